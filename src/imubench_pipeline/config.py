@@ -1,0 +1,189 @@
+"""The configuration of one run, and the list of simulated recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from imubench_pipeline.sensor import QUANTITIES, Channel, Sensor, quantity_of
+from imubench_pipeline.units import UnitError, quantity_to_si
+from imubench_pipeline.validation import (
+    ConfigError,
+    FractionOfLog,
+    Frequency,
+    Strict,
+    parse,
+    read_yaml,
+)
+
+
+class SimulatedChannel(Strict):
+    """The true noise of one simulated channel, with units as published."""
+
+    N: str | None = Field(None, description="white noise density, two-sided")
+    B: str | None = Field(None, description="bias instability (the curve's peak is 0.664 B)")
+    T_B: str | None = Field(None, description="correlation time of the Gauss-Markov process")
+    K: str | None = Field(None, description="rate or acceleration random walk")
+    bias: str | None = Field(None, description="constant bias")
+    assumed: tuple[Literal["N", "B", "T_B", "K", "bias"], ...] = Field(
+        (), description="parameters that no source publishes"
+    )
+
+    @model_validator(mode="after")
+    def _both(self) -> SimulatedChannel:
+        if (self.B is None) != (self.T_B is None):
+            raise ValueError("B and T_B go together; expected both or neither")
+        return self
+
+    def si(self, channel: str) -> dict[str, float]:
+        """Return the parameters that are there, and the bias, in SI."""
+        quantity = quantity_of(channel)
+        dimensions = {
+            "N": f"{quantity}_density",
+            "B": QUANTITIES[quantity],
+            "T_B": "time",
+            "K": f"{quantity}_random_walk",
+            "bias": QUANTITIES[quantity],
+        }
+        return {
+            name: quantity_to_si(text, dimension)
+            for name, dimension in dimensions.items()
+            if (text := getattr(self, name)) is not None
+        }
+
+
+class SimulatedRecording(Strict):
+    """A recording that is made before the run, from known parameters."""
+
+    sensor: str = Field(description="name of the sensor file whose log format it is written in")
+    recording: str = Field(pattern=r"^sim_[A-Za-z0-9_.-]+$", description="starts with sim_")
+    duration: str = Field(description="length with its unit, such as 10 h")
+    rate: Frequency
+    seed: int
+    source: str = Field(description="where the parameters are published")
+    channels: dict[Channel, SimulatedChannel] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _units(self) -> SimulatedRecording:
+        quantity_to_si(self.duration, "time")
+        for channel, truth in self.channels.items():
+            try:
+                truth.si(channel)
+            except UnitError as error:
+                raise ValueError(f"channels.{channel}: {error}") from error
+        return self
+
+
+class Simulated(Strict):
+    """The file that lists the simulated recordings."""
+
+    recordings: tuple[SimulatedRecording, ...]
+
+
+class AllanSettings(Strict):
+    """The grid of tau and the kernel."""
+
+    overlap: Literal["full"] = Field("full", description="every cluster of every cluster size")
+    per_decade: int = Field(10, ge=1, le=100, description="cluster sizes per decade of tau")
+    longest: FractionOfLog = Field(0.5, description="longest tau, as a part of the log")
+
+
+Method = Literal["curve", "paper", "weighted"]
+
+
+class EstimateSettings(Strict):
+    """How the noise parameters are estimated."""
+
+    methods: tuple[Method, ...] = Field(("curve", "paper", "weighted"), min_length=1)
+    longest: FractionOfLog = Field(1 / 9, description="longest tau of a fit, as a part of the log")
+
+
+class ReconstructionSettings(Strict):
+    """The simulated logs that a model is judged by."""
+
+    members: int = Field(1, ge=1, description="full-length logs per channel and method")
+    band_members: int = Field(200, ge=200, description="members of the 95 % band")
+    keep_series: bool = Field(False, description="keep the full-length logs as Parquet")
+    seed: int = Field(20260101, ge=0)
+
+
+class QualitySettings(Strict):
+    """Thresholds of the findings about a recording."""
+
+    shortest: int = Field(100, ge=10, description="samples; a shorter recording is rejected")
+    longest_hole: float = Field(
+        3600.0, gt=0, description="s; a longer gap begins a new segment instead of a hole"
+    )
+    jitter: float = Field(
+        0.01, gt=0, lt=1, description="share of stamps off the grid beyond which it is given up"
+    )
+    rate_tolerance: float = Field(
+        0.01, gt=0, description="relative difference of stated rate and stamps that is a finding"
+    )
+
+
+class DatasheetSettings(Strict):
+    """The comparison with printed figures."""
+
+    tolerance: float = Field(
+        0.1, gt=0, description="relative difference that still counts as 'as printed'"
+    )
+
+
+class ReportSettings(Strict):
+    """The report."""
+
+    title: str = "Inertial sensor benchmark"
+    units: Literal["practical", "si"] = Field(
+        "practical", description="practical: deg/sqrt(h), deg/h, ug; si: rad/s, m/s^2"
+    )
+
+
+def _path_or_none(value: object) -> object:
+    return None if str(value).strip().lower() in {"false", "none", "null", ""} else value
+
+
+class Run(Strict):
+    """One run: where the logs are, and the settings of each step."""
+
+    logs: Path = Field(Path("logs"), description="the drop zone: logs/<sensor>/<recording>")
+    results: Path = Field(Path("results"), description="where a run leaves its results")
+    sensors: Path = Field(Path("config/sensors"), description="folder of the sensor files")
+    simulated: Annotated[
+        Path | None, BeforeValidator(_path_or_none, json_schema_input_type=str | bool | None)
+    ] = Field(Path("config/simulated.yaml"), description="simulated recordings; false: none")
+    allan: AllanSettings = AllanSettings()
+    estimate: EstimateSettings = EstimateSettings()
+    reconstruction: ReconstructionSettings = ReconstructionSettings()
+    quality: QualitySettings = QualitySettings()
+    datasheet: DatasheetSettings = DatasheetSettings()
+    report: ReportSettings = ReportSettings()
+
+
+def read_run(config: Mapping[str, object], file: str = "config/config.yaml") -> Run:
+    """Validate the configuration of a run, as Snakemake hands it over (numbers may be text)."""
+    return parse(Run, config, file)
+
+
+def read_simulated(path: Path | None, sensors: Mapping[str, Sensor]) -> list[SimulatedRecording]:
+    """Read the list of simulated recordings; an empty one where ``path`` is None."""
+    if path is None:
+        return []
+    recordings = parse(Simulated, read_yaml(path), str(path)).recordings
+    for number, entry in enumerate(recordings):
+        key = f"{path}: recordings.{number}"
+        if entry.sensor not in sensors:
+            raise ConfigError(
+                f"{key}.sensor: found {entry.sensor!r}; expected one of the sensor "
+                f"files: {', '.join(sensors)}"
+            )
+        unknown = set(entry.channels) - set(sensors[entry.sensor].log.channels)
+        if unknown:
+            raise ConfigError(
+                f"{key}.channels: {', '.join(sorted(unknown))} not channels "
+                f"of {entry.sensor}: {', '.join(sensors[entry.sensor].log.channels)}"
+            )
+    return list(recordings)

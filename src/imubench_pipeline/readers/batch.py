@@ -1,0 +1,83 @@
+"""What every reader gives: batches of SI samples, and findings on what it left out."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.findings import Finding
+from imubench_pipeline.sensor import QUANTITIES, ColumnSource, LogFormat, quantity_of
+from imubench_pipeline.units import conversion
+
+TEMPERATURE = "temperature"
+"""Name of the temperature column of a recording."""
+
+
+class RecordingError(ValueError):
+    """A recording that cannot be used; the text is the reason, with what to mend."""
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Consecutive records of one log file.
+
+    Attributes
+    ----------
+    time : ndarray of float64, shape (n,), or None
+        s since the first stamp of the file; NaN where the stamp is missing.
+    columns : mapping of str to ndarray of float64, shape (n,)
+        rad/s, m/s² or °C by channel; NaN where the sample is missing.
+    """
+
+    time: NDArray[np.float64] | None
+    columns: Mapping[str, NDArray[np.float64]]
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values())))
+
+
+@dataclass
+class LogFile(ABC):
+    """One file of a recording, read as a stream in bounded memory.
+
+    Attributes
+    ----------
+    path : Path
+    log : LogFormat
+    sources : mapping of str to ColumnSource
+        The columns that are taken from this file: channels, and perhaps temperature.
+    started : str or None
+        ISO 8601 date and time of the first sample, known after the first batch.
+    findings : list of Finding
+        What was left out or passed over; complete once `batches` is exhausted.
+    """
+
+    path: Path
+    log: LogFormat
+    sources: Mapping[str, ColumnSource]
+    started: str | None = None
+    findings: list[Finding] = field(default_factory=list)
+
+    @abstractmethod
+    def batches(self) -> Iterator[Batch]:
+        """Yield the records in the order of the file.
+
+        Raises
+        ------
+        RecordingError
+            If the file is not what its sensor file says, or is corrupt inside.
+        """
+
+    def to_si(self, name: str, raw: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Convert the figures of a column as written to SI: scale * (raw - offset), then unit."""
+        source = self.sources[name]
+        dimension = TEMPERATURE if name == TEMPERATURE else QUANTITIES[quantity_of(name)]
+        factor, zero = conversion(source.unit, dimension)
+        if source.offset:
+            raw = raw - source.offset
+        return raw * (source.scale * factor) + zero

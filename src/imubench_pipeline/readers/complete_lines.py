@@ -1,0 +1,103 @@
+"""The bytes of a text log, decompressed, up to the last complete line."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import zlib
+from pathlib import Path
+
+from imubench_pipeline.findings import Finding
+from imubench_pipeline.readers.batch import RecordingError
+
+_GZIP_MAGIC = b"\x1f\x8b"
+_LONGEST_LINE = 1 << 20
+
+
+def open_text(path: Path) -> io.BufferedIOBase:
+    """Open a text log for reading bytes; gzip is seen by its first bytes, not by its name."""
+    with path.open("rb") as raw:
+        compressed = raw.read(2) == _GZIP_MAGIC
+    return gzip.open(path, "rb") if compressed else path.open("rb")
+
+
+class CompleteLines(io.RawIOBase):
+    """A stream that ends with the last complete line.
+
+    What follows the last line break was being written when the power was cut: a record
+    without its line break may have lost digits, so it is left out and noted. A compressed file
+    that ends early is read as far as it goes, and noted.
+    """
+
+    def __init__(self, path: Path, stream: io.BufferedIOBase, findings: list[Finding]) -> None:
+        super().__init__()
+        self._path = path
+        self._stream = stream
+        self._findings = findings
+        self._ready = b""
+        self._rest = b""
+        self._ended = False
+        self.error: RecordingError | None = None
+
+    def readable(self) -> bool:
+        """Return True: the stream can be read."""
+        return True
+
+    def readinto(self, buffer: object) -> int:
+        """Fill a buffer; 0 at the end."""
+        view = memoryview(buffer)  # type: ignore[arg-type]  # any writable buffer
+        while not self._ready and not self._ended:
+            self._fetch(max(len(view), 1 << 16))
+        taken = self._ready[: len(view)]
+        self._ready = self._ready[len(taken) :]
+        view[: len(taken)] = taken
+        return len(taken)
+
+    def _fetch(self, size: int) -> None:
+        block = self._read(size)
+        if not block:
+            self._end()
+            return
+        block = self._rest + block
+        cut = block.rfind(b"\n") + 1
+        self._ready, self._rest = block[:cut], block[cut:]
+        if len(self._rest) > _LONGEST_LINE and self._rest.strip(b"\0"):
+            self._fail(
+                f"{self._path.name}: no line break in {_LONGEST_LINE} bytes; this is no text log"
+            )
+
+    def _read(self, size: int) -> bytes:
+        try:
+            return self._stream.read(size)
+        except EOFError:
+            self._findings.append(
+                Finding(
+                    "truncated_file",
+                    "warning",
+                    f"{self._path.name}: the compressed file ends early; read as far as it goes",
+                    1,
+                )
+            )
+            return b""
+        except (OSError, zlib.error) as error:
+            self._fail(f"{self._path.name}: corrupt compressed data ({error}); copy it again")
+            return b""
+
+    def _end(self) -> None:
+        self._ended = True
+        if self._rest.strip(b"\0\r\n\t "):
+            shown = self._rest[:60].decode("utf-8", "replace")
+            self._findings.append(
+                Finding(
+                    "incomplete_last_record",
+                    "note",
+                    f"{self._path.name}: the last record has no line break and may be cut short; "
+                    f"left out: {shown!r}",
+                    1,
+                )
+            )
+
+    def _fail(self, reason: str) -> None:
+        # Kept as well as raised: a parser between us and the caller may wrap the exception.
+        self.error = RecordingError(reason)
+        raise self.error

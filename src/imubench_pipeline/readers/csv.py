@@ -1,0 +1,284 @@
+"""Delimited text: any delimiter, with or without header, numeric or ISO 8601 time, gzip."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pacsv
+from numpy.typing import NDArray
+
+from imubench_pipeline.findings import Finding
+from imubench_pipeline.readers.batch import Batch, LogFile, RecordingError
+from imubench_pipeline.readers.complete_lines import CompleteLines, open_text
+
+_BLOCK_BYTES = 4 << 20
+_DELIMITERS = ",;\t| "
+_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_ZONE = re.compile(r"(Z|[+-]\d\d:?\d\d)$")
+_LAYOUT_LINES = 1000
+_ARROW_ROW = re.compile(r"Row #(\d+)")
+_ARROW_COLUMN = re.compile(r"In CSV column #(\d+)")
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """How a file is laid out: found from its first lines and its sensor file."""
+
+    lines_before: int
+    bytes_before: int
+    delimiter: str
+    names: list[str]
+    first_record: list[str]
+
+
+class CsvFile(LogFile):
+    """A log file of delimited text."""
+
+    def batches(self) -> Iterator[Batch]:
+        """Yield the records in the order of the file (see `LogFile.batches`)."""
+        layout = self._layout()
+        columns = self._columns(layout)
+        types = {layout.names[position]: pa.float64() for position in columns.values()}
+        time_name = None
+        if self.log.time is not None:
+            time_name = layout.names[self._position(layout, self.log.time.column, "time")]
+            types[time_name] = self._time_type(layout, time_name)
+        invalid: list[pacsv.InvalidRow] = []
+
+        def keep(row: pacsv.InvalidRow) -> str:
+            invalid.append(row)
+            return "skip"
+
+        rows = 0
+        first_stamp: np.int64 | np.float64 | None = None
+        with open_text(self.path) as stream:
+            stream.read(layout.bytes_before)
+            lines = CompleteLines(self.path, stream, self.findings)
+            try:
+                reader = pacsv.open_csv(
+                    lines,
+                    read_options=pacsv.ReadOptions(
+                        use_threads=False, block_size=_BLOCK_BYTES, column_names=layout.names
+                    ),
+                    parse_options=pacsv.ParseOptions(
+                        delimiter=layout.delimiter, invalid_row_handler=keep
+                    ),
+                    convert_options=pacsv.ConvertOptions(
+                        column_types=types, include_columns=list(types)
+                    ),
+                )
+                for part in reader:
+                    if len(part) == 0:
+                        continue
+                    if invalid and invalid[0].number <= rows + len(part):
+                        raise self._wrong_width(invalid[0], layout)
+                    rows += len(part)
+                    time = None
+                    if time_name is not None:
+                        stamps = _stamps(part.column(time_name))
+                        if first_stamp is None:
+                            first_stamp = self._first(stamps)
+                        time = self._seconds(stamps, first_stamp)
+                    yield Batch(
+                        time,
+                        {
+                            name: self.to_si(name, _numbers(part, layout, position))
+                            for name, position in columns.items()
+                        },
+                    )
+            except pa.ArrowInvalid as error:
+                raise lines.error or self._explained(error, layout, types) from None
+            except UnicodeDecodeError as error:
+                raise RecordingError(f"{self.path.name}: not UTF-8 text ({error})") from None
+        if len(invalid) > 1:
+            raise self._wrong_width(invalid[0], layout)
+        if invalid:
+            self.findings.append(
+                Finding(
+                    "incomplete_last_record",
+                    "note",
+                    f"{self.path.name}: the last record has {invalid[0].actual_columns} of "
+                    f"{invalid[0].expected_columns} columns; left out",
+                    1,
+                )
+            )
+        if rows == 0:
+            raise RecordingError(f"{self.path.name}: no complete record")
+
+    # ------------------------------------------------------------------ the first lines
+
+    def _layout(self) -> _Layout:
+        before, size, first = 0, 0, None
+        head: list[str] = []
+        for raw in self._first_lines():
+            text = raw.decode("utf-8", "replace").rstrip("\r\n")
+            if not before and text.startswith("\ufeff"):
+                text = text[1:]
+            passed_over = (
+                before < self.log.skip_lines
+                or not text.strip()
+                or (self.log.comment is not None and text.startswith(self.log.comment))
+            )
+            if not passed_over:
+                head.append(text)
+                if len(head) == 2:
+                    break
+            if not head:
+                before, size = before + 1, size + len(raw)
+            elif len(head) == 1 and first is None:
+                first = len(raw)
+        if not head:
+            raise RecordingError(f"{self.path.name}: the file is empty")
+        delimiter = self.log.delimiter or _delimiter(head[0])
+        rows = [_split(text, delimiter) for text in head]
+        header = self._has_header(rows[0])
+        names = [name.strip() for name in rows[0]]
+        if header:
+            before, size = before + 1, size + (first or 0)
+        else:
+            names = [str(number) for number in range(1, len(names) + 1)]
+        records = rows[1:] if header else rows
+        if not records:
+            raise RecordingError(f"{self.path.name}: no record after the header")
+        # A name that stands twice can still be taken by its position.
+        names = [
+            name if names.count(name) == 1 else f"{name} (column {number})"
+            for number, name in enumerate(names, start=1)
+        ]
+        return _Layout(before, size, delimiter, names, records[0])
+
+    def _first_lines(self) -> list[bytes]:
+        """Return the lines that may belong to the top of the file."""
+        with open_text(self.path) as stream:
+            try:
+                lines = list(islice(iter(lambda: stream.readline(1 << 16), b""), _LAYOUT_LINES))
+            except (OSError, EOFError) as error:
+                raise RecordingError(f"{self.path.name}: corrupt compressed data ({error})") from (
+                    None
+                )
+        if lines and not lines[-1].endswith(b"\n") and len(lines) > 1:
+            lines.pop()
+        if any(b"\0" in line for line in lines[:2]):
+            raise RecordingError(f"{self.path.name}: holds binary data, expected text")
+        return lines
+
+    def _has_header(self, row: list[str]) -> bool:
+        if self.log.header is not None:
+            return self.log.header
+        wanted = [source.column for source in self.sources.values()]
+        if any(isinstance(column, str) for column in wanted):
+            return True
+        positions = [column - 1 for column in wanted if isinstance(column, int)]
+        return not all(_is_number(row[position]) for position in positions if position < len(row))
+
+    # ------------------------------------------------------------------------- columns
+
+    def _columns(self, layout: _Layout) -> dict[str, int]:
+        return {
+            name: self._position(layout, source.column, name)
+            for name, source in self.sources.items()
+        }
+
+    def _position(self, layout: _Layout, column: str | int, key: str) -> int:
+        found = ", ".join(layout.names)
+        if isinstance(column, int):
+            if column > len(layout.names):
+                raise RecordingError(
+                    f"{self.path.name}: no column {column} for {key}; found "
+                    f"{len(layout.names)} columns ({found}) with delimiter {layout.delimiter!r}"
+                )
+            return column - 1
+        if column not in layout.names:
+            raise RecordingError(
+                f"{self.path.name}: no column {column!r} for {key}; found {found} with "
+                f"delimiter {layout.delimiter!r}; mend 'column' of {key} in the sensor file"
+            )
+        return layout.names.index(column)
+
+    def _time_type(self, layout: _Layout, name: str) -> pa.DataType:
+        assert self.log.time is not None
+        if self.log.time.format == "iso8601":
+            position = layout.names.index(name)
+            text = layout.first_record[position] if position < len(layout.first_record) else ""
+            return pa.timestamp("ns", "UTC" if _ZONE.search(text.strip()) else None)
+        # Nanoseconds since 1970 do not fit into the 53 bits of a float64.
+        return pa.int64() if self.log.time.unit == "ns" else pa.float64()
+
+    def _first(self, stamps: NDArray[Any]) -> Any:  # noqa: ANN401  (int64 or float64)
+        valid = stamps[~np.isnan(stamps)] if stamps.dtype.kind == "f" else stamps
+        if not len(valid):
+            raise RecordingError(f"{self.path.name}: no time stamp in the first records")
+        assert self.log.time is not None
+        if self.log.time.format == "iso8601":
+            self.started = str(np.datetime64(int(valid[0]), "ns"))[:23]
+        return valid[0]
+
+    def _seconds(self, stamps: NDArray[Any], first: Any) -> NDArray[np.float64]:  # noqa: ANN401
+        assert self.log.time is not None
+        return np.asarray((stamps - first) * _SECONDS[self.log.time.unit or "ns"], np.float64)
+
+    # --------------------------------------------------------------------------- faults
+
+    def _wrong_width(self, row: pacsv.InvalidRow, layout: _Layout) -> RecordingError:
+        return RecordingError(
+            f"{self.path.name}, line {row.number + layout.lines_before}: found "
+            f"{row.actual_columns} columns, expected {row.expected_columns}: {row.text[:80]!r}; "
+            "the file is corrupt there, copy it again or cut it before that line"
+        )
+
+    def _explained(
+        self, error: pa.ArrowInvalid, layout: _Layout, types: dict[str, pa.DataType]
+    ) -> RecordingError:
+        text = str(error)
+        row, column = _ARROW_ROW.search(text), _ARROW_COLUMN.search(text)
+        where = f", line {int(row[1]) + layout.lines_before}" if row else ""
+        name = layout.names[int(column[1])] if column and int(column[1]) < len(layout.names) else ""
+        expected = "a time stamp" if name in types and types[name] != pa.float64() else "a number"
+        found = re.search(r"invalid value '(.*)'|expected .* zone offset in '(.*)'", text)
+        if not name or not found:
+            return RecordingError(
+                f"{self.path.name}{where}: cannot be read as text columns: {text}"
+            )
+        value = (found[1] or found[2] or "")[:40]
+        return RecordingError(
+            f"{self.path.name}{where}, column {name!r}: found {value!r}, expected {expected}; "
+            "the file is corrupt there, or the column is not the one meant"
+        )
+
+
+def _split(text: str, delimiter: str) -> list[str]:
+    return next(csv.reader([text], delimiter=delimiter))
+
+
+def _delimiter(line: str) -> str:
+    """Return the delimiter that divides a line into most columns."""
+    return max(_DELIMITERS, key=lambda sign: (line.count(sign), -_DELIMITERS.index(sign)))
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _numbers(part: pa.RecordBatch, layout: _Layout, position: int) -> NDArray[np.float64]:
+    column = part.column(layout.names[position])
+    return np.asarray(column.to_numpy(zero_copy_only=False), dtype=np.float64)
+
+
+def _stamps(column: pa.Array) -> NDArray[Any]:
+    if pa.types.is_timestamp(column.type):
+        column = column.cast(pa.int64())
+    if pa.types.is_integer(column.type) and column.null_count:
+        # An integer column with a gap: the gap becomes NaN.
+        return np.asarray(column.to_numpy(zero_copy_only=False), dtype=np.float64)
+    return np.asarray(column.to_numpy(zero_copy_only=False))

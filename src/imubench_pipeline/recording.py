@@ -1,0 +1,168 @@
+"""A recording as it is kept: Parquet files in SI, one a time base, with its provenance.
+
+The columns of ``log.parquet`` are the channels, and ``temperature`` in °C. Where the stamps
+are needed there is ``time`` (s from the first sample); where samples are missing there is also
+``sample``, the position on the uniform grid. A sample that is missing in one channel only is
+null. Where channels have clocks of their own, each clock has a file: ``log.gyro.parquet``.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from imubench_pipeline.readers.batch import TEMPERATURE
+
+ROW_GROUP = 1 << 20
+"""Rows of a row group."""
+
+_METADATA = b"imubench"
+_NOT_CHANNELS = {"time", "sample", TEMPERATURE}
+
+
+class LogWriter:
+    """Writes columns to one Parquet file, in row groups of `ROW_GROUP` rows."""
+
+    def __init__(self, path: Path, columns: Mapping[str, pa.DataType]) -> None:
+        self._schema = pa.schema([pa.field(name, kind) for name, kind in columns.items()])
+        floats = [name for name, kind in columns.items() if pa.types.is_floating(kind)]
+        integers = [name for name in columns if name not in floats]
+        self._writer = pq.ParquetWriter(
+            path,
+            self._schema,
+            compression="zstd",
+            compression_level=1,
+            use_dictionary=False,
+            use_byte_stream_split=floats,
+            column_encoding={name: "DELTA_BINARY_PACKED" for name in integers} or None,
+        )
+        self._waiting: list[dict[str, NDArray[Any]]] = []
+        self._rows = 0
+
+    def __enter__(self) -> LogWriter:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._writer.close()
+
+    def write(self, columns: Mapping[str, NDArray[Any]]) -> None:
+        """Take consecutive rows; NaN is kept as null."""
+        rows = len(next(iter(columns.values())))
+        if rows == 0:
+            return
+        self._waiting.append(dict(columns))
+        self._rows += rows
+        while self._rows >= ROW_GROUP:
+            self._flush(ROW_GROUP)
+
+    def finish(self, metadata: Mapping[str, Any]) -> None:
+        """Write what is waiting, and the metadata of the file."""
+        if self._rows:
+            self._flush(self._rows)
+        self._writer.add_key_value_metadata({_METADATA: json.dumps(metadata)})
+
+    def _flush(self, rows: int) -> None:
+        joined = {
+            name: np.concatenate([part[name] for part in self._waiting])
+            for name in self._schema.names
+        }
+        arrays = [
+            pa.array(joined[name][:rows], type=self._schema.field(name).type, from_pandas=True)
+            for name in self._schema.names
+        ]
+        self._writer.write_table(
+            pa.Table.from_arrays(arrays, schema=self._schema), row_group_size=ROW_GROUP
+        )
+        self._waiting = [{name: column[rows:].copy() for name, column in joined.items()}]
+        self._rows -= rows
+
+
+@dataclass(frozen=True)
+class ChannelLog:
+    """One channel of a kept recording.
+
+    Attributes
+    ----------
+    path : Path
+        Its Parquet file.
+    channel : str
+    rate : float
+        Hz.
+    grid : int
+        Points of the uniform grid.
+    segments : tuple of (int, int)
+        Grid points that begin and end each segment.
+    holes : bool
+        Samples are missing: blocks have NaN in their place.
+    """
+
+    path: Path
+    channel: str
+    rate: float
+    grid: int
+    segments: tuple[tuple[int, int], ...]
+    holes: bool
+
+    def blocks(self) -> Iterator[NDArray[np.float64]]:
+        """Yield the samples on the uniform grid in SI, in consecutive blocks; NaN where missing."""
+        with pq.ParquetFile(self.path) as file:
+            placed = "sample" in file.schema_arrow.names
+            columns = [self.channel, *(["sample"] if placed else [])]
+            reached = 0
+            for number in range(file.num_row_groups):
+                table = file.read_row_group(number, columns=columns, use_threads=False)
+                values = table.column(self.channel).to_numpy()
+                if not placed:
+                    yield values
+                    continue
+                points = table.column("sample").to_numpy()
+                block = np.full(int(points[-1]) + 1 - reached, np.nan)
+                block[points - reached] = values
+                reached = int(points[-1]) + 1
+                yield block
+
+
+def read_metadata(path: Path) -> dict[str, Any]:
+    """Return the metadata that `LogWriter.finish` wrote."""
+    found = pq.read_metadata(path).metadata or {}
+    data: dict[str, Any] = json.loads(found[_METADATA])
+    return data
+
+
+def log_paths(folder: Path) -> list[Path]:
+    """Return the Parquet files of a kept recording, one a time base."""
+    return sorted(folder.glob("log*.parquet"))
+
+
+def channel_logs(folder: Path) -> dict[str, ChannelLog]:
+    """Return the channels of a kept recording that can be analysed, by name, in order."""
+    logs: dict[str, ChannelLog] = {}
+    for path in log_paths(folder):
+        metadata = read_metadata(path)
+        for channel in pq.read_schema(path).names:
+            if channel in _NOT_CHANNELS or channel in metadata["unusable"]:
+                continue
+            logs[channel] = ChannelLog(
+                path,
+                channel,
+                metadata["rate"],
+                metadata["grid"],
+                tuple((start, stop) for start, stop in metadata["segments"]),
+                bool(metadata["holes"].get(channel, True)),
+            )
+    order = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
+    return {name: logs[name] for name in order if name in logs}

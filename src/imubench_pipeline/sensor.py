@@ -1,0 +1,245 @@
+"""The file of one sensor: how its logs are written and what its datasheet says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field, model_validator
+
+from imubench_pipeline.units import UnitError, conversion, quantity_to_si
+from imubench_pipeline.validation import ConfigError, Frequency, Strict, parse, read_yaml
+
+QUANTITIES: dict[str, str] = {"gyro": "angular_rate", "accel": "acceleration"}
+"""The measured quantities and the dimension of each."""
+
+CHANNELS: tuple[str, ...] = tuple(f"{q}_{axis}" for q in QUANTITIES for axis in "xyz")
+"""Every channel: one axis of one quantity."""
+
+Channel = Literal["gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"]
+
+
+def quantity_of(channel: str) -> str:
+    """Return the quantity, ``gyro`` or ``accel``, that a channel is an axis of."""
+    return channel.split("_", maxsplit=1)[0]
+
+
+class ColumnSource(Strict):
+    """Where one column of a recording is found, and the unit it is written in."""
+
+    column: str | int = Field(
+        description="name in the header, or position counted from 1 (as spreadsheets, awk and "
+        "MATLAB count)"
+    )
+    unit: str = Field(description="unit of the figures as written, after scale and offset")
+    file: str | None = Field(
+        None, description="file inside a recording that is a folder; null: the only one"
+    )
+    variable: str | None = Field(
+        None, description="MATLAB variable; null: the only one of the file"
+    )
+    scale: float = Field(1.0, description="unit per count or volt")
+    offset: float = Field(0.0, description="counts or volts at zero: scale * (raw - offset)")
+
+    @model_validator(mode="after")
+    def _from_one(self) -> ColumnSource:
+        if isinstance(self.column, int) and self.column < 1:
+            raise ValueError(f"column {self.column}: columns are counted from 1")
+        if self.scale == 0:
+            raise ValueError("scale is 0; expected unit per count")
+        return self
+
+
+class TimeSource(Strict):
+    """Where the time stamps are found, and how they are written."""
+
+    column: str | int = Field(description="name in the header, or position counted from 1")
+    unit: Literal["s", "ms", "us", "ns"] | None = Field(None, description="unit of numeric stamps")
+    format: Literal["iso8601"] | None = Field(None, description="format of stamps in text")
+
+    @model_validator(mode="after")
+    def _one_way(self) -> TimeSource:
+        if (self.unit is None) == (self.format is None):
+            raise ValueError("expected either 'unit' (s, ms, us, ns) or 'format' (iso8601)")
+        if isinstance(self.column, int) and self.column < 1:
+            raise ValueError(f"column {self.column}: columns are counted from 1")
+        return self
+
+
+class LogFormat(Strict):
+    """How the logs of a sensor are written."""
+
+    reader: Literal["csv", "matlab"] = Field("csv", description="format of the files")
+    rate: Frequency | None = Field(
+        None, description="sampling rate with its unit; needed where there are no stamps"
+    )
+    time: TimeSource | None = Field(None, description="null: no time stamps")
+    channels: dict[Channel, ColumnSource] = Field(min_length=1)
+    temperature: ColumnSource | None = None
+    bandwidth: Frequency | None = Field(
+        None, description="cut-off of the sensor's own low-pass filter, where known"
+    )
+    delimiter: str | None = Field(
+        None, min_length=1, max_length=1, description="of text files; null: found in the file"
+    )
+    header: bool | None = Field(
+        None, description="is there a line of column names? null: found in the file"
+    )
+    skip_lines: int = Field(0, ge=0, description="lines at the top to pass over")
+    comment: str | None = Field(
+        None, min_length=1, description="lines at the top that start so are passed over"
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> LogFormat:
+        if self.rate is None and self.time is None:
+            raise ValueError("expected 'rate' (such as 100 Hz) or 'time': neither is there")
+        for channel, source in self.channels.items():
+            _check_unit(source.unit, QUANTITIES[quantity_of(channel)], f"channels.{channel}.unit")
+        if self.temperature is not None:
+            _check_unit(self.temperature.unit, "temperature", "temperature.unit")
+        sources = [*self.channels.values()] + ([self.temperature] if self.temperature else [])
+        if any(source.file for source in sources) and not all(source.file for source in sources):
+            raise ValueError("some channels name a 'file' and others do not; expected all or none")
+        return self
+
+    @property
+    def rate_hz(self) -> float | None:
+        """The stated sampling rate in Hz."""
+        return None if self.rate is None else quantity_to_si(self.rate, "frequency")
+
+
+def _check_unit(unit: str, dimension: str, key: str) -> None:
+    try:
+        conversion(unit, dimension)
+    except UnitError as error:
+        raise ValueError(f"{key}: {error}") from error
+
+
+class PrintedFigure(Strict):
+    """One figure of a datasheet, as printed."""
+
+    value: float | None = Field(description="null: the document does not give it")
+    unit: str
+    kind: Literal["typ", "max", "min", "1sigma", "derived"] = "typ"
+    sidedness: Literal["one-sided", "two-sided", "unknown"] = Field(
+        "unknown", description="of a noise density: N is the one-sided density over sqrt(2)"
+    )
+    condition: str | None = None
+    evidence: str | None = Field(None, description="where the figure or its sidedness is from")
+
+
+class QuantityDatasheet(Strict):
+    """What a datasheet says of one quantity."""
+
+    noise_density: PrintedFigure | None = Field(None, description="amplitude density, .../sqrt(Hz)")
+    random_walk: PrintedFigure | None = Field(
+        None, description="angle or velocity random walk, deg/sqrt(h) or m/s/sqrt(h): N itself"
+    )
+    bias_instability: PrintedFigure | None = Field(
+        None, description="in-run bias: the minimum of the curve of Allan deviation"
+    )
+    rate_random_walk: PrintedFigure | None = Field(None, description="K")
+    correlation_time: PrintedFigure | None = Field(None, description="T_B")
+    offset: PrintedFigure | None = Field(None, description="zero-rate or zero-g offset")
+    temperature_coefficient: PrintedFigure | None = Field(None, description="offset per kelvin")
+
+
+FIGURE_DIMENSIONS: dict[str, dict[str, str]] = {
+    quantity: {
+        "noise_density": f"{quantity}_density",
+        "random_walk": f"{quantity}_density",
+        "bias_instability": dimension,
+        "rate_random_walk": f"{quantity}_random_walk",
+        "correlation_time": "time",
+        "offset": dimension,
+        "temperature_coefficient": f"{quantity}_temperature_coefficient",
+    }
+    for quantity, dimension in QUANTITIES.items()
+}
+"""Dimension of each datasheet figure, by quantity."""
+
+
+class Datasheet(Strict):
+    """What a vendor prints of a sensor."""
+
+    document: str | None = None
+    gyro: QuantityDatasheet | None = Field(
+        default=QuantityDatasheet(), description="null: the sensor has no gyro"
+    )
+    accel: QuantityDatasheet | None = Field(
+        default=QuantityDatasheet(), description="null: the sensor has no accelerometer"
+    )
+
+    @model_validator(mode="after")
+    def _units(self) -> Datasheet:
+        for quantity, dimensions in FIGURE_DIMENSIONS.items():
+            figures = getattr(self, quantity)
+            for name, dimension in dimensions.items():
+                figure = getattr(figures, name, None)
+                if figure is not None:
+                    _check_unit(figure.unit, dimension, f"{quantity}.{name}.unit")
+        return self
+
+
+class Sensor(Strict):
+    """One IMU model: its logs and its datasheet."""
+
+    vendor: str
+    model: str
+    price_class: str | None = None
+    log: LogFormat
+    datasheet: Datasheet = Datasheet()
+
+
+class UsedPart(Strict):
+    """The part of a recording to analyse, in s from its first sample."""
+
+    start: float = Field(0.0, ge=0)
+    end: float | None = None
+
+    @model_validator(mode="after")
+    def _ordered(self) -> UsedPart:
+        if self.end is not None and self.end <= self.start:
+            raise ValueError(f"end {self.end} s is not after start {self.start} s")
+        return self
+
+
+class RecordingNotes(Strict):
+    """What may stand in ``<recording>.yaml`` beside a log."""
+
+    device: str | None = Field(None, description="serial number; default: the recording's name")
+    started: str | None = Field(None, description="date and time of the first sample")
+    use: UsedPart = UsedPart()
+    log: dict[str, Any] = Field(default=dict(), description="merged over the sensor's log")
+
+
+def read_sensors(folder: Path) -> dict[str, Sensor]:
+    """Read every sensor file of a folder, by name.
+
+    Raises
+    ------
+    ConfigError
+        If the folder is not there or a file cannot be used.
+    """
+    if not folder.is_dir():
+        raise ConfigError(f"{folder}: no such folder; expected one YAML file a sensor")
+    return {
+        path.stem: parse(Sensor, read_yaml(path), str(path))
+        for path in sorted(folder.glob("*.yaml"))
+    }
+
+
+def merged_log(sensor: Sensor, notes: RecordingNotes, file: str) -> LogFormat:
+    """Return the log format of one recording: the keys of its notes over the sensor's."""
+    merged = _merge(sensor.log.model_dump(exclude_unset=True), notes.log)
+    return parse(LogFormat, merged, f"{file}: log")
+
+
+def _merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    merged = dict(base)
+    for key, value in over.items():
+        both = isinstance(value, Mapping) and isinstance(merged.get(key), Mapping)
+        merged[key] = _merge(merged[key], value) if both else value
+    return merged

@@ -1,0 +1,238 @@
+"""The schema of every table (column, type, unit, meaning), checked on write; atomic writes."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.csv as pacsv
+import pyarrow.parquet as pq
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a table; ``unit`` is ``-`` for a text, a count or a ratio."""
+
+    name: str
+    type: pa.DataType
+    unit: str
+    meaning: str
+    required: bool = True
+
+
+def _text(name: str, meaning: str, required: bool = True) -> Column:
+    return Column(name, pa.string(), "-", meaning, required)
+
+
+def _number(name: str, unit: str, meaning: str, required: bool = False) -> Column:
+    return Column(name, pa.float64(), unit, meaning, required)
+
+
+def _count(name: str, meaning: str, required: bool = False) -> Column:
+    return Column(name, pa.int64(), "-", meaning, required)
+
+
+_SENSOR = _text("sensor", "name of the sensor file")
+_RECORDING = _text("recording", "name of the recording")
+_CHANNEL = _text("channel", "axis and quantity, gyro_x to accel_z")
+_METHOD = _text("method", "estimation method")
+_SI = "rad/s or m/s^2"
+_KEYS = (_SENSOR, _RECORDING, _CHANNEL)
+
+TABLES: dict[str, tuple[Column, ...]] = {
+    "recordings": (
+        _SENSOR,
+        _text("device", "specimen of the sensor; by default the recording's name"),
+        _RECORDING,
+        _text("kind", "static or two_position"),
+        _text("started", "date and time of the first sample, where known", required=False),
+        Column("simulated", pa.bool_(), "-", "made from known parameters, not measured"),
+        _text("status", "ok or rejected"),
+        _text("reason", "why a recording is rejected", required=False),
+        _number("rate", "Hz", "sampling rate used"),
+        _count("samples", "samples present in the longest channel"),
+        _number("duration", "s", "from the first to the last sample"),
+        _number("temperature_min", "degC", "lowest temperature"),
+        _number("temperature_max", "degC", "highest temperature"),
+    ),
+    "findings": (
+        _SENSOR,
+        _RECORDING,
+        _text("channel", "the channel concerned; null: the whole recording", required=False),
+        _text("finding", "what was found"),
+        _text("severity", "note, warning or fatal"),
+        _text("detail", "in words, with what to do"),
+        _number("value", "as the finding says", "its size"),
+    ),
+    "allan": (
+        *_KEYS,
+        _number("tau", "s", "cluster length, cluster_size / rate", required=True),
+        _count("cluster_size", "samples in a cluster", required=True),
+        _number("adev", _SI, "Allan deviation", required=True),
+        _number("lower", _SI, "lower 95 % limit"),
+        _number("upper", _SI, "upper 95 % limit"),
+        _number("edf", "-", "equivalent degrees of freedom of the Allan variance"),
+    ),
+    "parameters": (
+        *_KEYS,
+        _METHOD,
+        Column("recommended", pa.bool_(), "-", "the method to use for this channel"),
+        _text("model", "the terms of the model, such as N+GM+K"),
+        _count("component", "number of a repeated term, from 1", required=True),
+        _text("parameter", "N, B, K or T_B"),
+        _number("value", "as in unit", "estimate; null where status says why"),
+        _number("lower", "as in unit", "lower 95 % limit"),
+        _number("upper", "as in unit", "upper 95 % limit"),
+        _text("unit", "SI unit of value, lower and upper"),
+        _text("status", "ok, not_shown, at_bound, not_identified or absent"),
+        _text("reason", "why there is no plain value", required=False),
+        _number("duration_needed", "s", "length of a log that gives the value to 10 %"),
+    ),
+    "reconstruction": (
+        *_KEYS,
+        _METHOD,
+        _number("tau", "s", "cluster length", required=True),
+        _number("adev", _SI, "median of the ensemble of simulated logs", required=True),
+        _number("lower", _SI, "lower 95 % limit of the ensemble", required=True),
+        _number("upper", _SI, "upper 95 % limit of the ensemble", required=True),
+        _number("reconstructed", _SI, "Allan deviation of the full-length simulated log", True),
+    ),
+    "scores": (
+        *_KEYS,
+        _METHOD,
+        _number("rms", _SI, "RMS over tau of reconstructed minus measured Allan deviation"),
+        _number("rms_log10", "decades", "RMS over tau of the difference of log10"),
+        _number("inside_band", "-", "share of the measured curve inside the 95 % band"),
+        _text("reason", "why there is no score", required=False),
+    ),
+    "datasheet": (
+        *_KEYS,
+        _METHOD,
+        _text("quantity", "N, bias_instability, K or T_B"),
+        _text("statistic", "what is compared: N, adev_minimum (0.664 B), K or T_B"),
+        _number("printed", "as in unit", "figure as printed; null: not published"),
+        _text("unit", "unit as printed", required=False),
+        _text("kind", "typ, max, min, 1sigma or derived", required=False),
+        _text("sidedness", "of a noise density, as assumed in this row", required=False),
+        _number("comparable", "SI", "the printed figure in the convention of measured"),
+        _number("measured", "SI", "estimate of the same quantity"),
+        _number("lower", "SI", "lower 95 % limit of measured"),
+        _number("upper", "SI", "upper 95 % limit of measured"),
+        _number("delta", "-", "measured / comparable - 1"),
+        _text("verdict", "better than typ, as printed, worse than typ, ..."),
+        _text("reason", "in words", required=False),
+    ),
+    "simulated_truth": (
+        *_KEYS,
+        _text("parameter", "N, B, K, T_B or bias"),
+        _number("value", "as in unit", "true value of the simulation", required=True),
+        _text("unit", "SI unit of value"),
+        Column("assumed", pa.bool_(), "-", "not published by the source: chosen"),
+        _text("source", "where the parameters are published"),
+    ),
+}
+"""Every table a run leaves, by name; all numbers are SI (temperatures in degC)."""
+
+
+class TableError(ValueError):
+    """Rows that do not fit the schema of their table."""
+
+
+def schema(table: str) -> pa.Schema:
+    """Return the Arrow schema of a table, with unit and meaning in the field metadata."""
+    return pa.schema(
+        [
+            pa.field(
+                column.name,
+                column.type,
+                nullable=not column.required,
+                metadata={"unit": column.unit, "meaning": column.meaning},
+            )
+            for column in TABLES[table]
+        ]
+    )
+
+
+def build(table: str, rows: Iterable[Mapping[str, Any]]) -> pa.Table:
+    """Make an Arrow table of rows and check it against the schema.
+
+    Parameters
+    ----------
+    table : str
+        A key of `TABLES`.
+    rows : iterable of mapping
+        One mapping a row; a column that a row leaves out is null. NaN becomes null.
+
+    Raises
+    ------
+    TableError
+        If a row has a column that the table does not, or lacks a required value.
+    """
+    listed = list(rows)
+    columns = TABLES[table]
+    unknown = {name for row in listed for name in row} - {column.name for column in columns}
+    if unknown:
+        raise TableError(f"table {table}: unknown columns {sorted(unknown)}")
+    arrays = []
+    for column in columns:
+        values = [row.get(column.name) for row in listed]
+        array = pa.array(values, type=column.type, from_pandas=True)
+        if column.required and array.null_count:
+            raise TableError(f"table {table}: column {column.name} has {array.null_count} nulls")
+        arrays.append(array)
+    return pa.Table.from_arrays(arrays, schema=schema(table))
+
+
+@contextlib.contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Give a temporary name beside ``path``, renamed to it when the block ends without error."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+        # mkstemp makes private files; results are for everybody, as the umask says.
+        umask = os.umask(0)
+        os.umask(umask)
+        temporary.chmod(0o666 & ~umask)
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write(table: str, rows: Iterable[Mapping[str, Any]], path: Path) -> None:
+    """Check rows against the schema of their table and write them as Parquet, atomically."""
+    write_arrow(build(table, rows), path)
+
+
+def write_arrow(table: pa.Table, path: Path) -> None:
+    """Write an Arrow table as Parquet or, where the name ends so, CSV, atomically."""
+    with replacing(path) as temporary:
+        if path.suffix == ".csv":
+            pacsv.write_csv(table, temporary)
+        else:
+            pq.write_table(table, temporary, compression="zstd")
+
+
+def read(table: str, paths: Sequence[Path]) -> pa.Table:
+    """Read and join files of one table, in the order given."""
+    parts = [pq.read_table(path, partitioning=None) for path in paths]
+    expected = schema(table)
+    for path, part in zip(paths, parts, strict=True):
+        if part.schema.names != expected.names:
+            raise TableError(f"{path}: columns {part.schema.names}, expected {expected.names}")
+    return pa.concat_tables([part.cast(expected) for part in parts] or [expected.empty_table()])
+
+
+def write_json(data: object, path: Path) -> None:
+    """Write JSON, atomically."""
+    with replacing(path) as temporary:
+        temporary.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")

@@ -1,0 +1,120 @@
+"""Settings checked against typed models, with errors that say what to mend."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Mapping
+from fractions import Fraction
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+import yaml
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+from imubench_pipeline.units import quantity_to_si
+
+
+class ConfigError(ValueError):
+    """A setting that cannot be used; the text names file, key, value and what was expected."""
+
+
+class Strict(BaseModel):
+    """A group of settings in which an unknown key is an error."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, str_strip_whitespace=True)
+
+
+def _fraction(value: object) -> float:
+    try:
+        number = float(Fraction(str(value).strip()))
+    except (ValueError, ZeroDivisionError) as error:
+        raise ValueError("expected a fraction of the log such as 1/9") from error
+    if not 0 < number <= 0.5:
+        raise ValueError("expected a fraction of the log above 0 and at most 1/2")
+    return number
+
+
+def _frequency(text: str) -> str:
+    if quantity_to_si(text, "frequency") <= 0:
+        raise ValueError("expected a frequency above zero")
+    return text
+
+
+FractionOfLog = Annotated[float, BeforeValidator(_fraction, json_schema_input_type=float | str)]
+Frequency = Annotated[str, AfterValidator(_frequency), Field(examples=["100 Hz"])]
+
+
+_Model = TypeVar("_Model", bound=BaseModel)
+
+
+def parse(model: type[_Model], data: object, file: str) -> _Model:
+    """Validate ``data`` as ``model``.
+
+    Raises
+    ------
+    ConfigError
+        One line for each fault: file, key, value found, what was expected.
+    """
+    if not isinstance(data, Mapping):
+        raise ConfigError(f"{file}: found {data!r}, expected keys and values")
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        raise ConfigError("\n".join(_fault(file, fault, model) for fault in error.errors())) from (
+            None
+        )
+
+
+def _fault(file: str, fault: Any, model: type[BaseModel]) -> str:  # noqa: ANN401  (pydantic's)
+    key = ".".join(str(part) for part in fault["loc"]) or "(top level)"
+    found = fault["input"]
+    message = re.sub(r"^(Value error|Assertion failed), ", "", fault["msg"])
+    if fault["type"] == "extra_forbidden":
+        known = _known_keys(model, fault["loc"][:-1])
+        close = difflib.get_close_matches(str(fault["loc"][-1]), known, n=1)
+        hint = f"did you mean {close[0]!r}? " if close else ""
+        return f"{file}: {key}: unknown key; {hint}expected one of {', '.join(known)}"
+    if fault["type"] == "missing":
+        return f"{file}: {key}: missing; expected a value here"
+    if fault["type"] == "value_error" and isinstance(found, Mapping):
+        return f"{file}: {key}: {message}"
+    return f"{file}: {key}: found {found!r}; {message[0].lower()}{message[1:]}"
+
+
+def _known_keys(model: type[BaseModel], path: tuple[Any, ...]) -> list[str]:
+    """Return the keys that the schema allows at ``path``."""
+    schema = model.model_json_schema()
+    node: dict[str, Any] = schema
+    for part in path:
+        node = _resolve(schema, node)
+        nested = node.get("properties", {}).get(part)
+        node = nested or node.get("items") or node.get("additionalProperties") or {}
+    node = _resolve(schema, node)
+    names = node.get("properties") or node.get("propertyNames", {}).get("enum") or {}
+    return sorted(names)
+
+
+def _resolve(schema: dict[str, Any], node: dict[str, Any]) -> dict[str, Any]:
+    for option in node.get("anyOf", []) + node.get("allOf", []):
+        if "$ref" in option:
+            node = option
+    while "$ref" in node:
+        node = schema["$defs"][node["$ref"].rsplit("/", maxsplit=1)[-1]]
+    return node
+
+
+def read_yaml(path: Path) -> object:
+    """Read one YAML file.
+
+    Raises
+    ------
+    ConfigError
+        If it is not there or not YAML; the text names the line.
+    """
+    try:
+        return yaml.safe_load(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ConfigError(f"{path}: no such file") from None
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: not readable as YAML: {error}") from None
