@@ -219,7 +219,7 @@ def _read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> _Par
             if time is not None:
                 kept_time = np.ascontiguousarray(time if whole else time[keep])
                 kept_time.tofile(stamps)
-                digest.update(kept_time)
+                digest.update(kept_time.tobytes())
             kept = {
                 name: part.spreads[name].add(values if whole else values[keep])
                 for name, values in batch.columns.items()

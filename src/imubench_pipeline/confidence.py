@@ -1,0 +1,170 @@
+"""How sure an Allan variance is: its noise type, degrees of freedom and chi-squared limits."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaincinv
+
+_FEWEST_CLUSTERS = 30
+_MOST_CLUSTERS = 1 << 20
+_ALL_LAGS = 2048
+
+
+def noise_exponent(
+    theta: NDArray[np.float64], present: NDArray[np.int32] | None, n: int
+) -> int | None:
+    """Tell the noise type from the lag-1 autocorrelation of adjacent cluster means.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (m + 1,)
+        Cumulative sums of the samples at the edges of m adjacent clusters.
+    present : ndarray of int, shape (m + 1,), or None
+        Cumulative counts of the samples present at the same edges; None: all are.
+    n : int
+        Samples in a cluster.
+
+    Returns
+    -------
+    int or None
+        Exponent from 2 to -2 (see `imubench_pipeline.allan.AllanCurve`); None where fewer
+        than 30 clusters are left.
+
+    References
+    ----------
+    W. Riley and C. Greenhall, "Power law noise identification using the lag 1
+    autocorrelation", EFTF 2004.
+    """
+    theta = theta[: _MOST_CLUSTERS + 1]
+    if present is None:
+        means = np.diff(theta) / n
+    else:
+        counts = np.diff(present[: _MOST_CLUSTERS + 1])
+        enough = counts >= 0.9 * n
+        means = np.where(enough, np.diff(theta) / np.maximum(counts, 1), np.nan)
+    if np.isfinite(means).sum() < _FEWEST_CLUSTERS:
+        return None
+    series = _without_line(means)
+    for differenced in range(3):
+        correlation = _lag_one(series)
+        if correlation is None:
+            return None
+        delta = correlation / (1.0 + correlation)
+        if delta < 0.25 or differenced == 2:
+            exponent = round(-2.0 * (delta + differenced))
+            return int(np.clip(exponent, -2, 2))
+        series = np.diff(series)
+    raise AssertionError("the loop returns at its last turn")
+
+
+def _without_line(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    good = np.isfinite(values)
+    time = np.arange(len(values)) - np.arange(len(values))[good].mean()
+    held = values[good] - values[good].mean()
+    slope = (time[good] @ held) / (time[good] @ time[good])
+    line: NDArray[np.float64] = values - values[good].mean() - slope * time
+    return line
+
+
+def _lag_one(values: NDArray[np.float64]) -> float | None:
+    centred = values - np.nanmean(values)
+    power = float(np.nanmean(centred**2))
+    if not power > 0:
+        return None
+    correlation = float(np.nanmean(centred[1:] * centred[:-1])) / power
+    return max(correlation, -0.999)
+
+
+@lru_cache(maxsize=4096)
+def equivalent_degrees(exponent: int, n: int, terms: int) -> float:
+    """Return the equivalent degrees of freedom of a fully overlapping Allan variance.
+
+    edf = M / (1 + 2 sum_k (1 - k/M) r_k^2) with r_k the autocorrelation, at lag k, of the
+    second differences of power-law noise, and M their number.
+
+    Parameters
+    ----------
+    exponent : int
+        Noise type, 2 to -2.
+    n : int
+        Samples in a cluster.
+    terms : int
+        M, the differences in the sum: L - 2n + 1.
+
+    References
+    ----------
+    C. Greenhall and W. Riley, "Uncertainty of stability variances based on finite
+    differences", PTTI 2003 (there with tables in place of the long sums).
+    """
+    lags = _lags(n, min(terms - 1, 3 * n))
+    if not len(lags):
+        return 1.0
+    at_zero = _second_difference(np.zeros(1), exponent, n)[0]
+    correlation = _second_difference(lags.astype(np.float64), exponent, n) / at_zero
+    weighted = (1.0 - lags / terms) * correlation**2
+    return float(terms / (1.0 + 2.0 * _sum_of_all(lags, weighted)))
+
+
+def _lags(n: int, longest: int) -> NDArray[np.int64]:
+    """Return lags from 1 to ``longest``: all of them, or crowded where the correlation bends."""
+    if longest <= _ALL_LAGS:
+        return np.arange(1, longest + 1, dtype=np.int64)
+    near = np.unique(np.rint(np.geomspace(1, n / 2 + 1, 160)).astype(np.int64))
+    offsets = np.concatenate((-near[::-1], [0], near))
+    lags = np.unique(np.concatenate([centre * n + offsets for centre in range(4)]))
+    return np.union1d(lags[(lags >= 1) & (lags <= longest)], [longest])
+
+
+def _sum_of_all(lags: NDArray[np.int64], values: NDArray[np.float64]) -> float:
+    """Sum over every whole lag of a function given at some, linear in between."""
+    between = np.diff(lags) * (values[1:] + values[:-1]) / 2.0
+    return float(between.sum() + (values[0] + values[-1]) / 2.0)
+
+
+def _second_difference(lags: NDArray[np.float64], exponent: int, n: int) -> NDArray[np.float64]:
+    """Return the autocovariance of theta_{i+2n} - 2 theta_{i+n} + theta_i, to a factor."""
+    total = np.zeros(len(lags))
+    for shift, weight in ((-2, 1.0), (-1, -4.0), (0, 6.0), (1, -4.0), (2, 1.0)):
+        total += weight * _phase_covariance(np.abs(lags + shift * n), exponent, n)
+    return total
+
+
+def _phase_covariance(lags: NDArray[np.float64], exponent: int, n: int) -> NDArray[np.float64]:
+    """Return the generalised autocovariance of the phase of power-law noise, to a factor."""
+    t = lags / n
+    if exponent == 2:  # white phase
+        return (lags == 0).astype(np.float64)
+    if exponent == 1:  # flicker phase, sampled: averaged over one sampling interval
+        far = lags > 1000.0
+        k = np.where(far, 1.0, lags)
+        near = -(_square_log(k + 1) + _square_log(np.abs(k - 1)) - 2 * _square_log(k))
+        return np.where(far, -2.0 * np.log(np.where(far, lags, 1.0)) - 3.0, near)
+    if exponent == 0:
+        return -t
+    if exponent == -1:
+        return _square_log(t)
+    return np.asarray(t**3)
+
+
+def _square_log(t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return t^2 ln t, 0 at 0."""
+    return np.asarray(t**2 * np.log(np.where(t > 0, t, 1.0)))
+
+
+def deviation_limits(
+    deviation: NDArray[np.float64], edf: NDArray[np.float64], confidence: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the chi-squared limits of an Allan deviation.
+
+    Parameters
+    ----------
+    deviation, edf : ndarray, shape (m,)
+    confidence : float
+        Such as 0.95: half of the rest lies beyond each limit.
+    """
+    tail = (1.0 - confidence) / 2.0
+    high, low = (2.0 * gammaincinv(edf / 2.0, p) for p in (1.0 - tail, tail))
+    return deviation * np.sqrt(edf / high), deviation * np.sqrt(edf / low)

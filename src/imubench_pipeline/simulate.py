@@ -1,0 +1,277 @@
+"""Logs from a noise model: full length, or just the Allan variances of many.
+
+A full-length log comes from the discrete state-space model, block by block. The Allan
+variances of an ensemble need no full-length logs: at long tau they follow from sums over
+blocks of samples, which are drawn jointly with the state (exact); at short tau, where a
+thousand clusters and more are averaged, from their covariance.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from imubench_pipeline.allan import integrate, of_phase
+from imubench_pipeline.noise import GaussMarkov, NoiseModel, RandomWalk
+
+Array = NDArray[np.float64]
+
+_BLOCK = 1 << 20
+_SUMS = 1 << 14
+"""Blocks that a member of the ensemble is made of, at most."""
+
+_BLOCKS_IN_CLUSTER = 16
+"""Clusters of fewer blocks are drawn from the covariance of the Allan variances."""
+
+_POINTS_IN_PERIOD = 32
+_FREQUENCIES_AT_ONCE = 1 << 15
+
+
+def channel_rng(seed: int, *names: str) -> np.random.Generator:
+    """Return the random stream of a channel: it depends on the seed and the names only."""
+    digest = hashlib.sha256("/".join(names).encode()).digest()
+    words = [int.from_bytes(digest[i : i + 4], "little") for i in range(0, 16, 4)]
+    return np.random.default_rng([seed, *words])
+
+
+def simulate(model: NoiseModel, rate: float, samples: int, rng: np.random.Generator) -> Array:
+    """Return a simulated log.
+
+    Parameters
+    ----------
+    model : NoiseModel
+    rate : float
+        Hz.
+    samples : int
+        Length of the log.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    ndarray, shape (samples,)
+        rad/s or m/s². The Gauss-Markov process starts in its stationary distribution, the
+        random walk at 0.
+    """
+    blocks = list(simulate_blocks(model, rate, samples, rng))
+    return np.concatenate(blocks) if blocks else np.empty(0)
+
+
+def simulate_blocks(
+    model: NoiseModel, rate: float, samples: int, rng: np.random.Generator, block: int = _BLOCK
+) -> Iterator[Array]:
+    """Yield a simulated log in blocks; the log does not depend on their size (see `simulate`)."""
+    space = model.state_space(rate)
+    white, initial, *streams = rng.spawn(2 + len(space.transition))
+    state = np.sqrt(space.initial_variance) * initial.standard_normal(len(space.transition))
+    for start in range(0, samples, block):
+        size = min(block, samples - start)
+        log = white.standard_normal(size) * math.sqrt(space.measurement_noise)
+        for i, stream in enumerate(streams):
+            drive = stream.standard_normal(size)
+            drive *= math.sqrt(space.process_noise[i])
+            state[i] = _add_state(log, state[i], space.transition[i], drive, space.output[i])
+        yield log
+
+
+@njit(cache=True, nogil=True)
+def _add_state(log, state, transition, drive, output):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+    """Add a state to a log and return the state after its last sample."""
+    for i in range(log.size):
+        log[i] += output * state
+        state = transition * state + drive[i]
+    return state
+
+
+def reconstructed_variance(
+    model: NoiseModel,
+    rate: float,
+    samples: int,
+    sizes: NDArray[np.int64],
+    rng: np.random.Generator,
+) -> Array:
+    """Return the Allan variance of one full-length simulated log, shape (m,)."""
+    phase = integrate(simulate_blocks(model, rate, samples, rng), samples, holes=False)
+    return of_phase(phase, rate, sizes).variance
+
+
+def ensemble(
+    model: NoiseModel,
+    rate: float,
+    samples: int,
+    sizes: NDArray[np.int64],
+    members: int,
+    rng: np.random.Generator,
+) -> Array:
+    """Return the Allan variances of an ensemble of simulated logs.
+
+    Parameters
+    ----------
+    model : NoiseModel
+    rate : float
+        Hz.
+    samples : int
+        Length of each log.
+    sizes : ndarray of int, shape (m,)
+        n of each tau.
+    members : int
+        Logs in the ensemble.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    ndarray, shape (members, m)
+        (rad/s)² or (m/s²)².
+    """
+    width = max(1, -(-samples // _SUMS))
+    long = sizes >= (_BLOCKS_IN_CLUSTER * width if width > 1 else 1)
+    result = np.empty((members, len(sizes)))
+    for_short, for_long = rng.spawn(2)
+    if not long.all():
+        result[:, ~long] = _from_covariance(model, rate, samples, sizes[~long], members, for_short)
+    if long.any():
+        result[:, long] = _from_block_sums(
+            model, rate, samples, sizes[long], width, members, for_long
+        )
+    return result
+
+
+def _from_block_sums(
+    model: NoiseModel,
+    rate: float,
+    samples: int,
+    sizes: NDArray[np.int64],
+    width: int,
+    members: int,
+    rng: np.random.Generator,
+) -> Array:
+    blocks = samples // width
+    in_blocks = np.maximum(1, np.rint(sizes / width).astype(np.int64))
+    in_blocks = np.minimum(in_blocks, blocks // 2)
+    # A cluster of whole blocks is a few per cent shorter or longer than the one wanted.
+    scale = model.allan_variance(sizes / rate, rate) / model.allan_variance(
+        in_blocks * width / rate, rate
+    )
+    distinct, place = np.unique(in_blocks, return_inverse=True)
+    result = np.empty((members, len(sizes)))
+    for member in range(members):
+        sums = block_sums(model, rate, blocks, width, rng)
+        phase = integrate([sums / width], blocks, holes=False)
+        variance = _variances(phase.theta, distinct)
+        result[member] = variance[place] * scale
+    return result
+
+
+@njit(cache=True, nogil=True)
+def _variances(theta, sizes):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+    """Return Allan variances without limits, for the members of an ensemble."""
+    variances = np.empty(sizes.size)
+    for j in range(sizes.size):
+        n = sizes[j]
+        total = 0.0
+        terms = theta.size - 2 * n
+        for i in range(terms):
+            difference = theta[i + 2 * n] - 2.0 * theta[i + n] + theta[i]
+            total += difference * difference
+        variances[j] = total / (2.0 * n * n * terms)
+    return variances
+
+
+def block_sums(
+    model: NoiseModel, rate: float, blocks: int, width: int, rng: np.random.Generator
+) -> Array:
+    """Return the sums over adjacent blocks of ``width`` samples of a simulated log, exactly.
+
+    The sum over a block and the state after it are jointly Gaussian, given the state before.
+    """
+    interval = 1.0 / rate
+    sums = rng.standard_normal(blocks) * math.sqrt(width * model.N**2 * rate)
+    for term in model.terms:
+        if isinstance(term, GaussMarkov):
+            variance = term.density * term.T_B / 2.0
+            start = rng.standard_normal() * math.sqrt(variance)
+            p = math.exp(-interval / term.T_B)
+            drive = -variance * math.expm1(-2.0 * interval / term.T_B)
+        elif isinstance(term, RandomWalk):
+            start, p, drive = 0.0, 1.0, term.K**2 * interval
+        else:
+            continue
+        # The sample i of a block is p^i x + sum_{j<i} p^(i-1-j) w_j.
+        powers = p ** np.arange(width + 1)
+        reach = np.concatenate(([0.0], np.cumsum(powers)))
+        in_sum = reach[width - 1 - np.arange(width)]
+        in_state = powers[width - 1 - np.arange(width)]
+        moments = drive * np.array(
+            [[in_state @ in_state, in_state @ in_sum], [in_state @ in_sum, in_sum @ in_sum]]
+        )
+        to_state = math.sqrt(moments[0, 0])
+        shared = moments[0, 1] / to_state
+        own = math.sqrt(max(moments[1, 1] - shared**2, 0.0))
+        normal = rng.standard_normal((2, blocks))
+        _add_block_sums(
+            sums, start, powers[width], reach[width], normal[0], normal[1], to_state, shared, own
+        )
+    return sums
+
+
+@njit(cache=True, nogil=True)
+def _add_block_sums(sums, state, decay, gain, first, second, to_state, shared, own):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+    for i in range(sums.size):
+        sums[i] += gain * state + shared * first[i] + own * second[i]
+        state = decay * state + to_state * first[i]
+
+
+def _from_covariance(
+    model: NoiseModel,
+    rate: float,
+    samples: int,
+    sizes: NDArray[np.int64],
+    members: int,
+    rng: np.random.Generator,
+) -> Array:
+    mean = model.allan_variance(sizes / rate, rate)
+    relative = variance_covariance(model, rate, samples, sizes) / np.outer(mean, mean)
+    # Wilson and Hilferty: the cube root of a chi-squared variate is very nearly normal.
+    spread = np.sqrt(np.diag(relative))
+    correlation = relative / np.outer(spread, spread)
+    values, vectors = np.linalg.eigh(correlation)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    normal = rng.standard_normal((members, len(sizes))) @ root.T
+    ninth = spread**2 / 9.0  # 2 / (9 edf) with spread^2 = 2 / edf
+    return np.asarray(mean * (1.0 - ninth + np.sqrt(ninth) * normal) ** 3)
+
+
+def variance_covariance(
+    model: NoiseModel, rate: float, samples: int, sizes: NDArray[np.int64]
+) -> Array:
+    """Return the covariance of the Allan variance estimates of a long Gaussian log.
+
+    With P the spectrum of the samples and |H_n|^2 = 4 sin^4(n w/2) / (n^2 sin^2(w/2)),
+
+        cov(n, m) = 1/(2 M) 1/(2 pi) int P^2 |H_n|^2 |H_m|^2 dw,   M = L - n - m,
+
+    for clusters much shorter than the log.
+
+    Returns
+    -------
+    ndarray, shape (m, m)
+        (rad/s)^4 or (m/s²)^4.
+    """
+    points = 1 << math.ceil(math.log2(max(_POINTS_IN_PERIOD * int(sizes.max()), 1 << 12)))
+    total = np.zeros((len(sizes), len(sizes)))
+    for start in range(0, points, _FREQUENCIES_AT_ONCE):
+        index = np.arange(start, min(start + _FREQUENCIES_AT_ONCE, points))
+        omega = np.pi * (index + 0.5) / points
+        shaped = (
+            model.sampled_spectrum(omega, rate)
+            * 4.0
+            * np.sin(np.outer(sizes, omega / 2.0)) ** 4
+            / (sizes[:, None] ** 2 * np.sin(omega / 2.0) ** 2)
+        )
+        total += shaped @ shaped.T
+    terms = samples - np.add.outer(sizes, sizes)
+    return np.asarray(total / points / (2.0 * terms))
