@@ -136,7 +136,7 @@ def _phase_covariance(lags: NDArray[np.float64], exponent: int, n: int) -> NDArr
     """Return the generalised autocovariance of the phase of power-law noise, to a factor."""
     t = lags / n
     if exponent == 2:  # white phase
-        return (lags == 0).astype(np.float64)
+        return np.asarray(lags == 0, dtype=np.float64)
     if exponent == 1:  # flicker phase, sampled: averaged over one sampling interval
         far = lags > 1000.0
         k = np.where(far, 1.0, lags)

@@ -1,0 +1,1 @@
+"""Noise parameters from a log: read from the curve, fitted to it."""

@@ -1,0 +1,170 @@
+"""Reading the curve: N, K, B and T_B from the slopes that it shows (000 section 2.2, 003 eq. 2-5).
+
+A slope that the log does not show gives no value, with the reason.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.allan import AllanCurve
+from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.noise import FLOOR, PEAK_TAU
+
+Array = NDArray[np.float64]
+
+_WINDOW = 0.5
+"""Decades of tau over which a local slope is taken."""
+
+_OCTAVE = math.log10(2.0)
+"""Estimates closer than an octave of tau are hardly independent."""
+
+_WHITE_TOLERANCE = 0.06
+_WALK_TOLERANCE = 0.12
+_WALK_SPANS = np.arange(0.4, 2.01, 0.1)
+_WALK_LEAST_SLOPE = 0.2
+_RISE_SIGMAS = 3.0
+
+
+@dataclass(frozen=True)
+class _Curve:
+    """The usable part of a curve: logarithms to base 10, and standard errors of the deviation."""
+
+    tau: Array
+    deviation: Array
+    error: Array
+
+    def slope(self, inside: NDArray[np.bool_]) -> tuple[float, float]:
+        """Return the weighted slope of the points inside, and its standard error."""
+        weight = self.error[inside] ** -2
+        centred = self.tau[inside] - np.average(self.tau[inside], weights=weight)
+        moment = float(weight @ centred**2)
+        slope = float(weight @ (centred * self.deviation[inside])) / moment
+        # Points crowd an octave, but an octave holds about one independent estimate.
+        spacing = float(np.median(np.diff(self.tau[inside])))
+        crowd = max(1.0, _OCTAVE / spacing)
+        return slope, math.sqrt(crowd / moment)
+
+    def level(self, inside: NDArray[np.bool_], slope: float, tau: float) -> float:
+        """Return the deviation at ``tau`` of a line of a given slope through the points inside."""
+        weight = self.error[inside] ** -2
+        offset = np.average(self.deviation[inside] - slope * self.tau[inside], weights=weight)
+        return float(10.0 ** (offset + slope * math.log10(tau)))
+
+
+def read(curve: AllanCurve, *, longest: float = 1 / 9) -> Estimate:
+    """Read the parameters from the slopes of an Allan deviation.
+
+    N is the value at tau = 1 s of the fitted -1/2 line, K that at 3 s of the fitted +1/2
+    line at the end of the curve, B the minimum over 0.664 and T_B the tau of the minimum over
+    1.89.
+
+    Parameters
+    ----------
+    curve : AllanCurve
+    longest : float
+        Longest tau that is read, as a part of the log: beyond, the curve is too unsure.
+
+    Returns
+    -------
+    Estimate
+        Parameters in SI; ``not_shown`` with the reason where the curve has no such slope.
+    """
+    used = curve.cluster_size <= longest * curve.samples
+    points = _Curve(
+        np.log10(curve.tau[used]),
+        np.log10(curve.deviation[used]),
+        1.0 / (math.log(10.0) * np.sqrt(2.0 * curve.edf[used])),
+    )
+    if used.sum() < 4:
+        nothing = Parameter(
+            None, "not_shown", f"the curve has {used.sum()} points up to {longest:.3g} of the log"
+        )
+        return Estimate("curve", dict.fromkeys(("N", "B", "T_B", "K"), nothing))
+    bias, correlation_time = _minimum(points)
+    return Estimate(
+        "curve",
+        {"N": _white(points), "B": bias, "T_B": correlation_time, "K": _walk(points)},
+    )
+
+
+def _white(points: _Curve) -> Parameter:
+    slopes = np.full(len(points.tau), np.nan)
+    for i, centre in enumerate(points.tau):
+        inside = np.abs(points.tau - centre) <= _WINDOW / 2 + 1e-9
+        if inside.sum() >= 3:
+            slope, error = points.slope(inside)
+            if error < 0.25:
+                slopes[i] = slope
+    if not np.isfinite(slopes).any():
+        return Parameter(None, "not_shown", "the curve is too short to show a slope")
+    # The ends have one-sided windows; the first runs of the right slope is the white noise.
+    close = np.abs(slopes + 0.5) <= _WHITE_TOLERANCE
+    run = _first_run(close)
+    if run is None:
+        low, high = np.nanmin(slopes), np.nanmax(slopes)
+        return Parameter(
+            None,
+            "not_shown",
+            f"no stretch of the curve has the slope -1/2: slopes run from {low:.2f} to {high:.2f}",
+        )
+    return Parameter(points.level(run, -0.5, 1.0))
+
+
+def _first_run(mask: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
+    """Return the first run of three and more points, as a mask."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
+    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+        if stop - start >= 3:
+            run = np.zeros(len(mask), dtype=bool)
+            run[start:stop] = True
+            return run
+    return None
+
+
+def _minimum(points: _Curve) -> tuple[Parameter, Parameter]:
+    lowest = int(np.argmin(points.deviation))
+    later = slice(lowest + 1, None)
+    rise = points.deviation[later] - points.deviation[lowest]
+    error = np.hypot(points.error[later], points.error[lowest])
+    fall = points.deviation[0] - points.deviation[lowest]
+    reason = None
+    if lowest == 0 or fall < _RISE_SIGMAS * math.hypot(points.error[0], points.error[lowest]):
+        reason = "the curve does not fall to a minimum: its lowest point is at its beginning"
+    elif not (rise > _RISE_SIGMAS * error).any():
+        tau = 10.0 ** points.tau[lowest]
+        reason = (
+            f"the curve does not rise again after its lowest point at {tau:.3g} s by "
+            f"{_RISE_SIGMAS:.0f} standard errors: no minimum is shown; a longer log may"
+        )
+    if reason:
+        nothing = Parameter(None, "not_shown", reason)
+        return nothing, nothing
+    return (
+        Parameter(float(10.0 ** points.deviation[lowest]) / FLOOR),
+        Parameter(float(10.0 ** points.tau[lowest]) / PEAK_TAU),
+    )
+
+
+def _walk(points: _Curve) -> Parameter:
+    """Read K from the longest stretch at the end of the curve that has the slope +1/2."""
+    lowest = int(np.argmin(points.deviation))
+    best: NDArray[np.bool_] | None = None
+    steepest = -np.inf
+    for span in _WALK_SPANS:
+        inside = points.tau >= points.tau[-1] - span - 1e-9
+        inside[: lowest + 1] = False
+        if inside.sum() < 4:
+            continue
+        slope, error = points.slope(inside)
+        steepest = max(steepest, slope)
+        if abs(slope - 0.5) <= _WALK_TOLERANCE + error and slope - 2 * error > _WALK_LEAST_SLOPE:
+            best = inside
+    if best is None:
+        shown = f"the steepest end has {steepest:+.2f}" if np.isfinite(steepest) else "it ends low"
+        return Parameter(None, "not_shown", f"the curve does not end with the slope +1/2: {shown}")
+    return Parameter(points.level(best, 0.5, 3.0))

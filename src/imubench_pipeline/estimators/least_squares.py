@@ -1,0 +1,180 @@
+"""The papers' optimisation: weighted least squares of the Allan variance (000 section 3.2).
+
+For a given T_B the model is linear in S_N, S_B and S_K, which are found by non-negative least
+squares; the search is over T_B alone (variable projection).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar, nnls
+
+from imubench_pipeline.allan import AllanCurve
+from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.noise import (
+    PEAK_TAU,
+    NoiseModel,
+    bias_instability,
+    gauss_markov_shape,
+    sampled_gauss_markov_shape,
+)
+
+Array = NDArray[np.float64]
+
+_SCAN = 160
+"""Correlation times tried before the search is refined."""
+
+_ABSENT = 1e-9
+"""A term below this part of the variance at every tau is not there."""
+
+
+def fit(
+    curve: AllanCurve,
+    *,
+    method: Literal["weighted", "paper"] = "weighted",
+    longest: float = 1 / 9,
+) -> Estimate:
+    """Fit N, B, T_B and K to an Allan variance.
+
+    C = sum_i w_i (variance_i - model(tau_i))^2 with
+
+    - ``weighted``: w = 1 / (2 sqrt(n/2L) variance)^2, the variance of the Allan variance;
+    - ``paper``: w = 1 / (2 sqrt(n/2L) deviation)^2 as 000 eq. 25 prints it, whose dimension is
+      not that of the cost: the bottom of the curve hardly counts. For the papers' figures.
+
+    Parameters
+    ----------
+    curve : AllanCurve
+    method : {"weighted", "paper"}
+    longest : float
+        Longest tau of the fit, as a part of the log.
+
+    Returns
+    -------
+    Estimate
+        SI. ``absent``: the fit is best without the term; ``at_bound``: T_B at the end of the
+        search, which goes as far as the process still peaks inside the tau used.
+
+    Raises
+    ------
+    ValueError
+        If fewer than four points lie within ``longest``, or the method is not known.
+    """
+    used = curve.cluster_size <= longest * curve.samples
+    if used.sum() < 4:
+        raise ValueError(
+            f"the curve has {used.sum()} points up to {longest:.3g} of the log, expected 4 or more"
+        )
+    tau, n, variance = curve.tau[used], curve.cluster_size[used], curve.variance[used]
+    spread = np.sqrt(n / (2.0 * curve.samples))
+    if method == "weighted":
+        root_weight = 1.0 / (2.0 * spread * variance)
+    elif method == "paper":
+        root_weight = 1.0 / (2.0 * spread * np.sqrt(variance))
+    else:
+        raise ValueError(f"method {method!r} is not known, expected 'weighted' or 'paper'")
+    interval = float(tau[0] / n[0])
+    search = _Search(tau, n, variance, root_weight, interval, sampled=False)
+    estimate = search.estimate(method)
+    if _sampling_shows(estimate.model, tau, interval, spread):
+        estimate = _Search(tau, n, variance, root_weight, interval, sampled=True).estimate(method)
+    return estimate
+
+
+def _sampling_shows(model: NoiseModel, tau: Array, interval: float, spread: Array) -> bool:
+    """Tell whether the sampled model differs from the continuous one by what the log can tell."""
+    continuous = model.allan_variance(tau)
+    difference = np.abs(model.allan_variance(tau, 1.0 / interval) - continuous)
+    return bool((difference > 0.1 * 2.0 * spread * continuous).any())
+
+
+class _Search:
+    """Least squares over (S_N, S_B, S_K) for a given T_B, and the search over T_B."""
+
+    def __init__(
+        self,
+        tau: Array,
+        n: NDArray[np.int64],
+        variance: Array,
+        root_weight: Array,
+        interval: float,
+        *,
+        sampled: bool,
+    ) -> None:
+        self._tau, self._n, self._interval, self._sampled = tau, n, interval, sampled
+        self._variance = variance
+        self._root_weight = root_weight
+        self._target = root_weight * variance
+        walk = tau / 3.0
+        if sampled:
+            walk = walk * (1.0 + 0.5 / n.astype(np.float64) ** 2)
+        self._white, self._walk = 1.0 / tau, walk
+        self.shortest, self.longest = tau[0] / PEAK_TAU, tau[-1] / PEAK_TAU
+
+    def _shape(self, T_B: float) -> Array:
+        if self._sampled:
+            return sampled_gauss_markov_shape(self._n, self._interval, T_B)
+        return gauss_markov_shape(self._tau, T_B)
+
+    def densities(self, T_B: float | None) -> tuple[Array, float]:
+        """Return S_N, S_B, S_K that fit best at a T_B, and the root of the cost."""
+        shape = self._shape(T_B) if T_B is not None else np.zeros_like(self._tau)
+        columns = np.column_stack([self._white, shape, self._walk]) * self._root_weight[:, None]
+        size = np.linalg.norm(columns, axis=0)
+        size[size == 0] = 1.0
+        solution, residual = nnls(columns / size, self._target)
+        return solution / size, float(residual)
+
+    def estimate(self, method: str) -> Estimate:
+        scan = np.geomspace(self.shortest, self.longest, _SCAN)
+        costs = [self.densities(T_B)[1] for T_B in scan]
+        best = int(np.argmin(costs))
+        low, high = scan[max(best - 1, 0)], scan[min(best + 1, _SCAN - 1)]
+        found = minimize_scalar(
+            lambda u: self.densities(math.exp(u))[1],
+            bounds=(math.log(low), math.log(high)),
+            method="bounded",
+            options={"xatol": 1e-10},
+        )
+        T_B = math.exp(found.x) if found.fun < costs[best] else float(scan[best])
+        return self._described(method, T_B)
+
+    def _described(self, method: str, T_B: float) -> Estimate:
+        (white, drive, walk), _ = self.densities(T_B)
+        parts = {"N": white * self._white, "B": drive * self._shape(T_B), "K": walk * self._walk}
+        there = {
+            name: bool((part > _ABSENT * self._variance).any()) for name, part in parts.items()
+        }
+        absent = Parameter(None, "absent", "the fit is best without this term")
+        at_end = self._at_end(T_B)
+        bias = Parameter(bias_instability(drive, T_B)) if there["B"] else absent
+        time = Parameter(T_B) if there["B"] else absent
+        if there["B"] and at_end:
+            bias = Parameter(bias.value, "at_bound", at_end)
+            time = Parameter(T_B, "at_bound", at_end)
+        return Estimate(
+            method,
+            {
+                "N": Parameter(math.sqrt(white)) if there["N"] else absent,
+                "B": bias,
+                "T_B": time,
+                "K": Parameter(math.sqrt(walk)) if there["K"] else absent,
+            },
+        )
+
+    def _at_end(self, T_B: float) -> str | None:
+        if T_B > self.longest * 0.99:
+            return (
+                f"T_B runs to the end of its search at {self.longest:.4g} s: the curve does not "
+                "show the peak of a Gauss-Markov process"
+            )
+        if T_B < self.shortest * 1.01:
+            return (
+                f"T_B runs to the beginning of its search at {self.shortest:.4g} s: the process "
+                "cannot be told from white noise"
+            )
+        return None

@@ -1,0 +1,207 @@
+"""What a run consists of: the recordings found and the settings of each step.
+
+This is all that the Snakefile asks of the package. Settings are handed to a rule as JSON text
+of what the rule depends on, so that an edit runs again what it touches and nothing else.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydantic import BaseModel
+
+from imubench_pipeline.config import Run, SimulatedRecording, read_run, read_simulated
+from imubench_pipeline.provenance import source_digest
+from imubench_pipeline.readers import log_files
+from imubench_pipeline.sensor import RecordingNotes, Sensor, merged_log, read_sensors
+from imubench_pipeline.validation import ConfigError, parse, read_yaml
+
+_NOT_LOGS = {".yaml", ".yml", ".md", ".part", ".tmp", ".filepart", ".crdownload"}
+_COMPRESSED = {".gz"}
+
+STEPS: Mapping[str, tuple[str, ...]] = {
+    "simulate": ("simulated_logs",),
+    "ingest": ("ingest", "results"),
+    "allan": ("allan", "recording", "results"),
+    "estimate": ("estimators.curve", "estimators.least_squares", "results"),
+    "reconstruct": ("simulate", "score", "results"),
+    "datasheet": ("datasheet", "results"),
+    "tables": ("tables",),
+    "report": ("report.page",),
+}
+"""The modules that each step runs: their edit runs the step again."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One recording that was found, or is to be simulated.
+
+    Attributes
+    ----------
+    sensor, name : str
+    path : Path
+        The log file, or the folder of a recording that has several.
+    notes : Path or None
+        The file of notes beside it.
+    simulated : bool
+    """
+
+    sensor: str
+    name: str
+    path: Path
+    notes: Path | None
+    simulated: bool
+
+    @property
+    def files(self) -> list[Path]:
+        """What the recording depends on."""
+        logs = [self.path] if self.simulated else log_files(self.path)
+        return logs + ([self.notes] if self.notes else [])
+
+
+class Plan:
+    """The plan of a run.
+
+    Raises
+    ------
+    ConfigError
+        If the configuration, a sensor file or the list of simulated recordings cannot be used,
+        or two logs would make one recording.
+    """
+
+    def __init__(self, config: Mapping[str, object]) -> None:
+        self.run: Run = read_run(config)
+        self.sensors: dict[str, Sensor] = read_sensors(self.run.sensors)
+        self._simulated = {
+            (entry.sensor, entry.recording): entry
+            for entry in read_simulated(self.run.simulated, self.sensors)
+        }
+        self.recordings: dict[tuple[str, str], Recording] = {}
+        for found in [*self._found_logs(), *self._to_simulate()]:
+            other = self.recordings.setdefault((found.sensor, found.name), found)
+            if other is not found:
+                raise ConfigError(
+                    f"{other.path} and {found.path} would both be the recording "
+                    f"{found.sensor}/{found.name}; rename or remove one"
+                )
+
+    def _found_logs(self) -> list[Recording]:
+        if not self.run.logs.is_dir():
+            return []
+        found = []
+        for folder in sorted(path for path in self.run.logs.iterdir() if path.is_dir()):
+            for path in sorted(folder.iterdir()):
+                if path.name.startswith(".") or path.name.endswith("~"):
+                    continue
+                if path.is_file() and path.suffix.lower() in _NOT_LOGS:
+                    continue
+                name = path.name if path.is_dir() else _stem(path)
+                notes = folder / f"{name}.yaml"
+                found.append(
+                    Recording(folder.name, name, path, notes if notes.is_file() else None, False)
+                )
+        return found
+
+    def _to_simulate(self) -> list[Recording]:
+        return [
+            Recording(
+                sensor, name, self.run.results / "simulated" / sensor / name, None, simulated=True
+            )
+            for sensor, name in self._simulated
+        ]
+
+    def ingest_settings(self, sensor: str, name: str) -> str:
+        """Return what the ingest of a recording depends on, its error where it cannot be read."""
+        recording = self.recordings[sensor, name]
+        settings: dict[str, object] = {
+            "simulated": recording.simulated,
+            "quality": self.run.quality.model_dump(mode="json"),
+            "sizes": [path.stat().st_size for path in recording.files if path.is_file()],
+        }
+        try:
+            notes = RecordingNotes()
+            if recording.notes:
+                notes = parse(
+                    RecordingNotes, read_yaml(recording.notes) or {}, str(recording.notes)
+                )
+            if sensor not in self.sensors:
+                expected = self.run.sensors / f"{sensor}.yaml"
+                raise ConfigError(
+                    f"no sensor file {expected} for the logs in {self.run.logs / sensor}; write "
+                    "one, or move the logs to the folder of their sensor"
+                )
+            log = merged_log(self.sensors[sensor], notes, str(recording.notes or sensor))
+            settings |= {
+                "notes": notes.model_dump(mode="json"),
+                "log": log.model_dump(mode="json"),
+            }
+        except ConfigError as error:
+            settings["error"] = str(error)
+        return _text(settings)
+
+    def simulated_settings(self, sensor: str, name: str) -> str:
+        """Return the parameters of a simulated recording and the layout that it is written in."""
+        return _text(
+            {
+                "recording": self._simulated[sensor, name].model_dump(mode="json"),
+                "log": self.sensors[sensor].log.model_dump(mode="json"),
+            }
+        )
+
+    def settings(self, section: str) -> str:
+        """Return one section of the run's configuration."""
+        value = getattr(self.run, section)
+        return _text(value.model_dump(mode="json") if isinstance(value, BaseModel) else value)
+
+    def datasheet_settings(self, sensor: str) -> str:
+        """Return what the comparison with the datasheet of a sensor depends on."""
+        known = self.sensors.get(sensor)
+        return _text(
+            {
+                "datasheet": known.datasheet.model_dump(mode="json") if known else {},
+                "tolerance": self.run.datasheet.tolerance,
+            }
+        )
+
+    def report_settings(self) -> str:
+        """Return what the report shows beside the tables."""
+        used = {sensor for sensor, _ in self.recordings}
+        return _text(
+            {
+                "report": self.run.report.model_dump(mode="json"),
+                "sensors": {
+                    name: sensor.model_dump(mode="json", include={"vendor", "model", "datasheet"})
+                    for name, sensor in self.sensors.items()
+                    if name in used
+                },
+            }
+        )
+
+    def truths(self) -> str:
+        """Return the true parameters of the simulated recordings."""
+        return _text([entry.model_dump(mode="json") for entry in self._simulated.values()])
+
+    @staticmethod
+    def code(step: str) -> str:
+        """Return the digest of the code that a step runs."""
+        return source_digest(*STEPS[step])
+
+
+def read_truths(text: str) -> list[SimulatedRecording]:
+    """Read what `Plan.truths` wrote."""
+    return [SimulatedRecording.model_validate(entry) for entry in json.loads(text)]
+
+
+def _stem(path: Path) -> str:
+    name = path.name
+    for suffix in path.suffixes[::-1]:
+        if suffix.lower() in _COMPRESSED:
+            name = name[: -len(suffix)]
+    return name.rsplit(".", maxsplit=1)[0] if "." in name else name
+
+
+def _text(value: object) -> str:
+    return json.dumps(value, sort_keys=True, ensure_ascii=False)

@@ -1,0 +1,120 @@
+"""What a run leaves of one recording: library objects to rows of the tables, and back."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import pyarrow as pa
+
+from imubench_pipeline.allan import AllanCurve
+from imubench_pipeline.estimators.estimate import (
+    SI_UNITS,
+    Estimate,
+    Parameter,
+    Status,
+)
+from imubench_pipeline.sensor import quantity_of
+from imubench_pipeline.tables import read
+
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Key:
+    """What names a channel in every table."""
+
+    sensor: str
+    recording: str
+    channel: str
+
+
+@dataclass(frozen=True)
+class Quality:
+    """``quality.json``: what the ingest found, and the channels that go on."""
+
+    recording: dict[str, Any]
+    findings: list[dict[str, Any]]
+    channels: dict[str, dict[str, Any]]
+
+    @classmethod
+    def read(cls, path: Path) -> Quality:
+        """Read the file that `ingest` wrote."""
+        return cls(**json.loads(path.read_text(encoding="utf-8")))
+
+
+def allan_rows(key: Key, curve: AllanCurve) -> Iterator[Row]:
+    """Yield the rows of the table ``allan``."""
+    lower, upper = curve.limits(0.95)
+    for i, tau in enumerate(curve.tau):
+        yield asdict(key) | {
+            "tau": float(tau),
+            "cluster_size": int(curve.cluster_size[i]),
+            "adev": float(curve.deviation[i]),
+            "lower": float(lower[i]),
+            "upper": float(upper[i]),
+            "edf": float(curve.edf[i]),
+            "exponent": int(curve.exponent[i]),
+        }
+
+
+def curves(path: Path, quality: Quality) -> dict[str, AllanCurve]:
+    """Read the curves of a recording from its table ``allan``, by channel."""
+    by_channel = _by(read("allan", [path]), "channel")
+    return {
+        channel: AllanCurve(
+            tau=table["tau"].to_numpy(),
+            cluster_size=table["cluster_size"].to_numpy(),
+            variance=table["adev"].to_numpy() ** 2,
+            edf=table["edf"].to_numpy(),
+            exponent=table["exponent"].to_numpy(),
+            samples=int(quality.channels[channel]["grid"]),
+        )
+        for (channel,), table in by_channel.items()
+    }
+
+
+def parameter_rows(key: Key, estimate: Estimate, *, recommended: bool) -> Iterator[Row]:
+    """Yield the rows of the table ``parameters``."""
+    units = SI_UNITS[quantity_of(key.channel)]
+    for name, parameter in estimate.parameters.items():
+        yield asdict(key) | {
+            "method": estimate.method,
+            "recommended": recommended,
+            "model": estimate.model.name,
+            "component": 1,
+            "parameter": name,
+            "unit": units[name],
+            **asdict(parameter),
+        }
+
+
+def estimates(path: Path) -> dict[str, list[Estimate]]:
+    """Read the estimates of a recording from its table ``parameters``, by channel."""
+    found: dict[str, list[Estimate]] = {}
+    for (channel, method), table in _by(read("parameters", [path]), "channel", "method").items():
+        parameters = {
+            row["parameter"]: Parameter(
+                row["value"],
+                cast(Status, row["status"]),
+                row["reason"],
+                row["lower"],
+                row["upper"],
+            )
+            for row in table.to_pylist()
+        }
+        found.setdefault(channel, []).append(Estimate(method, parameters))
+    return found
+
+
+def _by(table: pa.Table, *names: str) -> dict[tuple[str, ...], pa.Table]:
+    """Divide a table by the values of columns, in the order in which they appear."""
+    keys = list(zip(*(table[name].to_pylist() for name in names), strict=True))
+    order = dict.fromkeys(keys)
+    labels = {key: i for i, key in enumerate(order)}
+    which = np.array([labels[key] for key in keys], dtype=np.int64)
+    return {key: table.filter(pa.array(which == label)) for key, label in labels.items()}
