@@ -19,7 +19,8 @@ from imubench_pipeline import timebase
 from imubench_pipeline.config import QualitySettings
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.readers import TEMPERATURE, LogFile, RecordingError, log_files, read
-from imubench_pipeline.recording import LogWriter, log_paths
+from imubench_pipeline.recording import LogWriter, channel_logs, log_paths
+from imubench_pipeline.results import Quality
 from imubench_pipeline.sensor import LogFormat, RecordingNotes, UsedPart, quantity_of
 
 _STAMP_BLOCK = 1 << 20
@@ -78,10 +79,23 @@ class Ingested:
     summary : dict
         A row of the table ``recordings`` without the names.
     findings : list of Finding
+    channels : dict
+        Rate in Hz, points of the grid and segments of each channel that goes on.
     """
 
     summary: dict[str, Any]
     findings: list[Finding]
+    channels: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+    def quality(self, names: dict[str, Any]) -> Quality:
+        """Return what ``quality.json`` says, with the names of the recording."""
+        status = "ok" if self.channels else "rejected"
+        sensor, recording = names["sensor"], names["recording"]
+        return Quality(
+            names | {"status": status} | self.summary,
+            [dict(finding.row(sensor, recording)) for finding in self.findings],
+            self.channels,
+        )
 
 
 def ingest(
@@ -190,7 +204,11 @@ def _ingest(
         )
     for temporary, final in written:
         temporary.replace(final)
-    return Ingested(summary, findings)
+    channels = {
+        name: {"rate": kept.rate, "grid": kept.grid, "segments": kept.segments}
+        for name, kept in channel_logs(folder).items()
+    }
+    return Ingested(summary, findings, channels)
 
 
 def _read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> _Part:

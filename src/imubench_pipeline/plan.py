@@ -13,7 +13,7 @@ from pathlib import Path
 
 from pydantic import BaseModel
 
-from imubench_pipeline.config import Run, SimulatedRecording, read_run, read_simulated
+from imubench_pipeline.config import Run, read_run, read_simulated
 from imubench_pipeline.provenance import source_digest
 from imubench_pipeline.readers import log_files
 from imubench_pipeline.sensor import RecordingNotes, Sensor, merged_log, read_sensors
@@ -26,10 +26,10 @@ STEPS: Mapping[str, tuple[str, ...]] = {
     "simulate": ("simulated_logs",),
     "ingest": ("ingest", "results"),
     "allan": ("allan", "recording", "results"),
-    "estimate": ("estimators.curve", "estimators.least_squares", "results"),
-    "reconstruct": ("simulate", "score", "results"),
+    "estimate": ("estimators", "results"),
+    "reconstruct": ("reconstruction",),
     "datasheet": ("datasheet", "results"),
-    "tables": ("tables",),
+    "tables": ("results",),
     "report": ("report.page",),
 }
 """The modules that each step runs: their edit runs the step again."""
@@ -134,10 +134,11 @@ class Plan:
                     "one, or move the logs to the folder of their sensor"
                 )
             log = merged_log(self.sensors[sensor], notes, str(recording.notes or sensor))
-            settings |= {
-                "notes": notes.model_dump(mode="json"),
-                "log": log.model_dump(mode="json"),
-            }
+            layout = log.model_dump(mode="json")
+            if recording.simulated:
+                made = self._simulated[sensor, name].channels
+                layout["channels"] = {channel: layout["channels"][channel] for channel in made}
+            settings |= {"notes": notes.model_dump(mode="json"), "log": layout}
         except ConfigError as error:
             settings["error"] = str(error)
         return _text(settings)
@@ -188,11 +189,6 @@ class Plan:
     def code(step: str) -> str:
         """Return the digest of the code that a step runs."""
         return source_digest(*STEPS[step])
-
-
-def read_truths(text: str) -> list[SimulatedRecording]:
-    """Read what `Plan.truths` wrote."""
-    return [SimulatedRecording.model_validate(entry) for entry in json.loads(text)]
 
 
 def _stem(path: Path) -> str:

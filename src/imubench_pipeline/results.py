@@ -12,14 +12,10 @@ import numpy as np
 import pyarrow as pa
 
 from imubench_pipeline.allan import AllanCurve
-from imubench_pipeline.estimators.estimate import (
-    SI_UNITS,
-    Estimate,
-    Parameter,
-    Status,
-)
+from imubench_pipeline.config import SimulatedRecording
+from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate, Parameter, Status
 from imubench_pipeline.sensor import quantity_of
-from imubench_pipeline.tables import read
+from imubench_pipeline.tables import build, read
 
 Row = Mapping[str, Any]
 
@@ -118,3 +114,45 @@ def _by(table: pa.Table, *names: str) -> dict[tuple[str, ...], pa.Table]:
     labels = {key: i for i, key in enumerate(order)}
     which = np.array([labels[key] for key in keys], dtype=np.int64)
     return {key: table.filter(pa.array(which == label)) for key, label in labels.items()}
+
+
+def joined_tables(parts: Mapping[str, list[Path]], truths: str) -> dict[str, pa.Table]:
+    """Join the results of all recordings.
+
+    Parameters
+    ----------
+    parts : mapping of str to list of Path
+        Files of each table, in the order of the recordings; ``quality`` for the JSON files.
+    truths : str
+        The simulated recordings, as the plan wrote them.
+
+    Returns
+    -------
+    dict
+        Every table of `imubench_pipeline.tables.TABLES`.
+    """
+    qualities = [Quality.read(path) for path in parts["quality"]]
+    joined = {name: read(name, paths) for name, paths in parts.items() if name != "quality"}
+    joined["recordings"] = build("recordings", [quality.recording for quality in qualities])
+    joined["findings"] = build("findings", [row for q in qualities for row in q.findings])
+    joined["simulated_truth"] = build("simulated_truth", truth_rows(truths))
+    return joined
+
+
+def truth_rows(truths: str) -> Iterator[Row]:
+    """Yield the rows of the table ``simulated_truth``."""
+    for entry in json.loads(truths):
+        recording = SimulatedRecording.model_validate(entry)
+        for channel, truth in recording.channels.items():
+            units = SI_UNITS[quantity_of(channel)]
+            for parameter, value in truth.si(channel).items():
+                yield {
+                    "sensor": recording.sensor,
+                    "recording": recording.recording,
+                    "channel": channel,
+                    "parameter": parameter,
+                    "value": value,
+                    "unit": units["B"] if parameter == "bias" else units[parameter],
+                    "assumed": parameter in truth.assumed,
+                    "source": recording.source,
+                }

@@ -238,8 +238,9 @@ def merged_log(sensor: Sensor, notes: RecordingNotes, file: str) -> LogFormat:
 
 
 def _merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """Return ``base`` with the keys of ``over``; a key that is null there is taken out."""
     merged = dict(base)
     for key, value in over.items():
         both = isinstance(value, Mapping) and isinstance(merged.get(key), Mapping)
         merged[key] = _merge(merged[key], value) if both else value
-    return merged
+    return {key: value for key, value in merged.items() if value is not None}

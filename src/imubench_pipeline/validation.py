@@ -22,7 +22,7 @@ class ConfigError(ValueError):
 class Strict(BaseModel):
     """A group of settings in which an unknown key is an error."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, str_strip_whitespace=True)
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 def _fraction(value: object) -> float:

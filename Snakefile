@@ -1,0 +1,136 @@
+"""From static logs of inertial sensors to a cross-IMU report: `snakemake -c2`."""
+
+from imubench_pipeline.plan import Plan
+from imubench_pipeline.tables import TABLES
+from imubench_pipeline.validation import ConfigError
+
+
+configfile: "config/config.yaml"
+
+
+try:
+    plan = Plan(config)
+except ConfigError as error:
+    raise WorkflowError(str(error)) from None
+
+RESULTS = str(plan.run.results)
+FOLDER = RESULTS + "/recordings/{sensor}/{recording}"
+FOLDERS = [FOLDER.format(sensor=s, recording=r) for s, r in plan.recordings]
+
+
+wildcard_constraints:
+    sensor="[^/]+",
+    recording="[^/]+",
+
+
+localrules:
+    all,
+
+
+rule all:
+    input:
+        RESULTS + "/report/index.html",
+
+
+rule simulate:
+    output:
+        directory(RESULTS + "/simulated/{sensor}/{recording}"),
+    params:
+        settings=lambda w: plan.simulated_settings(w.sensor, w.recording),
+        code=plan.code("simulate"),
+    script:
+        "workflow/scripts/simulate.py"
+
+
+rule ingest:
+    input:
+        lambda w: plan.recordings[w.sensor, w.recording].files,
+    output:
+        FOLDER + "/quality.json",
+    params:
+        source=lambda w: str(plan.recordings[w.sensor, w.recording].path),
+        settings=lambda w: plan.ingest_settings(w.sensor, w.recording),
+        code=plan.code("ingest"),
+    script:
+        "workflow/scripts/ingest.py"
+
+
+rule allan:
+    input:
+        quality=FOLDER + "/quality.json",
+    output:
+        FOLDER + "/allan.parquet",
+    params:
+        settings=plan.settings("allan"),
+        code=plan.code("allan"),
+    script:
+        "workflow/scripts/allan.py"
+
+
+rule estimate:
+    input:
+        quality=FOLDER + "/quality.json",
+        allan=FOLDER + "/allan.parquet",
+    output:
+        FOLDER + "/parameters.parquet",
+    params:
+        settings=plan.settings("estimate"),
+        code=plan.code("estimate"),
+    script:
+        "workflow/scripts/estimate.py"
+
+
+rule reconstruct:
+    input:
+        quality=FOLDER + "/quality.json",
+        allan=FOLDER + "/allan.parquet",
+        parameters=FOLDER + "/parameters.parquet",
+    output:
+        reconstruction=FOLDER + "/reconstruction.parquet",
+        scores=FOLDER + "/scores.parquet",
+    params:
+        settings=plan.settings("reconstruction"),
+        code=plan.code("reconstruct"),
+    script:
+        "workflow/scripts/reconstruct.py"
+
+
+rule datasheet:
+    input:
+        parameters=FOLDER + "/parameters.parquet",
+    output:
+        FOLDER + "/datasheet.parquet",
+    params:
+        settings=lambda w: plan.datasheet_settings(w.sensor),
+        code=plan.code("datasheet"),
+    script:
+        "workflow/scripts/datasheet.py"
+
+
+rule tables:
+    input:
+        quality=[f"{folder}/quality.json" for folder in FOLDERS],
+        allan=[f"{folder}/allan.parquet" for folder in FOLDERS],
+        parameters=[f"{folder}/parameters.parquet" for folder in FOLDERS],
+        reconstruction=[f"{folder}/reconstruction.parquet" for folder in FOLDERS],
+        scores=[f"{folder}/scores.parquet" for folder in FOLDERS],
+        datasheet=[f"{folder}/datasheet.parquet" for folder in FOLDERS],
+    output:
+        [f"{RESULTS}/tables/{table}.{kind}" for table in TABLES for kind in ("parquet", "csv")],
+    params:
+        truths=plan.truths(),
+        code=plan.code("tables"),
+    script:
+        "workflow/scripts/tables.py"
+
+
+rule report:
+    input:
+        [f"{RESULTS}/tables/{table}.parquet" for table in TABLES],
+    output:
+        report(RESULTS + "/report/index.html", category="Comparison"),
+    params:
+        settings=plan.report_settings(),
+        code=plan.code("report"),
+    script:
+        "workflow/scripts/report.py"

@@ -1,0 +1,127 @@
+"""What the report shows of each channel, taken from the tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from imubench_pipeline.noise import NoiseModel
+
+Row = Mapping[str, Any]
+Name = tuple[str, str, str]
+METHOD_NAMES = {
+    "curve": "read from the curve",
+    "paper": "least squares, weights as printed",
+    "weighted": "least squares, right weights",
+}
+
+
+@dataclass
+class ChannelView:
+    """Everything that the tables say of one channel; numbers are SI."""
+
+    sensor: str
+    recording: str
+    channel: str
+    simulated: bool
+    tau: NDArray[np.float64]
+    adev: NDArray[np.float64]
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+    parameters: dict[str, dict[str, Row]] = field(default_factory=dict)
+    recommended: str = ""
+    reconstruction: dict[str, dict[str, NDArray[np.float64]]] = field(default_factory=dict)
+    scores: dict[str, Row] = field(default_factory=dict)
+    datasheet: list[Row] = field(default_factory=list)
+    truth: dict[str, Row] = field(default_factory=dict)
+
+    @property
+    def quantity(self) -> str:
+        """``gyro`` or ``accel``."""
+        return self.channel.split("_", maxsplit=1)[0]
+
+    @property
+    def anchor(self) -> str:
+        """Name of the section of the page."""
+        return f"{self.sensor}-{self.recording}-{self.channel}"
+
+    @property
+    def label(self) -> str:
+        """Sensor and recording, and whether it is simulated."""
+        return f"{self.sensor} / {self.recording}" + " (simulated)" * self.simulated
+
+    def model(self, method: str) -> NoiseModel:
+        """Return the noise model that a method estimated."""
+        values = {name: row["value"] for name, row in self.parameters[method].items()}
+        both = values.get("B") is not None and values.get("T_B") is not None
+        return NoiseModel(
+            N=values.get("N") or 0.0,
+            B=(values["B"] or 0.0) if both else 0.0,
+            T_B=values["T_B"] if both else None,
+            K=values.get("K") or 0.0,
+        )
+
+
+def channel_views(tables: Mapping[str, pa.Table]) -> list[ChannelView]:
+    """Gather the tables by channel, in their order."""
+    simulated = {
+        (row["sensor"], row["recording"]): row["simulated"]
+        for row in tables["recordings"].to_pylist()
+    }
+    views: dict[Name, ChannelView] = {}
+    for name, part in _by_channel(tables["allan"]).items():
+        views[name] = ChannelView(
+            *name,
+            simulated[name[0], name[1]],
+            tau=_floats(part, "tau"),
+            adev=_floats(part, "adev"),
+            lower=_floats(part, "lower"),
+            upper=_floats(part, "upper"),
+        )
+    for row in tables["parameters"].to_pylist():
+        view = views[_name(row)]
+        view.parameters.setdefault(row["method"], {})[row["parameter"]] = row
+        if row["recommended"]:
+            view.recommended = row["method"]
+    for name, part in _by_channel(tables["reconstruction"]).items():
+        methods = part["method"].to_pylist()
+        for method in dict.fromkeys(methods):
+            chosen = part.filter(pa.array([each == method for each in methods]))
+            views[name].reconstruction[method] = {
+                column: _floats(chosen, column)
+                for column in ("tau", "adev", "lower", "upper", "reconstructed")
+            }
+    for row in tables["scores"].to_pylist():
+        views[_name(row)].scores[row["method"]] = row
+    for row in tables["datasheet"].to_pylist():
+        views[_name(row)].datasheet.append(row)
+    for row in tables["simulated_truth"].to_pylist():
+        if _name(row) in views:
+            views[_name(row)].truth[row["parameter"]] = row
+    return list(views.values())
+
+
+def _name(row: Row) -> Name:
+    return row["sensor"], row["recording"], row["channel"]
+
+
+def _floats(part: pa.Table, column: str) -> NDArray[np.float64]:
+    return np.asarray(part[column].to_numpy(), dtype=np.float64)
+
+
+def _by_channel(table: pa.Table) -> dict[Name, pa.Table]:
+    """Divide a table, whose channels stand together, into one slice a channel."""
+    names = list(
+        zip(*(table[key].to_pylist() for key in ("sensor", "recording", "channel")), strict=True)
+    )
+    starts = [i for i, name in enumerate(names) if i == 0 or name != names[i - 1]]
+    stops = [*starts[1:], len(names)]
+    return {
+        names[start]: table.slice(start, stop - start)
+        for start, stop in zip(starts, stops, strict=True)
+    }

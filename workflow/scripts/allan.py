@@ -1,0 +1,27 @@
+"""Compute the Allan variance of every channel of a recording."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+from imubench_pipeline.allan import cluster_sizes, integrate, of_phase
+from imubench_pipeline.config import AllanSettings
+from imubench_pipeline.recording import channel_logs
+from imubench_pipeline.results import Key, Row, allan_rows
+from imubench_pipeline.tables import write
+
+
+def curves(folder: Path, sensor: str, recording: str, settings: AllanSettings) -> Iterator[Row]:
+    """Yield the rows of the table ``allan``; none of a rejected recording."""
+    for channel, log in channel_logs(folder).items():
+        phase = integrate(log.blocks(), log.grid, holes=log.holes, segments=log.segments)
+        sizes = cluster_sizes(log.grid, per_decade=settings.per_decade, longest=settings.longest)
+        yield from allan_rows(Key(sensor, recording, channel), of_phase(phase, log.rate, sizes))
+
+
+if __name__ == "__main__":
+    names = snakemake.wildcards
+    settings = AllanSettings.model_validate(json.loads(snakemake.params.settings))
+    kept = Path(snakemake.input.quality).parent
+    rows = curves(kept, names.sensor, names.recording, settings)
+    write("allan", rows, Path(snakemake.output[0]))
