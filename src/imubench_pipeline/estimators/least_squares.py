@@ -7,6 +7,7 @@ squares; the search is over T_B alone (variable projection).
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -24,6 +25,14 @@ from imubench_pipeline.noise import (
 )
 
 Array = NDArray[np.float64]
+
+_FEWEST_POINTS = 4
+_BEYOND_FILTERS = 16
+"""Cluster size beyond which the sensor's own filter hardly matters."""
+
+_BENT_SIGMAS = 4.0
+_SHORTEST_CORRELATION = 20
+"""Sampling intervals: a shorter correlation is that of a filter, not a bias instability."""
 
 _SCAN = 160
 """Correlation times tried before the search is refined."""
@@ -51,7 +60,8 @@ def fit(
     curve : AllanCurve
     method : {"weighted", "paper"}
     longest : float
-        Longest tau of the fit, as a part of the log.
+        Longest tau of the fit, as a part of the log. The shortest is where the curve begins
+        to follow a model of its longer tau: the sensor's own filter bends it before that.
 
     Returns
     -------
@@ -65,21 +75,53 @@ def fit(
         If fewer than four points lie within ``longest``, or the method is not known.
     """
     used = curve.cluster_size <= longest * curve.samples
-    if used.sum() < 4:
+    if used.sum() < _FEWEST_POINTS:
         raise ValueError(
-            f"the curve has {used.sum()} points up to {longest:.3g} of the log, expected 4 or more"
+            f"the curve has {used.sum()} points up to {longest:.3g} of the log, expected "
+            f"{_FEWEST_POINTS} or more"
         )
+    if method not in ("weighted", "paper"):
+        raise ValueError(f"method {method!r} is not known, expected 'weighted' or 'paper'")
+    certain = used & (curve.cluster_size >= _BEYOND_FILTERS)
+    if certain.sum() >= _FEWEST_POINTS:
+        model = _fit(curve, certain, method).model
+        used &= curve.cluster_size >= _first_unbent(curve, certain, model)
+    estimate = _fit(curve, used, method)
+    first = int(np.flatnonzero(used)[0])
+    if first == 0:
+        return estimate
+    parameters = dict(estimate.parameters)
+    parameters["N"] = replace(
+        parameters["N"],
+        reason=f"from tau = {curve.tau[first]:.3g} s: at shorter tau the curve is bent, as by the "
+        "sensor's own filter",
+    )
+    return Estimate(method, parameters)
+
+
+def _first_unbent(curve: AllanCurve, certain: NDArray[np.bool_], model: NoiseModel) -> int:
+    """Return the smallest cluster size from which the curve follows a model of its longer tau.
+
+    The sensor's own low-pass filter, and coarse steps of its output, bend the curve at the
+    shortest tau, which weigh most in a fit.
+    """
+    first = int(np.flatnonzero(certain)[0])
+    variance = model.allan_variance(curve.tau)
+    unsure = 2.0 / curve.edf + 2.0 / curve.edf[first]
+    off = np.abs(curve.variance / variance - 1.0) > _BENT_SIGMAS * np.sqrt(unsure)
+    bent = np.flatnonzero(off[:first])
+    return int(curve.cluster_size[bent[-1] + 1 if len(bent) else 0])
+
+
+def _fit(
+    curve: AllanCurve, used: NDArray[np.bool_], method: Literal["weighted", "paper"]
+) -> Estimate:
     tau, n, variance = curve.tau[used], curve.cluster_size[used], curve.variance[used]
     spread = np.sqrt(n / (2.0 * curve.samples))
-    if method == "weighted":
-        root_weight = 1.0 / (2.0 * spread * variance)
-    elif method == "paper":
-        root_weight = 1.0 / (2.0 * spread * np.sqrt(variance))
-    else:
-        raise ValueError(f"method {method!r} is not known, expected 'weighted' or 'paper'")
+    power = variance if method == "weighted" else np.sqrt(variance)
+    root_weight = 1.0 / (2.0 * spread * power)
     interval = float(tau[0] / n[0])
-    search = _Search(tau, n, variance, root_weight, interval, sampled=False)
-    estimate = search.estimate(method)
+    estimate = _Search(tau, n, variance, root_weight, interval, sampled=False).estimate(method)
     if _sampling_shows(estimate.model, tau, interval, spread):
         estimate = _Search(tau, n, variance, root_weight, interval, sampled=True).estimate(method)
     return estimate
@@ -113,7 +155,8 @@ class _Search:
         if sampled:
             walk = walk * (1.0 + 0.5 / n.astype(np.float64) ** 2)
         self._white, self._walk = 1.0 / tau, walk
-        self.shortest, self.longest = tau[0] / PEAK_TAU, tau[-1] / PEAK_TAU
+        self.longest = tau[-1] / PEAK_TAU
+        self.shortest = min(_SHORTEST_CORRELATION * interval, self.longest / 2.0)
 
     def _shape(self, T_B: float) -> Array:
         if self._sampled:
