@@ -132,8 +132,8 @@ def integrate(
     Raises
     ------
     ValueError
-        If the blocks are not ``samples`` long, or a sample is missing although ``holes`` is
-        False.
+        If the blocks are not ``samples`` long, a sample is infinite, or one is missing although
+        ``holes`` is False.
     """
     theta = np.empty(samples + 1)
     theta[0] = 0.0
@@ -145,17 +145,22 @@ def integrate(
         stop = reached + len(values)
         if stop > samples:
             raise ValueError(f"the blocks hold more than the {samples} samples stated")
-        if level is None:
+        finite = values[np.isfinite(values)] if level is None else values
+        if level is None and len(finite):
             # A constant drops out of the variance, but 9.81 would eat the digits of the sum.
-            level = float(np.nanmean(values)) if np.isfinite(values).any() else None
-        _accumulate(values, level or 0.0, theta[reached : stop + 1])
-        if present is not None:
-            _count(values, present[reached : stop + 1])
+            level = float(finite.mean())
+        if present is None:
+            _accumulate(values, level or 0.0, theta[reached : stop + 1])
+        else:
+            reach = slice(reached, stop + 1)
+            _accumulate_present(values, level or 0.0, theta[reach], present[reach])
         reached = stop
     if reached != samples:
         raise ValueError(f"the blocks hold {reached} samples, {samples} were stated")
-    if present is None and not np.isfinite(theta[-1]):
-        raise ValueError("a sample is missing or not finite; holes=True takes care of it")
+    if not np.isfinite(theta[-1]):
+        raise ValueError(
+            "a sample is infinite" if holes else "a sample is missing or infinite, but holes=False"
+        )
     return Phase(theta, present, tuple(segments) if segments else ((0, samples),))
 
 
@@ -307,19 +312,19 @@ def _degrees(phase: Phase, exponent: int, n: int) -> float:
 def _accumulate(values, level, theta):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     total = theta[0]
     for i in range(values.size):
-        difference = values[i] - level
-        if not np.isnan(difference):
-            total += difference
+        total += values[i] - level
         theta[i + 1] = total
 
 
 @njit(cache=True, nogil=True)
-def _count(values, present):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
-    total = present[0]
+def _accumulate_present(values, level, theta, present):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+    total, number = theta[0], present[0]
     for i in range(values.size):
         if not np.isnan(values[i]):
-            total += 1
-        present[i + 1] = total
+            total += values[i] - level
+            number += 1
+        theta[i + 1] = total
+        present[i + 1] = number
 
 
 @njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})

@@ -192,9 +192,12 @@ def sampled_gauss_markov_shape(n: ArrayLike, interval: float, T_B: float) -> Arr
     # 3 - 4 p^n + p^2n = 2 (1 - p^n) + (1 - p^n)^2 with the sign of its parts kept.
     decay = -np.expm1(-x)
     closed = (n * (1.0 + p) / q - p * decay * (2.0 + decay) / q**2) / n**2
-    # For clusters far shorter than T_B the difference cancels: continuous form and its samples.
-    continuous = 2.0 / T_B * gauss_markov_shape(n * interval, T_B) + interval / (3 * T_B * n)
-    return T_B / 2.0 * np.where(x < 1e-3, continuous, closed)
+    # For clusters far shorter than T_B this cancels; the continuous form does not, and the
+    # moments sum_ij w_i w_j |i - j|^m of the samples tell what sampling adds to it.
+    h = interval / T_B
+    added = h / (3.0 * n) - h**3 / 6.0 * (n / 3.0 + 1.0 / (15.0 * n))
+    continuous = 2.0 / T_B * gauss_markov_shape(n * interval, T_B) + added
+    return T_B / 2.0 * np.where(x < 3e-3, continuous, closed)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -114,6 +114,8 @@ def _converter(unit: str, dimension: str) -> tuple[float, float]:
     registry = _registry()
     target = registry.Quantity(1.0, _normalise(SI_UNITS[dimension])).units
     try:
+        if "//" in unit:
+            raise pint.UndefinedUnitError(unit)
         source = registry.parse_units(_normalise(unit))
         zero, one = (registry.Quantity(value, source).to(target).magnitude for value in (0.0, 1.0))
     except pint.UndefinedUnitError as error:
@@ -157,7 +159,7 @@ def from_si(value: float, unit: str, dimension: str) -> float:
     return (value - offset) / factor
 
 
-_QUANTITY = re.compile(r"^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*)$")
+_QUANTITY = re.compile(r"^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d\s.].*)$")
 
 
 def quantity_to_si(text: str, dimension: str) -> float:

@@ -24,7 +24,8 @@ _OCTAVE = math.log10(2.0)
 """Estimates closer than an octave of tau are hardly independent."""
 
 _WHITE_TOLERANCE = 0.06
-_WALK_TOLERANCE = 0.12
+_WALK_TOLERANCE = 0.06
+_WALK_MOST_TOLERANCE = 0.2
 _WALK_SPANS = np.arange(0.4, 2.01, 0.1)
 _WALK_LEAST_SLOPE = 0.2
 _RISE_SIGMAS = 3.0
@@ -162,7 +163,8 @@ def _walk(points: _Curve) -> Parameter:
             continue
         slope, error = points.slope(inside)
         steepest = max(steepest, slope)
-        if abs(slope - 0.5) <= _WALK_TOLERANCE + error and slope - 2 * error > _WALK_LEAST_SLOPE:
+        allowed = max(_WALK_TOLERANCE, min(error, _WALK_MOST_TOLERANCE))
+        if abs(slope - 0.5) <= allowed and slope - 2 * error > _WALK_LEAST_SLOPE:
             best = inside
     if best is None:
         shown = f"the steepest end has {steepest:+.2f}" if np.isfinite(steepest) else "it ends low"

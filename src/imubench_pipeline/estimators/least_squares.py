@@ -31,6 +31,7 @@ _BEYOND_FILTERS = 16
 """Cluster size beyond which the sensor's own filter hardly matters."""
 
 _BENT_SIGMAS = 4.0
+_MOST_REFITS = 5
 _SHORTEST_CORRELATION = 20
 """Sampling intervals: a shorter correlation is that of a filter, not a bias instability."""
 
@@ -82,10 +83,7 @@ def fit(
         )
     if method not in ("weighted", "paper"):
         raise ValueError(f"method {method!r} is not known, expected 'weighted' or 'paper'")
-    certain = used & (curve.cluster_size >= _BEYOND_FILTERS)
-    if certain.sum() >= _FEWEST_POINTS:
-        model = _fit(curve, certain, method).model
-        used &= curve.cluster_size >= _first_unbent(curve, certain, model)
+    used &= curve.cluster_size >= _first_unbent(curve, used, method)
     estimate = _fit(curve, used, method)
     first = int(np.flatnonzero(used)[0])
     if first == 0:
@@ -99,18 +97,55 @@ def fit(
     return Estimate(method, parameters)
 
 
-def _first_unbent(curve: AllanCurve, certain: NDArray[np.bool_], model: NoiseModel) -> int:
+def _first_unbent(
+    curve: AllanCurve, used: NDArray[np.bool_], method: Literal["weighted", "paper"]
+) -> int:
     """Return the smallest cluster size from which the curve follows a model of its longer tau.
 
     The sensor's own low-pass filter, and coarse steps of its output, bend the curve at the
-    shortest tau, which weigh most in a fit.
+    shortest tau, which weigh most in a fit. Where a bend is seen, it fades as 1/n: the fit
+    begins where it is below the standard error of the curve.
     """
-    first = int(np.flatnonzero(certain)[0])
-    variance = model.allan_variance(curve.tau)
-    unsure = 2.0 / curve.edf + 2.0 / curve.edf[first]
-    off = np.abs(curve.variance / variance - 1.0) > _BENT_SIGMAS * np.sqrt(unsure)
-    bent = np.flatnonzero(off[:first])
-    return int(curve.cluster_size[bent[-1] + 1 if len(bent) else 0])
+    n = curve.cluster_size
+    error = np.sqrt(2.0 / curve.edf)
+    start = _BEYOND_FILTERS
+    for _ in range(_MOST_REFITS):
+        certain = used & (n >= start)
+        if certain.sum() < _FEWEST_POINTS:
+            break
+        first = int(np.flatnonzero(certain)[0])
+        expected, unsure = _predicted(curve, certain, _fit(curve, certain, method).model)
+        off = np.abs(curve.variance / expected - 1.0)[:first]
+        bent = off > _BENT_SIGMAS * np.hypot(error, unsure)[:first]
+        if not bent.any():
+            break
+        fading = float((off * n[:first])[bent].max()) / n
+        unbent = used & (fading <= error)
+        unbent[: np.flatnonzero(bent)[-1] + 1] = False
+        if unbent.sum() < _FEWEST_POINTS or n[unbent][0] <= start:
+            return int(n[unbent][0]) if unbent.any() else start
+        start = int(n[unbent][0])
+    else:
+        return start
+    return int(n[0]) if start == _BEYOND_FILTERS else start
+
+
+def _predicted(
+    curve: AllanCurve, used: NDArray[np.bool_], model: NoiseModel
+) -> tuple[Array, Array]:
+    """Return what a model fitted to some tau says of all, and the relative error of that."""
+    rate = curve.cluster_size[0] / curve.tau[0]
+    expected = model.allan_variance(curve.tau, rate)
+    shapes = [NoiseModel(N=1.0), NoiseModel(K=1.0)]
+    if model.T_B is not None:
+        shapes.append(NoiseModel(B=1.0, T_B=model.T_B))
+    relative = np.array([shape.allan_variance(curve.tau, rate) / expected for shape in shapes])
+    # Estimates within an octave go together: a decade holds fewer than it has points.
+    crowd = max(1.0, math.log10(2.0) / float(np.median(np.diff(np.log10(curve.tau[used])))))
+    information = (relative[:, used] * curve.edf[used] / (2.0 * crowd)) @ relative[:, used].T
+    covariance = np.linalg.pinv(information, hermitian=True)
+    unsure = np.sqrt(np.maximum(np.einsum("ij,ik,kj->j", relative, covariance, relative), 0.0))
+    return expected, unsure
 
 
 def _fit(

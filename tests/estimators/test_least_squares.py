@@ -1,0 +1,129 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes
+from imubench_pipeline.confidence import equivalent_degrees
+from imubench_pipeline.estimators.estimate import Estimate
+from imubench_pipeline.estimators.least_squares import fit
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.simulate import ensemble, simulate
+
+MTI_7 = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7)
+HOURS_10 = 3_600_000
+
+
+def curve_of(variance: np.ndarray, sizes: np.ndarray, rate: float, samples: int) -> AllanCurve:
+    edf = [equivalent_degrees(0, int(n), samples - 2 * int(n) + 1) for n in sizes]
+    return AllanCurve(
+        sizes / rate, sizes, variance, np.array(edf), np.zeros(len(sizes), dtype=int), samples
+    )
+
+
+def noiseless(model: NoiseModel, rate: float = 100.0, samples: int = HOURS_10) -> AllanCurve:
+    sizes = cluster_sizes(samples)
+    return curve_of(model.allan_variance(sizes / rate), sizes, rate, samples)
+
+
+def value(estimate: Estimate, name: str) -> float:
+    found = estimate.parameters[name].value
+    assert found is not None, estimate.parameters[name]
+    return found
+
+
+@pytest.mark.parametrize("method", ["weighted", "paper"])
+def test_a_noiseless_curve_gives_its_parameters_back(method) -> None:
+    estimate = fit(noiseless(MTI_7), method=method)
+    for name in ("N", "B", "T_B", "K"):
+        assert value(estimate, name) == pytest.approx(getattr(MTI_7, name), rel=1e-6)
+        assert estimate.parameters[name].status == "ok"
+    assert estimate.model.name == "N+GM+K"
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.floats(0.3, 3), st.floats(0.5, 2), st.floats(20, 500), st.floats(0.3, 3))
+def test_noiseless_curves_of_many_sensors(N: float, B: float, T_B: float, K: float) -> None:
+    model = NoiseModel(N=N * 1e-4, B=B * 7e-5, T_B=T_B, K=K * 1e-6)
+    estimate = fit(noiseless(model))
+    for name in ("N", "B", "T_B", "K"):
+        assert value(estimate, name) == pytest.approx(getattr(model, name), rel=1e-6)
+
+
+def test_the_tau_of_a_curve_is_that_of_its_clusters() -> None:
+    # sizes far from a log-spaced grid: a fit at nominal taus would be badly off
+    sizes = np.unique(np.rint(np.geomspace(1, HOURS_10 / 9, 23) * 1.04).astype(int))
+    curve = curve_of(MTI_7.allan_variance(sizes / 100.0), sizes, 100.0, HOURS_10)
+    assert value(fit(curve), "T_B") == pytest.approx(89.5, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("model", "absent"),
+    [
+        (NoiseModel(N=1e-3), ("B", "T_B", "K")),
+        (NoiseModel(N=1e-3, K=1e-5), ("B", "T_B")),
+        (NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5), ("K",)),
+    ],
+)
+def test_terms_that_are_not_there_are_absent(model: NoiseModel, absent: tuple) -> None:
+    estimate = fit(noiseless(model))
+    for name in absent:
+        assert estimate.parameters[name].status == "absent"
+        assert estimate.parameters[name].value is None
+    assert value(estimate, "N") == pytest.approx(model.N, rel=1e-6)
+
+
+def test_a_peak_beyond_the_curve_is_at_its_bound() -> None:
+    estimate = fit(noiseless(NoiseModel(N=1e-4, B=1e-3, T_B=20_000.0), samples=HOURS_10))
+    assert estimate.parameters["T_B"].status == "at_bound"
+    assert "end of its search" in (estimate.parameters["T_B"].reason or "")
+
+
+def test_sampling_counts_where_the_log_can_tell(rng) -> None:
+    # a random walk sampled at 1 Hz with little white noise: 3/2 of the continuous form at n = 1
+    model = NoiseModel(N=1e-3, K=2e-3)
+    log = simulate(model, 1.0, 200_000, rng)
+    estimate = fit(allan_variance(log, 1.0))
+    assert value(estimate, "K") == pytest.approx(2e-3, rel=0.02)
+    assert value(estimate, "N") == pytest.approx(1e-3, rel=0.05)
+
+
+def test_a_low_pass_in_the_sensor_harms_neither_n_nor_b(rng) -> None:
+    log = simulate(MTI_7, 100.0, HOURS_10, rng)
+    filtered = (log[1:] + log[:-1]) / 2
+    plain, bent = (fit(allan_variance(samples, 100.0)) for samples in (log, filtered))
+    assert value(bent, "N") == pytest.approx(8.4e-5, rel=0.01)
+    assert value(bent, "B") == pytest.approx(value(plain, "B"), rel=0.03)
+    assert value(bent, "T_B") == pytest.approx(value(plain, "T_B"), rel=0.06)
+    assert "curve is bent" in (bent.parameters["N"].reason or "")
+    assert plain.parameters["N"].reason is None
+
+
+def test_clean_curves_keep_their_short_taus(rng) -> None:
+    sizes = cluster_sizes(HOURS_10)
+    curves = ensemble(MTI_7, 100.0, HOURS_10, sizes, 300, rng)
+    shortened = sum(
+        fit(curve_of(variance, sizes, 100.0, HOURS_10)).parameters["N"].reason is not None
+        for variance in curves
+    )
+    assert shortened <= 6
+
+
+def test_ten_hour_logs_of_an_mti_7(rng) -> None:
+    """RMSE near the Cramér-Rao bound of 0.037, 4.2 and 9.8 %."""
+    errors = {name: [] for name in ("N", "B", "T_B")}
+    for _ in range(50):
+        estimate = fit(allan_variance(simulate(MTI_7, 100.0, HOURS_10, rng), 100.0))
+        for name, found in errors.items():
+            found.append(value(estimate, name) / getattr(MTI_7, name) - 1)
+    rmse = {name: np.sqrt(np.mean(np.square(found))) for name, found in errors.items()}
+    assert rmse["N"] <= 0.0015
+    assert rmse["B"] <= 0.06
+    assert rmse["T_B"] <= 0.13
+
+
+def test_wrong_arguments() -> None:
+    with pytest.raises(ValueError, match="expected 4 or more"):
+        fit(noiseless(MTI_7, samples=20))
+    with pytest.raises(ValueError, match="'weighted' or 'paper'"):
+        fit(noiseless(MTI_7), method="best")  # type: ignore[arg-type]

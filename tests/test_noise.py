@@ -1,0 +1,132 @@
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import quad
+
+from imubench_pipeline.noise import (
+    FLOOR,
+    PEAK_TAU,
+    GaussMarkov,
+    NoiseModel,
+    RandomWalk,
+    WhiteNoise,
+    bias_instability,
+    driving_density,
+    sampled_gauss_markov_shape,
+)
+
+MTI_7 = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7)
+
+
+def exact_gauss_markov(tau: float, T_B: float) -> mpmath.mpf:
+    with mpmath.workdps(40):
+        t, c = mpmath.mpf(tau), mpmath.mpf(T_B)
+        bracket = 1 - c / (2 * t) * (3 - 4 * mpmath.exp(-t / c) + mpmath.exp(-2 * t / c))
+        return c**2 / t * bracket
+
+
+@settings(deadline=None)
+@given(st.floats(-6, 6), st.floats(-3, 5))
+def test_gauss_markov_to_ten_digits_at_every_tau(log_ratio: float, log_time: float) -> None:
+    T_B = 10.0**log_time
+    tau = T_B * 10.0**log_ratio
+    term = GaussMarkov(1.0, T_B)
+    expected = float(exact_gauss_markov(tau, T_B)) * term.density
+    assert term.allan_variance(np.array([tau]))[0] == pytest.approx(expected, rel=1e-10)
+
+
+@pytest.mark.parametrize("term", [WhiteNoise(0.3), GaussMarkov(0.7, 5.0), RandomWalk(0.2)])
+@pytest.mark.parametrize("tau", [0.5, 3.0, 40.0])
+def test_allan_variance_is_the_integral_of_the_spectrum(term, tau: float) -> None:
+    # sigma^2 = 4 int S sin^4(pi f tau) / (pi f tau)^2 df, with x = pi f tau
+    def integrand(x: float) -> float:
+        return float(term.psd(np.array([x / (np.pi * tau)]))[0] * np.sin(x) ** 4 / x**2)
+
+    total = sum(
+        quad(integrand, k * np.pi + 1e-12, (k + 1) * np.pi, limit=200)[0] for k in range(3000)
+    )
+    # beyond, sin^4 averages to 3/8; the rest falls with 1/x at least
+    last = 3000 * np.pi
+    tail = 3 / 8 * float(term.psd(np.array([last / (np.pi * tau)]))[0]) / last
+    assert 4 / (np.pi * tau) * (total + tail) == pytest.approx(
+        float(term.allan_variance(np.array([tau]))[0]), rel=2e-6
+    )
+
+
+@pytest.mark.parametrize("n", [1, 2, 7, 60])
+@pytest.mark.parametrize("T_B", [0.05, 0.8, 200.0])
+def test_sampled_gauss_markov_is_the_sum_of_covariances(n: int, T_B: float) -> None:
+    interval, variance = 0.1, 1.0
+    weights = np.concatenate([-np.ones(n), np.ones(n)]) / n
+    lags = np.abs(np.subtract.outer(np.arange(2 * n), np.arange(2 * n)))
+    expected = weights @ (variance * np.exp(-lags * interval / T_B)) @ weights / 2
+    density = 2 * variance / T_B
+    found = density * sampled_gauss_markov_shape([n], interval, T_B)[0]
+    assert found == pytest.approx(expected, rel=1e-8)
+
+
+@pytest.mark.parametrize("n", [1, 3, 20])
+def test_sampled_random_walk_is_the_sum_of_covariances(n: int) -> None:
+    interval, K = 0.1, 0.3
+    weights = np.concatenate([-np.ones(n), np.ones(n)]) / n
+    steps = np.arange(1, 2 * n + 1)
+    covariance = K**2 * interval * np.minimum.outer(steps, steps)
+    expected = weights @ covariance @ weights / 2
+    found = RandomWalk(K).sampled_allan_variance(np.array([float(n)]), interval)[0]
+    assert found == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("term", [WhiteNoise(0.3), GaussMarkov(0.7, 5.0), RandomWalk(0.2)])
+def test_sampled_spectrum_gives_the_sampled_allan_variance(term) -> None:
+    interval, points = 0.1, 1 << 16
+    omega = np.pi * (np.arange(points) + 0.5) / points
+    for n in (1, 4, 50):
+        transfer = 4 * np.sin(n * omega / 2) ** 4 / (n**2 * np.sin(omega / 2) ** 2)
+        found = np.mean(term.sampled_spectrum(omega, interval) * transfer) / 2
+        expected = term.sampled_allan_variance(np.array([float(n)]), interval)[0]
+        assert found == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_peak_of_gauss_markov_is_the_plateau_of_b() -> None:
+    term = GaussMarkov(1.0, 10.0)
+    tau = np.linspace(1.5, 2.5, 20_001) * 10.0
+    deviation = np.sqrt(term.allan_variance(tau))
+    assert tau[np.argmax(deviation)] / 10.0 == pytest.approx(PEAK_TAU, abs=1e-4)
+    assert deviation.max() == pytest.approx(FLOOR, rel=1e-3)
+    assert FLOOR == pytest.approx(0.66428, abs=1e-5)
+
+
+def test_b_and_its_driving_density_are_inverse() -> None:
+    assert bias_instability(driving_density(3e-5, 77.0), 77.0) == pytest.approx(3e-5)
+
+
+def test_state_space_is_exact() -> None:
+    space = MTI_7.state_space(100.0)
+    term = GaussMarkov(MTI_7.B, 89.5)
+    stationary = term.density * 89.5 / 2
+    np.testing.assert_allclose(space.transition, [np.exp(-0.01 / 89.5), 1.0])
+    np.testing.assert_allclose(
+        space.process_noise, [stationary * (1 - space.transition[0] ** 2), 8.2e-7**2 * 0.01]
+    )
+    np.testing.assert_allclose(space.initial_variance, [stationary, 0.0])
+    assert space.measurement_noise == pytest.approx(8.4e-5**2 * 100.0)
+
+
+def test_a_model_is_the_sum_of_its_terms() -> None:
+    tau = np.geomspace(0.01, 1e4, 20)
+    parts = [WhiteNoise(8.4e-5), GaussMarkov(6.7e-5, 89.5), RandomWalk(8.2e-7)]
+    np.testing.assert_allclose(MTI_7.allan_variance(tau), sum(p.allan_variance(tau) for p in parts))
+    np.testing.assert_allclose(MTI_7.psd(tau), sum(p.psd(tau) for p in parts))
+    assert MTI_7.name == "N+GM+K"
+    assert NoiseModel().name == "none"
+    assert (NoiseModel().allan_variance(tau) == 0).all()
+
+
+@pytest.mark.parametrize(
+    "values", [{"N": -1.0}, {"K": np.nan}, {"B": 1.0}, {"B": 1.0, "T_B": 0.0}, {"N": np.inf}]
+)
+def test_impossible_models(values: dict) -> None:
+    with pytest.raises(ValueError, match="expected"):
+        NoiseModel(**values)

@@ -1,0 +1,110 @@
+import numpy as np
+import pytest
+
+from imubench_pipeline.allan import cluster_sizes
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.simulate import (
+    block_sums,
+    channel_rng,
+    ensemble,
+    reconstructed_variance,
+    simulate,
+    simulate_blocks,
+    variance_covariance,
+)
+
+MODEL = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=20.0, K=8.2e-6)
+RATE = 10.0
+
+
+def gauss_markov_variance(tau: np.ndarray, B: float, T_B: float) -> np.ndarray:
+    """Integral of the spectrum, written apart from the library, over a fine grid of log f."""
+    f = np.geomspace(1e-9, 1e5, 400_001)
+    density = 2 * B**2 * np.log(2) / (np.pi * 0.4365**2 * T_B)
+    psd = density / (1 / T_B**2 + (2 * np.pi * f) ** 2)
+    return np.array(
+        [
+            np.trapezoid(4 * psd * np.sin(np.pi * f * t) ** 4 / (np.pi * f * t) ** 2 * f, np.log(f))
+            for t in tau
+        ]
+    )
+
+
+def test_the_allan_variance_of_simulated_logs_is_the_theoretical_one(rng) -> None:
+    sizes = np.array([2, 10, 50, 200, 800, 2000])
+    tau = sizes / RATE
+    found = np.array([reconstructed_variance(MODEL, RATE, 20_000, sizes, rng) for _ in range(400)])
+    expected = (
+        MODEL.N**2 / tau
+        + gauss_markov_variance(tau, MODEL.B, 20.0)
+        + MODEL.K**2 * tau / 3 * (1 + 0.5 / sizes**2)
+    )
+    error = found.std(axis=0) / np.sqrt(len(found))
+    assert (np.abs(found.mean(axis=0) - expected) < 4 * error + 1e-4 * expected).all()
+
+
+def test_the_spectrum_of_simulated_logs_is_the_theoretical_one(rng) -> None:
+    length, members = 4096, 600
+    window = np.hanning(length)
+    power = np.zeros(length // 2 + 1)
+    for _ in range(members):
+        log = simulate(NoiseModel(N=1e-3, B=5e-3, T_B=2.0), RATE, length, rng)
+        power += np.abs(np.fft.rfft(window * (log - log.mean()))) ** 2
+    density = power / members / (window @ window) / RATE
+    f = np.fft.rfftfreq(length, 1 / RATE)[20:200]  # far below Nyquist: no aliasing to speak of
+    driving = 2 * 5e-3**2 * np.log(2) / (np.pi * 0.4365**2 * 2.0)
+    expected = 1e-6 + driving / (1 / 2.0**2 + (2 * np.pi * f) ** 2)
+    ratio = density[20:200] / expected
+    assert ratio.mean() == pytest.approx(1.0, abs=0.01)
+    assert np.abs(ratio - 1).max() < 5 / np.sqrt(members)
+
+
+def test_gauss_markov_starts_stationary(rng) -> None:
+    model = NoiseModel(B=1.0, T_B=1000.0)
+    starts = [simulate(model, RATE, 1, rng)[0] for _ in range(4000)]
+    stationary = model.state_space(RATE).initial_variance[0]
+    assert np.var(starts) == pytest.approx(stationary, rel=0.1)
+
+
+def test_a_log_depends_on_its_seed_only() -> None:
+    def log(*names: str, block: int = 1 << 20) -> np.ndarray:
+        rng = channel_rng(1, *names)
+        return np.concatenate(list(simulate_blocks(MODEL, RATE, 5000, rng, block)))
+
+    np.testing.assert_array_equal(log("s", "r", "gyro_x"), log("s", "r", "gyro_x", block=77))
+    assert not np.allclose(log("s", "r", "gyro_x"), log("s", "r", "gyro_y"))
+    assert not np.allclose(log("s", "r", "gyro_x"), log("sr", "", "gyro_x"))
+
+
+def test_block_sums_are_distributed_as_the_sums_of_a_log(rng) -> None:
+    model = NoiseModel(N=0.1, B=1.0, T_B=3.0, K=0.2)
+    width, blocks, members = 25, 4, 6000
+    direct = np.array(
+        [
+            simulate(model, RATE, width * blocks, rng).reshape(blocks, width).sum(1)
+            for _ in range(members)
+        ]
+    )
+    drawn = np.array([block_sums(model, RATE, blocks, width, rng) for _ in range(members)])
+    scale = np.sqrt(np.outer(np.diag(np.cov(direct.T)), np.diag(np.cov(direct.T))))
+    np.testing.assert_allclose(np.cov(drawn.T) / scale, np.cov(direct.T) / scale, atol=0.08)
+
+
+def test_the_ensemble_is_that_of_full_length_logs(rng) -> None:
+    length = 40_000
+    sizes = cluster_sizes(length, per_decade=4)
+    drawn = ensemble(MODEL, RATE, length, sizes, 2000, rng)
+    full = np.array([reconstructed_variance(MODEL, RATE, length, sizes, rng) for _ in range(500)])
+    spread = full.std(axis=0)
+    for quantile, allowed in ((0.025, 0.45), (0.5, 0.2), (0.975, 0.6)):
+        difference = np.quantile(drawn, quantile, axis=0) - np.quantile(full, quantile, axis=0)
+        assert (np.abs(difference) < allowed * spread).all(), quantile
+    np.testing.assert_allclose(drawn.std(axis=0) / spread, 1.0, atol=0.15)
+
+
+def test_neighbouring_taus_go_together_in_the_ensemble(rng) -> None:
+    sizes = np.array([2, 3, 4, 8])
+    full = np.array([reconstructed_variance(MODEL, RATE, 4000, sizes, rng) for _ in range(3000)])
+    expected = variance_covariance(MODEL, RATE, 4000, sizes)
+    scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+    np.testing.assert_allclose(np.cov(full.T) / scale, expected / scale, atol=0.08)
