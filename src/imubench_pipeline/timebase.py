@@ -93,7 +93,9 @@ def from_stamps(stamps: Stamps, stated: float | None, settings: QualitySettings)
     for block in stamps():
         tracks[0].follow(block)
     found = tracks[0]
-    if found.off_grid > settings.jitter * found.rows:
+    # Many holes that are together longer than the log are pauses of the host, not losses.
+    bursts = found.grid > 2 * found.rows and found.holes > 0.05 * found.rows
+    if found.off_grid > settings.jitter * found.rows or bursts:
         return _arrival_order(stamps, found, stated, settings)
     # The mean over the whole recording is far better known than the typical interval.
     exact = found.elapsed / found.steps if found.steps else interval
@@ -316,9 +318,9 @@ def _arrival_order(
         Finding(
             "jittered_stamps",
             "warning",
-            f"{100 * found.off_grid / found.rows:.0f} % of the stamps lie on no uniform grid "
-            f"(intervals up to {1e3 * worst:.3g} ms); the samples are taken as consecutive at the "
-            f"mean rate of {rate:.6g} Hz, so lost samples cannot be seen",
+            f"the stamps lie on no uniform grid ({100 * found.off_grid / found.rows:.0f} % of them "
+            f"off it, {found.holes} pauses, intervals up to {1e3 * worst:.3g} ms); "
+            f"the samples are taken as consecutive at the mean rate of {rate:.6g} Hz, so lost samples cannot be seen",
             worst,
         ),
         *_rate_findings(rate, stated, settings),

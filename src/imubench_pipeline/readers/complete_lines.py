@@ -68,7 +68,8 @@ class CompleteLines(io.RawIOBase):
 
     def _read(self, size: int) -> bytes:
         try:
-            return self._stream.read(size)
+            # read1, for read would throw away what comes before an early end.
+            return self._stream.read1(size)
         except EOFError:
             self._findings.append(
                 Finding(

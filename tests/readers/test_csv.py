@@ -1,0 +1,196 @@
+import gzip
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from imubench_pipeline.readers import RecordingError, read
+from imubench_pipeline.sensor import LogFormat
+
+DEG = np.pi / 180
+TWO = {"gyro_x": {"column": "wx", "unit": "deg/s"}, "accel_x": {"column": "ax", "unit": "g"}}
+ROWS = "1,0.5\n2,0.25\n-3,1e-3\n"
+
+
+def log_format(channels: dict[str, Any] | None = None, **keys: Any) -> LogFormat:
+    given = {"rate": None if "time" in keys else "100 Hz"} | keys
+    return LogFormat.model_validate({"channels": channels or TWO} | given)
+
+
+def columns(path: Path, log: LogFormat) -> tuple[dict[str, np.ndarray], np.ndarray | None, Any]:
+    (file,) = read(path, log)
+    batches = list(file.batches())
+    joined = {name: np.concatenate([b.columns[name] for b in batches]) for name in file.sources}
+    times = [b.time for b in batches if b.time is not None]
+    return joined, np.concatenate(times) if times else None, file
+
+
+def written(tmp_path: Path, text: str | bytes, name: str = "a.csv") -> Path:
+    path = tmp_path / name
+    path.write_bytes(text.encode() if isinstance(text, str) else text)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("text", "keys"),
+    [
+        ("wx,ax\n" + ROWS, {}),
+        ("ax,other,wx\n0.5,x,1\n0.25,y,2\n1e-3,z,-3\n", {}),
+        ("\ufeffwx,ax\r\n1,0.5\r\n2,0.25\r\n-3,1e-3\r\n", {}),
+        ('"wx";"ax"\n1;0.5\n2;0.25\n-3;1e-3\n', {}),
+        ("wx\tax\n1\t0.5\n2\t0.25\n-3\t1e-3\n", {}),
+        ("wx|ax\n1|0.5\n2|0.25\n-3|1e-3\n", {}),
+        ("wx ax\n1 0.5\n2 0.25\n-3 1e-3\n", {}),
+        ("wx#ax\n1#0.5\n2#0.25\n-3#1e-3\n", {"delimiter": "#"}),
+        ("// made by\n// a logger\nwx,ax\n" + ROWS, {"comment": "//"}),
+        ("made by\n\nwx,ax\n" + ROWS, {"skip_lines": 1}),
+        ("\n\nwx, ax\n" + ROWS, {}),
+    ],
+)
+def test_layouts(tmp_path: Path, text: str, keys: dict[str, Any]) -> None:
+    found, time, file = columns(written(tmp_path, text), log_format(**keys))
+    np.testing.assert_allclose(found["gyro_x"], np.array([1, 2, -3]) * DEG)
+    np.testing.assert_allclose(found["accel_x"], np.array([0.5, 0.25, 1e-3]) * 9.80665)
+    assert time is None
+    assert file.findings == []
+
+
+@pytest.mark.parametrize("header", ["", "a,b\n"])
+def test_columns_by_position_with_and_without_header(tmp_path: Path, header: str) -> None:
+    channels = {"gyro_x": {"column": 2, "unit": "rad/s"}}
+    found, _, _ = columns(written(tmp_path, header + "1,4\n2,5\n"), log_format(channels))
+    assert found["gyro_x"].tolist() == [4.0, 5.0]
+
+
+def test_gzip_is_seen_by_its_content(tmp_path: Path) -> None:
+    text = gzip.compress(("wx,ax\n" + ROWS).encode())
+    for name in ("a.csv.gz", "b.csv"):
+        found, _, _ = columns(written(tmp_path, text, name), log_format())
+        assert len(found["gyro_x"]) == 3
+
+
+def test_raw_counts_have_scale_and_offset(tmp_path: Path) -> None:
+    channels = {"gyro_x": {"column": 1, "unit": "deg/s", "scale": 0.5, "offset": 100}}
+    found, _, _ = columns(written(tmp_path, "100\n104\n"), log_format(channels))
+    np.testing.assert_allclose(found["gyro_x"], [0.0, 2 * DEG])
+
+
+ISO = {"column": "t", "format": "iso8601"}
+HALVES = ("00", "00.5", "01")
+
+
+@pytest.mark.parametrize(
+    ("time", "stamps"),
+    [
+        ({"column": "t", "unit": "s"}, ["10", "10.5", "11"]),
+        ({"column": "t", "unit": "ms"}, ["1e6", "1000500", "1001000"]),
+        (
+            {"column": "t", "unit": "ns"},
+            [str(1_700_000_000 * 10**9 + i * 10**9 // 2) for i in range(3)],
+        ),
+        (ISO, [f"2021-09-20T09:00:{second}" for second in HALVES]),
+        (ISO, [f"2021-09-20 09:00:{second}Z" for second in HALVES]),
+        (ISO, [f"2021-09-20T09:00:{second}+02:00" for second in HALVES]),
+    ],
+)
+def test_times(tmp_path: Path, time: dict[str, str], stamps: list[str]) -> None:
+    text = "t,wx,ax\n" + "".join(f"{stamp},1,2\n" for stamp in stamps)
+    _, found, file = columns(written(tmp_path, text), log_format(time=time))
+    assert found is not None
+    np.testing.assert_allclose(found, [0.0, 0.5, 1.0], atol=1e-9)
+    if time.get("format"):
+        assert file.started.startswith("2021-09-20T0")
+
+
+def test_missing_cells_are_nan(tmp_path: Path) -> None:
+    found, _, _ = columns(written(tmp_path, "wx,ax\n1,2\n,3\nnan,4\n"), log_format())
+    np.testing.assert_array_equal(np.isnan(found["gyro_x"]), [False, True, True])
+
+
+@pytest.mark.parametrize("cut", ["4,0.", "4", "4,0.125", "4,0.125\0\0\0\0"])
+def test_a_last_record_cut_short_is_left_out_and_counted(tmp_path: Path, cut: str) -> None:
+    found, _, file = columns(written(tmp_path, "wx,ax\n" + ROWS + cut), log_format())
+    assert len(found["gyro_x"]) == 3
+    assert [note.finding for note in file.findings] == ["incomplete_last_record"]
+    assert "left out" in file.findings[0].detail
+
+
+def test_a_short_last_line_is_left_out_and_counted(tmp_path: Path) -> None:
+    found, _, file = columns(written(tmp_path, "wx,ax\n" + ROWS + "4\n"), log_format())
+    assert len(found["gyro_x"]) == 3
+    assert [note.finding for note in file.findings] == ["incomplete_last_record"]
+
+
+def test_zeros_after_the_end_are_passed_over(tmp_path: Path) -> None:
+    found, _, _ = columns(written(tmp_path, "wx,ax\n" + ROWS + "\0" * 5000), log_format())
+    assert len(found["gyro_x"]) == 3
+
+
+def test_a_compressed_file_cut_short_is_read_as_far_as_it_goes(
+    tmp_path: Path, rng: np.random.Generator
+) -> None:
+    text = "wx,ax\n" + "".join(f"{a:.6f},{b:.6f}\n" for a, b in rng.standard_normal((50_000, 2)))
+    packed = gzip.compress(text.encode())
+    found, _, file = columns(written(tmp_path, packed[: len(packed) // 2]), log_format())
+    assert 20_000 < len(found["gyro_x"]) < 30_000
+    assert "truncated_file" in [note.finding for note in file.findings]
+
+
+LONG = "wx,ax\n" + "1.25,2.5\n" * 600_000  # more than one block of the reader
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "the file is empty"),
+        ("wx,ax\n", "no record after the header"),
+        ("wx,ay\n" + ROWS, r"no column 'ax' for accel_x; found wx, ay .*; mend 'column'"),
+        ("wx,ax\n1,2\nx7,3\n1,2\n", r"a.csv, line 3, column 'wx': found 'x7', expected a number"),
+        ("// c\nwx,ax\n1,2\n5,6,7\n1,2\n", r"line 4: found 3 columns, expected 2: '5,6,7'"),
+        ("wx,ax\n1,2\n5\n1,2\n", r"line 3: found 1 columns, expected 2"),
+        (LONG + "1,oops\n" + "1,2\n", r"line 600002, column 'ax': found 'oops'"),
+        (LONG + "1\n" + "1,2\n" * 600_000, r"line 600002: found 1 columns"),
+        ("wx,ax\n1,2\n\0\0\0\0\0\0\0\n1,2\n", r"a.csv"),
+        (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" + bytes(range(256)) * 20, "a.csv"),
+        (b"x" * 3_000_000, "a.csv"),
+    ],
+)
+def test_what_is_wrong_is_named(tmp_path: Path, text: str | bytes, message: str) -> None:
+    path = written(tmp_path, text)
+    with pytest.raises(RecordingError, match=message):
+        columns(path, log_format(comment="//"))
+
+
+def test_compressed_data_corrupt_inside_reject(tmp_path: Path, rng: np.random.Generator) -> None:
+    text = "wx,ax\n" + "".join(f"{a:.6f},{b:.6f}\n" for a, b in rng.standard_normal((50_000, 2)))
+    packed = bytearray(gzip.compress(text.encode()))
+    packed[len(packed) // 2 : len(packed) // 2 + 64] = bytes(64)
+    with pytest.raises(RecordingError, match=r"a\.csv"):
+        columns(written(tmp_path, bytes(packed)), log_format())
+
+
+def test_a_mixed_time_zone_is_named(tmp_path: Path) -> None:
+    text = "t,wx,ax\n2021-09-20T09:00:00,1,2\n2021-09-20T09:00:01Z,1,2\n"
+    time = {"column": "t", "format": "iso8601"}
+    with pytest.raises(RecordingError, match=r"line 3, column 't': .*expected a time stamp"):
+        columns(written(tmp_path, text), log_format(time=time))
+
+
+def test_files_and_folders(tmp_path: Path) -> None:
+    per_axis = {
+        "gyro_x": {"file": "x.csv", "column": 1, "unit": "rad/s"},
+        "gyro_y": {"file": "y.csv", "column": 1, "unit": "rad/s"},
+    }
+    folder = tmp_path / "r"
+    folder.mkdir()
+    written(folder, "1\n2\n", "x.csv")
+    with pytest.raises(RecordingError, match=r"no file 'y.csv' for gyro_y; the folder has x.csv"):
+        read(folder, log_format(per_axis))
+    written(folder, "3\n4\n", "y.csv")
+    files = read(folder, log_format(per_axis))
+    assert [file.path.name for file in files] == ["x.csv", "y.csv"]
+    with pytest.raises(RecordingError, match=r"expected one file, the folder has x.csv, y.csv"):
+        read(folder, log_format())
+    with pytest.raises(RecordingError, match="is one file, but the sensor file takes gyro_x"):
+        read(folder / "x.csv", log_format(per_axis))

@@ -1,0 +1,131 @@
+import numpy as np
+import pytest
+
+from imubench_pipeline.config import QualitySettings
+from imubench_pipeline.readers import RecordingError
+from imubench_pipeline.timebase import TimeBase, from_stamps, positions, without_stamps
+
+SETTINGS = QualitySettings()
+
+
+def found(stamps: np.ndarray, stated: float | None = None) -> tuple[TimeBase, np.ndarray]:
+    def blocks():
+        yield from np.array_split(stamps, 7)
+
+    base = from_stamps(blocks, stated, SETTINGS)
+    return base, np.concatenate(list(positions(base, blocks, SETTINGS)))
+
+
+def names(base: TimeBase) -> list[str]:
+    return [finding.finding for finding in base.findings]
+
+
+GRID = np.arange(50_000) / 100.0
+
+
+def test_uniform_stamps() -> None:
+    base, points = found(GRID + 7.0)
+    assert base.uniform and base.stamped and base.missing == 0
+    assert base.rate == pytest.approx(100.0, rel=1e-12)
+    assert base.segments == ((0, 50_000),)
+    np.testing.assert_array_equal(points, np.arange(50_000))
+    assert base.findings == ()
+
+
+@pytest.mark.parametrize("jitter", [0.01, 0.1, 0.25])
+def test_small_jitter_stays_on_the_grid(rng: np.random.Generator, jitter: float) -> None:
+    base, points = found(GRID + rng.uniform(-jitter, jitter, len(GRID)) / 100.0)
+    assert base.uniform
+    assert base.rate == pytest.approx(100.0, rel=2 * jitter / len(GRID))
+    np.testing.assert_array_equal(points, np.arange(50_000))
+
+
+@pytest.mark.parametrize("rate", [512.0, 64.0, 333.3])
+def test_stamps_rounded_to_milliseconds(rate: float) -> None:
+    base, _ = found(np.round(np.arange(100_000) / rate, 3))
+    assert base.uniform, names(base)
+    assert base.rate == pytest.approx(rate, rel=5e-6)
+
+
+def test_a_rate_that_drifts_is_followed() -> None:
+    base, points = found(GRID * (1 + 2e-5 * GRID / GRID[-1]))
+    assert base.uniform
+    assert points[-1] == 49_999
+
+
+@pytest.mark.parametrize("loss", [0.001, 0.01, 0.1])
+def test_random_losses_are_holes(rng: np.random.Generator, loss: float) -> None:
+    kept = rng.random(len(GRID)) >= loss
+    kept[[0, -1]] = True
+    base, points = found(GRID[kept])
+    assert not base.uniform
+    assert base.missing == (~kept).sum()
+    assert len(base.segments) == 1
+    np.testing.assert_array_equal(points, np.flatnonzero(kept))
+    assert names(base) == ["missing_samples"]
+
+
+@pytest.mark.parametrize("length", [1, 100, 20_000])
+def test_one_hole_of_any_length_is_placed(length: int) -> None:
+    kept = np.ones(len(GRID), dtype=bool)
+    kept[10_000 : 10_000 + length] = False
+    base, points = found(GRID[kept])
+    np.testing.assert_array_equal(points, np.flatnonzero(kept))
+    assert base.findings[0].value == length
+
+
+def test_a_gap_beyond_the_longest_hole_divides() -> None:
+    stamps = np.concatenate([GRID, GRID + 5000.0])
+    base, points = found(stamps)
+    assert base.segments == ((0, 50_000), (50_000, 100_000))
+    assert base.missing == 0
+    assert base.rate == pytest.approx(100.0)
+    np.testing.assert_array_equal(points, np.arange(100_000))
+    assert names(base) == ["segments"]
+
+
+def test_a_restarted_clock_divides() -> None:
+    base, _ = found(np.concatenate([GRID, GRID[:20_000]]))
+    assert base.segments == ((0, 50_000), (50_000, 70_000))
+
+
+def test_repeated_stamps_are_left_out_and_counted() -> None:
+    stamps = np.insert(GRID, [100, 5000], GRID[[99, 4999]])
+    base, points = found(stamps)
+    assert (points == -1).sum() == 2
+    np.testing.assert_array_equal(points[points >= 0], np.arange(50_000))
+    assert names(base) == ["repeated_stamps"]
+
+
+def test_stamps_at_arrival_give_the_mean_rate(rng: np.random.Generator) -> None:
+    # ten samples at a time, 2 ms apart, when the host gets round to it
+    bursts = np.repeat(np.arange(5000) * 0.1, 10) + np.tile(np.arange(10) * 2e-3, 5000)
+    base, points = found(bursts + rng.uniform(0, 1e-3, len(bursts)))
+    assert not base.stamped and not base.uniform
+    assert base.rate == pytest.approx(100.0, rel=1e-3)
+    np.testing.assert_array_equal(points, np.arange(50_000))
+    assert names(base) == ["jittered_stamps"]
+    assert base.findings[0].severity == "warning"
+
+
+def test_whole_seconds_shared_by_many_samples() -> None:
+    base, _ = found(np.floor(GRID))
+    assert not base.stamped
+    assert base.rate == pytest.approx(100.0, rel=0.003)
+
+
+def test_a_rate_that_contradicts_the_stamps_is_a_finding() -> None:
+    base, _ = found(GRID, stated=200.0)
+    assert base.rate == pytest.approx(100.0)
+    assert names(base) == ["rate_contradicts_stamps"]
+    assert names(found(GRID, stated=100.5)[0]) == []
+
+
+def test_stamps_that_do_not_advance() -> None:
+    with pytest.raises(RecordingError, match="do not advance"):
+        found(np.zeros(100))
+
+
+def test_no_stamps() -> None:
+    base = without_stamps(10, 5.0)
+    assert base.uniform and base.segments == ((0, 10),) and base.source == "stated"
