@@ -18,36 +18,13 @@ from numpy.typing import NDArray
 from imubench_pipeline import timebase
 from imubench_pipeline.config import QualitySettings
 from imubench_pipeline.findings import Finding
+from imubench_pipeline.quality import Spread, column_findings
 from imubench_pipeline.readers import TEMPERATURE, LogFile, RecordingError, log_files, read
 from imubench_pipeline.recording import LogWriter, channel_logs, log_paths
 from imubench_pipeline.results import Quality
 from imubench_pipeline.sensor import LogFormat, RecordingNotes, UsedPart, quantity_of
 
 _STAMP_BLOCK = 1 << 20
-
-
-@dataclass
-class _Spread:
-    """What is counted of one column while it passes."""
-
-    present: int = 0
-    missing: int = 0
-    not_finite: int = 0
-    low: float = np.inf
-    high: float = -np.inf
-
-    def add(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Count a block and return it with infinities made missing."""
-        finite = np.isfinite(values)
-        good = values[finite]
-        infinite = int(np.isinf(values).sum())
-        self.present += len(good)
-        self.missing += len(values) - len(good) - infinite
-        self.not_finite += infinite
-        if len(good):
-            self.low = min(self.low, float(good.min()))
-            self.high = max(self.high, float(good.max()))
-        return np.where(finite, values, np.nan) if infinite else values
 
 
 @dataclass
@@ -60,7 +37,7 @@ class _Part:
     writer: LogWriter
     rows: int = 0
     not_used: int = 0
-    spreads: dict[str, _Spread] = field(default_factory=dict)
+    spreads: dict[str, Spread] = field(default_factory=dict)
     stamped: bool = False
     digest: str = ""
 
@@ -158,7 +135,8 @@ def _ingest(
     ]
     findings = [finding for part in parts for finding in part.source.findings]
     bases = [_base(part, log, settings) for part in parts]
-    findings += _column_findings(parts)
+    for part in parts:
+        findings += column_findings(part.spreads)
     unusable = {finding.channel for finding in findings if finding.severity == "fatal"}
     groups = _shared_bases(parts, bases)
     names = _names(parts, groups)
@@ -215,7 +193,7 @@ def _read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> _Par
     data, stamps_path = scratch / f"part{number}.parquet", scratch / f"part{number}.stamps"
     columns = list(file.sources)
     writer = LogWriter(data, dict.fromkeys(columns, pa.float64()))
-    part = _Part(file, data, stamps_path, writer, spreads={name: _Spread() for name in columns})
+    part = _Part(file, data, stamps_path, writer, spreads={name: Spread() for name in columns})
     rate = file.log.rate_hz
     digest = hashlib.blake2b()
     read_rows = 0
@@ -269,51 +247,6 @@ def _base(part: _Part, log: LogFormat, settings: QualitySettings) -> timebase.Ti
         return timebase.from_stamps(part.stamps, log.rate_hz, settings)
     except RecordingError as error:
         raise RecordingError(f"{part.source.path.name}: {error}") from None
-
-
-def _column_findings(parts: list[_Part]) -> list[Finding]:
-    findings = []
-    for part in parts:
-        for channel, spread in part.spreads.items():
-            if channel == TEMPERATURE:
-                continue
-            if spread.present == 0:
-                findings.append(
-                    Finding("no_samples", "fatal", f"{channel} holds no number", 0, channel)
-                )
-            elif spread.low == spread.high:
-                findings.append(
-                    Finding(
-                        "stuck",
-                        "fatal",
-                        f"{channel} never changes (it stays at {spread.low:.6g} in SI); the axis "
-                        "is dead or the column is not the one meant",
-                        spread.low,
-                        channel,
-                    )
-                )
-            if spread.missing:
-                findings.append(
-                    Finding(
-                        "empty_cells",
-                        "note",
-                        f"{channel} has {spread.missing} records without a number; treated as "
-                        "missing samples",
-                        spread.missing,
-                        channel,
-                    )
-                )
-            if spread.not_finite:
-                findings.append(
-                    Finding(
-                        "not_finite",
-                        "warning",
-                        f"{channel} has {spread.not_finite} infinities; treated as missing samples",
-                        spread.not_finite,
-                        channel,
-                    )
-                )
-    return findings
 
 
 def _shared_bases(parts: list[_Part], bases: list[timebase.TimeBase]) -> list[list[int]]:
@@ -397,7 +330,7 @@ def _summary(
     longest = max(range(len(parts)), key=lambda index: bases[index].rows)
     base = bases[longest]
     temperature = next(
-        (part.spreads[TEMPERATURE] for part in parts if TEMPERATURE in part.spreads), _Spread()
+        (part.spreads[TEMPERATURE] for part in parts if TEMPERATURE in part.spreads), Spread()
     )
     known = temperature.present > 0
     return {

@@ -320,7 +320,8 @@ def _arrival_order(
             "warning",
             f"the stamps lie on no uniform grid ({100 * found.off_grid / found.rows:.0f} % of them "
             f"off it, {found.holes} pauses, intervals up to {1e3 * worst:.3g} ms); "
-            f"the samples are taken as consecutive at the mean rate of {rate:.6g} Hz, so lost samples cannot be seen",
+            f"the samples are taken as consecutive at the mean rate of {rate:.6g} Hz, so lost "
+            "samples cannot be seen",
             worst,
         ),
         *_rate_findings(rate, stated, settings),

@@ -54,17 +54,23 @@ class CompleteLines(io.RawIOBase):
         return len(taken)
 
     def _fetch(self, size: int) -> None:
-        block = self._read(size)
-        if not block:
-            self._end()
-            return
-        block = self._rest + block
-        cut = block.rfind(b"\n") + 1
-        self._ready, self._rest = block[:cut], block[cut:]
+        blocks, held = [self._rest], 0
+        while held < size:
+            block = self._read(size - held)
+            if not block:
+                self._ended = True
+                break
+            blocks.append(block)
+            held += len(block)
+        read = b"".join(blocks)
+        cut = read.rfind(b"\n") + 1
+        self._ready, self._rest = read[:cut], read[cut:]
         if len(self._rest) > _LONGEST_LINE and self._rest.strip(b"\0"):
             self._fail(
                 f"{self._path.name}: no line break in {_LONGEST_LINE} bytes; this is no text log"
             )
+        if self._ended:
+            self._end()
 
     def _read(self, size: int) -> bytes:
         try:
@@ -85,7 +91,6 @@ class CompleteLines(io.RawIOBase):
             return b""
 
     def _end(self) -> None:
-        self._ended = True
         if self._rest.strip(b"\0\r\n\t "):
             shown = self._rest[:60].decode("utf-8", "replace")
             self._findings.append(

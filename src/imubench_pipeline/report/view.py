@@ -116,11 +116,10 @@ def _floats(part: pa.Table, column: str) -> NDArray[np.float64]:
 
 def _by_channel(table: pa.Table) -> dict[Name, pa.Table]:
     """Divide a table, whose channels stand together, into one slice a channel."""
-    names = list(
-        zip(*(table[key].to_pylist() for key in ("sensor", "recording", "channel")), strict=True)
-    )
+    keys = ("sensor", "recording", "channel")
+    names: list[Name] = list(zip(*(table[key].to_pylist() for key in keys), strict=True))
     starts = [i for i, name in enumerate(names) if i == 0 or name != names[i - 1]]
-    stops = [*starts[1:], len(names)]
+    stops = [*starts[1:], len(names)] if names else []
     return {
         names[start]: table.slice(start, stop - start)
         for start, stop in zip(starts, stops, strict=True)

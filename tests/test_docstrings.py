@@ -1,0 +1,40 @@
+"""Every public function says what its arguments are."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import PROJECT
+
+SOURCE = PROJECT / "src/imubench_pipeline"
+PUBLIC = ["allan", "confidence", "noise", "simulate", "score", "datasheet", "units",
+          "estimators/curve", "estimators/least_squares", "readers/__init__", "ingest"]  # fmt: skip
+
+
+def functions(path: Path) -> list[ast.FunctionDef]:
+    return [
+        node
+        for node in ast.parse(path.read_text()).body
+        if isinstance(node, ast.FunctionDef) and not node.name.startswith("_")
+    ]
+
+
+@pytest.mark.parametrize("module", PUBLIC)
+def test_arguments_of_documented_functions_are_documented(module: str) -> None:
+    for function in functions(SOURCE / f"{module}.py"):
+        text = ast.get_docstring(function) or ""
+        assert text, function.name
+        if "Parameters\n" not in text:
+            continue
+        arguments = [*function.args.args, *function.args.kwonlyargs]
+        for argument in arguments:
+            listed = [line for line in text.splitlines() if line and not line.startswith(" ")]
+            assert any(argument.arg in line.split(" : ")[0] for line in listed if " : " in line), (
+                f"{module}.{function.name}: {argument.arg} is not documented"
+            )
+
+
+def test_modules_are_small() -> None:
+    for path in SOURCE.rglob("*.py"):
+        assert len(path.read_text().splitlines()) <= 420, path

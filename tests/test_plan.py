@@ -1,0 +1,88 @@
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from imubench_pipeline.plan import Plan
+from imubench_pipeline.validation import ConfigError
+from tests.test_configuration import SENSOR
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> dict[str, Any]:
+    (tmp_path / "sensors").mkdir()
+    (tmp_path / "logs/s").mkdir(parents=True)
+    (tmp_path / "sensors/s.yaml").write_text(yaml.safe_dump(SENSOR))
+    return {
+        "logs": str(tmp_path / "logs"),
+        "sensors": str(tmp_path / "sensors"),
+        "results": str(tmp_path / "results"),
+        "simulated": "false",
+    }
+
+
+def put(project: dict[str, Any], name: str, text: str = "1,2\n") -> Path:
+    path = Path(project["logs"]) / "s" / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+    return path
+
+
+def test_recordings_are_found_in_order(project: dict[str, Any]) -> None:
+    for name in ("b.csv", "a.txt.gz", "c/x.csv", ".hidden", "notes.md", "d.csv.part", "b.yaml"):
+        put(project, name, "{}")
+    plan = Plan(project)
+    assert list(plan.recordings) == [("s", "a"), ("s", "b"), ("s", "c")]
+    assert [path.name for path in plan.recordings["s", "b"].files] == ["b.csv", "b.yaml"]
+    assert [path.name for path in plan.recordings["s", "c"].files] == ["x.csv"]
+
+
+def test_two_logs_of_one_name_are_an_error(project: dict[str, Any]) -> None:
+    put(project, "a.csv")
+    put(project, "a.csv.gz")
+    with pytest.raises(ConfigError, match=r"a\.csv and .*a\.csv\.gz would both be"):
+        Plan(project)
+
+
+def test_a_sensor_without_a_file_rejects_its_logs_only(project: dict[str, Any]) -> None:
+    put(project, "a.csv")
+    put(project, "../t/a.csv")
+    plan = Plan(project)
+    assert "error" not in json.loads(plan.ingest_settings("s", "a"))
+    error = json.loads(plan.ingest_settings("t", "a"))["error"]
+    assert "no sensor file" in error and "t.yaml" in error
+    assert json.loads(plan.datasheet_settings("t"))["datasheet"] == {}
+
+
+def test_wrong_notes_reject_their_log_only(project: dict[str, Any]) -> None:
+    put(project, "a.csv")
+    put(project, "a.yaml", "divice: 7\n")
+    put(project, "b.csv")
+    put(project, "b.yaml", "log: [\n")
+    plan = Plan(project)
+    assert "did you mean 'device'" in json.loads(plan.ingest_settings("s", "a"))["error"]
+    assert "not readable as YAML" in json.loads(plan.ingest_settings("s", "b"))["error"]
+
+
+def test_an_edit_of_the_datasheet_changes_nothing_else(project: dict[str, Any]) -> None:
+    put(project, "a.csv")
+    before = Plan(project)
+    changed = SENSOR | {"datasheet": {}, "price_class": "cheap"}
+    (Path(project["sensors"]) / "s.yaml").write_text(yaml.safe_dump(changed))
+    after = Plan(project)
+    assert after.ingest_settings("s", "a") == before.ingest_settings("s", "a")
+    assert after.datasheet_settings("s") != before.datasheet_settings("s")
+
+
+def test_a_log_of_another_size_is_another_log(project: dict[str, Any]) -> None:
+    put(project, "a.csv")
+    before = Plan(project).ingest_settings("s", "a")
+    put(project, "a.csv", "1,2\n3,4\n")
+    assert Plan(project).ingest_settings("s", "a") != before
+
+
+def test_code_is_known_by_its_content() -> None:
+    digests = {step: Plan.code(step) for step in ("ingest", "allan", "estimate", "report")}
+    assert len(set(digests.values())) == 4
