@@ -1,0 +1,191 @@
+"""Real runs of Snakemake on a small project of real files."""
+
+import gzip
+import re
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+import yaml
+
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.simulate import simulate
+from tests.conftest import PROJECT
+
+pytestmark = pytest.mark.workflow
+
+CHANNELS = {
+    "gyro_x": {"column": "wx", "unit": "deg/s"},
+    "accel_x": {"column": "ax", "unit": "m/s^2"},
+}
+DATASHEET = {"gyro": {"noise_density": {"value": 0.01, "unit": "deg/s/sqrt(Hz)"}}}
+STEPS_OF_A_RECORDING = {"ingest", "allan", "estimate", "reconstruct", "datasheet"}
+
+
+@dataclass
+class Project:
+    folder: Path
+    results: Path
+
+    def run(self, *flags: str, cores: int = 2) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "snakemake", f"-c{cores}", *flags, "--config",
+                   f"logs={self.folder / 'logs'}", f"sensors={self.folder / 'sensors'}",
+                   f"results={self.results}", "simulated=false"]  # fmt: skip
+        return subprocess.run(
+            command, cwd=PROJECT, capture_output=True, text=True, check=False, timeout=600
+        )
+
+    def jobs(self) -> dict[str, int]:
+        """What a run would do now."""
+        done = self.run("-n")
+        assert done.returncode == 0, done.stderr
+        stats = done.stdout.partition("Job stats:")[2].partition("\n\n")[0]
+        counts = dict(re.findall(r"^(\w+) +(\d+)$", stats, flags=re.MULTILINE))
+        return {rule: int(count) for rule, count in counts.items() if rule not in ("all", "total")}
+
+    def table(self, name: str) -> list[dict]:
+        return pq.read_table(self.results / f"tables/{name}.parquet").to_pylist()
+
+
+def put_log(path: Path, seed: int, samples: int = 20_000) -> None:
+    rng = np.random.default_rng(seed)
+    wx = np.degrees(simulate(NoiseModel(N=1e-4, B=1e-4, T_B=5.0), 100.0, samples, rng))
+    ax = 9.81 + simulate(NoiseModel(N=1e-3, K=1e-3), 100.0, samples, rng)
+    rows = "".join(f"{w:.9g},{a:.9g}\n" for w, a in zip(wx, ax, strict=True))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    text = ("wx,ax\n" + rows).encode()
+    path.write_bytes(gzip.compress(text) if path.suffix == ".gz" else text)
+
+
+def put_sensor(path: Path, **changes: object) -> None:
+    sensor = {"vendor": "V", "model": path.stem, "log": {"rate": "100 Hz", "channels": CHANNELS}}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(yaml.safe_dump(sensor | {"datasheet": DATASHEET} | changes))
+
+
+def put_bad_logs(folder: Path) -> dict[str, str]:
+    """Write logs that cannot be used; return what their reasons say."""
+    folder.mkdir(parents=True, exist_ok=True)
+    good = "wx,ax\n" + "0.5,9.81\n0.25,9.82\n" * 1000
+    middle = len(good) // 2
+    (folder / "corrupt.csv").write_text(good[:middle] + "\x01\x02garbage\n" + good[middle:])
+    (folder / "empty.csv").write_text("")
+    (folder / "random.csv").write_bytes(np.random.default_rng(1).bytes(50_000))
+    (folder / "text.csv").write_text(good + "0.5,abc\n" + "0.5,9.81\n")
+    (folder / "column.csv").write_text(good.replace("wx", "wy", 1))
+    return {
+        "corrupt": "line ",
+        "empty": "the file is empty",
+        "random": "random.csv",
+        "text": "line 2002, column 'ax': found 'abc', expected a number",
+        "column": "no column 'wx' for gyro_x; found wy, ax",
+    }
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory: pytest.TempPathFactory) -> Project:
+    folder = tmp_path_factory.mktemp("project")
+    put_sensor(folder / "sensors/one.yaml")
+    put_sensor(folder / "sensors/two.yaml")
+    put_log(folder / "logs/one/a.csv", 1)
+    put_log(folder / "logs/one/b.csv.gz", 2)
+    put_log(folder / "logs/two/a.csv", 3)
+    made = Project(folder, folder / "results")
+    done = made.run()
+    assert done.returncode == 0, done.stdout + done.stderr
+    return made
+
+
+def test_a_run_leaves_tables_and_a_report(project: Project) -> None:
+    assert {row["status"] for row in project.table("recordings")} == {"ok"}
+    estimates = {
+        (row["sensor"], row["recording"], row["channel"]): row["value"]
+        for row in project.table("parameters")
+        if row["method"] == "weighted" and row["parameter"] == "N"
+    }
+    assert len(estimates) == 6
+    for (_, _, channel), value in estimates.items():
+        assert value == pytest.approx({"gyro_x": 1e-4, "accel_x": 1e-3}[channel], rel=0.05)
+    for name in ("scores", "reconstruction", "datasheet", "findings", "simulated_truth", "allan"):
+        assert (project.results / f"tables/{name}.csv").is_file()
+    page = (project.results / "report/index.html").read_text()
+    assert "3 recordings of 2 sensors" in page
+    assert not list(project.results.rglob("*.part"))
+
+
+def test_a_second_run_has_nothing_to_do(project: Project) -> None:
+    assert project.jobs() == {}
+
+
+def test_one_core_and_two_give_the_same_tables(project: Project, tmp_path: Path) -> None:
+    alone = Project(project.folder, tmp_path / "results")
+    assert alone.run(cores=1).returncode == 0
+    for path in sorted((project.results / "tables").iterdir()):
+        assert path.read_bytes() == (alone.results / "tables" / path.name).read_bytes(), path.name
+
+
+def test_an_edit_of_a_datasheet_runs_its_deltas_and_the_global_steps(project: Project) -> None:
+    density = {"value": 0.02, "unit": "deg/s/sqrt(Hz)"}
+    put_sensor(project.folder / "sensors/one.yaml", datasheet={"gyro": {"noise_density": density}})
+    assert project.jobs() == {"datasheet": 2, "tables": 1, "report": 1}
+    assert project.run().returncode == 0
+    printed = {
+        row["sensor"]: row["printed"] for row in project.table("datasheet") if row["printed"]
+    }
+    assert printed == {"one": 0.02, "two": 0.01}
+
+
+def test_one_more_log_runs_its_own_steps_and_the_global_ones(project: Project) -> None:
+    put_log(project.folder / "logs/two/b.csv", 4)
+    expected = dict.fromkeys(STEPS_OF_A_RECORDING, 1) | {"tables": 1, "report": 1}
+    assert project.jobs() == expected
+    assert project.run().returncode == 0
+    assert len(project.table("recordings")) == 4
+
+
+def test_a_removed_log_runs_the_global_steps(project: Project) -> None:
+    (project.folder / "logs/two/b.csv").unlink()
+    assert project.jobs() == {"tables": 1, "report": 1}
+    assert project.run().returncode == 0
+    assert len(project.table("recordings")) == 3
+
+
+def test_bad_logs_are_rejected_and_stop_nothing_else(project: Project) -> None:
+    reasons = put_bad_logs(project.folder / "logs/two")
+    (project.folder / "logs/unknown").mkdir()
+    put_log(project.folder / "logs/unknown/a.csv", 5, samples=10)
+    reasons_of_all = reasons | {"a": "no sensor file"}
+    done = project.run()
+    assert done.returncode == 0, done.stdout + done.stderr
+    rejected = {
+        row["recording"]: row["reason"]
+        for row in project.table("recordings")
+        if row["status"] == "rejected"
+    }
+    assert set(rejected) == set(reasons_of_all)
+    for name, text in reasons_of_all.items():
+        assert text in rejected[name]
+    complete = {
+        (row["sensor"], row["recording"])
+        for row in project.table("scores")
+        if row["method"] == "weighted"
+    }
+    assert complete == {("one", "a"), ("one", "b"), ("two", "a")}
+    page = (project.results / "report/index.html").read_text()
+    assert "6 rejected" in page
+    for name in reasons:
+        assert 0 < page.index(f"two / {name}<") < page.index('id="comparison"')
+    assert project.jobs() == {}
+
+
+def test_a_wrong_setting_stops_the_run_before_it_begins(project: Project) -> None:
+    put_sensor(project.folder / "sensors/three.yaml", vendr="V")
+    done = project.run("-n")
+    (project.folder / "sensors/three.yaml").unlink()
+    assert done.returncode != 0
+    assert "three.yaml: vendr: unknown key; did you mean 'vendor'?" in done.stdout + done.stderr
+    assert "Traceback" not in done.stdout + done.stderr
