@@ -93,6 +93,24 @@ def test_holes_follow_the_rule(rng: np.random.Generator) -> None:
     np.testing.assert_allclose(curve.variance, expected, rtol=1e-9)
 
 
+def test_the_samples_averaged_are_counted(rng: np.random.Generator) -> None:
+    samples = rng.standard_normal(50_000)
+    assert allan_variance(samples, 1.0, cluster_sizes=[3, 40]).averaged.tolist() == [3.0, 40.0]
+    samples[rng.random(50_000) < 0.05] = np.nan
+    curve = allan_variance(samples, 1.0, cluster_sizes=[40])
+    assert 36.0 < curve.averaged[0] < 40.0
+    # white noise of variance 1: the variance of a mean is one over the samples in it
+    assert curve.variance[0] == pytest.approx(1 / curve.averaged[0], rel=0.1)
+
+
+@pytest.mark.parametrize("loss", [0.1, 0.12, 0.3, 0.9])
+def test_heavy_losses_end_the_curve_early(rng: np.random.Generator, loss: float) -> None:
+    samples = rng.standard_normal(50_000)
+    samples[rng.random(50_000) < loss] = np.nan
+    curve = allan_variance(samples, 1.0)
+    assert np.isfinite(curve.variance).all() and np.isfinite(curve.edf).all()
+
+
 def test_one_missing_sample_spoils_nothing_after_it(rng: np.random.Generator) -> None:
     samples = rng.standard_normal(50_000)
     whole = allan_variance(samples, 1.0, cluster_sizes=[1, 10, 100])
@@ -144,6 +162,8 @@ def test_only_taus_with_a_difference_are_returned() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        ({"samples": []}, "2 or more"),
+        ({"samples": [[1.0, 2.0]]}, "one dimension"),
         ({"rate": 0.0}, "frequency above zero"),
         ({"cluster_sizes": [0]}, "whole numbers from 1"),
         ({"overlap": "none"}, "expected 'full'"),
@@ -153,9 +173,9 @@ def test_only_taus_with_a_difference_are_returned() -> None:
     ],
 )
 def test_wrong_arguments(arguments: dict, message: str) -> None:
-    given = {"rate": 1.0} | arguments
+    given = {"samples": np.arange(100.0), "rate": 1.0} | arguments
     with pytest.raises(ValueError, match=message):
-        allan_variance(np.arange(100.0), given.pop("rate"), **given)
+        allan_variance(given.pop("samples"), given.pop("rate"), **given)
 
 
 def test_blocks_must_be_as_long_as_stated() -> None:

@@ -40,11 +40,111 @@ def test_small_jitter_stays_on_the_grid(rng: np.random.Generator, jitter: float)
     np.testing.assert_array_equal(points, np.arange(50_000))
 
 
-@pytest.mark.parametrize("rate", [512.0, 64.0, 333.3])
+@pytest.mark.parametrize("rate", [512.0, 64.0, 333.3, 700.0, 800.0, 833.0, 900.0])
 def test_stamps_rounded_to_milliseconds(rate: float) -> None:
     base, _ = found(np.round(np.arange(100_000) / rate, 3))
     assert base.uniform, names(base)
     assert base.rate == pytest.approx(rate, rel=5e-6)
+
+
+def test_stamps_in_single_precision_far_from_zero() -> None:
+    base, _ = found((1e5 + GRID).astype(np.float32).astype(np.float64))
+    assert base.missing == 0
+    assert base.rate == pytest.approx(100.0, rel=1e-4)
+
+
+@pytest.mark.parametrize("spread", [0.2, 0.3, 0.5, 2.0])
+def test_strong_jitter_gives_up_the_grid_and_nothing_else(
+    rng: np.random.Generator, spread: float
+) -> None:
+    base, _ = found(GRID + spread / 100.0 * rng.standard_normal(len(GRID)))
+    assert base.missing == 0 and len(base.segments) == 1
+    assert base.rate == pytest.approx(100.0, rel=1e-4)
+
+
+def test_losses_with_jitter(rng: np.random.Generator) -> None:
+    kept = rng.random(len(GRID)) > 0.1
+    kept[[0, -1]] = True
+    _, points = found((GRID + 1e-3 * rng.uniform(-1, 1, len(GRID)))[kept])
+    np.testing.assert_array_equal(points, np.flatnonzero(kept))
+
+
+@pytest.mark.parametrize("spread", [0.1, 0.15])
+def test_no_sample_is_lost_to_jitter(rng: np.random.Generator, spread: float) -> None:
+    base, points = found(GRID + spread / 100.0 * rng.standard_normal(len(GRID)))
+    np.testing.assert_array_equal(points, np.arange(len(GRID)))
+    assert base.uniform
+
+
+@pytest.mark.parametrize("rate", [256.0, 400.0, 512.0])
+@pytest.mark.parametrize("loss", [0.01, 0.05])
+def test_losses_with_stamps_rounded(rng: np.random.Generator, rate: float, loss: float) -> None:
+    kept = rng.random(100_000) > loss
+    kept[[0, -1]] = True
+    base, points = found(np.round(np.flatnonzero(kept) / rate, 3))
+    assert base.rate == pytest.approx(rate, rel=1e-5)
+    assert base.missing == pytest.approx((~kept).sum(), abs=3)
+    assert np.mean(points[points >= 0] != np.flatnonzero(kept)[points >= 0]) < 0.001
+
+
+@pytest.mark.parametrize("rate", [50.0, 100.0, 400.0])
+def test_the_rate_of_samples_that_share_stamps(rate: float) -> None:
+    base, _ = found(np.floor(np.arange(20_000) / rate))
+    assert len(base.segments) == 1
+    assert base.rate == pytest.approx(rate, rel=1e-9)
+    packets, _ = found(np.repeat(np.arange(200) * 1.5, 150))
+    assert packets.rate == pytest.approx(100.0)
+    assert len(packets.segments) == 1
+
+
+@pytest.mark.parametrize("repeated", [0.005, 0.02, 0.05])
+def test_repeated_records_are_no_samples(rng: np.random.Generator, repeated: float) -> None:
+    twice = 1 + (rng.random(len(GRID)) < repeated)
+    base, points = found(np.repeat(GRID, twice))
+    assert base.rate == pytest.approx(100.0)
+    assert (points == -1).sum() == (twice == 2).sum()
+
+
+@pytest.mark.parametrize("length", [100, 5000])
+def test_stamps_missing_at_an_end_do_not_bias_the_rate(length: int) -> None:
+    for missing in (slice(None, length), slice(-length, None)):
+        stamps = GRID.copy()
+        stamps[missing] = np.nan
+        base, _ = found(stamps)
+        assert base.rate == pytest.approx(100.0)
+
+
+def test_a_step_of_the_rate_is_followed() -> None:
+    stamps = np.concatenate([GRID, GRID[-1] + 0.0101 * np.arange(1, 20_001)])
+    base, points = found(stamps)
+    assert base.uniform and points[-1] == len(stamps) - 1
+
+
+def test_swapped_neighbours_are_counted_and_divide_nothing() -> None:
+    stamps = GRID.copy()
+    stamps[1000:1002] = stamps[[1001, 1000]]
+    base, points = found(stamps)
+    assert len(base.segments) == 1
+    assert (points == -1).sum() == 1
+    assert base.missing == 0 or base.grid == len(GRID)
+
+
+def test_one_stamp_astray_divides_nothing() -> None:
+    stamps = GRID.copy()
+    stamps[1000] += 50.0
+    stamps[2000] -= 50.0
+    base, points = found(stamps)
+    assert len(base.segments) == 1
+    np.testing.assert_array_equal(points, np.arange(len(GRID)))
+    assert names(base) == ["missing_stamps"]
+
+
+def test_missing_stamps_are_consecutive() -> None:
+    stamps = GRID.copy()
+    stamps[[5, 700, 701]] = np.nan
+    base, points = found(stamps)
+    np.testing.assert_array_equal(points, np.arange(len(GRID)))
+    assert names(base) == ["missing_stamps"]
 
 
 def test_a_rate_that_drifts_is_followed() -> None:

@@ -27,6 +27,9 @@ PRESENT = 0.9
 """Part of a cluster's samples that must be there for its mean to count."""
 
 
+_MANY_CLUSTERS = 100
+
+
 @dataclass(frozen=True)
 class AllanCurve:
     """An Allan variance over tau.
@@ -46,6 +49,9 @@ class AllanCurve:
         frequency (0: white noise of the samples, -1: flicker, -2: random walk).
     samples : int
         L, samples in the log.
+    averaged : ndarray, shape (m,)
+        Samples that a cluster really averages: n, or fewer (their harmonic mean) where samples
+        are missing. The variance of white noise goes with 1 / averaged.
     """
 
     tau: NDArray[np.float64]
@@ -54,6 +60,7 @@ class AllanCurve:
     edf: NDArray[np.float64]
     exponent: NDArray[np.int64]
     samples: int
+    averaged: NDArray[np.float64]
 
     @property
     def deviation(self) -> NDArray[np.float64]:
@@ -207,8 +214,8 @@ def allan_variance(
     variances based on finite differences", PTTI 2003.
     """
     values = np.asarray(samples, dtype=np.float64)
-    if values.ndim != 1:
-        raise ValueError(f"samples have {values.ndim} dimensions, expected 1")
+    if values.ndim != 1 or len(values) < 2:
+        raise ValueError(f"samples have shape {values.shape}, expected one dimension of 2 or more")
     if overlap != "full":
         raise ValueError(f"overlap {overlap!r} is not known, expected 'full'")
     if valid is not None:
@@ -235,9 +242,9 @@ def of_phase(
     wanted = cluster_sizes(phase.samples) if sizes is None else np.asarray(sizes, dtype=np.int64)
     if wanted.ndim != 1 or (wanted < 1).any():
         raise ValueError("cluster sizes must be whole numbers from 1 in one dimension")
-    total, terms, possible = _sums(phase, wanted, threads)
+    total, thinned, terms, possible = _sums(phase, wanted, threads)
     shown = terms > 0
-    wanted, total = wanted[shown], total[shown]
+    wanted, total, thinned = wanted[shown], total[shown], thinned[shown]
     terms, possible = terms[shown], possible[shown]
     variance = total / (2.0 * terms)
     exponent = np.array(_exponents(phase, wanted), dtype=np.int64)
@@ -248,7 +255,13 @@ def of_phase(
         ]
     )
     return AllanCurve(
-        wanted / rate, wanted, variance, np.maximum(edf, 1.0), exponent, phase.samples
+        tau=wanted / rate,
+        cluster_size=wanted,
+        variance=variance,
+        edf=np.maximum(edf, 1.0),
+        exponent=exponent,
+        samples=phase.samples,
+        averaged=terms / thinned,
     )
 
 
@@ -265,9 +278,20 @@ def _check_segments(phase: Phase) -> None:
 
 def _sums(
     phase: Phase, sizes: NDArray[np.int64], threads: int
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-    """Return, by size, the sum of squared differences of means, their number, and the most."""
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+    """Sum over the differences of means, by size.
+
+    Returns
+    -------
+    total : ndarray
+        Sum of the squared differences.
+    thinned : ndarray
+        Sum of the mean inverse numbers of samples that the two clusters average.
+    terms, possible : ndarray of int
+        Number of differences, and what it would be without holes.
+    """
     total = np.zeros(len(sizes))
+    thinned = np.zeros(len(sizes))
     terms = np.zeros(len(sizes), dtype=np.int64)
     possible = np.zeros(len(sizes), dtype=np.int64)
     before = get_num_threads()
@@ -279,27 +303,37 @@ def _sums(
             possible += most
             if phase.present is None:
                 total += _full(theta, sizes).sum(axis=0) / sizes.astype(np.float64) ** 2
+                thinned += most / sizes
                 terms += most
             else:
                 counts = phase.present[start : stop + 1]
                 enough = np.ceil(PRESENT * sizes - 1e-9).astype(np.int64)
-                sums, numbers = _full_with_holes(theta, counts, sizes, enough)
+                sums, inverse, numbers = _full_with_holes(theta, counts, sizes, enough)
                 total += sums.sum(axis=0)
+                thinned += inverse.sum(axis=0)
                 terms += numbers.sum(axis=0)
     finally:
         set_num_threads(before)
-    return total, terms, possible
+    return total, thinned, terms, possible
 
 
 def _exponents(phase: Phase, sizes: NDArray[np.int64]) -> list[int]:
-    """Return the noise type at each size; where too few clusters are left, the last one told."""
+    """Return the noise type at each size; where too few clusters are left, the last one told.
+
+    With few clusters white noise often looks blue: then no bluer type than before is believed.
+    """
     start, stop = max(phase.segments, key=lambda segment: segment[1] - segment[0])
     exponents: list[int] = []
     for n in sizes:
         edges = phase.theta[start : stop + 1 : n]
         held = None if phase.present is None else phase.present[start : stop + 1 : n]
         found = noise_exponent(edges, held, int(n))
-        exponents.append(found if found is not None else (exponents[-1] if exponents else 0))
+        before = exponents[-1] if exponents else 0
+        if found is None:
+            found = before
+        elif len(edges) <= _MANY_CLUSTERS:
+            found = min(found, max(before, 0))
+        exponents.append(found)
     return exponents
 
 
@@ -359,16 +393,18 @@ def _full(theta, sizes):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
 
 @njit(cache=True, nogil=True, parallel=True)
 def _full_with_holes(theta, present, sizes, enough):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
-    """Return sums and numbers of squared differences of means over the samples present."""
+    """Return, by block and size, what `_sums` adds up, over the samples present."""
     points = theta.size
     blocks = (points + BLOCK - 1) // BLOCK
     sums = np.zeros((blocks, sizes.size))
+    inverse = np.zeros((blocks, sizes.size))
     numbers = np.zeros((blocks, sizes.size), dtype=np.int64)
     for block in prange(blocks):
         start = block * BLOCK
         for j in range(sizes.size):
             n = sizes[j]
             total = 0.0
+            thinned = 0.0
             number = 0
             for i in range(start, min(start + BLOCK, points - 2 * n)):
                 first = present[i + n] - present[i]
@@ -378,7 +414,9 @@ def _full_with_holes(theta, present, sizes, enough):  # type: ignore[no-untyped-
                         theta[i + n] - theta[i]
                     ) / first
                     total += difference * difference
+                    thinned += 0.5 / first + 0.5 / second
                     number += 1
             sums[block, j] = total
+            inverse[block, j] = thinned
             numbers[block, j] = number
-    return sums, numbers
+    return sums, inverse, numbers

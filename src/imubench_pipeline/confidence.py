@@ -70,11 +70,14 @@ def _without_line(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _lag_one(values: NDArray[np.float64]) -> float | None:
+    pairs = np.isfinite(values[1:]) & np.isfinite(values[:-1])
+    if pairs.sum() < _FEWEST_CLUSTERS - 3:
+        return None
     centred = values - np.nanmean(values)
     power = float(np.nanmean(centred**2))
     if not power > 0:
         return None
-    correlation = float(np.nanmean(centred[1:] * centred[:-1])) / power
+    correlation = float((centred[1:] * centred[:-1])[pairs].mean()) / power
     return max(correlation, -0.999)
 
 

@@ -54,6 +54,7 @@ def allan_rows(key: Key, curve: AllanCurve) -> Iterator[Row]:
             "lower": float(lower[i]),
             "upper": float(upper[i]),
             "edf": float(curve.edf[i]),
+            "averaged": float(curve.averaged[i]),
             "exponent": int(curve.exponent[i]),
         }
 
@@ -69,6 +70,7 @@ def curves(path: Path, quality: Quality) -> dict[str, AllanCurve]:
             edf=table["edf"].to_numpy(),
             exponent=table["exponent"].to_numpy(),
             samples=int(quality.channels[channel]["grid"]),
+            averaged=table["averaged"].to_numpy(),
         )
         for (channel,), table in by_channel.items()
     }

@@ -79,6 +79,11 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _number("lower", _SI, "lower 95 % limit"),
         _number("upper", _SI, "upper 95 % limit"),
         _number("edf", "-", "equivalent degrees of freedom of the Allan variance"),
+        _number(
+            "averaged",
+            "-",
+            "samples that a cluster really averages: fewer than its size where samples are missing",
+        ),
         _count("exponent", "noise type: 0 white, -1 flicker, -2 random walk, 1 and 2 phase noise"),
     ),
     "parameters": (

@@ -8,25 +8,19 @@ the samples are taken as consecutive, and that is a finding.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from imubench_pipeline.config import QualitySettings
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.readers.batch import RecordingError
+from imubench_pipeline.stamps import Stamps, Track, tracked, typical_interval
 
-Stamps = Callable[[], Iterator[NDArray[np.float64]]]
-"""Gives the stamps of a file in s, block by block, afresh at each call."""
-
-_OFF_GRID = 0.4
-"""Part of a sampling interval beyond which a stamp does not say which grid point it means."""
-
-_TRACKING = 0.01
-"""Gain with which the grid follows a slow drift of the sampling rate against the stamps."""
+_SHARED = 0.2
+"""Part of the records that repeat a stamp beyond which a stamp belongs to a group of samples."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +44,8 @@ class TimeBase:
     stamped : bool
         The stamps say which grid point each sample is.
     findings : tuple of Finding
+    tracking_interval : float or None
+        Interval with which the stamps were put on the grid, s.
     """
 
     rate: float
@@ -60,6 +56,7 @@ class TimeBase:
     uniform: bool
     stamped: bool
     findings: tuple[Finding, ...] = ()
+    tracking_interval: float | None = None
 
     @property
     def missing(self) -> int:
@@ -88,23 +85,32 @@ def from_stamps(stamps: Stamps, stated: float | None, settings: QualitySettings)
     RecordingError
         If the stamps do not advance.
     """
-    interval = _typical_interval(stamps)
-    tracks = [_Track(interval, settings.longest_hole)]
-    for block in stamps():
-        tracks[0].follow(block)
-    found = tracks[0]
+    interval = typical_interval(stamps)
+    if interval is None:
+        raise RecordingError("the time stamps do not advance; is the right column named?")
+    first = tracked(stamps, interval, settings.longest_hole)
+    # The mean over the recording is far better known than the typical interval: once more.
+    found = tracked(stamps, first.mean_interval or interval, settings.longest_hole)
     # Many holes that are together longer than the log are pauses of the host, not losses.
     bursts = found.grid > 2 * found.rows and found.holes > 0.05 * found.rows
-    if found.off_grid > settings.jitter * found.rows or bursts:
+    shared = found.duplicates > _SHARED * found.rows
+    if found.off_grid > settings.jitter * found.rows or bursts or shared:
         return _arrival_order(stamps, found, stated, settings)
-    # The mean over the whole recording is far better known than the typical interval.
-    exact = found.elapsed / found.steps if found.steps else interval
+    exact = found.mean_interval or interval
     findings = _grid_findings(found, exact)
     rate = 1.0 / exact
     findings += _rate_findings(rate, stated, settings)
     uniform = found.grid == found.rows and len(found.starts) == 1 and not found.duplicates
     return TimeBase(
-        rate, "stamps", found.rows, found.grid, found.segments, uniform, True, tuple(findings)
+        rate,
+        "stamps",
+        found.rows,
+        found.grid,
+        found.segments,
+        uniform,
+        True,
+        tuple(findings),
+        found.interval,
     )
 
 
@@ -118,122 +124,13 @@ def positions(
             yield np.arange(start, start + len(block), dtype=np.int64)
             start += len(block)
         return
-    track = _Track(_typical_interval(stamps), settings.longest_hole)
+    assert base.tracking_interval is not None  # as from_stamps makes it
+    track = Track(base.tracking_interval, settings.longest_hole)
     for block in stamps():
         yield track.follow(block)
 
 
-def _typical_interval(stamps: Stamps) -> float:
-    """Return the mean of the intervals that are not longer than 1.75 times their median, s."""
-    medians = []
-    for block in stamps():
-        steps = np.diff(block)
-        steps = steps[steps > 0]
-        if len(steps):
-            medians.append(float(np.median(steps)))
-    if not medians:
-        raise RecordingError("the time stamps do not advance; is the right column named?")
-    limit = 1.75 * float(np.median(medians))
-    total, count = 0.0, 0
-    for block in stamps():
-        steps = np.diff(block)
-        steps = steps[(steps > 0) & (steps <= limit)]
-        total += float(steps.sum())
-        count += len(steps)
-    return total / count
-
-
-@dataclass
-class _Track:
-    """Follows stamps along a grid of a given interval, in s."""
-
-    interval: float
-    longest_hole: float
-    rows: int = 0
-    grid: int = 0
-    off_grid: int = 0
-    duplicates: int = 0
-    holes: int = 0
-    longest: int = 0
-    elapsed: float = 0.0
-    steps: int = 0
-    starts: list[int] = field(default_factory=list)
-    unstamped: int = 0
-    _state: NDArray[np.float64] = field(default_factory=lambda: np.full(2, np.nan))
-
-    @property
-    def segments(self) -> tuple[tuple[int, int], ...]:
-        return tuple(zip(self.starts, [*self.starts[1:], self.grid], strict=True))
-
-    def follow(self, block: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Return the grid points of a block of stamps and keep count of what is found."""
-        points = np.empty(len(block), dtype=np.int64)
-        breaks = np.empty(len(block), dtype=np.int64)
-        counts = np.zeros(6, dtype=np.int64)
-        seconds = np.zeros(1)
-        _follow(
-            block, self.interval, self.longest_hole, self.grid, self._state,
-            points, breaks, counts, seconds,
-        )  # fmt: skip
-        self.starts += breaks[: counts[0]].tolist()
-        self.off_grid += int(counts[1])
-        self.duplicates += int(counts[2])
-        self.holes += int(counts[3])
-        self.longest = max(self.longest, int(counts[4]))
-        self.unstamped += int(counts[5])
-        self.rows += len(block)
-        taken = points[points >= 0]
-        if len(taken):
-            self.grid = int(taken[-1]) + 1
-        self.elapsed += float(seconds[0])
-        # Grid steps inside segments: every point but the first of each segment.
-        self.steps = self.grid - len(self.starts)
-        return points
-
-
-@njit(cache=True, nogil=True)
-def _follow(block, interval, longest_hole, grid, state, points, breaks, counts, seconds):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
-    """Track stamps; ``state`` holds the time of grid point ``grid - 1`` and the last stamp."""
-    origin, last = state[0], state[1]
-    point = grid - 1
-    for i in range(block.size):
-        stamp = block[i]
-        if np.isnan(stamp):
-            counts[5] += 1
-            point += 1
-            origin += interval
-            points[i] = point
-            continue
-        step = stamp - last
-        if np.isnan(last) or step < -0.5 * interval or step > longest_hole:
-            point += 1
-            breaks[counts[0]] = point
-            counts[0] += 1
-            origin = stamp
-        else:
-            steps = (stamp - origin) / interval
-            whole = int(np.round(steps))
-            error = stamp - origin - whole * interval
-            if abs(error) > _OFF_GRID * interval or whole < 1:
-                counts[1] += 1
-            if whole < 1:
-                counts[2] += 1
-                points[i] = -1
-                seconds[0] += max(step, 0.0)
-                last = max(last, stamp)
-                continue
-            if whole > 1:
-                counts[3] += 1
-                counts[4] = max(counts[4], whole - 1)
-            point += whole
-            origin += whole * interval + _TRACKING * error
-            seconds[0] += step
-        last = stamp
-        points[i] = point
-    state[0], state[1] = origin, last
-
-
-def _grid_findings(found: _Track, interval: float) -> list[Finding]:
+def _grid_findings(found: Track, interval: float) -> list[Finding]:
     findings = []
     missing = found.grid - (found.rows - found.duplicates)
     if missing:
@@ -270,7 +167,8 @@ def _grid_findings(found: _Track, interval: float) -> list[Finding]:
             Finding(
                 "missing_stamps",
                 "warning",
-                f"{found.unstamped} records have no time stamp; taken as consecutive",
+                f"{found.unstamped} records have no time stamp, or one far astray; taken as "
+                "consecutive",
                 found.unstamped,
             )
         )
@@ -292,28 +190,36 @@ def _rate_findings(rate: float, stated: float | None, settings: QualitySettings)
 
 
 def _arrival_order(
-    stamps: Stamps, found: _Track, stated: float | None, settings: QualitySettings
+    stamps: Stamps, found: Track, stated: float | None, settings: QualitySettings
 ) -> TimeBase:
     """Return the time base of stamps that lie on no grid: consecutive samples at the mean rate."""
-    rows, elapsed, last = 0, 0.0, np.nan
-    starts = [0]
+    # A pause is long against the mean interval and against the steps of stamps that are shared.
     mean = _span(stamps) / max(found.rows - 1, 1)
-    gap = max(1.0, 100 * mean)
-    worst = 0.0
+    gap = max(1.0, 100 * mean, 10 * found.interval) * (1 + 1e-6)
+    rows, last, worst = 0, np.nan, 0.0
+    starts = [0]
+    # Between the records with which a stamp changes: samples that share one are counted whole.
+    changed_at, changed_stamp = 0, np.nan
+    samples, elapsed = 0, 0.0
     for block in stamps():
-        joined = np.concatenate(([last], block[~np.isnan(block)]))
-        steps = np.diff(joined)
-        cut = np.flatnonzero((steps < 0) | (steps > gap))
-        starts += [rows + int(i) for i in cut]
-        inside = steps[(steps >= 0) & (steps <= gap)]
-        elapsed += float(inside.sum())
-        worst = max(worst, float(inside.max(initial=0.0)))
+        # A missing stamp stands for no time: the step after it covers it.
+        held = np.concatenate(([last], block))
+        good = np.maximum.accumulate(np.where(np.isnan(held), 0, np.arange(len(held))))
+        held = held[good]
+        steps = np.diff(held)
+        cut = np.abs(steps) > gap
+        starts += [rows + int(i) for i in np.flatnonzero(cut)]
+        worst = max(worst, float(steps[np.isfinite(steps) & ~cut].max(initial=0.0)))
+        for i in np.flatnonzero((steps != 0) & np.isfinite(steps)) if len(steps) else ():
+            if not cut[i] and np.isfinite(changed_stamp):
+                samples += rows + int(i) - changed_at
+                elapsed += float(held[i + 1] - changed_stamp)
+            changed_at, changed_stamp = rows + int(i), float(held[i + 1])
         rows += len(block)
-        last = joined[-1]
-    steps_inside = rows - len(starts)
+        last = held[-1]
     if elapsed <= 0:
         raise RecordingError("the time stamps do not advance; is the right column named?")
-    rate = steps_inside / elapsed
+    rate = samples / elapsed
     findings = [
         Finding(
             "jittered_stamps",
@@ -341,10 +247,9 @@ def _arrival_order(
 
 
 def _span(stamps: Stamps) -> float:
-    """Return the sum of all steps forward, s."""
-    total, last = 0.0, np.nan
+    """Return the time from the earliest to the latest stamp, s."""
+    low, high = np.inf, -np.inf
     for block in stamps():
-        steps = np.diff(np.concatenate(([last], block)))
-        total += float(steps[steps > 0].sum())
-        last = block[-1]
-    return total
+        if np.isfinite(block).any():
+            low, high = min(low, float(np.nanmin(block))), max(high, float(np.nanmax(block)))
+    return high - low

@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 
 from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes
 from imubench_pipeline.confidence import equivalent_degrees
+from imubench_pipeline.estimators.curve import read
 from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.estimators.least_squares import fit
 from imubench_pipeline.noise import NoiseModel
@@ -17,7 +18,13 @@ HOURS_10 = 3_600_000
 def curve_of(variance: np.ndarray, sizes: np.ndarray, rate: float, samples: int) -> AllanCurve:
     edf = [equivalent_degrees(0, int(n), samples - 2 * int(n) + 1) for n in sizes]
     return AllanCurve(
-        sizes / rate, sizes, variance, np.array(edf), np.zeros(len(sizes), dtype=int), samples
+        sizes / rate,
+        sizes,
+        variance,
+        np.array(edf),
+        np.zeros(len(sizes), dtype=int),
+        samples,
+        sizes.astype(float),
     )
 
 
@@ -42,7 +49,7 @@ def test_a_noiseless_curve_gives_its_parameters_back(method) -> None:
 
 
 @settings(max_examples=40, deadline=None)
-@given(st.floats(0.3, 3), st.floats(0.5, 2), st.floats(20, 500), st.floats(0.3, 3))
+@given(st.floats(0.5, 3), st.floats(0.5, 1.4), st.floats(20, 500), st.floats(0.3, 3))
 def test_noiseless_curves_of_many_sensors(N: float, B: float, T_B: float, K: float) -> None:
     model = NoiseModel(N=N * 1e-4, B=B * 7e-5, T_B=T_B, K=K * 1e-6)
     estimate = fit(noiseless(model))
@@ -86,6 +93,25 @@ def test_sampling_counts_where_the_log_can_tell(rng) -> None:
     estimate = fit(allan_variance(log, 1.0))
     assert value(estimate, "K") == pytest.approx(2e-3, rel=0.02)
     assert value(estimate, "N") == pytest.approx(1e-3, rel=0.05)
+
+
+@pytest.mark.parametrize("loss", [0.01, 0.05, 0.1])
+def test_holes_do_not_bias_n(rng, loss: float) -> None:
+    log = simulate(MTI_7, 100.0, HOURS_10, rng)
+    log[rng.random(HOURS_10) < loss] = np.nan
+    curve = allan_variance(log, 100.0)
+    assert value(fit(curve), "N") == pytest.approx(8.4e-5, rel=0.005)
+    assert fit(curve).parameters["N"].reason is None
+    assert value(read(curve), "N") == pytest.approx(8.4e-5, rel=0.01)
+
+
+def test_noiseless_curves_of_sampled_logs() -> None:
+    sizes = cluster_sizes(HOURS_10)
+    for T_B, B in ((2.0, 6.7e-4), (20.0, 6.7e-4), (89.5, 6.7e-3)):
+        model = NoiseModel(N=8.4e-5, B=B, T_B=T_B, K=8.2e-5)
+        curve = curve_of(model.allan_variance(sizes / 100.0, 100.0), sizes, 100.0, HOURS_10)
+        for name in ("N", "B", "T_B", "K"):
+            assert value(fit(curve), name) == pytest.approx(getattr(model, name), rel=1e-6)
 
 
 def test_a_low_pass_in_the_sensor_harms_neither_n_nor_b(rng) -> None:

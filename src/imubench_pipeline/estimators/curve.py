@@ -76,6 +76,8 @@ def read(curve: AllanCurve, *, longest: float = 1 / 9) -> Estimate:
         Parameters in SI; ``not_shown`` with the reason where the curve has no such slope.
     """
     used = curve.cluster_size <= longest * curve.samples
+    # Where samples are missing, white noise is averaged over fewer than n: as at a shorter tau.
+    thinned = np.sqrt(curve.cluster_size / curve.averaged)[used]
     points = _Curve(
         np.log10(curve.tau[used]),
         np.log10(curve.deviation[used]),
@@ -89,11 +91,11 @@ def read(curve: AllanCurve, *, longest: float = 1 / 9) -> Estimate:
     bias, correlation_time = _minimum(points)
     return Estimate(
         "curve",
-        {"N": _white(points), "B": bias, "T_B": correlation_time, "K": _walk(points)},
+        {"N": _white(points, thinned), "B": bias, "T_B": correlation_time, "K": _walk(points)},
     )
 
 
-def _white(points: _Curve) -> Parameter:
+def _white(points: _Curve, thinned: Array) -> Parameter:
     slopes = np.full(len(points.tau), np.nan)
     for i, centre in enumerate(points.tau):
         inside = np.abs(points.tau - centre) <= _WINDOW / 2 + 1e-9
@@ -113,7 +115,8 @@ def _white(points: _Curve) -> Parameter:
             "not_shown",
             f"no stretch of the curve has the slope -1/2: slopes run from {low:.2f} to {high:.2f}",
         )
-    return Parameter(points.level(run, -0.5, 1.0))
+    excess = float(np.average(thinned[run], weights=points.error[run] ** -2))
+    return Parameter(points.level(run, -0.5, 1.0) / excess)
 
 
 def _first_run(mask: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
@@ -146,7 +149,10 @@ def _minimum(points: _Curve) -> tuple[Parameter, Parameter]:
         nothing = Parameter(None, "not_shown", reason)
         return nothing, nothing
     return (
-        Parameter(float(10.0 ** points.deviation[lowest]) / FLOOR),
+        Parameter(
+            float(10.0 ** points.deviation[lowest]) / FLOOR,
+            reason="read at the minimum of the whole curve, where N and K add to B",
+        ),
         Parameter(float(10.0 ** points.tau[lowest]) / PEAK_TAU),
     )
 

@@ -32,6 +32,7 @@ _BEYOND_FILTERS = 16
 
 _BENT_SIGMAS = 4.0
 _MOST_REFITS = 5
+_SAMPLING_SIGMAS = 0.02
 _SHORTEST_CORRELATION = 20
 """Sampling intervals: a shorter correlation is that of a filter, not a bias instability."""
 
@@ -89,6 +90,8 @@ def fit(
     if first == 0:
         return estimate
     parameters = dict(estimate.parameters)
+    if parameters["N"].value is None:
+        return estimate
     parameters["N"] = replace(
         parameters["N"],
         reason=f"from tau = {curve.tau[first]:.3g} s: at shorter tau the curve is bent, as by the "
@@ -136,6 +139,8 @@ def _predicted(
     """Return what a model fitted to some tau says of all, and the relative error of that."""
     rate = curve.cluster_size[0] / curve.tau[0]
     expected = model.allan_variance(curve.tau, rate)
+    # White noise is averaged over the samples present, fewer than n where some are missing.
+    expected = expected + model.N**2 * (rate / curve.averaged - 1.0 / curve.tau)
     shapes = [NoiseModel(N=1.0), NoiseModel(K=1.0)]
     if model.T_B is not None:
         shapes.append(NoiseModel(B=1.0, T_B=model.T_B))
@@ -151,22 +156,23 @@ def _predicted(
 def _fit(
     curve: AllanCurve, used: NDArray[np.bool_], method: Literal["weighted", "paper"]
 ) -> Estimate:
-    tau, n, variance = curve.tau[used], curve.cluster_size[used], curve.variance[used]
-    spread = np.sqrt(n / (2.0 * curve.samples))
-    power = variance if method == "weighted" else np.sqrt(variance)
-    root_weight = 1.0 / (2.0 * spread * power)
-    interval = float(tau[0] / n[0])
-    estimate = _Search(tau, n, variance, root_weight, interval, sampled=False).estimate(method)
-    if _sampling_shows(estimate.model, tau, interval, spread):
-        estimate = _Search(tau, n, variance, root_weight, interval, sampled=True).estimate(method)
-    return estimate
+    continuous = _Search(curve, used, method, sampled=False).estimate()
+    if not _sampling_shows(curve, used, continuous.model):
+        return continuous
+    return _Search(curve, used, method, sampled=True).estimate()
 
 
-def _sampling_shows(model: NoiseModel, tau: Array, interval: float, spread: Array) -> bool:
-    """Tell whether the sampled model differs from the continuous one by what the log can tell."""
+def _sampling_shows(curve: AllanCurve, used: NDArray[np.bool_], model: NoiseModel) -> bool:
+    """Tell whether the sampled model differs from the continuous one by what the log can tell.
+
+    Sampling adds (S_B + S_K) T^2 / (6 tau), which has the shape of white noise: left out, it
+    goes into N.
+    """
+    tau = curve.tau[used]
     continuous = model.allan_variance(tau)
-    difference = np.abs(model.allan_variance(tau, 1.0 / interval) - continuous)
-    return bool((difference > 0.1 * 2.0 * spread * continuous).any())
+    difference = model.allan_variance(tau, curve.cluster_size[0] / curve.tau[0]) - continuous
+    error = 2.0 * np.sqrt(curve.cluster_size[used] / (2.0 * curve.samples)) * continuous
+    return bool((np.abs(difference) > _SAMPLING_SIGMAS * error).any())
 
 
 class _Search:
@@ -174,24 +180,26 @@ class _Search:
 
     def __init__(
         self,
-        tau: Array,
-        n: NDArray[np.int64],
-        variance: Array,
-        root_weight: Array,
-        interval: float,
+        curve: AllanCurve,
+        used: NDArray[np.bool_],
+        method: Literal["weighted", "paper"],
         *,
         sampled: bool,
     ) -> None:
-        self._tau, self._n, self._interval, self._sampled = tau, n, interval, sampled
-        self._variance = variance
-        self._root_weight = root_weight
-        self._target = root_weight * variance
-        walk = tau / 3.0
+        self._tau, self._n = curve.tau[used], curve.cluster_size[used]
+        self._interval = float(self._tau[0] / self._n[0])
+        self._method, self._sampled = method, sampled
+        self._variance = curve.variance[used]
+        spread = np.sqrt(self._n / (2.0 * curve.samples))
+        power = self._variance if method == "weighted" else np.sqrt(self._variance)
+        self._root_weight = 1.0 / (2.0 * spread * power)
+        self._target = self._root_weight * self._variance
+        self._white = 1.0 / (curve.averaged[used] * self._interval)
+        self._walk = self._tau / 3.0
         if sampled:
-            walk = walk * (1.0 + 0.5 / n.astype(np.float64) ** 2)
-        self._white, self._walk = 1.0 / tau, walk
-        self.longest = tau[-1] / PEAK_TAU
-        self.shortest = min(_SHORTEST_CORRELATION * interval, self.longest / 2.0)
+            self._walk = self._walk * (1.0 + 0.5 / self._n.astype(np.float64) ** 2)
+        self.longest = self._tau[-1] / PEAK_TAU
+        self.shortest = min(_SHORTEST_CORRELATION * self._interval, self.longest / 2.0)
 
     def _shape(self, T_B: float) -> Array:
         if self._sampled:
@@ -207,7 +215,8 @@ class _Search:
         solution, residual = nnls(columns / size, self._target)
         return solution / size, float(residual)
 
-    def estimate(self, method: str) -> Estimate:
+    def estimate(self) -> Estimate:
+        """Return the estimate at the best T_B."""
         scan = np.geomspace(self.shortest, self.longest, _SCAN)
         costs = [self.densities(T_B)[1] for T_B in scan]
         best = int(np.argmin(costs))
@@ -219,9 +228,9 @@ class _Search:
             options={"xatol": 1e-10},
         )
         T_B = math.exp(found.x) if found.fun < costs[best] else float(scan[best])
-        return self._described(method, T_B)
+        return self._described(T_B)
 
-    def _described(self, method: str, T_B: float) -> Estimate:
+    def _described(self, T_B: float) -> Estimate:
         (white, drive, walk), _ = self.densities(T_B)
         parts = {"N": white * self._white, "B": drive * self._shape(T_B), "K": walk * self._walk}
         there = {
@@ -235,7 +244,7 @@ class _Search:
             bias = Parameter(bias.value, "at_bound", at_end)
             time = Parameter(T_B, "at_bound", at_end)
         return Estimate(
-            method,
+            self._method,
             {
                 "N": Parameter(math.sqrt(white)) if there["N"] else absent,
                 "B": bias,

@@ -1,0 +1,208 @@
+"""Time stamps put on a uniform grid, block by block."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Stamps = Callable[[], Iterator[NDArray[np.float64]]]
+"""Gives the stamps of a file in s, block by block, afresh at each call; NaN where missing."""
+
+_OFF_GRID = 0.48
+"""Part of a sampling interval beyond which a stamp does not say which grid point it means."""
+
+_TRACKING = 0.02
+"""Gain with which the grid follows the stamps; its interval, with a quarter of
+the square."""
+
+
+def typical_interval(stamps: Stamps) -> float | None:
+    """Return the mean of the intervals between which no sample is missing, in s.
+
+    None where the stamps do not advance.
+    """
+    medians, rounded = [], []
+    for block in stamps():
+        steps = _advances(block)
+        if len(steps):
+            medians.append(float(np.median(steps)))
+            rounded.append(_long_steps_are_regular(steps, medians[-1]))
+    if not medians:
+        return None
+    # Stamps rounded coarsely advance by one step or two in turn; else two are a missing sample.
+    limit = (2.2 if np.mean(rounded) > 0.5 else 1.75) * float(np.median(medians))
+    total, count = 0.0, 0
+    for block in stamps():
+        steps = _advances(block)
+        steps = steps[steps <= limit]
+        total += float(steps.sum())
+        count += len(steps)
+    return total / count
+
+
+def _advances(block: NDArray[np.float64]) -> NDArray[np.float64]:
+    steps = np.diff(block)
+    return steps[steps > 0]
+
+
+def _long_steps_are_regular(steps: NDArray[np.float64], median: float) -> bool:
+    """Tell rounding, whose long steps come at regular distances, from losses, which do not."""
+    long = np.flatnonzero((steps > 1.75 * median) & (steps < 2.2 * median))
+    if len(long) < 10:
+        return False
+    distances = np.diff(long)
+    return bool(np.mean(np.abs(distances - np.median(distances)) <= 1) > 0.9)
+
+
+@dataclass
+class Track:
+    """Follows stamps along a grid, and counts what it meets.
+
+    Attributes
+    ----------
+    interval : float
+        Of the grid at its beginning, s.
+    longest_hole : float
+        A longer step forward begins a segment, s.
+    rows, grid : int
+        Records, and points of the grid up to the last one.
+    off_grid, duplicates, unstamped : int
+        Records whose stamp lies between two points, repeats a point, or is missing.
+    holes, longest : int
+        Number of holes, and the points of the longest.
+    elapsed, steps
+        s, and grid points, between stamped records of the same segment.
+    starts : list of int
+        First grid point of each segment.
+    """
+
+    interval: float
+    longest_hole: float
+    rows: int = 0
+    grid: int = 0
+    off_grid: int = 0
+    duplicates: int = 0
+    unstamped: int = 0
+    holes: int = 0
+    longest: int = 0
+    elapsed: float = 0.0
+    steps: int = 0
+    starts: list[int] = field(default_factory=list)
+    _state: NDArray[np.float64] = field(default_factory=lambda: np.full(4, np.nan))
+
+    @property
+    def segments(self) -> tuple[tuple[int, int], ...]:
+        """First and one-past-last grid point of each segment."""
+        return tuple(zip(self.starts, [*self.starts[1:], self.grid], strict=True))
+
+    @property
+    def mean_interval(self) -> float | None:
+        """Mean interval of the grid, s; None where no two stamps are in one segment."""
+        return self.elapsed / self.steps if self.steps else None
+
+    def follow(self, block: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Return the grid point of each record of a block; -1 for a repeated one."""
+        points = np.empty(len(block), dtype=np.int64)
+        breaks = np.empty(len(block), dtype=np.int64)
+        counts = np.zeros(7, dtype=np.int64)
+        if np.isnan(self._state[2]):
+            self._state[2] = self.interval
+        self.elapsed += _follow(
+            block, self.longest_hole, self.grid, self._state, points, breaks, counts
+        )
+        self.starts += breaks[: counts[0]].tolist()
+        self.off_grid += int(counts[1])
+        self.duplicates += int(counts[2])
+        self.holes += int(counts[3])
+        self.longest = max(self.longest, int(counts[4]))
+        self.unstamped += int(counts[5])
+        self.steps += int(counts[6])
+        self.rows += len(block)
+        self.grid = max(self.grid, int(points.max(initial=-1)) + 1)
+        return points
+
+
+def tracked(stamps: Stamps, interval: float, longest_hole: float) -> Track:
+    """Return the track of all stamps of a file."""
+    track = Track(interval, longest_hole)
+    for block in stamps():
+        track.follow(block)
+    return track
+
+
+@njit(cache=True, nogil=True)
+def _follow(block, longest_hole, grid, state, points, breaks, counts):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+    """Give each stamp its grid point; return the seconds between stamps.
+
+    ``state``: time of the last grid point, last stamp, interval, last stamped grid point.
+    """
+    origin, last, interval, stamped = state[0], state[1], state[2], state[3]
+    point = grid - 1
+    elapsed = 0.0
+    late = False
+    for i in range(block.size):
+        stamp = block[i]
+        # One stamp far from where the next ones go on is no jump of the clock.
+        astray = (
+            i + 1 < block.size
+            and abs(stamp - last) > 10.0 * interval
+            and abs(block[i + 1] - last - 2.0 * interval) < interval
+        )
+        if np.isnan(stamp) or astray:
+            counts[5] += 1
+            point += 1
+            origin += interval
+            points[i] = point
+            continue
+        step = stamp - last
+        if np.isnan(last) or step < -max(1.0, 10.0 * interval) or step > longest_hole:
+            point += 1
+            breaks[counts[0]] = point
+            counts[0] += 1
+            origin = stamp
+            late = False
+        else:
+            whole = int(np.round((stamp - origin) / interval))
+            error = stamp - origin - whole * interval
+            if step != 0.0 and (abs(error) > _OFF_GRID * interval or whole < 1):
+                counts[1] += 1
+            if whole == 0 and step > 0.0 and late:
+                # The sample before came late by half an interval: it belongs into the hole.
+                points[i - 1] -= 1
+                points[i] = point
+                counts[3] -= 1
+                late = False
+                elapsed += step
+                last = stamp
+                continue
+            if (
+                whole == 0
+                and step > 0.0
+                and i + 1 < block.size
+                and np.round((block[i + 1] - origin) / interval) == 2
+            ):
+                # This one came early: the next leaves a hole for it.
+                whole = 1
+                error = stamp - origin - interval
+            if whole < 1:
+                counts[2] += 1
+                points[i] = -1
+                continue
+            late = whole == 2 and error < 0.0 and i > 0
+            if whole > 1:
+                counts[3] += 1
+                counts[4] = max(counts[4], whole - 1)
+            point += whole
+            origin += whole * interval + _TRACKING * error
+            interval += _TRACKING**2 / 4.0 * error
+            elapsed += step
+            counts[6] += point - int(stamped)
+        last = stamp
+        stamped = point
+        points[i] = point
+    state[0], state[1], state[2], state[3] = origin, last, interval, stamped
+    return elapsed
