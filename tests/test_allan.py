@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from imubench_pipeline.allan import allan_variance, cluster_sizes, integrate, of_phase
+from imubench_pipeline.allan import allan_variance, cluster_sizes, of_phase
+from imubench_pipeline.phase import integrate
 
 
 def by_definition(samples: np.ndarray, n: int) -> float:

@@ -55,8 +55,12 @@ def test_a_sensor_file_is_read() -> None:
         ("vender", "x", r"vender: unknown key; did you mean 'vendor'\?"),
         ("log.chanels", {}, r"log.chanels: unknown key; did you mean 'channels'\?"),
         ("log.channels.gyro_w", {"column": 1, "unit": "g"}, r"gyro_w"),
-        ("log.channels.gyro_x.unit", "deg", r"gyro_x.unit: 'deg' is not a angular rate.*deg/s"),
-        ("log.channels.gyro_x.unit", "m/s^2", r"'m/s\^2' is not"),
+        (
+            "log.channels.gyro_x.unit",
+            "deg",
+            r"gyro_x.unit: 'deg' is no unit of angular rate.*deg/s",
+        ),
+        ("log.channels.gyro_x.unit", "m/s^2", r"'m/s\^2' is no"),
         ("log.channels.gyro_x.column", None, r"log.channels.gyro_x.column: missing"),
         ("log.channels.gyro_x.column", 0, r"counted from 1"),
         ("log.rate", "100", r"log.rate: .*'100' is not a number with its unit"),
@@ -64,7 +68,7 @@ def test_a_sensor_file_is_read() -> None:
         ("log.rate", None, r"expected 'rate'.*or 'time'"),
         ("log.time", {"column": "t"}, r"either 'unit'"),
         ("log.reader", "cvs", r"log.reader: found 'cvs'; input should be"),
-        ("datasheet.gyro.noise_density.unit", "deg/s", r"noise_density.unit: 'deg/s' is not"),
+        ("datasheet.gyro.noise_density.unit", "deg/s", r"noise_density.unit: 'deg/s' is no"),
         ("datasheet.gyro.noise_density.sidedness", "both", r"found 'both'"),
     ],
 )
@@ -144,7 +148,7 @@ def test_simulated_recordings_name_known_sensors_and_channels(tmp_path: Path) ->
     for change, message in (
         ({"sensor": "t"}, "found 't'; expected one of the sensor files: s"),
         ({"channels": {"gyro_z": {"N": "1 rad/√s"}}}, "gyro_z not channels of s"),
-        ({"channels": {"gyro_x": {"N": "1 m/s"}}}, "is not a gyro density"),
+        ({"channels": {"gyro_x": {"N": "1 m/s"}}}, "is no unit of gyro density"),
         ({"channels": {"gyro_x": {"B": "1 rad/s"}}}, "B and T_B go together"),
         ({"recording": "a"}, "recording: found 'a'"),
     ):

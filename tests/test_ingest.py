@@ -133,8 +133,13 @@ def test_an_axis_cut_short_loses_the_others_nothing(
 ) -> None:
     for axis, length in zip("xyz", (400, 400, 399), strict=True):
         write_csv(tmp_path / f"r/{axis}.csv", w=rng.standard_normal(length))
-    _, values = kept(tmp_path / "r", tmp_path / "out", PER_AXIS)
+    result, values = kept(tmp_path / "r", tmp_path / "out", PER_AXIS)
     assert [len(values[f"gyro_{axis}"]) for axis in "xyz"] == [400, 400, 399]
+    assert [(f.finding, f.value) for f in result.findings] == [("unequal_length", 1)]
+    write_csv(tmp_path / "r/z.csv", w=rng.standard_normal(50))
+    result, values = kept(tmp_path / "r", tmp_path / "out", PER_AXIS)
+    assert list(values) == ["gyro_x", "gyro_y"]
+    assert ("too_short", "gyro_z") in [(f.finding, f.channel) for f in result.findings]
 
 
 def test_the_part_to_use(tmp_path: Path) -> None:
@@ -170,9 +175,23 @@ def test_infinities_are_missing_samples(tmp_path: Path, rng: np.random.Generator
 
 def test_too_short_a_recording_is_rejected_and_leaves_nothing(tmp_path: Path) -> None:
     source = write_csv(tmp_path / "a.csv", wx=np.arange(99.0), wy=np.arange(99.0))
-    with pytest.raises(RecordingError, match=r"99 samples, expected at least 100"):
+    with pytest.raises(RecordingError, match=r"gyro_x has 99 samples, expected at least 100"):
         kept(source, tmp_path / "out")
     assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_long_holes_are_read_in_bounded_blocks(tmp_path: Path) -> None:
+    time = np.concatenate([500.0 * i + np.arange(100) / 1000.0 for i in range(20)])
+    wx = np.sin(np.arange(2000.0))
+    source = write_csv(tmp_path / "a.csv", t=time, wx=wx)
+    kept(source, tmp_path / "out", {"gyro_x": XY["gyro_x"]}, time=TIME)
+    log = channel_logs(tmp_path / "out")["gyro_x"]
+    assert log.grid > 9_000_000
+    blocks = list(log.blocks())
+    assert max(map(len, blocks)) < 3 << 20
+    joined = np.concatenate(blocks)
+    assert len(joined) == log.grid
+    np.testing.assert_array_equal(joined[np.isfinite(joined)], wx)
 
 
 def test_a_second_run_replaces_the_first(tmp_path: Path, rng: np.random.Generator) -> None:

@@ -61,9 +61,41 @@ def test_wrong_notes_reject_their_log_only(project: dict[str, Any]) -> None:
     put(project, "a.yaml", "divice: 7\n")
     put(project, "b.csv")
     put(project, "b.yaml", "log: [\n")
+    put(project, "c.csv")
+    put(project, "c.yaml", "device: 12345\nstarted: 2024-01-01T10:00:00Z\n")
     plan = Plan(project)
     assert "did you mean 'device'" in json.loads(plan.ingest_settings("s", "a"))["error"]
     assert "not readable as YAML" in json.loads(plan.ingest_settings("s", "b"))["error"]
+    notes = json.loads(plan.ingest_settings("s", "c"))["notes"]
+    assert notes["device"] == "12345" and notes["started"].startswith("2024-01-01T10:00:00")
+
+
+@pytest.mark.parametrize("name", ["a{b}.csv", "d<e>.csv", "x" * 200 + ".csv", "a\nb.csv"])
+def test_a_name_that_cannot_be_used_rejects_its_log_only(
+    project: dict[str, Any], name: str
+) -> None:
+    put(project, "good.csv")
+    put(project, name)
+    plan = Plan(project)
+    assert len(plan.recordings) == 2
+    (bad,) = [key for key in plan.recordings if key[1] != "good"]
+    assert not set("{}<>\n") & set(bad[1]) and len(bad[1]) <= 120
+    assert "rename the file" in json.loads(plan.ingest_settings(*bad))["error"]
+    assert plan.recordings[bad].files == []
+
+
+def test_a_link_to_nowhere_rejects_its_log_only(project: dict[str, Any]) -> None:
+    put(project, "good.csv")
+    (Path(project["logs"]) / "s/lost.csv").symlink_to("nowhere.csv")
+    (Path(project["logs"]) / "s/empty").mkdir()
+    plan = Plan(project)
+    assert "No such file" in json.loads(plan.ingest_settings("s", "lost"))["error"]
+    assert "has no files" in json.loads(plan.ingest_settings("s", "empty"))["error"]
+
+
+def test_a_drop_zone_that_is_not_there(project: dict[str, Any]) -> None:
+    with pytest.raises(ConfigError, match=r"logs: found .*/nowhere', which is no folder"):
+        Plan(project | {"logs": project["logs"] + "/nowhere"})
 
 
 def test_an_edit_of_the_datasheet_changes_nothing_else(project: dict[str, Any]) -> None:

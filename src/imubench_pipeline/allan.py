@@ -10,7 +10,7 @@ overlapping Allan variance at n samples a cluster is
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -19,6 +19,7 @@ from numba import get_num_threads, njit, prange, set_num_threads
 from numpy.typing import ArrayLike, NDArray
 
 from imubench_pipeline.confidence import deviation_limits, equivalent_degrees, noise_exponent
+from imubench_pipeline.phase import Phase, integrate
 
 BLOCK = 1 << 14
 """Differences summed together: three blocks of float64 stay in the L2 cache."""
@@ -72,30 +73,6 @@ class AllanCurve:
         return deviation_limits(self.deviation, self.edf, confidence)
 
 
-@dataclass(frozen=True)
-class Phase:
-    """Cumulative sums of a log on its uniform grid.
-
-    Attributes
-    ----------
-    theta : ndarray of float64, shape (L + 1,)
-        Cumulative sum of the samples less a constant; missing samples add nothing.
-    present : ndarray of int32, shape (L + 1,), or None
-        Cumulative number of samples present; None: all are.
-    segments : tuple of (int, int)
-        Grid points that begin and end each segment.
-    """
-
-    theta: NDArray[np.float64]
-    present: NDArray[np.int32] | None
-    segments: tuple[tuple[int, int], ...]
-
-    @property
-    def samples(self) -> int:
-        """L, the points of the grid."""
-        return len(self.theta) - 1
-
-
 def cluster_sizes(samples: int, *, per_decade: int = 10, longest: float = 0.5) -> NDArray[np.int64]:
     """Return log-spaced cluster sizes, whole and distinct.
 
@@ -114,61 +91,6 @@ def cluster_sizes(samples: int, *, per_decade: int = 10, longest: float = 0.5) -
     exponents = np.arange(int(np.log10(largest) * per_decade + 1e-9) + 1) / per_decade
     sizes = np.rint(10.0**exponents).astype(np.int64)
     return np.unique(sizes[sizes <= largest])
-
-
-def integrate(
-    blocks: Iterable[NDArray[np.float64]],
-    samples: int,
-    *,
-    holes: bool,
-    segments: Sequence[tuple[int, int]] | None = None,
-) -> Phase:
-    """Sum consecutive blocks of samples up, in bounded memory beyond the result.
-
-    Parameters
-    ----------
-    blocks : iterable of ndarray
-        The log in order; NaN where a sample is missing.
-    samples : int
-        L, the length of all blocks together.
-    holes : bool
-        Samples may be missing; False saves the memory of their counts.
-    segments : sequence of (int, int), optional
-        Grid points that begin and end each segment; one segment by default.
-
-    Raises
-    ------
-    ValueError
-        If the blocks are not ``samples`` long, a sample is infinite, or one is missing although
-        ``holes`` is False.
-    """
-    theta = np.empty(samples + 1)
-    theta[0] = 0.0
-    present = np.zeros(samples + 1, dtype=np.int32) if holes else None
-    reached = 0
-    level: float | None = None
-    for block in blocks:
-        values = np.asarray(block, dtype=np.float64)
-        stop = reached + len(values)
-        if stop > samples:
-            raise ValueError(f"the blocks hold more than the {samples} samples stated")
-        finite = values[np.isfinite(values)] if level is None else values
-        if level is None and len(finite):
-            # A constant drops out of the variance, but 9.81 would eat the digits of the sum.
-            level = float(finite.mean())
-        if present is None:
-            _accumulate(values, level or 0.0, theta[reached : stop + 1])
-        else:
-            reach = slice(reached, stop + 1)
-            _accumulate_present(values, level or 0.0, theta[reach], present[reach])
-        reached = stop
-    if reached != samples:
-        raise ValueError(f"the blocks hold {reached} samples, {samples} were stated")
-    if not np.isfinite(theta[-1]):
-        raise ValueError(
-            "a sample is infinite" if holes else "a sample is missing or infinite, but holes=False"
-        )
-    return Phase(theta, present, tuple(segments) if segments else ((0, samples),))
 
 
 def allan_variance(
@@ -340,25 +262,6 @@ def _exponents(phase: Phase, sizes: NDArray[np.int64]) -> list[int]:
 def _degrees(phase: Phase, exponent: int, n: int) -> float:
     terms = [stop - start - 2 * n + 1 for start, stop in phase.segments]
     return sum(equivalent_degrees(exponent, n, term) for term in terms if term > 0)
-
-
-@njit(cache=True, nogil=True)
-def _accumulate(values, level, theta):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
-    total = theta[0]
-    for i in range(values.size):
-        total += values[i] - level
-        theta[i + 1] = total
-
-
-@njit(cache=True, nogil=True)
-def _accumulate_present(values, level, theta, present):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
-    total, number = theta[0], present[0]
-    for i in range(values.size):
-        if not np.isnan(values[i]):
-            total += values[i] - level
-            number += 1
-        theta[i + 1] = total
-        present[i + 1] = number
 
 
 @njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})

@@ -136,9 +136,21 @@ def _ingest(
     findings = [finding for part in parts for finding in part.source.findings]
     bases = [_base(part, log, settings) for part in parts]
     for part in parts:
-        findings += column_findings(part.spreads)
+        findings += column_findings(part.spreads, settings.shortest)
     unusable = {finding.channel for finding in findings if finding.severity == "fatal"}
     groups = _shared_bases(parts, bases)
+    if len({part.rows for part in parts if not part.stamped}) > 1:
+        lengths = ", ".join(f"{part.source.path.name} {part.rows}" for part in parts)
+        rows = [part.rows for part in parts]
+        findings.append(
+            Finding(
+                "unequal_length",
+                "warning",
+                f"files without stamps differ in length ({lengths} samples): the shorter ones may "
+                "be cut short",
+                max(rows) - min(rows),
+            )
+        )
     names = _names(parts, groups)
     metadata = provenance | {
         "sources": [
@@ -175,11 +187,6 @@ def _ingest(
         raise RecordingError(
             "no channel can be used: " + "; ".join(f.detail for f in findings if f.channel)
         )
-    if summary["samples"] < settings.shortest:
-        raise RecordingError(
-            f"{summary['samples']} samples, expected at least {settings.shortest} "
-            "(quality.shortest); record for longer"
-        )
     for temporary, final in written:
         temporary.replace(final)
     channels = {
@@ -207,9 +214,10 @@ def _read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> _Par
                 clock = time
                 part.stamped = True
             read_rows += len(batch)
-            keep = clock >= use.start if use.start > 0 else np.ones(len(batch), dtype=bool)
+            # A record without a stamp is not known to lie outside.
+            keep = ~(clock < use.start)
             if use.end is not None:
-                keep &= clock <= use.end
+                keep &= ~(clock > use.end)
             whole = bool(keep.all())
             part.not_used += len(batch) - int(keep.sum())
             if time is not None:
@@ -327,7 +335,8 @@ def _columns_of(parts: list[_Part]) -> Iterator[dict[str, NDArray[Any]]]:
 def _summary(
     parts: list[_Part], bases: list[timebase.TimeBase], started: str | None
 ) -> dict[str, Any]:
-    longest = max(range(len(parts)), key=lambda index: bases[index].rows)
+    measured = [i for i, part in enumerate(parts) if set(part.spreads) != {TEMPERATURE}]
+    longest = max(measured, key=lambda index: bases[index].rows)
     base = bases[longest]
     temperature = next(
         (part.spreads[TEMPERATURE] for part in parts if TEMPERATURE in part.spreads), Spread()

@@ -7,6 +7,7 @@ of what the rule depends on, so that an edit runs again what it touches and noth
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +22,8 @@ from imubench_pipeline.validation import ConfigError, parse, read_yaml
 
 _NOT_LOGS = {".yaml", ".yml", ".md", ".part", ".tmp", ".filepart", ".crdownload"}
 _COMPRESSED = {".gz"}
+_UNUSABLE_IN_NAMES = re.compile(r"[^\w .+()-]")
+_LONGEST_NAME = 120
 
 STEPS: Mapping[str, tuple[str, ...]] = {
     "simulate": ("simulated_logs",),
@@ -47,6 +50,8 @@ class Recording:
     notes : Path or None
         The file of notes beside it.
     simulated : bool
+    error : str or None
+        Why the file cannot be used, where its name or its place says so already.
     """
 
     sensor: str
@@ -54,10 +59,13 @@ class Recording:
     path: Path
     notes: Path | None
     simulated: bool
+    error: str | None = None
 
     @property
     def files(self) -> list[Path]:
         """What the recording depends on."""
+        if self.error:
+            return []
         logs = [self.path] if self.simulated else log_files(self.path)
         return logs + ([self.notes] if self.notes else [])
 
@@ -90,6 +98,11 @@ class Plan:
 
     def _found_logs(self) -> list[Recording]:
         if not self.run.logs.is_dir():
+            if self.run.simulated is None:
+                raise ConfigError(
+                    f"logs: found {str(self.run.logs)!r}, which is no folder; expected the folder "
+                    "that holds <sensor>/<recording>"
+                )
             return []
         found = []
         for folder in sorted(path for path in self.run.logs.iterdir() if path.is_dir()):
@@ -101,7 +114,14 @@ class Plan:
                 name = path.name if path.is_dir() else _stem(path)
                 notes = folder / f"{name}.yaml"
                 found.append(
-                    Recording(folder.name, name, path, notes if notes.is_file() else None, False)
+                    Recording(
+                        folder.name,
+                        _UNUSABLE_IN_NAMES.sub("_", name)[:_LONGEST_NAME],
+                        path,
+                        notes if notes.is_file() else None,
+                        simulated=False,
+                        error=_fault(path, name),
+                    )
                 )
         return found
 
@@ -122,6 +142,8 @@ class Plan:
             "sizes": [path.stat().st_size for path in recording.files if path.is_file()],
         }
         try:
+            if recording.error:
+                raise ConfigError(recording.error)
             notes = RecordingNotes()
             if recording.notes:
                 notes = parse(
@@ -189,6 +211,26 @@ class Plan:
     def code(step: str) -> str:
         """Return the digest of the code that a step runs."""
         return source_digest(*STEPS[step])
+
+
+def _fault(path: Path, name: str) -> str | None:
+    """Return why a file of the drop zone cannot be used, if its name or place says so."""
+    shown = ascii(path.name)
+    if _UNUSABLE_IN_NAMES.search(name) or len(name) > _LONGEST_NAME:
+        return (
+            f"the file name {shown} cannot be used; expected at most {_LONGEST_NAME} letters, "
+            "digits, spaces and . _ - + ( ) in it: rename the file"
+        )
+    try:
+        if not log_files(path):
+            return f"the folder {shown} has no files"
+        for file in log_files(path):
+            file.stat()
+            with file.open("rb"):
+                pass
+    except OSError as error:
+        return f"{shown} cannot be read ({error.strerror})"
+    return None
 
 
 def _stem(path: Path) -> str:

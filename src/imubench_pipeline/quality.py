@@ -36,7 +36,7 @@ class Spread:
         return np.where(finite, values, np.nan) if infinite else values
 
 
-def column_findings(spreads: Mapping[str, Spread]) -> list[Finding]:
+def column_findings(spreads: Mapping[str, Spread], shortest: int) -> list[Finding]:
     """Return what the spread of each column tells; a channel that cannot be used is fatal."""
     findings = []
     for channel, spread in spreads.items():
@@ -45,6 +45,17 @@ def column_findings(spreads: Mapping[str, Spread]) -> list[Finding]:
         if spread.present == 0:
             findings.append(
                 Finding("no_samples", "fatal", f"{channel} holds no number", 0, channel)
+            )
+        elif spread.present < shortest:
+            findings.append(
+                Finding(
+                    "too_short",
+                    "fatal",
+                    f"{channel} has {spread.present} samples, expected at least {shortest} "
+                    "(quality.shortest); record for longer",
+                    spread.present,
+                    channel,
+                )
             )
         elif spread.low == spread.high:
             findings.append(

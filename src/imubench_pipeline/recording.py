@@ -130,10 +130,15 @@ class ChannelLog:
                     yield values
                     continue
                 points = table.column("sample").to_numpy()
-                block = np.full(int(points[-1]) + 1 - reached, np.nan)
-                block[points - reached] = values
-                reached = int(points[-1]) + 1
-                yield block
+                start = 0
+                while start < len(points):
+                    # Long holes: a row group can stand for many times its rows on the grid.
+                    stop = int(np.searchsorted(points, max(reached, points[start]) + ROW_GROUP))
+                    block = np.full(int(points[stop - 1]) + 1 - reached, np.nan)
+                    block[points[start:stop] - reached] = values[start:stop]
+                    reached = int(points[stop - 1]) + 1
+                    start = stop
+                    yield block
 
 
 def read_metadata(path: Path) -> dict[str, Any]:

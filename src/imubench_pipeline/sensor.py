@@ -9,7 +9,7 @@ from typing import Any, Literal
 from pydantic import Field, model_validator
 
 from imubench_pipeline.units import UnitError, conversion, quantity_to_si
-from imubench_pipeline.validation import ConfigError, Frequency, Strict, parse, read_yaml
+from imubench_pipeline.validation import ConfigError, Frequency, Strict, Text, parse, read_yaml
 
 QUANTITIES: dict[str, str] = {"gyro": "angular_rate", "accel": "acceleration"}
 """The measured quantities and the dimension of each."""
@@ -209,8 +209,8 @@ class UsedPart(Strict):
 class RecordingNotes(Strict):
     """What may stand in ``<recording>.yaml`` beside a log."""
 
-    device: str | None = Field(None, description="serial number; default: the recording's name")
-    started: str | None = Field(None, description="date and time of the first sample")
+    device: Text | None = Field(None, description="serial number; default: the recording's name")
+    started: Text | None = Field(None, description="date and time of the first sample")
     use: UsedPart = UsedPart()
     log: dict[str, Any] = Field(default=dict(), description="merged over the sensor's log")
 

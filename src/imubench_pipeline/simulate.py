@@ -16,8 +16,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from imubench_pipeline.allan import integrate, of_phase
+from imubench_pipeline.allan import of_phase
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, RandomWalk
+from imubench_pipeline.phase import integrate
 
 Array = NDArray[np.float64]
 

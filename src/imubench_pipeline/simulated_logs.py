@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.config import SimulatedRecording
 from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.readers.batch import SECONDS
 from imubench_pipeline.sensor import QUANTITIES, ColumnSource, LogFormat, quantity_of
 from imubench_pipeline.simulate import channel_rng, simulate_blocks
 from imubench_pipeline.units import conversion, quantity_to_si
@@ -125,8 +126,8 @@ class _Writer:
         if self._log.time is not None:
             if self._log.time.format is not None:
                 raise ConfigError("simulated logs have numeric time stamps, not ISO 8601")
-            per_second = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}[self._log.time.unit or "s"]
-            stamps = np.arange(start, start + count) / rate * per_second
+            seconds = SECONDS[self._log.time.unit or "s"]
+            stamps = np.arange(start, start + count) / rate / seconds
             columns[str(self._log.time.column)] = np.round(stamps, 9)
         for channel, source in self._sources.items():
             factor, _ = conversion(source.unit, QUANTITIES[quantity_of(channel)])

@@ -210,11 +210,14 @@ def _arrival_order(
         cut = np.abs(steps) > gap
         starts += [rows + int(i) for i in np.flatnonzero(cut)]
         worst = max(worst, float(steps[np.isfinite(steps) & ~cut].max(initial=0.0)))
-        for i in np.flatnonzero((steps != 0) & np.isfinite(steps)) if len(steps) else ():
-            if not cut[i] and np.isfinite(changed_stamp):
-                samples += rows + int(i) - changed_at
-                elapsed += float(held[i + 1] - changed_stamp)
-            changed_at, changed_stamp = rows + int(i), float(held[i + 1])
+        changes = np.flatnonzero((steps != 0) & np.isfinite(steps))
+        if len(changes):
+            at = np.concatenate(([changed_at], rows + changes))
+            when = np.concatenate(([changed_stamp], held[changes + 1]))
+            inside = ~cut[changes] & np.isfinite(when[:-1])
+            samples += int(np.diff(at)[inside].sum())
+            elapsed += float(np.diff(when)[inside].sum())
+            changed_at, changed_stamp = int(at[-1]), float(when[-1])
         rows += len(block)
         last = held[-1]
     if elapsed <= 0:

@@ -84,7 +84,11 @@ def _registry() -> pint.UnitRegistry[float]:
 
 def _normalise(text: str) -> str:
     """Rewrite a vendor's spelling (°/√h, dps/rtHz, m/s²) as an expression for the registry."""
-    unit = text.strip()
+    unit = re.sub(
+        r"[\s-]*(\(?\brms\b\)?|1\s*[σs]igma|1\s*σ)\s*$", "", text.strip(), flags=re.IGNORECASE
+    )
+    unit = re.sub(r"\bx\s*Hz\s*\^?-1/2", "/sqrt(Hz)", unit)
+    unit = re.sub(r"\bm/s2\b", "m/s^2", unit)
     for written, meant in (("²", "^2"), ("³", "^3"), ("−", "-"), ("·", "*"), ("×", "*")):
         unit = unit.replace(written, meant)
     unit = re.sub(r"[°º]\s*C\b|\bdeg\s*C\b|\bcelsius\b", "degC", unit, flags=re.IGNORECASE)
@@ -94,7 +98,7 @@ def _normalise(text: str) -> str:
     unit = re.sub(r"sqrt\s*\(\s*([A-Za-z]+)\s*\)", r"(\1)**0.5", unit, flags=re.IGNORECASE)
     unit = re.sub(r"\^\s*\(\s*(\d+)\s*/\s*(\d+)\s*\)", _power, unit)
     unit = unit.replace("^", "**")
-    unit = re.sub(r"\bhour\b", "h", unit)
+    unit = re.sub(r"\b(hour|Hr)\b", "h", unit)
     # A difference of temperatures is meant wherever degC is not alone.
     return unit if unit == "degC" else re.sub(r"\bdegC\b", "K", unit)
 
@@ -122,7 +126,7 @@ def _converter(unit: str, dimension: str) -> tuple[float, float]:
         raise UnitError(f"unknown unit {unit!r}; {_expected(dimension)}") from error
     except pint.DimensionalityError as error:
         raise UnitError(
-            f"{unit!r} is not a {dimension.replace('_', ' ')}; {_expected(dimension)}"
+            f"{unit!r} is no unit of {dimension.replace('_', ' ')}; {_expected(dimension)}"
         ) from error
     except Exception as error:  # the registry raises many kinds on text that is no unit
         raise UnitError(f"cannot read {unit!r} as a unit; {_expected(dimension)}") from error

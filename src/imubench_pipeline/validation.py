@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Mapping
+from datetime import date
 from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -22,7 +23,7 @@ class ConfigError(ValueError):
 class Strict(BaseModel):
     """A group of settings in which an unknown key is an error."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 def _fraction(value: object) -> float:
@@ -35,6 +36,13 @@ def _fraction(value: object) -> float:
     return number
 
 
+def as_text(value: object) -> object:
+    """Return what YAML read as a number or a date as text again."""
+    if isinstance(value, (int, float, date)) and not isinstance(value, bool):
+        return value.isoformat() if isinstance(value, date) else str(value)
+    return value
+
+
 def _frequency(text: str) -> str:
     if quantity_to_si(text, "frequency") <= 0:
         raise ValueError("expected a frequency above zero")
@@ -42,7 +50,8 @@ def _frequency(text: str) -> str:
 
 
 FractionOfLog = Annotated[float, BeforeValidator(_fraction, json_schema_input_type=float | str)]
-Frequency = Annotated[str, AfterValidator(_frequency), Field(examples=["100 Hz"])]
+Text = Annotated[str, BeforeValidator(as_text)]
+Frequency = Annotated[Text, AfterValidator(_frequency), Field(examples=["100 Hz"])]
 
 
 _Model = TypeVar("_Model", bound=BaseModel)

@@ -1,4 +1,5 @@
 import gzip
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,38 @@ def test_layouts(tmp_path: Path, text: str, keys: dict[str, Any]) -> None:
     np.testing.assert_allclose(found["accel_x"], np.array([0.5, 0.25, 1e-3]) * 9.80665)
     assert time is None
     assert file.findings == []
+
+
+@pytest.mark.parametrize("quotes", ['"a', 'b"c', '"'])
+def test_a_stray_quote_swallows_nothing(tmp_path: Path, quotes: str) -> None:
+    rows = [f"{i},0.5,{quotes if i in (50, 70) else 'x'}\n" for i in range(100)]
+    found, _, _ = columns(written(tmp_path, "wx,ax,note\n" + "".join(rows)), log_format())
+    np.testing.assert_allclose(found["gyro_x"], np.arange(100) * DEG)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Time (s),Gyro X (deg/s),Accel X\n0,1,2\n1,1,2\n",
+        "Time (s)\tGyro X (deg/s)\tAccel X\n0\t1\t2\n1\t1\t2\n",
+    ],
+)
+def test_spaces_in_names_are_no_delimiters(tmp_path: Path, text: str) -> None:
+    channels = {"gyro_x": {"column": "Gyro X (deg/s)", "unit": "deg/s"}}
+    found, _, _ = columns(written(tmp_path, text), log_format(channels))
+    np.testing.assert_allclose(found["gyro_x"], [DEG, DEG])
+
+
+def test_an_empty_first_cell_is_a_missing_sample(tmp_path: Path) -> None:
+    channels = {"gyro_x": {"column": 1, "unit": "rad/s"}}
+    found, _, _ = columns(written(tmp_path, ",0.1\n2,0.2\n"), log_format(channels))
+    np.testing.assert_array_equal(found["gyro_x"], [np.nan, 2.0])
+
+
+def test_many_lines_before_the_header(tmp_path: Path) -> None:
+    text = "# a comment\n" * 3000 + "wx,ax\n" + ROWS
+    found, _, _ = columns(written(tmp_path, text), log_format(comment="#"))
+    assert len(found["gyro_x"]) == 3
 
 
 @pytest.mark.parametrize("header", ["", "a,b\n"])
@@ -137,6 +170,24 @@ def test_a_compressed_file_cut_short_is_read_as_far_as_it_goes(
     assert "truncated_file" in [note.finding for note in file.findings]
 
 
+@pytest.mark.parametrize("kept", [0.0, 0.1, 0.6, 1.0])
+def test_every_line_of_a_file_cut_short_that_can_be_read_is_kept(
+    tmp_path: Path, rng: np.random.Generator, kept: float
+) -> None:
+    lines = [f"{a:.6f},{b:.6f}\n" for a, b in rng.standard_normal((600_000, 2))]
+    packed = gzip.compress(("wx,ax\n" + "".join(lines)).encode(), compresslevel=1)
+    cut = packed[: max(2000, int(kept * len(packed)) - 8)]
+    readable = zlib.decompressobj(31).decompress(cut).count(b"\n") - 1
+    found, _, _ = columns(written(tmp_path, cut), log_format())
+    assert readable * 0.999 - 1500 <= len(found["gyro_x"]) <= readable
+
+
+def test_what_cannot_be_opened_is_named(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").symlink_to(tmp_path / "none.csv")
+    with pytest.raises(RecordingError, match=r"a\.csv: cannot be opened \(No such file"):
+        columns(tmp_path / "a.csv", log_format())
+
+
 LONG = "wx,ax\n" + "1.25,2.5\n" * 600_000  # more than one block of the reader
 
 
@@ -149,6 +200,10 @@ LONG = "wx,ax\n" + "1.25,2.5\n" * 600_000  # more than one block of the reader
         ("wx,ax\n1,2\nx7,3\n1,2\n", r"a.csv, line 3, column 'wx': found 'x7', expected a number"),
         ("// c\nwx,ax\n1,2\n5,6,7\n1,2\n", r"line 4: found 3 columns, expected 2: '5,6,7'"),
         ("wx,ax\n1,2\n5\n1,2\n", r"line 3: found 1 columns, expected 2"),
+        ("wx,ax\r1,2\r3,4\r", "carriage return"),
+        ("wx,ax\n1,2\n\n\n1,2\nx,2\n1,2\n", r"line 6, column 'wx'"),
+        ("wx,wx,ax\n1,2,3\n", r"column 'wx' for gyro_x stands twice .* by its position"),
+        (b"\x28\xb5\x2f\xfd" + bytes(100), "compressed with zstd"),
         (LONG + "1,oops\n" + "1,2\n", r"line 600002, column 'ax': found 'oops'"),
         (LONG + "1\n" + "1,2\n" * 600_000, r"line 600002: found 1 columns"),
         ("wx,ax\n1,2\n\0\0\0\0\0\0\0\n1,2\n", r"a.csv"),
@@ -162,10 +217,14 @@ def test_what_is_wrong_is_named(tmp_path: Path, text: str | bytes, message: str)
         columns(path, log_format(comment="//"))
 
 
-def test_compressed_data_corrupt_inside_reject(tmp_path: Path, rng: np.random.Generator) -> None:
+@pytest.mark.parametrize("place", [100, 0.5])
+def test_compressed_data_corrupt_inside_reject(
+    tmp_path: Path, rng: np.random.Generator, place: float
+) -> None:
     text = "wx,ax\n" + "".join(f"{a:.6f},{b:.6f}\n" for a, b in rng.standard_normal((50_000, 2)))
     packed = bytearray(gzip.compress(text.encode()))
-    packed[len(packed) // 2 : len(packed) // 2 + 64] = bytes(64)
+    begin = int(place if place > 1 else place * len(packed))
+    packed[begin : begin + 64] = bytes(64)
     with pytest.raises(RecordingError, match=r"a\.csv"):
         columns(written(tmp_path, bytes(packed)), log_format())
 

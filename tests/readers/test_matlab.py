@@ -64,6 +64,7 @@ def test_vectors_by_name(tmp_path: Path) -> None:
         ),
         ({"gyro_x": {"column": 1, "unit": "rad/s"}}, "several variables .m, v.; name the one"),
         ({"gyro_x": {"column": 1, "unit": "rad/s", "variable": "w"}}, "no variable 'w'.*has m, v"),
+        ({"gyro_x": {"column": "m", "unit": "rad/s"}}, "'m' for gyro_x is a matrix of 4 columns"),
         (
             {
                 "gyro_x": {"column": "v", "unit": "rad/s"},
@@ -84,6 +85,22 @@ def test_what_is_no_matlab_file(tmp_path: Path) -> None:
     path.write_bytes(b"MATLAB 5.0 MAT-file" + bytes(200))
     with pytest.raises(RecordingError, match=r"save it with -v7\.3"):
         columns(path, log_format(MATRIX))
+
+
+def test_fuzzed_files_never_crash(tmp_path: Path, rng: np.random.Generator) -> None:
+    whole = saved(tmp_path, data=rng.standard_normal((4, 3000))).read_bytes()
+    path = tmp_path / "b.mat"
+    rejected = 0
+    for _ in range(200):
+        data = bytearray(whole)
+        for place in rng.integers(512, 6000, 8):
+            data[place] = rng.integers(256)
+        path.write_bytes(data)
+        try:
+            columns(path, log_format(MATRIX))
+        except RecordingError:
+            rejected += 1
+    assert rejected > 20
 
 
 def test_corrupt_inside(tmp_path: Path, rng: np.random.Generator) -> None:

@@ -4,8 +4,9 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 
-from imubench_pipeline.allan import cluster_sizes, integrate, of_phase
+from imubench_pipeline.allan import cluster_sizes, of_phase
 from imubench_pipeline.config import AllanSettings
+from imubench_pipeline.phase import integrate
 from imubench_pipeline.recording import channel_logs
 from imubench_pipeline.results import Key, Row, allan_rows
 from imubench_pipeline.tables import write

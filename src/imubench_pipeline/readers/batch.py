@@ -18,6 +18,10 @@ TEMPERATURE = "temperature"
 """Name of the temperature column of a recording."""
 
 
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+"""Seconds in a unit of time stamps."""
+
+
 class RecordingError(ValueError):
     """A recording that cannot be used; the text is the reason, with what to mend."""
 

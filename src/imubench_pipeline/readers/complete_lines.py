@@ -5,20 +5,56 @@ from __future__ import annotations
 import gzip
 import io
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
 
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.readers.batch import RecordingError
 
 _GZIP_MAGIC = b"\x1f\x8b"
+_OTHER_COMPRESSION = {
+    b"\x28\xb5\x2f\xfd": "zstd",
+    b"\xfd7zXZ\x00": "xz",
+    b"BZh": "bzip2",
+    b"PK\x03\x04": "zip",
+}
 _LONGEST_LINE = 1 << 20
 
 
 def open_text(path: Path) -> io.BufferedIOBase:
-    """Open a text log for reading bytes; gzip is seen by its first bytes, not by its name."""
-    with path.open("rb") as raw:
-        compressed = raw.read(2) == _GZIP_MAGIC
-    return gzip.open(path, "rb") if compressed else path.open("rb")
+    """Open a text log for reading bytes; gzip is seen by its first bytes, not by its name.
+
+    Raises
+    ------
+    RecordingError
+        If the file cannot be opened, or is compressed in another way.
+    """
+    try:
+        with path.open("rb") as raw:
+            begin = raw.read(6)
+    except OSError as error:
+        raise RecordingError(f"{path.name}: cannot be opened ({error.strerror})") from None
+    for magic, kind in _OTHER_COMPRESSION.items():
+        if begin.startswith(magic):
+            raise RecordingError(f"{path.name}: is compressed with {kind}; unpack it, or use gzip")
+    return gzip.open(path, "rb") if begin.startswith(_GZIP_MAGIC) else path.open("rb")
+
+
+def first_lines(path: Path) -> Iterator[bytes]:
+    """Yield the complete lines of a text log from its beginning, as far as they can be read."""
+    with open_text(path) as stream:
+        while True:
+            try:
+                line = stream.readline(_LONGEST_LINE)
+            except EOFError:
+                return
+            except (OSError, zlib.error) as error:
+                raise RecordingError(
+                    f"{path.name}: corrupt compressed data ({error}); copy it again"
+                ) from None
+            if not line:
+                return
+            yield line
 
 
 class CompleteLines(io.RawIOBase):
@@ -65,7 +101,9 @@ class CompleteLines(io.RawIOBase):
         read = b"".join(blocks)
         cut = read.rfind(b"\n") + 1
         self._ready, self._rest = read[:cut], read[cut:]
-        if len(self._rest) > _LONGEST_LINE and self._rest.strip(b"\0"):
+        if not self._rest.strip(b"\0"):
+            self._rest = b""  # what a power cut leaves of a file that was growing
+        elif len(self._rest) > _LONGEST_LINE:
             self._fail(
                 f"{self._path.name}: no line break in {_LONGEST_LINE} bytes; this is no text log"
             )

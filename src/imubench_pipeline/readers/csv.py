@@ -6,7 +6,6 @@ import csv
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -15,14 +14,17 @@ import pyarrow.csv as pacsv
 from numpy.typing import NDArray
 
 from imubench_pipeline.findings import Finding
-from imubench_pipeline.readers.batch import Batch, LogFile, RecordingError
-from imubench_pipeline.readers.complete_lines import CompleteLines, open_text
+from imubench_pipeline.readers.batch import SECONDS, Batch, LogFile, RecordingError
+from imubench_pipeline.readers.complete_lines import CompleteLines, first_lines, open_text
 
 _BLOCK_BYTES = 4 << 20
-_DELIMITERS = ",;\t| "
-_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_DELIMITERS = ";\t|, "
+_MISSING = {"", "nan", "na", "n/a", "null"}
 _ZONE = re.compile(r"(Z|[+-]\d\d:?\d\d)$")
-_LAYOUT_LINES = 1000
+_ADVICE = (
+    "either the file is corrupt there (copy it again, or cut it before that line), or the sensor "
+    "file does not describe it (delimiter, header, skip_lines, comment, column)"
+)
 _ARROW_ROW = re.compile(r"Row #(\d+)")
 _ARROW_COLUMN = re.compile(r"In CSV column #(\d+)")
 
@@ -34,6 +36,7 @@ class _Layout:
     lines_before: int
     bytes_before: int
     delimiter: str
+    quoted: bool
     names: list[str]
     first_record: list[str]
 
@@ -68,7 +71,10 @@ class CsvFile(LogFile):
                         use_threads=False, block_size=_BLOCK_BYTES, column_names=layout.names
                     ),
                     parse_options=pacsv.ParseOptions(
-                        delimiter=layout.delimiter, invalid_row_handler=keep
+                        delimiter=layout.delimiter,
+                        # A stray quote would swallow the lines up to the next one.
+                        quote_char='"' if layout.quoted else False,
+                        invalid_row_handler=keep,
                     ),
                     convert_options=pacsv.ConvertOptions(
                         column_types=types, include_columns=list(types)
@@ -115,59 +121,62 @@ class CsvFile(LogFile):
     # ------------------------------------------------------------------ the first lines
 
     def _layout(self) -> _Layout:
-        before, size, first = 0, 0, None
+        before, size, header_size = 0, 0, 0
         head: list[str] = []
-        for raw in self._first_lines():
+        for number, raw in enumerate(first_lines(self.path)):
             text = raw.decode("utf-8", "replace").rstrip("\r\n")
-            if not before and text.startswith("\ufeff"):
-                text = text[1:]
+            text = text.removeprefix("\ufeff") if number == 0 else text
             passed_over = (
-                before < self.log.skip_lines
+                number < self.log.skip_lines
                 or not text.strip()
                 or (self.log.comment is not None and text.startswith(self.log.comment))
             )
             if not passed_over:
+                self._check_text(raw, text)
                 head.append(text)
-                if len(head) == 2:
-                    break
-            if not head:
+            if len(head) == 2:
+                break
+            if head:
+                header_size += len(raw)
+            else:
                 before, size = before + 1, size + len(raw)
-            elif len(head) == 1 and first is None:
-                first = len(raw)
         if not head:
             raise RecordingError(f"{self.path.name}: the file is empty")
-        delimiter = self.log.delimiter or _delimiter(head[0])
-        rows = [_split(text, delimiter) for text in head]
+        delimiter = self.log.delimiter or _delimiter(head)
+        rows = [self._split(text, delimiter) for text in head]
         header = self._has_header(rows[0])
         names = [name.strip() for name in rows[0]]
         if header:
-            before, size = before + 1, size + (first or 0)
+            before, size = before + 1, size + header_size
         else:
             names = [str(number) for number in range(1, len(names) + 1)]
         records = rows[1:] if header else rows
         if not records:
             raise RecordingError(f"{self.path.name}: no record after the header")
+        quoted = '"' in (head[-1] if header else head[0])
         # A name that stands twice can still be taken by its position.
         names = [
             name if names.count(name) == 1 else f"{name} (column {number})"
             for number, name in enumerate(names, start=1)
         ]
-        return _Layout(before, size, delimiter, names, records[0])
+        return _Layout(before, size, delimiter, quoted, names, records[0])
 
-    def _first_lines(self) -> list[bytes]:
-        """Return the lines that may belong to the top of the file."""
-        with open_text(self.path) as stream:
-            try:
-                lines = list(islice(iter(lambda: stream.readline(1 << 16), b""), _LAYOUT_LINES))
-            except (OSError, EOFError) as error:
-                raise RecordingError(f"{self.path.name}: corrupt compressed data ({error})") from (
-                    None
-                )
-        if lines and not lines[-1].endswith(b"\n") and len(lines) > 1:
-            lines.pop()
-        if any(b"\0" in line for line in lines[:2]):
+    def _check_text(self, raw: bytes, text: str) -> None:
+        if b"\0" in raw:
             raise RecordingError(f"{self.path.name}: holds binary data, expected text")
-        return lines
+        if "\r" in text:
+            raise RecordingError(
+                f"{self.path.name}: lines end with a carriage return alone; expected line feeds "
+                "(tr '\\r' '\\n' mends it)"
+            )
+
+    def _split(self, text: str, delimiter: str) -> list[str]:
+        try:
+            return next(csv.reader([text], delimiter=delimiter))
+        except csv.Error as error:
+            raise RecordingError(
+                f"{self.path.name}: cannot be read as columns ({error}): {text[:40]!r}"
+            ) from None
 
     def _has_header(self, row: list[str]) -> bool:
         if self.log.header is not None:
@@ -176,7 +185,8 @@ class CsvFile(LogFile):
         if any(isinstance(column, str) for column in wanted):
             return True
         positions = [column - 1 for column in wanted if isinstance(column, int)]
-        return not all(_is_number(row[position]) for position in positions if position < len(row))
+        cells = [row[position] for position in positions if position < len(row)]
+        return not all(_is_number_or_missing(cell) for cell in cells)
 
     # ------------------------------------------------------------------------- columns
 
@@ -187,7 +197,7 @@ class CsvFile(LogFile):
         }
 
     def _position(self, layout: _Layout, column: str | int, key: str) -> int:
-        found = ", ".join(layout.names)
+        found = ", ".join(layout.names[:20]) + (", ..." if len(layout.names) > 20 else "")
         if isinstance(column, int):
             if column > len(layout.names):
                 raise RecordingError(
@@ -195,6 +205,11 @@ class CsvFile(LogFile):
                     f"{len(layout.names)} columns ({found}) with delimiter {layout.delimiter!r}"
                 )
             return column - 1
+        if f"{column} (column" in found:
+            raise RecordingError(
+                f"{self.path.name}: column {column!r} for {key} stands twice in the header "
+                f"({found}); take it by its position, as a number"
+            )
         if column not in layout.names:
             raise RecordingError(
                 f"{self.path.name}: no column {column!r} for {key}; found {found} with "
@@ -222,26 +237,37 @@ class CsvFile(LogFile):
 
     def _seconds(self, stamps: NDArray[Any], first: Any) -> NDArray[np.float64]:  # noqa: ANN401
         assert self.log.time is not None
-        return np.asarray((stamps - first) * _SECONDS[self.log.time.unit or "ns"], np.float64)
+        return np.asarray((stamps - first) * SECONDS[self.log.time.unit or "ns"], np.float64)
 
     # --------------------------------------------------------------------------- faults
 
     def _wrong_width(self, row: pacsv.InvalidRow, layout: _Layout) -> RecordingError:
         return RecordingError(
-            f"{self.path.name}, line {row.number + layout.lines_before}: found "
+            f"{self.path.name}, line {self._line(row.number, layout)}: found "
             f"{row.actual_columns} columns, expected {row.expected_columns}: {row.text[:80]!r}; "
-            "the file is corrupt there, copy it again or cut it before that line"
+            f"{_ADVICE}"
         )
+
+    def _line(self, row: int, layout: _Layout) -> int:
+        """Return the line of a record in the file; blank lines are no records."""
+        records = 0
+        for number, raw in enumerate(first_lines(self.path), start=1):
+            records += number > layout.lines_before and bool(raw.strip(b"\r\n"))
+            if records == row:
+                return number
+        return row + layout.lines_before
 
     def _explained(
         self, error: pa.ArrowInvalid, layout: _Layout, types: dict[str, pa.DataType]
     ) -> RecordingError:
         text = str(error)
         row, column = _ARROW_ROW.search(text), _ARROW_COLUMN.search(text)
-        where = f", line {int(row[1]) + layout.lines_before}" if row else ""
+        where = f", line {self._line(int(row[1]), layout)}" if row else ""
         name = layout.names[int(column[1])] if column and int(column[1]) < len(layout.names) else ""
         expected = "a time stamp" if name in types and types[name] != pa.float64() else "a number"
-        found = re.search(r"invalid value '(.*)'|expected .* zone offset in '(.*)'", text)
+        found = re.search(
+            r"invalid value '(.*)'|expected .* zone offset in '(.*)'", text, re.DOTALL
+        )
         if not name or not found:
             return RecordingError(
                 f"{self.path.name}{where}: cannot be read as text columns: {text}"
@@ -249,20 +275,21 @@ class CsvFile(LogFile):
         value = (found[1] or found[2] or "")[:40]
         return RecordingError(
             f"{self.path.name}{where}, column {name!r}: found {value!r}, expected {expected}; "
-            "the file is corrupt there, or the column is not the one meant"
+            f"{_ADVICE}"
         )
 
 
-def _split(text: str, delimiter: str) -> list[str]:
-    return next(csv.reader([text], delimiter=delimiter))
+def _delimiter(head: list[str]) -> str:
+    """Return the likeliest delimiter: the most telling one that stands as often in both lines."""
+    for sign in _DELIMITERS:
+        if 0 < head[0].count(sign) == head[-1].count(sign):
+            return sign
+    return max(_DELIMITERS, key=lambda sign: (head[-1].count(sign), -_DELIMITERS.index(sign)))
 
 
-def _delimiter(line: str) -> str:
-    """Return the delimiter that divides a line into most columns."""
-    return max(_DELIMITERS, key=lambda sign: (line.count(sign), -_DELIMITERS.index(sign)))
-
-
-def _is_number(text: str) -> bool:
+def _is_number_or_missing(text: str) -> bool:
+    if text.strip().lower() in _MISSING:
+        return True
     try:
         float(text)
     except ValueError:

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import ExitStack
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.readers.batch import Batch, LogFile, RecordingError
+from imubench_pipeline.readers.batch import SECONDS, Batch, LogFile, RecordingError
 
 _BLOCK_ROWS = 1 << 18
-_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
 class MatlabFile(LogFile):
@@ -24,43 +22,50 @@ class MatlabFile(LogFile):
 
     def batches(self) -> Iterator[Batch]:
         """Yield the records in the order of the file (see `LogFile.batches`)."""
-        with ExitStack() as stack:
-            try:
-                file = stack.enter_context(h5py.File(self.path, "r"))
-            except OSError as error:
-                raise RecordingError(
-                    f"{self.path.name}: not a MATLAB v7.3 file ({error}); save it with -v7.3"
-                ) from None
-            columns = {
-                name: self._column(file, source.column, source.variable, name)
-                for name, source in self.sources.items()
-            }
-            time = self._time_column(file)
-            lengths = {name: column.rows for name, column in columns.items()}
-            if time is not None:
-                lengths["time"] = time.rows
-            if len(set(lengths.values())) > 1:
-                raise RecordingError(f"{self.path.name}: columns of unequal length: {lengths}")
-            rows = next(iter(lengths.values()))
-            if rows == 0:
-                raise RecordingError(f"{self.path.name}: no record")
-            try:
-                first = None
-                for start in range(0, rows, _BLOCK_ROWS):
-                    stamps = None
-                    if time is not None and self.log.time is not None:
-                        read = time.block(start)
-                        first = read[0] if first is None else first
-                        stamps = (read - first) * _SECONDS[self.log.time.unit or "s"]
-                    yield Batch(
-                        stamps,
-                        {
-                            name: self.to_si(name, column.block(start))
-                            for name, column in columns.items()
-                        },
-                    )
-            except (OSError, RuntimeError) as error:
-                raise RecordingError(f"{self.path.name}: corrupt data ({error})") from None
+        if not self.path.is_file():
+            raise RecordingError(f"{self.path.name}: cannot be opened (no such file)")
+        if not h5py.is_hdf5(self.path):
+            raise RecordingError(
+                f"{self.path.name}: not a MATLAB v7.3 file, or its beginning is damaged; save it "
+                "with -v7.3"
+            )
+        try:
+            with h5py.File(self.path, "r") as file:
+                yield from self._read(file)
+        except (OSError, RuntimeError, KeyError, TypeError, ValueError) as error:
+            if isinstance(error, RecordingError):
+                raise
+            raise RecordingError(
+                f"{self.path.name}: corrupt data, or cut short ({error}); copy it again"
+            ) from None
+
+    def _read(self, file: h5py.File) -> Iterator[Batch]:
+        columns = {
+            name: self._column(file, source.column, source.variable, name)
+            for name, source in self.sources.items()
+        }
+        time = self._time_column(file)
+        lengths = {name: column.rows for name, column in columns.items()}
+        if time is not None:
+            lengths["time"] = time.rows
+        if len(set(lengths.values())) > 1:
+            raise RecordingError(f"{self.path.name}: columns of unequal length: {lengths}")
+        rows = next(iter(lengths.values()))
+        if rows == 0:
+            raise RecordingError(f"{self.path.name}: no record")
+        first = None
+        for start in range(0, rows, _BLOCK_ROWS):
+            stamps = None
+            if time is not None and self.log.time is not None:
+                read = time.block(start)
+                finite = read[np.isfinite(read)]
+                if first is None and len(finite):
+                    first = finite[0]
+                stamps = (read - (first or 0.0)) * SECONDS[self.log.time.unit or "s"]
+            yield Batch(
+                stamps,
+                {name: self.to_si(name, column.block(start)) for name, column in columns.items()},
+            )
 
     def _time_column(self, file: h5py.File) -> _Column | None:
         if self.log.time is None:
@@ -91,6 +96,11 @@ class MatlabFile(LogFile):
                 f"{', '.join(present) or 'none'}"
             )
         found = _Column(file[name], 1 if isinstance(column, str) else column)
+        if isinstance(column, str) and found.columns > 1:
+            raise RecordingError(
+                f"{self.path.name}: {name!r} for {key} is a matrix of {found.columns} columns; "
+                f"name the column with 'column: 2, variable: {name}'"
+            )
         if found.number > found.columns:
             raise RecordingError(
                 f"{self.path.name}: no column {found.number} for {key}; {name} has "
@@ -126,9 +136,9 @@ def _variables(file: h5py.File) -> list[str]:
             isinstance(item, h5py.Dataset)
             and item.ndim in (1, 2)
             and item.dtype.kind in "fiu"
-            and not name.startswith("#")
+            and not str(name).startswith("#")
         ):
-            names.append(name)
+            names.append(str(name))
 
     file.visititems(visit)
     return sorted(names)
