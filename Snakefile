@@ -116,7 +116,11 @@ rule tables:
         scores=[f"{folder}/scores.parquet" for folder in FOLDERS],
         datasheet=[f"{folder}/datasheet.parquet" for folder in FOLDERS],
     output:
-        [f"{RESULTS}/tables/{table}.{kind}" for table in TABLES for kind in ("parquet", "csv")],
+        [
+            f"{RESULTS}/tables/{table}.{kind}"
+            for table in TABLES
+            for kind in ("parquet", "csv")
+        ],
     params:
         truths=plan.truths(),
         code=plan.code("tables"),

@@ -8,11 +8,18 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from pydantic import BaseModel
+
 from imubench_pipeline.config import Run, Simulated
 from imubench_pipeline.sensor import RecordingNotes, Sensor
 from imubench_pipeline.tables import write_json
 
-SCHEMAS = {"run": Run, "sensor": Sensor, "recording": RecordingNotes, "simulated": Simulated}
+SCHEMAS: dict[str, type[BaseModel]] = {
+    "run": Run,
+    "sensor": Sensor,
+    "recording": RecordingNotes,
+    "simulated": Simulated,
+}
 """The configuration files: config.yaml, a sensor's, the notes beside a log, simulated.yaml."""
 
 
