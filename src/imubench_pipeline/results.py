@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, cast
@@ -95,7 +95,15 @@ def estimates(path: Path) -> dict[str, list[Estimate]]:
     """Read the estimates of a recording from its table ``parameters``, by channel."""
     found: dict[str, list[Estimate]] = {}
     for (channel, method), table in _by(read("parameters", [path]), "channel", "method").items():
-        parameters = {
+        found.setdefault(channel, []).append(estimate_of(method, table.to_pylist()))
+    return found
+
+
+def estimate_of(method: str, rows: Iterable[Row]) -> Estimate:
+    """Return the estimate that rows of the table ``parameters`` stand for."""
+    return Estimate(
+        method,
+        {
             row["parameter"]: Parameter(
                 row["value"],
                 cast(Status, row["status"]),
@@ -103,10 +111,9 @@ def estimates(path: Path) -> dict[str, list[Estimate]]:
                 row["lower"],
                 row["upper"],
             )
-            for row in table.to_pylist()
-        }
-        found.setdefault(channel, []).append(Estimate(method, parameters))
-    return found
+            for row in rows
+        },
+    )
 
 
 def _by(table: pa.Table, *names: str) -> dict[tuple[str, ...], pa.Table]:

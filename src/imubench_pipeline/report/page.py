@@ -78,30 +78,29 @@ def _parameter_tables(views: list[ChannelView], system: System) -> Iterator[dict
         if not chosen:
             continue
         units = {symbol: page_unit(quantity, symbol, system) for symbol in PARAMETERS}
-        rows = []
+        groups = []
         for view in chosen:
-            for method, parameters in view.parameters.items():
-                rows.append(
-                    {
-                        "view": view,
-                        "method": METHOD_NAMES.get(method, method),
-                        "recommended": method == view.recommended,
-                        "cells": [
-                            _cell(parameters[symbol], units[symbol].text) for symbol in PARAMETERS
-                        ],
-                    }
-                )
+            rows = [
+                _method_row(view, method, [_cell(parameters[s], units[s].text) for s in PARAMETERS])
+                for method, parameters in view.parameters.items()
+            ]
             if view.truth:
-                rows.append(
-                    {
-                        "view": view,
-                        "method": "truth of the simulation",
-                        "recommended": False,
-                        "cells": [_truth_cell(view, s, units[s].text) for s in PARAMETERS],
-                    }
-                )
+                truth = [_truth_cell(view, symbol, units[symbol].text) for symbol in PARAMETERS]
+                rows.append(_method_row(view, "truth of the simulation", truth))
+            groups.append({"view": view, "rows": rows})
         heads = [f"{symbol} ({units[symbol].sign})" for symbol in PARAMETERS]
-        yield {"title": title, "heads": heads, "rows": rows}
+        yield {"title": f"{title}: parameters", "heads": heads, "groups": groups}
+
+
+def _method_row(
+    view: ChannelView, method: str, cells: list[dict[str, str]], note: str = ""
+) -> dict[str, Any]:
+    return {
+        "method": METHOD_NAMES.get(method, method),
+        "recommended": method == view.recommended,
+        "cells": cells,
+        "note": note,
+    }
 
 
 def _cell(row: Mapping[str, Any], text: Any) -> dict[str, str]:  # noqa: ANN401
@@ -126,25 +125,21 @@ def _score_tables(views: list[ChannelView], system: System) -> Iterator[dict[str
         if not chosen:
             continue
         unit = page_unit(quantity, "adev", system)
-        rows = []
+        groups = []
         for view in chosen:
+            rows = []
             for method, score in view.scores.items():
                 known = score["rms"] is not None
-                rows.append(
-                    {
-                        "view": view,
-                        "method": METHOD_NAMES.get(method, method),
-                        "recommended": method == view.recommended,
-                        "cells": [
-                            unit.text(score["rms"]),
-                            f"{score['rms_log10']:.3f}" if known else "–",
-                            f"{100 * score['inside_band']:.0f} %" if known else "–",
-                        ],
-                        "note": score["reason"] or "",
-                    }
-                )
+                texts = [
+                    unit.text(score["rms"]),
+                    f"{score['rms_log10']:.3f}" if known else "–",
+                    f"{100 * score['inside_band']:.0f} %" if known else "–",
+                ]
+                cells = [{"text": text, "note": "", "class": "number"} for text in texts]
+                rows.append(_method_row(view, method, cells, score["reason"] or ""))
+            groups.append({"view": view, "rows": rows})
         heads = [f"RMS ({unit.sign})", "RMS of log10 (decades)", "inside the 95 % band"]
-        yield {"title": title, "heads": heads, "rows": rows}
+        yield {"title": f"{title}: scores", "heads": heads, "groups": groups}
 
 
 def _deltas(views: list[ChannelView], system: System) -> Iterator[dict[str, Any]]:

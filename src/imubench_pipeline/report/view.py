@@ -11,6 +11,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.results import estimate_of
 
 Row = Mapping[str, Any]
 Name = tuple[str, str, str]
@@ -57,14 +58,7 @@ class ChannelView:
 
     def model(self, method: str) -> NoiseModel:
         """Return the noise model that a method estimated."""
-        values = {name: row["value"] for name, row in self.parameters[method].items()}
-        both = values.get("B") is not None and values.get("T_B") is not None
-        return NoiseModel(
-            N=values.get("N") or 0.0,
-            B=(values["B"] or 0.0) if both else 0.0,
-            T_B=values["T_B"] if both else None,
-            K=values.get("K") or 0.0,
-        )
+        return estimate_of(method, self.parameters[method].values()).model
 
 
 def channel_views(tables: Mapping[str, pa.Table]) -> list[ChannelView]:
