@@ -49,7 +49,7 @@ def main() -> None:
         config = [f"{key}={folder / key}" for key in ("logs", "sensors", "results")]
         for step in ("quality.json", "allan.parquet", "parameters.parquet", "scores.parquet"):
             target = folder / "results/recordings/one/long" / step
-            command = [sys.executable, "-m", "snakemake", "-c1", "--quiet", "all", str(target)]
+            command = [sys.executable, "-m", "snakemake", "-c1", str(target), "--quiet", "all"]
             process = subprocess.Popen(
                 [*command, "--config", *config, "simulated=false"], cwd=PROJECT
             )

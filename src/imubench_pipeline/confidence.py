@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ _ALL_LAGS = 2048
 
 
 def noise_exponent(
-    theta: NDArray[np.float64], present: NDArray[np.int32] | None, n: int
+    theta: NDArray[np.float64], present: NDArray[np.integer[Any]] | None, n: int
 ) -> int | None:
     """Tell the noise type from the lag-1 autocorrelation of adjacent cluster means.
 

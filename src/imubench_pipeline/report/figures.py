@@ -40,7 +40,7 @@ mpl.rcParams.update(
 
 
 def _axes(quantity: str, system: System) -> tuple[Figure, Axes, float]:
-    figure = Figure(figsize=(6.4, 4.2), layout="constrained")
+    figure = Figure(figsize=(6.4, 5.0), layout="constrained")
     axes = figure.add_subplot()
     unit = page_unit(quantity, "adev", system)
     axes.set_xscale("log")
@@ -48,6 +48,12 @@ def _axes(quantity: str, system: System) -> tuple[Figure, Axes, float]:
     axes.set_xlabel("averaging time τ (s)")
     axes.set_ylabel(f"Allan deviation ({unit.sign})")
     return figure, axes, unit.per_si
+
+
+def _legend(figure: Figure, axes: Axes, title: str | None = None) -> None:
+    """Name the lines below the axes, where they hide nothing."""
+    lines, names = axes.get_legend_handles_labels()
+    figure.legend(lines, names, title=title, loc="outside lower center", ncols=2, frameon=False)
 
 
 def _svg(figure: Figure) -> str:
@@ -91,14 +97,16 @@ def channel_figure(view: ChannelView, system: System) -> str:
             ms=3,
             label=f"{label}: reconstruction",
         )
-    axes.legend()
+    _legend(figure, axes)
     return _svg(figure)
 
 
-def comparison_figure(views: Sequence[ChannelView], system: System) -> str:
-    """Draw the curves of the same axis of several sensors (000, Figures 6 and 7)."""
+def comparison_figure(views: Sequence[ChannelView], sensors: Sequence[str], system: System) -> str:
+    """Draw the curves of the same axis of several sensors (000, Figures 6 and 7).
+
+    A sensor has the same colour and mark in every figure: its place among ``sensors``.
+    """
     figure, axes, scale = _axes(views[0].quantity, system)
-    sensors = list(dict.fromkeys(view.sensor for view in views))
     for view in views:
         place = sensors.index(view.sensor)
         axes.plot(
@@ -111,7 +119,7 @@ def comparison_figure(views: Sequence[ChannelView], system: System) -> str:
             markevery=8,
             label=view.label,
         )
-    axes.legend(title="dashed: simulated" if any(view.simulated for view in views) else None)
+    _legend(figure, axes, "dashed: simulated" if any(v.simulated for v in views) else None)
     return _svg(figure)
 
 
@@ -156,5 +164,5 @@ def datasheet_figure(view: ChannelView, system: System) -> str | None:
                 label=f"datasheet bias instability {row['printed']:g} {row['unit']} "
                 f"({FLOOR:.3f} B)",
             )
-    axes.legend()
+    _legend(figure, axes)
     return _svg(figure)

@@ -16,6 +16,7 @@ from imubench_pipeline.report.practical import System, page_unit
 from imubench_pipeline.report.view import METHOD_NAMES, ChannelView, channel_views
 
 _LIBRARIES = ("imubench_pipeline", "numpy", "scipy", "numba", "pyarrow", "snakemake")
+_QUANTITY_SYMBOLS = {"N": "N", "bias_instability": "bias instability", "K": "K", "T_B": "T_B"}
 _QUANTITY_NAMES = {"gyro": "Gyroscope", "accel": "Accelerometer"}
 
 
@@ -63,11 +64,12 @@ def render(tables: Mapping[str, pa.Table], settings: Mapping[str, Any]) -> str:
 
 
 def _comparisons(views: list[ChannelView], system: System) -> Iterator[dict[str, Any]]:
+    sensors = list(dict.fromkeys(view.sensor for view in views))
     for channel in dict.fromkeys(view.channel for view in views):
         chosen = [view for view in views if view.channel == channel]
         yield {
             "title": f"{_QUANTITY_NAMES[chosen[0].quantity]}, {channel[-1]} axis",
-            "figure": comparison_figure(chosen, system),
+            "figure": comparison_figure(chosen, sensors, system),
             "names": ", ".join(view.label for view in chosen),
         }
 
@@ -145,21 +147,24 @@ def _score_tables(views: list[ChannelView], system: System) -> Iterator[dict[str
 def _deltas(views: list[ChannelView], system: System) -> Iterator[dict[str, Any]]:
     symbols = {"N": "N", "bias_instability": "B", "K": "K", "T_B": "T_B"}
     for view in views:
+        rows = []
         for row in view.datasheet:
             if row["method"] != view.recommended:
                 continue
             unit = page_unit(view.quantity, symbols[row["quantity"]], system)
-            printed = "–" if row["printed"] is None else f"{row['printed']:g} {row['unit']}"
-            yield {
-                "view": view,
-                "quantity": row["quantity"].replace("_", " "),
-                "printed": printed,
-                "kind": row["kind"] or "",
-                "sidedness": row["sidedness"] or "",
-                "comparable": unit.text(row["comparable"]),
-                "measured": unit.text(row["measured"]),
-                "unit": unit.sign,
-                "delta": "–" if row["delta"] is None else f"{100 * row['delta']:+.0f} %",
-                "verdict": row["verdict"],
-                "reason": row["reason"] or "",
-            }
+            published = row["printed"] is not None
+            rows.append(
+                {
+                    "quantity": _QUANTITY_SYMBOLS[row["quantity"]],
+                    "printed": f"{row['printed']:g} {row['unit']}" if published else "–",
+                    "kind": row["kind"] or "",
+                    "comparable": unit.text(row["comparable"]),
+                    "measured": unit.text(row["measured"]),
+                    "unit": unit.sign,
+                    "delta": "–" if row["delta"] is None else f"{100 * row['delta']:+.0f} %",
+                    "verdict": row["verdict"],
+                    "reason": (row["reason"] or "") if published else "",
+                }
+            )
+        if rows:
+            yield {"view": view, "rows": rows}
