@@ -12,15 +12,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
-from numba import get_num_threads, njit, prange, set_num_threads
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from imubench_pipeline.confidence import deviation_limits, equivalent_degrees, noise_exponent
-from imubench_pipeline.octave import DECIMATION, OctaveSums, octave_sizes, split, sum_squares
+from imubench_pipeline.octave import (
+    DECIMATION,
+    SHORTEST,
+    OctaveSums,
+    octave_sizes,
+    split,
+    sum_squares,
+)
 from imubench_pipeline.phase import Phase, integrate
+from imubench_pipeline.threads import in_threads
 
 BLOCK = 1 << 14
 """Differences summed together: three blocks of float64 stay in the L2 cache."""
@@ -117,9 +126,9 @@ def allan_variance(
     cluster_sizes : array_like of int, optional
         n of each tau; by default `cluster_sizes` of the length.
     overlap : {"full", "octave"}
-        Use every cluster of every size; or clusters that start a sixteenth of their length
-        apart, or closer, which is as sure and many times faster (sizes are then rounded by up
-        to 3 %, see `imubench_pipeline.octave.octave_sizes`).
+        Use every cluster of every size; or clusters that start 1/48 of their length apart, or
+        closer, which is as sure and many times faster (sizes are then rounded by up to 1 %,
+        see `imubench_pipeline.octave.octave_sizes`).
     valid : array_like of bool, shape (L,), optional
         False where the sample is missing.
     segments : sequence of (int, int), optional
@@ -198,6 +207,9 @@ def of_blocks(
     spans = tuple(segments) if segments else ((0, samples),)
     wanted = _checked(rate, sizes, samples, spans)
     wanted = octave_sizes(wanted)
+    if samples < SHORTEST:
+        phase = integrate(blocks, samples, holes=holes, segments=spans)
+        return of_phase(phase, rate, wanted, threads=threads)
     parts = [OctaveSums(wanted, share=PRESENT, holes=holes, threads=threads) for _ in spans]
     for number, block in split(blocks, spans):
         parts[number].push(np.asarray(block, dtype=np.float64))
@@ -312,26 +324,24 @@ def _sums(
     thinned = np.zeros(len(sizes))
     terms = np.zeros(len(sizes), dtype=np.int64)
     possible = np.zeros(len(sizes), dtype=np.int64)
-    before = get_num_threads()
-    set_num_threads(max(1, min(threads, before)))
-    try:
-        for start, stop in phase.segments:
-            theta = phase.theta[start : stop + 1]
-            most = np.maximum(stop - start - 2 * sizes + 1, 0)
-            possible += most
-            if phase.present is None:
-                total += _full(theta, sizes).sum(axis=0) / sizes.astype(np.float64) ** 2
-                thinned += most / sizes
-                terms += most
-            else:
-                counts = phase.present[start : stop + 1]
-                enough = np.ceil(PRESENT * sizes - 1e-9).astype(np.int64)
-                sums, inverse, numbers = _full_with_holes(theta, counts, sizes, enough)
-                total += sums.sum(axis=0)
-                thinned += inverse.sum(axis=0)
-                terms += numbers.sum(axis=0)
-    finally:
-        set_num_threads(before)
+    for start, stop in phase.segments:
+        theta = phase.theta[start : stop + 1]
+        blocks = -(-len(theta) // BLOCK)
+        most = np.maximum(stop - start - 2 * sizes + 1, 0)
+        possible += most
+        if phase.present is None:
+            (sums,) = in_threads(partial(_full, theta, sizes), blocks, threads)
+            total += sums.sum(axis=0) / sizes.astype(np.float64) ** 2
+            thinned += most / sizes
+            terms += most
+        else:
+            counts = phase.present[start : stop + 1]
+            enough = np.ceil(PRESENT * sizes - 1e-9).astype(np.int64)
+            work = partial(_full_with_holes, theta, counts, sizes, enough)
+            sums, inverse, numbers = in_threads(work, blocks, threads)
+            total += sums.sum(axis=0)
+            thinned += inverse.sum(axis=0)
+            terms += numbers.sum(axis=0)
     return total, thinned, terms, possible
 
 
@@ -358,14 +368,13 @@ def _degrees(segments: Sequence[tuple[int, int]], exponent: int, n: int) -> floa
     return sum(equivalent_degrees(exponent, n, term) for term in terms if term > 0)
 
 
-@njit(cache=True, nogil=True, parallel=True)
-def _full(theta, sizes):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+@njit(cache=True, nogil=True)
+def _full(theta, sizes, low, high):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """Return the sum of squared second differences of each block and size."""
     points = theta.size
-    blocks = (points + BLOCK - 1) // BLOCK
-    sums = np.zeros((blocks, sizes.size))
-    for block in prange(blocks):
-        start = block * BLOCK
+    sums = np.zeros((high - low, sizes.size))
+    for block in range(high - low):
+        start = (low + block) * BLOCK
         for j in range(sizes.size):
             n = sizes[j]
             stop = min(start + BLOCK, points - 2 * n)
@@ -376,19 +385,18 @@ def _full(theta, sizes):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
                     theta[start + n : stop + n],
                     theta[start + 2 * n : stop + 2 * n],
                 )
-    return sums
+    return (sums,)
 
 
-@njit(cache=True, nogil=True, parallel=True)
-def _full_with_holes(theta, present, sizes, enough):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+@njit(cache=True, nogil=True)
+def _full_with_holes(theta, present, sizes, enough, low, high):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """Return, by block and size, what `_sums` adds up, over the samples present."""
     points = theta.size
-    blocks = (points + BLOCK - 1) // BLOCK
-    sums = np.zeros((blocks, sizes.size))
-    inverse = np.zeros((blocks, sizes.size))
-    numbers = np.zeros((blocks, sizes.size), dtype=np.int64)
-    for block in prange(blocks):
-        start = block * BLOCK
+    sums = np.zeros((high - low, sizes.size))
+    inverse = np.zeros((high - low, sizes.size))
+    numbers = np.zeros((high - low, sizes.size), dtype=np.int64)
+    for block in range(high - low):
+        start = (low + block) * BLOCK
         for j in range(sizes.size):
             n = sizes[j]
             total = 0.0

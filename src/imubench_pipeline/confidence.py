@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.special import gammaincinv
 
 _FEWEST_CLUSTERS = 30
-_MOST_CLUSTERS = 1 << 20
+_MOST_CLUSTERS = 1 << 13
 _ALL_LAGS = 2048
 
 
@@ -46,40 +46,42 @@ def noise_exponent(
         counts = np.diff(present[: _MOST_CLUSTERS + 1])
         enough = counts >= 0.9 * n
         means = np.where(enough, np.diff(theta) / np.maximum(counts, 1), np.nan)
-    if np.isfinite(means).sum() < _FEWEST_CLUSTERS:
+    good = np.isfinite(means)
+    if good.sum() < _FEWEST_CLUSTERS:
         return None
-    series = _without_line(means)
+    # A missing mean is 0 after the line is taken out, and its products are not counted.
+    series = np.where(good, _without_line(means, good), 0.0)
     for differenced in range(3):
-        correlation = _lag_one(series)
+        correlation = _lag_one(series, good)
         if correlation is None:
             return None
         delta = correlation / (1.0 + correlation)
         if delta < 0.25 or differenced == 2:
             exponent = round(-2.0 * (delta + differenced))
             return int(np.clip(exponent, -2, 2))
-        series = np.diff(series)
+        good = good[1:] & good[:-1]
+        series = np.where(good, np.diff(series), 0.0)
     raise AssertionError("the loop returns at its last turn")
 
 
-def _without_line(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    good = np.isfinite(values)
-    time = np.arange(len(values)) - np.arange(len(values))[good].mean()
-    held = values[good] - values[good].mean()
-    slope = (time[good] @ held) / (time[good] @ time[good])
-    line: NDArray[np.float64] = values - values[good].mean() - slope * time
-    return line
+def _without_line(values: NDArray[np.float64], good: NDArray[np.bool_]) -> NDArray[np.float64]:
+    time = np.arange(len(values), dtype=np.float64)
+    time -= time[good].mean()
+    level = values[good].mean()
+    slope = (time[good] @ (values[good] - level)) / (time[good] @ time[good])
+    return np.asarray(values - level - slope * time)
 
 
-def _lag_one(values: NDArray[np.float64]) -> float | None:
-    pairs = np.isfinite(values[1:]) & np.isfinite(values[:-1])
-    if pairs.sum() < _FEWEST_CLUSTERS - 3:
+def _lag_one(values: NDArray[np.float64], good: NDArray[np.bool_]) -> float | None:
+    pairs = int(np.count_nonzero(good[1:] & good[:-1]))
+    number = int(np.count_nonzero(good))
+    if pairs < _FEWEST_CLUSTERS - 3:
         return None
-    centred = values - np.nanmean(values)
-    power = float(np.nanmean(centred**2))
+    centred = np.where(good, values - values.sum() / number, 0.0)
+    power = float(centred @ centred) / number
     if not power > 0:
         return None
-    correlation = float((centred[1:] * centred[:-1])[pairs].mean()) / power
-    return max(correlation, -0.999)
+    return max(float(centred[1:] @ centred[:-1]) / pairs / power, -0.999)
 
 
 @lru_cache(maxsize=4096)

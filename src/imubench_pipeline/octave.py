@@ -1,6 +1,6 @@
 """The multi-octave Allan variance: one pass over the log for every tau, in bounded memory.
 
-Clusters of n samples need not start at every sample: starts n/16 apart, or closer, cost no
+Clusters of n samples need not start at every sample: starts n/48 apart, or closer, cost no
 measurable efficiency. So the phase is decimated as n grows, and the work is O(L). Inside a
 section of the log that fits the cache the phase is decimated up to `DECIMATION`; longer clusters
 are taken from the phase of the whole log at that stride.
@@ -11,14 +11,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
-from numba import get_num_threads, njit, prange, set_num_threads
+from numba import njit
 from numpy.typing import NDArray
 
 from imubench_pipeline.phase import Phase, integrate
+from imubench_pipeline.threads import in_threads
 
 Array = NDArray[np.float64]
 
-STEPS = 16
+STEPS = 48
 """Starts of clusters within a cluster's length, at least."""
 
 DECIMATION = 64
@@ -27,13 +28,19 @@ DECIMATION = 64
 SECTION = 1 << 17
 """Samples that are summed together: their phase fits the cache."""
 
+INNER = 1 << 11
+"""Starts whose clusters of all sizes are summed while their phase is in the L1 cache."""
+
+SHORTEST = 1 << 16
+"""Samples of a log that is worth a decimation; the clusters of a shorter one overlap fully."""
+
 _LEVELS = 6  # strides 1, 2 ... 32 inside a section
 _AHEAD = 2 * STEPS * DECIMATION  # two of the longest clusters of a section
-_FIRST = 1 << 20
+_FIRST = 1 << 18
 
 
 def octave_sizes(sizes: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Round cluster sizes to multiples of the stride of their octave (by 3 % at most)."""
+    """Round cluster sizes to multiples of the stride of their octave (by 1 % at most)."""
     stride = np.left_shift(1, _level(sizes))
     return np.unique(np.rint(sizes / stride).astype(np.int64) * stride)
 
@@ -95,14 +102,8 @@ class OctaveSums:
         self.present: NDArray[np.int64] | None = None
         if self._holes:
             self.present = np.concatenate([*self._counts, [self._present_at]])[:points]
-        levels = _level(self._sizes)
-        for level in np.unique(levels[~self._short]):
-            step = 1 << int(level - _LEVELS)
-            chosen = np.flatnonzero(levels == level)
-            edges = np.ascontiguousarray(self.theta[::step])
-            held = None if self.present is None else np.ascontiguousarray(self.present[::step])
-            for j in chosen:
-                self._add_long(int(j), edges, held, int(self._sizes[j]) // (step * DECIMATION))
+        for j in np.flatnonzero(~self._short):
+            self._add_long(int(j))
 
     @property
     def first(self) -> Phase:
@@ -116,26 +117,24 @@ class OctaveSums:
         squares, thinned, terms = self._sums
         return squares, thinned, np.rint(terms).astype(np.int64), self._possible
 
-    def _add_long(self, j: int, edges: Array, held: NDArray[np.int64] | None, m: int) -> None:
-        most = max(0, len(edges) - 2 * m)
+    def _add_long(self, j: int) -> None:
+        theta, present = self.theta, self.present
+        m = int(self._sizes[j]) // DECIMATION
+        most = max(0, len(theta) - 2 * m)
         if most == 0:
             return
-        if held is None:
-            second = edges[2 * m :] - 2.0 * edges[m:-m] + edges[: -2 * m]
+        if present is None:
+            square = sum_squares(theta[: -2 * m], theta[m:-m], theta[2 * m :])
             n = float(self._sizes[j])
-            self._sums[:, j] += np.array([second @ second / n**2, most / n, most])
+            self._sums[:, j] += np.array([square / n**2, most / n, most])
         else:
-            counts = held[m:] - held[:-m]
+            counts = present[m:] - present[:-m]
             good = counts >= self._enough[j]
-            means = (edges[m:] - edges[:-m]) / np.maximum(counts, 1)
+            means = (theta[m:] - theta[:-m]) / np.maximum(counts, 1)
             both = good[m:] & good[:-m]
             difference = (means[m:] - means[:-m])[both]
             thinned = 0.5 / counts[m:][both] + 0.5 / counts[:-m][both]
-            self._sums[:, j] += (
-                float(difference @ difference),
-                float(thinned.sum()),
-                len(difference),
-            )
+            self._sums[:, j] += np.array([difference @ difference, thinned.sum(), len(difference)])
         self._possible[j] += most
 
     def _sum(self, samples: Array, sections: int) -> None:
@@ -147,16 +146,11 @@ class OctaveSums:
             finite = begin[np.isfinite(begin)]
             self._bias = float(finite.mean()) if len(finite) else 0.0
         sizes = self._sizes[self._short]
-        arguments = (
-            samples, sections, self._bias, sizes, _level(sizes), self._enough[self._short],
-        )  # fmt: skip
-        before = get_num_threads()
-        set_num_threads(max(1, min(self._threads, before)))
-        try:
-            kernel = _sections_with_holes if self._holes else _sections
-            sums, possible, edges, present = kernel(*arguments)
-        finally:
-            set_num_threads(before)
+        kernel = _sections_with_holes if self._holes else _sections
+        arguments = (self._bias, sizes, _level(sizes), self._enough[self._short])
+        sums, possible, edges, present = in_threads(
+            lambda low, high: kernel(samples, low, high, *arguments), sections, self._threads
+        )
         for section in range(sections):
             self._sums[:, self._short] += sums[section]
             self._possible[self._short] += possible[section]
@@ -230,14 +224,16 @@ def _local_phase(samples, bias, theta):  # type: ignore[no-untyped-def]  # noqa:
         theta[i + 1] = d
 
 
-@njit(cache=True, nogil=True, parallel=True)
-def _sections(samples, sections, bias, sizes, levels, enough):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+@njit(cache=True, nogil=True)
+def _sections(samples, low, high, bias, sizes, levels, enough):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+    """Sum the clusters that begin in sections ``low`` to ``high``; return them, and the phase."""
+    sections = high - low
     sums = np.zeros((sections, 3, sizes.size))
     possible = np.zeros((sections, sizes.size), dtype=np.int64)
     edges = np.zeros((sections, SECTION // DECIMATION + 1))
-    counts = np.zeros((1, 1), dtype=np.int64)
-    for section in prange(sections):
-        begin = section * SECTION
+    counts = np.zeros((sections, 1), dtype=np.int64)
+    for section in range(sections):
+        begin = (low + section) * SECTION
         stop = min(begin + SECTION + _AHEAD, samples.size)
         own = min(SECTION, samples.size - begin)
         theta = np.empty(stop - begin + 1)
@@ -246,18 +242,21 @@ def _sections(samples, sections, bias, sizes, levels, enough):  # type: ignore[n
         points = theta.size
         for level in range(_LEVELS):
             starts = (own + (1 << level) - 1) >> level
-            for j in range(sizes.size):
-                if levels[j] == level:
-                    m = sizes[j] >> level
-                    most = min(starts, points - 2 * m)
-                    if most > 0:
-                        square = sum_squares(
-                            theta[:most], theta[m : m + most], theta[2 * m : 2 * m + most]
-                        )
-                        sums[section, 0, j] = square / (sizes[j] * sizes[j])
-                        sums[section, 1, j] = most / sizes[j]
-                        sums[section, 2, j] = most
-                        possible[section, j] = most
+            for block in range(0, starts, INNER):
+                for j in range(sizes.size):
+                    if levels[j] == level:
+                        m = sizes[j] >> level
+                        stop_at = min(block + INNER, starts, points - 2 * m)
+                        if stop_at > block:
+                            square = sum_squares(
+                                theta[block:stop_at],
+                                theta[block + m : stop_at + m],
+                                theta[block + 2 * m : stop_at + 2 * m],
+                            )
+                            sums[section, 0, j] += square / (sizes[j] * sizes[j])
+                            sums[section, 1, j] += (stop_at - block) / sizes[j]
+                            sums[section, 2, j] += stop_at - block
+                            possible[section, j] += stop_at - block
             points = (points + 1) // 2
             for i in range(points):
                 theta[i] = theta[2 * i]
@@ -266,14 +265,16 @@ def _sections(samples, sections, bias, sizes, levels, enough):  # type: ignore[n
     return sums, possible, edges, counts
 
 
-@njit(cache=True, nogil=True, parallel=True)
-def _sections_with_holes(samples, sections, bias, sizes, levels, enough):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+@njit(cache=True, nogil=True)
+def _sections_with_holes(samples, low, high, bias, sizes, levels, enough):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+    """Sum the clusters that begin in sections ``low`` to ``high``; return them, and the phase."""
+    sections = high - low
     sums = np.zeros((sections, 3, sizes.size))
     possible = np.zeros((sections, sizes.size), dtype=np.int64)
     edges = np.zeros((sections, SECTION // DECIMATION + 1))
     counts = np.zeros((sections, SECTION // DECIMATION + 1), dtype=np.int64)
-    for section in prange(sections):
-        begin = section * SECTION
+    for section in range(sections):
+        begin = (low + section) * SECTION
         stop = min(begin + SECTION + _AHEAD, samples.size)
         own = min(SECTION, samples.size - begin)
         theta = np.empty(stop - begin + 1)

@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 
-from imubench_pipeline.allan import cluster_sizes, of_phase
+from imubench_pipeline.allan import cluster_sizes, of_blocks, of_phase
 from imubench_pipeline.config import AllanSettings
 from imubench_pipeline.phase import integrate
 from imubench_pipeline.recording import channel_logs
@@ -15,9 +15,13 @@ from imubench_pipeline.tables import write
 def curves(folder: Path, sensor: str, recording: str, settings: AllanSettings) -> Iterator[Row]:
     """Yield the rows of the table ``allan``; none of a rejected recording."""
     for channel, log in channel_logs(folder).items():
-        phase = integrate(log.blocks(), log.grid, holes=log.holes, segments=log.segments)
         sizes = cluster_sizes(log.grid, per_decade=settings.per_decade, longest=settings.longest)
-        yield from allan_rows(Key(sensor, recording, channel), of_phase(phase, log.rate, sizes))
+        about = {"holes": log.holes, "segments": log.segments}
+        if settings.overlap == "octave":
+            curve = of_blocks(log.blocks(), log.grid, log.rate, sizes, **about)
+        else:
+            curve = of_phase(integrate(log.blocks(), log.grid, **about), log.rate, sizes)
+        yield from allan_rows(Key(sensor, recording, channel), curve)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,96 @@
+import numpy as np
+import pytest
+
+from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes, of_blocks
+from imubench_pipeline.octave import SECTION, STEPS, octave_sizes
+
+
+def standard_error(curve: AllanCurve) -> np.ndarray:
+    return np.sqrt(2 / curve.edf) / 2 * curve.deviation
+
+
+def make(rng: np.random.Generator, kind: str, samples: int) -> np.ndarray:
+    white = rng.standard_normal(samples)
+    return {
+        "white": 9.81 + 1e-3 * white,
+        "walk": white.cumsum(),
+        "both": white + 0.01 * rng.standard_normal(samples).cumsum(),
+    }[kind]
+
+
+@pytest.mark.parametrize("kind", ["white", "walk", "both"])
+@pytest.mark.parametrize("samples", [300, 3000, SECTION, SECTION + 2049, 3 * SECTION + 17])
+@pytest.mark.parametrize("loss", [0.0, 0.02])
+def test_equal_to_full_overlap_within_a_tenth_of_its_error(rng, kind, samples, loss) -> None:
+    log = make(rng, kind, samples)
+    log[rng.random(samples) < loss] = np.nan
+    sizes = octave_sizes(cluster_sizes(samples))
+    full = allan_variance(log, 10.0, cluster_sizes=sizes)
+    octave = allan_variance(log, 10.0, cluster_sizes=sizes, overlap="octave")
+    together = min(len(full.tau), len(octave.tau))
+    assert together >= len(full.tau) - 1
+    difference = np.abs(octave.deviation - full.deviation[:together])
+    assert (difference < 0.1 * standard_error(full)[:together]).all()
+    np.testing.assert_allclose(octave.averaged, full.averaged[:together], rtol=2e-3)
+
+
+def test_short_clusters_overlap_fully(rng: np.random.Generator) -> None:
+    log = 9.81 + rng.standard_normal(200_000)
+    sizes = np.arange(1, 2 * STEPS)
+    full = allan_variance(log, 10.0, cluster_sizes=sizes)
+    octave = allan_variance(log, 10.0, cluster_sizes=sizes, overlap="octave")
+    np.testing.assert_allclose(octave.variance, full.variance, rtol=1e-9)
+
+
+@pytest.mark.parametrize("holes", [False, True])
+def test_blocks_and_threads_do_not_change_a_bit(rng: np.random.Generator, holes: bool) -> None:
+    log = rng.standard_normal(500_000)
+    if holes:
+        log[rng.random(500_000) < 0.05] = np.nan
+    whole = of_blocks([log], len(log), 1.0, holes=holes)
+    parts = np.split(log, [5, 100_000, 100_001, 333_333])
+    again = of_blocks(parts, len(log), 1.0, holes=holes, threads=2)
+    np.testing.assert_array_equal(whole.variance, again.variance)
+    np.testing.assert_array_equal(whole.exponent, again.exponent)
+
+
+def test_no_difference_spans_segments(rng: np.random.Generator) -> None:
+    log = np.concatenate([rng.standard_normal(40_000), 100 + rng.standard_normal(30_000)])
+    segments = [(0, 40_000), (40_000, 69_990)]
+    full = allan_variance(log, 1.0, segments=segments)
+    octave = allan_variance(log, 1.0, segments=segments, overlap="octave")
+    for n, variance in zip(octave.cluster_size, octave.variance, strict=True):
+        near = np.argmin(np.abs(full.cluster_size - n))
+        assert variance * n == pytest.approx(full.variance[near] * full.cluster_size[near], rel=0.5)
+    parts = np.split(log, [39_999, 40_001])
+    again = of_blocks(parts, len(log), 1.0, holes=False, segments=segments)
+    np.testing.assert_array_equal(again.variance, octave.variance)
+
+
+def test_sizes_are_rounded_to_the_stride_of_their_octave() -> None:
+    sizes = cluster_sizes(10_000_000)
+    rounded = octave_sizes(sizes)
+    assert np.isin(rounded, sizes)[rounded < 2 * STEPS].all()
+    nearest = sizes[np.abs(np.log(sizes[:, None] / rounded)).argmin(axis=0)]
+    assert (np.abs(rounded / nearest - 1) <= 0.5 / STEPS).all()
+    for n in rounded:
+        stride = 1 << max(0, int(np.log2(n / STEPS)))
+        assert n % stride == 0
+    np.testing.assert_array_equal(octave_sizes(rounded), rounded)
+
+
+def test_tau_is_that_of_the_size_really_used(rng: np.random.Generator) -> None:
+    curve = allan_variance(rng.standard_normal(5000), 50.0, cluster_sizes=[1001], overlap="octave")
+    assert curve.cluster_size[0] % 16 == 0
+    assert curve.tau[0] == curve.cluster_size[0] / 50.0
+
+
+def test_wrong_blocks() -> None:
+    with pytest.raises(ValueError, match="hold 5 samples"):
+        of_blocks([np.zeros(5)], 10, 1.0, holes=False)
+    with pytest.raises(ValueError, match="end before sample 100000"):
+        of_blocks([np.zeros(5)], 100_000, 1.0, holes=False)
+    with pytest.raises(ValueError, match="missing or infinite"):
+        of_blocks([np.array([0.0, np.nan, 1.0, 2.0])], 4, 1.0, holes=False)
+    with pytest.raises(ValueError, match="missing or infinite"):
+        of_blocks([np.full(100_000, np.nan)], 100_000, 1.0, holes=False)
