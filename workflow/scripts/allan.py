@@ -16,11 +16,12 @@ def curves(folder: Path, sensor: str, recording: str, settings: AllanSettings) -
     """Yield the rows of the table ``allan``; none of a rejected recording."""
     for channel, log in channel_logs(folder).items():
         sizes = cluster_sizes(log.grid, per_decade=settings.per_decade, longest=settings.longest)
-        about = {"holes": log.holes, "segments": log.segments}
+        blocks, holes, segments = log.blocks(), log.holes, log.segments
         if settings.overlap == "octave":
-            curve = of_blocks(log.blocks(), log.grid, log.rate, sizes, **about)
+            curve = of_blocks(blocks, log.grid, log.rate, sizes, holes=holes, segments=segments)
         else:
-            curve = of_phase(integrate(log.blocks(), log.grid, **about), log.rate, sizes)
+            phase = integrate(blocks, log.grid, holes=holes, segments=segments)
+            curve = of_phase(phase, log.rate, sizes)
         yield from allan_rows(Key(sensor, recording, channel), curve)
 
 
