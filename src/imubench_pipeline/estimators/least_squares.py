@@ -32,6 +32,7 @@ _BEYOND_FILTERS = 16
 
 _BENT_SIGMAS = 4.0
 _MOST_REFITS = 5
+_FADED = 0.1
 _SAMPLING_SIGMAS = 0.02
 _SHORTEST_CORRELATION = 20
 """Sampling intervals: a shorter correlation is that of a filter, not a bias instability."""
@@ -122,6 +123,9 @@ def _first_unbent(
         bent = off > _BENT_SIGMAS * np.hypot(error, unsure)[:first]
         if not bent.any():
             break
+        if start > _BEYOND_FILTERS and off[-1] > _FADED:
+            # No bend that fades: the curve has something else here, such as a sinusoid.
+            return start
         fading = float((off * n[:first])[bent].max()) / n
         unbent = used & (fading <= error)
         unbent[: np.flatnonzero(bent)[-1] + 1] = False
