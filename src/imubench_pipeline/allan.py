@@ -11,32 +11,22 @@ overlapping Allan variance at n samples a cluster is
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from imubench_pipeline.confidence import deviation_limits, equivalent_degrees, noise_exponent
+from imubench_pipeline.full_overlap import PRESENT, full_sums
 from imubench_pipeline.octave import (
     DECIMATION,
     SHORTEST,
     OctaveSums,
     octave_sizes,
     split,
-    sum_squares,
 )
 from imubench_pipeline.phase import Phase, integrate
-from imubench_pipeline.threads import in_threads
-
-BLOCK = 1 << 14
-"""Differences summed together: three blocks of float64 stay in the L2 cache."""
-
-PRESENT = 0.9
-"""Part of a cluster's samples that must be there for its mean to count."""
-
 
 _MANY_CLUSTERS = 100
 
@@ -58,23 +48,32 @@ class AllanCurve:
         Allan variance in the squared unit of the samples.
     edf : ndarray, shape (m,)
         Equivalent degrees of freedom of each variance.
+    samples : int
+        L, samples in the log; by default twice the largest cluster.
     exponent : ndarray of int, shape (m,)
         Noise type at each tau: the power of frequency, 2 to -2, in the spectrum of fractional
-        frequency (0: white noise of the samples, -1: flicker, -2: random walk).
-    samples : int
-        L, samples in the log.
+        frequency (0: white noise of the samples, -1: flicker, -2: random walk). By default 0.
     averaged : ndarray, shape (m,)
-        Samples that a cluster really averages: n, or fewer (their harmonic mean) where samples
-        are missing. The variance of white noise goes with 1 / averaged.
+        Samples that a cluster really averages: n, by default, or fewer (their harmonic mean)
+        where samples are missing. The variance of white noise goes with 1 / averaged.
     """
 
     tau: NDArray[np.float64]
     cluster_size: NDArray[np.int64]
     variance: NDArray[np.float64]
     edf: NDArray[np.float64]
-    exponent: NDArray[np.int64]
-    samples: int
-    averaged: NDArray[np.float64]
+    samples: int = 0
+    exponent: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    averaged: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+
+    def __post_init__(self) -> None:
+        # The class is frozen: defaults that follow from other fields go this way.
+        if not self.samples:
+            object.__setattr__(self, "samples", 2 * int(np.max(self.cluster_size)))
+        if not len(self.exponent):
+            object.__setattr__(self, "exponent", np.zeros(len(self.tau), dtype=np.int64))
+        if not len(self.averaged):
+            object.__setattr__(self, "averaged", np.asarray(self.cluster_size, dtype=np.float64))
 
     @property
     def deviation(self) -> NDArray[np.float64]:
@@ -252,7 +251,7 @@ def of_phase(
             None if held is None else held[start : stop + 1 : n],
         )
 
-    sums = _sums(phase, wanted, threads)
+    sums = full_sums(phase, wanted, threads)
     return _curve(rate, wanted, phase.samples, phase.segments, sums, edges)
 
 
@@ -284,7 +283,7 @@ def _curve(
     sums: Sequence[NDArray[Any]],
     edges: Edges,
 ) -> AllanCurve:
-    """Make the curve of the sums over differences of means (see `_sums`)."""
+    """Make the curve of the sums over differences of means (see `full_sums`)."""
     shown = sums[2] > 0
     n = sizes[shown]
     total, thinned, terms, possible = (column[shown] for column in sums)
@@ -304,45 +303,6 @@ def _curve(
         samples=samples,
         averaged=terms / thinned,
     )
-
-
-def _sums(
-    phase: Phase, sizes: NDArray[np.int64], threads: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-    """Sum over the differences of means, by size.
-
-    Returns
-    -------
-    total : ndarray
-        Sum of the squared differences.
-    thinned : ndarray
-        Sum of the mean inverse numbers of samples that the two clusters average.
-    terms, possible : ndarray of int
-        Number of differences, and what it would be without holes.
-    """
-    total = np.zeros(len(sizes))
-    thinned = np.zeros(len(sizes))
-    terms = np.zeros(len(sizes), dtype=np.int64)
-    possible = np.zeros(len(sizes), dtype=np.int64)
-    for start, stop in phase.segments:
-        theta = phase.theta[start : stop + 1]
-        blocks = -(-len(theta) // BLOCK)
-        most = np.maximum(stop - start - 2 * sizes + 1, 0)
-        possible += most
-        if phase.present is None:
-            (sums,) = in_threads(partial(_full, theta, sizes), blocks, threads)
-            total += sums.sum(axis=0) / sizes.astype(np.float64) ** 2
-            thinned += most / sizes
-            terms += most
-        else:
-            counts = phase.present[start : stop + 1]
-            enough = np.ceil(PRESENT * sizes - 1e-9).astype(np.int64)
-            work = partial(_full_with_holes, theta, counts, sizes, enough)
-            sums, inverse, numbers = in_threads(work, blocks, threads)
-            total += sums.sum(axis=0)
-            thinned += inverse.sum(axis=0)
-            terms += numbers.sum(axis=0)
-    return total, thinned, terms, possible
 
 
 def _exponents(edges: Edges, sizes: NDArray[np.int64]) -> list[int]:
@@ -366,53 +326,3 @@ def _exponents(edges: Edges, sizes: NDArray[np.int64]) -> list[int]:
 def _degrees(segments: Sequence[tuple[int, int]], exponent: int, n: int) -> float:
     terms = [stop - start - 2 * n + 1 for start, stop in segments]
     return sum(equivalent_degrees(exponent, n, term) for term in terms if term > 0)
-
-
-@njit(cache=True, nogil=True)
-def _full(theta, sizes, low, high):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
-    """Return the sum of squared second differences of each block and size."""
-    points = theta.size
-    sums = np.zeros((high - low, sizes.size))
-    for block in range(high - low):
-        start = (low + block) * BLOCK
-        for j in range(sizes.size):
-            n = sizes[j]
-            stop = min(start + BLOCK, points - 2 * n)
-            if stop > start:
-                # Slices first: an index i + 2 n inside the loop would keep it scalar.
-                sums[block, j] = sum_squares(
-                    theta[start:stop],
-                    theta[start + n : stop + n],
-                    theta[start + 2 * n : stop + 2 * n],
-                )
-    return (sums,)
-
-
-@njit(cache=True, nogil=True)
-def _full_with_holes(theta, present, sizes, enough, low, high):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
-    """Return, by block and size, what `_sums` adds up, over the samples present."""
-    points = theta.size
-    sums = np.zeros((high - low, sizes.size))
-    inverse = np.zeros((high - low, sizes.size))
-    numbers = np.zeros((high - low, sizes.size), dtype=np.int64)
-    for block in range(high - low):
-        start = (low + block) * BLOCK
-        for j in range(sizes.size):
-            n = sizes[j]
-            total = 0.0
-            thinned = 0.0
-            number = 0
-            for i in range(start, min(start + BLOCK, points - 2 * n)):
-                first = present[i + n] - present[i]
-                second = present[i + 2 * n] - present[i + n]
-                if first >= enough[j] and second >= enough[j]:
-                    difference = (theta[i + 2 * n] - theta[i + n]) / second - (
-                        theta[i + n] - theta[i]
-                    ) / first
-                    total += difference * difference
-                    thinned += 0.5 / first + 0.5 / second
-                    number += 1
-            sums[block, j] = total
-            inverse[block, j] = thinned
-            numbers[block, j] = number
-    return sums, inverse, numbers

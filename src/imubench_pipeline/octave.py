@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from imubench_pipeline.phase import Phase, integrate
+from imubench_pipeline.phase import Phase, integrate, sum_squares
 from imubench_pipeline.threads import in_threads
 
 Array = NDArray[np.float64]
@@ -183,16 +183,6 @@ def split(
             else:
                 break
         reached += len(block)
-
-
-@njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})
-def sum_squares(first, middle, last):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN201
-    """Return the sum of (last - 2 middle + first)^2 over arrays of one length."""
-    total = 0.0
-    for i in range(first.size):
-        difference = last[i] - 2.0 * middle[i] + first[i]
-        total += difference * difference
-    return total
 
 
 @njit(cache=True, nogil=True)

@@ -106,3 +106,13 @@ def _accumulate_present(values, level, theta, present):  # type: ignore[no-untyp
             number += 1
         theta[i + 1] = total
         present[i + 1] = number
+
+
+@njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})
+def sum_squares(first, middle, last):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN201
+    """Return the sum of (last - 2 middle + first)^2 over arrays of one length."""
+    total = 0.0
+    for i in range(first.size):
+        difference = last[i] - 2.0 * middle[i] + first[i]
+        total += difference * difference
+    return total

@@ -17,15 +17,7 @@ HOURS_10 = 3_600_000
 
 def curve_of(variance: np.ndarray, sizes: np.ndarray, rate: float, samples: int) -> AllanCurve:
     edf = [equivalent_degrees(0, int(n), samples - 2 * int(n) + 1) for n in sizes]
-    return AllanCurve(
-        sizes / rate,
-        sizes,
-        variance,
-        np.array(edf),
-        np.zeros(len(sizes), dtype=int),
-        samples,
-        sizes.astype(float),
-    )
+    return AllanCurve(sizes / rate, sizes, variance, np.array(edf), samples)
 
 
 def noiseless(model: NoiseModel, rate: float = 100.0, samples: int = HOURS_10) -> AllanCurve:
@@ -146,6 +138,13 @@ def test_ten_hour_logs_of_an_mti_7(rng) -> None:
     assert rmse["N"] <= 0.0015
     assert rmse["B"] <= 0.06
     assert rmse["T_B"] <= 0.13
+
+
+def test_a_curve_without_its_log() -> None:
+    sizes = cluster_sizes(HOURS_10)
+    edf = np.full(len(sizes), 100.0)
+    curve = AllanCurve(sizes / 100.0, sizes, MTI_7.allan_variance(sizes / 100.0), edf)
+    assert value(fit(curve), "T_B") == pytest.approx(89.5, rel=1e-6)
 
 
 def test_wrong_arguments() -> None:

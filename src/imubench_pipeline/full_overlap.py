@@ -1,0 +1,107 @@
+"""Sums over every pair of adjacent clusters: the fully overlapping Allan variance."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from imubench_pipeline.phase import Phase, sum_squares
+from imubench_pipeline.threads import in_threads
+
+BLOCK = 1 << 14
+"""Differences summed together: three blocks of float64 stay in the L2 cache."""
+
+PRESENT = 0.9
+"""Part of a cluster's samples that must be there for its mean to count."""
+
+
+def full_sums(
+    phase: Phase, sizes: NDArray[np.int64], threads: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+    """Sum over the differences of means, by size.
+
+    Returns
+    -------
+    total : ndarray
+        Sum of the squared differences.
+    thinned : ndarray
+        Sum of the mean inverse numbers of samples that the two clusters average.
+    terms, possible : ndarray of int
+        Number of differences, and what it would be without holes.
+    """
+    total = np.zeros(len(sizes))
+    thinned = np.zeros(len(sizes))
+    terms = np.zeros(len(sizes), dtype=np.int64)
+    possible = np.zeros(len(sizes), dtype=np.int64)
+    for start, stop in phase.segments:
+        theta = phase.theta[start : stop + 1]
+        blocks = -(-len(theta) // BLOCK)
+        most = np.maximum(stop - start - 2 * sizes + 1, 0)
+        possible += most
+        if phase.present is None:
+            (sums,) = in_threads(partial(_full, theta, sizes), blocks, threads)
+            total += sums.sum(axis=0) / sizes.astype(np.float64) ** 2
+            thinned += most / sizes
+            terms += most
+        else:
+            counts = phase.present[start : stop + 1]
+            enough = np.ceil(PRESENT * sizes - 1e-9).astype(np.int64)
+            work = partial(_full_with_holes, theta, counts, sizes, enough)
+            sums, inverse, numbers = in_threads(work, blocks, threads)
+            total += sums.sum(axis=0)
+            thinned += inverse.sum(axis=0)
+            terms += numbers.sum(axis=0)
+    return total, thinned, terms, possible
+
+
+@njit(cache=True, nogil=True)
+def _full(theta, sizes, low, high):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+    """Return the sum of squared second differences of each block and size."""
+    points = theta.size
+    sums = np.zeros((high - low, sizes.size))
+    for block in range(high - low):
+        start = (low + block) * BLOCK
+        for j in range(sizes.size):
+            n = sizes[j]
+            stop = min(start + BLOCK, points - 2 * n)
+            if stop > start:
+                # Slices first: an index i + 2 n inside the loop would keep it scalar.
+                sums[block, j] = sum_squares(
+                    theta[start:stop],
+                    theta[start + n : stop + n],
+                    theta[start + 2 * n : stop + 2 * n],
+                )
+    return (sums,)
+
+
+@njit(cache=True, nogil=True)
+def _full_with_holes(theta, present, sizes, enough, low, high):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+    """Return, by block and size, what `full_sums` adds up, over the samples present."""
+    points = theta.size
+    sums = np.zeros((high - low, sizes.size))
+    inverse = np.zeros((high - low, sizes.size))
+    numbers = np.zeros((high - low, sizes.size), dtype=np.int64)
+    for block in range(high - low):
+        start = (low + block) * BLOCK
+        for j in range(sizes.size):
+            n = sizes[j]
+            total = 0.0
+            thinned = 0.0
+            number = 0
+            for i in range(start, min(start + BLOCK, points - 2 * n)):
+                first = present[i + n] - present[i]
+                second = present[i + 2 * n] - present[i + n]
+                if first >= enough[j] and second >= enough[j]:
+                    difference = (theta[i + 2 * n] - theta[i + n]) / second - (
+                        theta[i + n] - theta[i]
+                    ) / first
+                    total += difference * difference
+                    thinned += 0.5 / first + 0.5 / second
+                    number += 1
+            sums[block, j] = total
+            inverse[block, j] = thinned
+            numbers[block, j] = number
+    return sums, inverse, numbers
