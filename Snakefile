@@ -97,6 +97,8 @@ rule reconstruct:
 
 rule datasheet:
     input:
+        quality=FOLDER + "/quality.json",
+        allan=FOLDER + "/allan.parquet",
         parameters=FOLDER + "/parameters.parquet",
     output:
         FOLDER + "/datasheet.parquet",
@@ -138,3 +140,7 @@ rule report:
         code=plan.code("report"),
     script:
         "workflow/scripts/report.py"
+
+
+onsuccess:
+    print(plan.summary())

@@ -1,14 +1,16 @@
 import math
 from typing import Any
 
+import numpy as np
 import pytest
 
 from imubench_pipeline.datasheet import deltas
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.noise import FLOOR
+from imubench_pipeline.noise import FLOOR, NoiseModel
 from imubench_pipeline.sensor import Datasheet
 
 DEG = math.pi / 180
+TAU = np.geomspace(0.01, 1e4, 61)
 
 
 def sheet(**figures: dict[str, Any]) -> Datasheet:
@@ -21,8 +23,11 @@ def estimate(**values: float | None) -> Estimate:
 
 
 def rows(datasheet: Datasheet, found: Estimate, channel: str = "gyro_x") -> dict:
-    listed = list(deltas(datasheet, channel, found, 0.1))
-    return {(row.quantity, row.sidedness): row for row in listed}
+    listed = list(deltas(datasheet, channel, found, TAU, 0.1))
+    return {
+        (row.statistic if row.quantity == "bias_instability" else row.quantity, row.sidedness): row
+        for row in listed
+    }
 
 
 def test_table_4_of_the_first_paper_both_ways() -> None:
@@ -56,31 +61,50 @@ def test_a_stated_side_gives_one_row() -> None:
     assert found["N", None].delta == pytest.approx(0.0, abs=1e-12)
 
 
-def test_bias_instability_is_the_minimum_of_the_curve() -> None:
+def test_bias_instability_is_compared_with_the_minimum_of_the_curve() -> None:
     printed = {"value": 10, "unit": "deg/h"}
-    row = rows(sheet(bias_instability=printed), estimate(B=10 / 3600 * DEG / FLOOR))[
-        "bias_instability", None
+    plateau = 10 / 3600 * DEG
+    found = rows(
+        sheet(bias_instability=printed), estimate(N=1e-4, B=plateau / FLOOR, T_B=100.0, K=3e-6)
+    )
+    model = NoiseModel(N=1e-4, B=plateau / FLOOR, T_B=100.0, K=3e-6)
+    minimum = float(np.sqrt(model.allan_variance(TAU)).min())
+    assert found["adev_minimum", None].measured == pytest.approx(minimum)
+    assert found["adev_minimum", None].delta == pytest.approx(minimum / plateau - 1)
+    assert found["plateau", None].measured == pytest.approx(plateau)
+    assert found["plateau", None].verdict == "as printed"
+
+
+def test_a_curve_that_only_falls_has_no_minimum_to_compare() -> None:
+    row = rows(sheet(bias_instability={"value": 10, "unit": "deg/h"}), estimate(N=1e-4))[
+        "adev_minimum", None
     ]
-    assert row.statistic == "adev_minimum"
-    assert row.measured == pytest.approx(row.comparable)
-    assert row.verdict == "as printed"
+    assert row.verdict == "not measured"
+    assert "no minimum" in (row.reason or "")
+
+
+def test_what_is_read_from_the_curve_is_its_minimum() -> None:
+    read = Estimate("curve", {"N": Parameter(1e-4), "B": Parameter(1e-4), "T_B": Parameter(10.0)})
+    read = Estimate("curve", {**read.parameters, "K": Parameter(None, "not_shown", "no slope")})
+    row = rows(sheet(bias_instability={"value": 10, "unit": "deg/h"}), read)["adev_minimum", None]
+    assert row.measured == pytest.approx(FLOOR * 1e-4)
 
 
 def test_what_is_not_published_is_listed() -> None:
     found = rows(sheet(), estimate(N=1e-4, B=1e-4, T_B=10.0, K=1e-6))
-    assert {key[0] for key in found} == {"N", "bias_instability", "K", "T_B"}
+    assert {key[0] for key in found} == {"N", "adev_minimum", "plateau", "K", "T_B"}
     assert {row.verdict for row in found.values()} == {"not published"}
     assert found["K", None].measured == 1e-6
     assert found["K", None].delta is None
     null = {"value": None, "unit": "deg/h"}
-    assert rows(sheet(bias_instability=null), estimate())["bias_instability", None].verdict == (
+    assert rows(sheet(bias_instability=null), estimate())["plateau", None].verdict == (
         "not published"
     )
 
 
 def test_what_is_not_measured_has_its_reason() -> None:
     row = rows(sheet(bias_instability={"value": 1, "unit": "deg/h"}), estimate(N=1e-4))[
-        "bias_instability", None
+        "plateau", None
     ]
     assert row.verdict == "not measured"
     assert row.reason == "absent: no such term"

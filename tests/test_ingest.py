@@ -147,7 +147,9 @@ def test_the_part_to_use(tmp_path: Path) -> None:
     result, values = kept(source, tmp_path / "out", use={"start": 2.0, "end": 7.99})
     assert values["gyro_x"][[0, -1]].tolist() == [200.0, 799.0]
     assert [(f.finding, f.value) for f in result.findings] == [("not_used", 400)]
-    with pytest.raises(RecordingError, match="no sample between 20"):
+    with pytest.raises(
+        RecordingError, match=r"none of its 1000 samples lies in the part to use \(use: start 20"
+    ):
         kept(source, tmp_path / "out", use={"start": 20.0})
 
 

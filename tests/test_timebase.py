@@ -221,6 +221,12 @@ def test_a_rate_that_contradicts_the_stamps_is_a_finding() -> None:
     assert names(found(GRID, stated=100.5)[0]) == []
 
 
+@pytest.mark.parametrize("factor", [1e-6, 1e-3, 1e3])
+def test_a_wrong_unit_of_time_is_told(factor: float) -> None:
+    with pytest.raises(RecordingError, match="'unit' of 'time' is probably another"):
+        found(GRID * factor, stated=100.0)
+
+
 def test_stamps_that_do_not_advance() -> None:
     with pytest.raises(RecordingError, match="do not advance"):
         found(np.zeros(100))

@@ -80,6 +80,10 @@ class AllanCurve:
         """Allan deviation in the unit of the samples, shape (m,)."""
         return np.sqrt(self.variance)
 
+    def up_to(self, part: float) -> NDArray[np.float64]:
+        """Return the tau up to a part of the log, s."""
+        return self.tau[self.cluster_size <= part * self.samples]
+
     def limits(self, confidence: float = 0.95) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the lower and upper confidence limits of the deviation, shapes (m,)."""
         return deviation_limits(self.deviation, self.edf, confidence)

@@ -165,7 +165,7 @@ class Run(Strict):
     report: ReportSettings = ReportSettings()
 
 
-def read_run(config: Mapping[str, object], file: str = "config/config.yaml") -> Run:
+def read_run(config: Mapping[str, object], file: str = "config/config.yaml or --config") -> Run:
     """Validate the configuration of a run, as Snakemake hands it over (numbers may be text)."""
     return parse(Run, config, file)
 

@@ -2,8 +2,10 @@
 
 Two conventions ruin such a comparison. A printed noise density is mostly one-sided, and N is
 that density over sqrt(2); where the datasheet does not say, both readings are given. A printed
-bias instability is the minimum of the curve of Allan deviation, 0.664 B, and is compared with
-that, not with B.
+bias instability is the minimum of the curve of Allan deviation, and is compared with the minimum of
+the model's curve. Beside it stands the plateau 0.664 B: the two agree where the curve has a
+plateau, and differ where N and K add to B at the minimum, or the curve dips beside the peak of a
+Gauss-Markov process.
 """
 
 from __future__ import annotations
@@ -11,6 +13,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.noise import FLOOR
@@ -92,7 +97,8 @@ def comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
     if density is None and walk is None:
         yield Comparable("N", "N", None)
     for name, quantity_name, statistic, reason in (
-        ("bias_instability", "bias_instability", "adev_minimum", "minimum of the curve: 0.664 B"),
+        ("bias_instability", "bias_instability", "adev_minimum", "minimum of the curve"),
+        ("bias_instability", "bias_instability", "plateau", "the plateau alone: 0.664 B"),
         ("rate_random_walk", "K", "K", None),
         ("correlation_time", "T_B", "T_B", None),
     ):
@@ -101,7 +107,11 @@ def comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
 
 
 def deltas(
-    datasheet: Datasheet, channel: str, estimate: Estimate, tolerance: float
+    datasheet: Datasheet,
+    channel: str,
+    estimate: Estimate,
+    tau: NDArray[np.float64],
+    tolerance: float,
 ) -> Iterator[Delta]:
     """Compare an estimate with what a datasheet prints.
 
@@ -111,6 +121,8 @@ def deltas(
     channel : str
     estimate : Estimate
         In SI.
+    tau : ndarray, shape (m,)
+        Where the log shows the curve well enough for its minimum, s.
     tolerance : float
         Relative difference that still counts as printed.
 
@@ -120,7 +132,7 @@ def deltas(
         One a printed figure and reading of it; K and T_B are mostly not published.
     """
     for entry in comparables(datasheet, channel):
-        parameter, factor = _measured(entry.statistic, estimate)
+        parameter, factor = _measured(entry.statistic, estimate, tau)
         measured, lower, upper = (
             None if value is None else value * factor
             for value in (parameter.value, parameter.lower, parameter.upper)
@@ -154,10 +166,24 @@ def deltas(
         )
 
 
-def _measured(statistic: str, estimate: Estimate) -> tuple[Parameter, float]:
+def _measured(
+    statistic: str, estimate: Estimate, tau: NDArray[np.float64]
+) -> tuple[Parameter, float]:
+    bias = estimate.parameters["B"]
+    if statistic == "plateau" or (statistic == "adev_minimum" and estimate.method == "curve"):
+        return bias, FLOOR  # what is read from the curve is its minimum over 0.664
     if statistic == "adev_minimum":
-        return estimate.parameters["B"], FLOOR
+        return _minimum(estimate, tau), 1.0
     return estimate.parameters[statistic], 1.0
+
+
+def _minimum(estimate: Estimate, tau: NDArray[np.float64]) -> Parameter:
+    """Return the minimum of the model's curve, if it lies inside the tau of the log."""
+    deviation = np.sqrt(estimate.model.allan_variance(tau))
+    lowest = int(np.argmin(deviation)) if len(tau) else 0
+    if not 0 < lowest < len(tau) - 1:
+        return Parameter(None, "not_shown", "the curve has no minimum inside the log's tau")
+    return Parameter(float(deviation[lowest]))
 
 
 def _verdict(kind: str, delta: float, tolerance: float) -> str:

@@ -184,9 +184,8 @@ def _ingest(
         written.append((_assemble(chosen, base, settings, about, scratch / name), folder / name))
     summary = _summary(parts, bases, metadata["started"])
     if all(channel in unusable for channel in log.channels):
-        raise RecordingError(
-            "no channel can be used: " + "; ".join(f.detail for f in findings if f.channel)
-        )
+        reasons = "; ".join(f.detail for f in findings if f.severity == "fatal")
+        raise RecordingError(f"no channel can be used: {reasons}")
     for temporary, final in written:
         temporary.replace(final)
     channels = {
@@ -232,7 +231,8 @@ def _read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> _Par
             writer.write(kept)
     if part.rows == 0:
         raise RecordingError(
-            f"{file.path.name}: no sample between {use.start} s and {use.end} s (use:)"
+            f"{file.path.name}: none of its {read_rows} samples lies in the part to use "
+            f"(use: start {use.start} s, end {use.end or 'open'})"
         )
     if part.not_used:
         file.findings.append(

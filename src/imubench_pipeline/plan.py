@@ -18,6 +18,7 @@ from imubench_pipeline.config import Run, read_run, read_simulated
 from imubench_pipeline.provenance import source_digest
 from imubench_pipeline.readers import log_files
 from imubench_pipeline.sensor import RecordingNotes, Sensor, merged_log, read_sensors
+from imubench_pipeline.tables import read
 from imubench_pipeline.validation import ConfigError, parse, read_yaml
 
 _NOT_LOGS = {".yaml", ".yml", ".md", ".part", ".tmp", ".filepart", ".crdownload"}
@@ -186,6 +187,7 @@ class Plan:
             {
                 "datasheet": known.datasheet.model_dump(mode="json") if known else {},
                 "tolerance": self.run.datasheet.tolerance,
+                "longest": self.run.estimate.longest,
             }
         )
 
@@ -195,6 +197,10 @@ class Plan:
         return _text(
             {
                 "report": self.run.report.model_dump(mode="json"),
+                "settings": {
+                    section: getattr(self.run, section).model_dump(mode="json")
+                    for section in ("allan", "estimate", "reconstruction", "quality", "datasheet")
+                },
                 "sensors": {
                     name: sensor.model_dump(mode="json", include={"vendor", "model", "datasheet"})
                     for name, sensor in self.sensors.items()
@@ -206,6 +212,18 @@ class Plan:
     def truths(self) -> str:
         """Return the true parameters of the simulated recordings."""
         return _text([entry.model_dump(mode="json") for entry in self._simulated.values()])
+
+    def summary(self) -> str:
+        """Return what a finished run says: recordings analysed and rejected, and the report."""
+        table = self.run.results / "tables/recordings.parquet"
+        if not table.is_file():
+            return ""
+        rows = read("recordings", [table]).to_pylist()
+        rejected = [row for row in rows if row["status"] == "rejected"]
+        lines = [f"{len(rows) - len(rejected)} recordings analysed, {len(rejected)} rejected"]
+        lines += [f"  rejected: {r['sensor']}/{r['recording']}: {r['reason']}" for r in rejected]
+        lines.append(f"report: {self.run.results / 'report/index.html'}")
+        return "\n".join(lines)
 
     @staticmethod
     def code(step: str) -> str:

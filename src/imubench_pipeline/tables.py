@@ -122,7 +122,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         *_KEYS,
         _METHOD,
         _text("quantity", "N, bias_instability, K or T_B"),
-        _text("statistic", "what is compared: N, adev_minimum (0.664 B), K or T_B"),
+        _text("statistic", "what is compared: N, adev_minimum, plateau (0.664 B), K, T_B"),
         _number("printed", "as in unit", "figure as printed; null: not published"),
         _text("unit", "unit as printed", required=False),
         _text("kind", "typ, max, min, 1sigma or derived", required=False),

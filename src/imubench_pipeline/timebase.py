@@ -138,8 +138,8 @@ def _grid_findings(found: Track, interval: float) -> list[Finding]:
             Finding(
                 "missing_samples",
                 "note" if missing < 0.01 * found.grid else "warning",
-                f"{missing} of {found.grid} samples are missing in {found.holes} holes, the "
-                f"longest {found.longest * interval:.3g} s; they are left out of the clusters",
+                f"{missing} of {found.grid} samples are missing ({found.holes} holes, the "
+                f"longest {found.longest * interval:.3g} s); they are left out of the clusters",
                 missing,
             )
         )
@@ -178,6 +178,12 @@ def _grid_findings(found: Track, interval: float) -> list[Finding]:
 def _rate_findings(rate: float, stated: float | None, settings: QualitySettings) -> list[Finding]:
     if stated is None or abs(rate / stated - 1.0) <= settings.rate_tolerance:
         return []
+    thousands = np.log10(rate / stated) / 3.0
+    if abs(thousands) > 0.9 and abs(thousands - round(thousands)) < 0.01:
+        raise RecordingError(
+            f"the stamps say {rate:.6g} Hz, the sensor file states {stated:.6g} Hz: 'unit' of "
+            "'time' is probably another one of s, ms, us, ns"
+        )
     return [
         Finding(
             "rate_contradicts_stamps",

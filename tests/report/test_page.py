@@ -13,6 +13,7 @@ from imubench_pipeline.tables import TABLES, build
 SETTINGS = {
     "report": {"title": "A <title>", "units": "practical"},
     "sensors": {"s": {"vendor": "V", "model": "M"}},
+    "settings": {"allan": {"overlap": "octave"}},
 }
 
 
@@ -87,6 +88,7 @@ def test_a_page_is_whole_and_needs_nothing_else() -> None:
     assert "A &lt;title&gt;" in page
     assert not re.search(r"https?://(?!www\.w3\.org)", page)
     figures = [base64.b64decode(found) for found in re.findall(r"base64,([^\"]+)", page)]
+    assert "allan.overlap: octave" in page
     assert len(figures) == 3  # comparison, channel, datasheet
     assert all(figure.startswith(b"<?xml") and b"</svg>" in figure for figure in figures)
 

@@ -175,6 +175,7 @@ def test_bad_logs_are_rejected_and_stop_nothing_else(project: Project) -> None:
         if row["method"] == "weighted"
     }
     assert complete == {("one", "a"), ("one", "b"), ("two", "a")}
+    assert "3 recordings analysed, 6 rejected" in done.stdout + done.stderr
     page = (project.results / "report/index.html").read_text()
     assert "6 rejected" in page
     for name in reasons:

@@ -22,6 +22,7 @@ _METHOD_STYLE = {
     "paper": ("#CC79A7", "-."),
     "weighted": ("#0072B2", "-"),
 }
+_LINES = ("-", "--", ":", "-.")
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 mpl.rcParams.update(
@@ -50,10 +51,10 @@ def _axes(quantity: str, system: System) -> tuple[Figure, Axes, float]:
     return figure, axes, unit.per_si
 
 
-def _legend(figure: Figure, axes: Axes, title: str | None = None) -> None:
+def _legend(figure: Figure, axes: Axes) -> None:
     """Name the lines below the axes, where they hide nothing."""
     lines, names = axes.get_legend_handles_labels()
-    figure.legend(lines, names, title=title, loc="outside lower center", ncols=2, frameon=False)
+    figure.legend(lines, names, loc="outside lower center", ncols=2, frameon=False)
 
 
 def _svg(figure: Figure) -> str:
@@ -104,22 +105,26 @@ def channel_figure(view: ChannelView, system: System) -> str:
 def comparison_figure(views: Sequence[ChannelView], sensors: Sequence[str], system: System) -> str:
     """Draw the curves of the same axis of several sensors (000, Figures 6 and 7).
 
-    A sensor has the same colour and mark in every figure: its place among ``sensors``.
+    A sensor has the same colour and mark in every figure: its place among ``sensors``. Its
+    recordings differ in their lines.
     """
     figure, axes, scale = _axes(views[0].quantity, system)
+    recordings: dict[str, list[str]] = {}
     for view in views:
         place = sensors.index(view.sensor)
+        of_sensor = recordings.setdefault(view.sensor, [])
+        of_sensor.append(view.recording)
         axes.plot(
             view.tau,
             view.adev * scale,
             color=_COLOURS[place % len(_COLOURS)],
-            ls="--" if view.simulated else "-",
+            ls=_LINES[(len(of_sensor) - 1) % len(_LINES)],
             marker=_MARKERS[place % len(_MARKERS)],
             ms=3,
             markevery=8,
             label=view.label,
         )
-    _legend(figure, axes, "dashed: simulated" if any(v.simulated for v in views) else None)
+    _legend(figure, axes)
     return _svg(figure)
 
 

@@ -16,7 +16,13 @@ from imubench_pipeline.report.practical import System, page_unit
 from imubench_pipeline.report.view import METHOD_NAMES, ChannelView, channel_views
 
 _LIBRARIES = ("imubench_pipeline", "numpy", "scipy", "numba", "pyarrow", "snakemake")
-_QUANTITY_SYMBOLS = {"N": "N", "bias_instability": "bias instability", "K": "K", "T_B": "T_B"}
+_STATISTIC_NAMES = {
+    "N": "N",
+    "adev_minimum": "bias instability (minimum)",
+    "plateau": "bias instability (0.664 B)",
+    "K": "K",
+    "T_B": "T_B",
+}
 _QUANTITY_NAMES = {"gyro": "Gyroscope", "accel": "Accelerometer"}
 
 
@@ -58,6 +64,11 @@ def render(tables: Mapping[str, pa.Table], settings: Mapping[str, Any]) -> str:
             for view in views
         ],
         deltas=list(_deltas(views, system)),
+        settings={
+            f"{section}.{key}": value
+            for section, values in settings["settings"].items()
+            for key, value in values.items()
+        },
         versions={"python": platform.python_version()} | {n: version(n) for n in _LIBRARIES},
     )
     return page + "\n"
@@ -155,13 +166,13 @@ def _deltas(views: list[ChannelView], system: System) -> Iterator[dict[str, Any]
             published = row["printed"] is not None
             rows.append(
                 {
-                    "quantity": _QUANTITY_SYMBOLS[row["quantity"]],
+                    "quantity": _STATISTIC_NAMES[row["statistic"]],
                     "printed": f"{row['printed']:g} {row['unit']}" if published else "–",
                     "kind": row["kind"] or "",
                     "comparable": unit.text(row["comparable"]),
                     "measured": unit.text(row["measured"]),
                     "unit": unit.sign,
-                    "delta": "–" if row["delta"] is None else f"{100 * row['delta']:+.0f} %",
+                    "delta": "–" if row["delta"] is None else f"{round(100 * row['delta']):+d} %",
                     "verdict": row["verdict"],
                     "reason": (row["reason"] or "") if published else "",
                 }
