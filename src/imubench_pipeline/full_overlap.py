@@ -58,7 +58,9 @@ def full_sums(
 
 
 @njit(cache=True, nogil=True)
-def _full(theta, sizes, low, high):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def _full(
+    theta: NDArray[np.float64], sizes: NDArray[np.int64], low: int, high: int
+) -> tuple[NDArray[np.float64]]:
     """Return the sum of squared second differences of each block and size."""
     points = theta.size
     sums = np.zeros((high - low, sizes.size))
@@ -78,7 +80,14 @@ def _full(theta, sizes, low, high):  # type: ignore[no-untyped-def]  # noqa: ANN
 
 
 @njit(cache=True, nogil=True)
-def _full_with_holes(theta, present, sizes, enough, low, high):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def _full_with_holes(
+    theta: NDArray[np.float64],
+    present: NDArray[np.int32],
+    sizes: NDArray[np.int64],
+    enough: NDArray[np.int64],
+    low: int,
+    high: int,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """Return, by block and size, what `full_sums` adds up, over the samples present."""
     points = theta.size
     sums = np.zeros((high - low, sizes.size))

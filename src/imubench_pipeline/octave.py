@@ -186,7 +186,7 @@ def split(
 
 
 @njit(cache=True, nogil=True)
-def _local_phase(samples, bias, theta):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def _local_phase(samples: Array, bias: float, theta: Array) -> None:
     """Sum samples up in four chains at once: one chain waits for each addition."""
     quarter = samples.size // 4
     a = b = c = d = 0.0
@@ -215,7 +215,15 @@ def _local_phase(samples, bias, theta):  # type: ignore[no-untyped-def]  # noqa:
 
 
 @njit(cache=True, nogil=True)
-def _sections(samples, low, high, bias, sizes, levels, enough):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def _sections(
+    samples: Array,
+    low: int,
+    high: int,
+    bias: float,
+    sizes: NDArray[np.int64],
+    levels: NDArray[np.int64],
+    enough: NDArray[np.int64],
+) -> tuple[Array, NDArray[np.int64], Array, NDArray[np.int64]]:
     """Sum the clusters that begin in sections ``low`` to ``high``; return them, and the phase."""
     sections = high - low
     sums = np.zeros((sections, 3, sizes.size))
@@ -256,7 +264,15 @@ def _sections(samples, low, high, bias, sizes, levels, enough):  # type: ignore[
 
 
 @njit(cache=True, nogil=True)
-def _sections_with_holes(samples, low, high, bias, sizes, levels, enough):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def _sections_with_holes(
+    samples: Array,
+    low: int,
+    high: int,
+    bias: float,
+    sizes: NDArray[np.int64],
+    levels: NDArray[np.int64],
+    enough: NDArray[np.int64],
+) -> tuple[Array, NDArray[np.int64], Array, NDArray[np.int64]]:
     """Sum the clusters that begin in sections ``low`` to ``high``; return them, and the phase."""
     sections = high - low
     sums = np.zeros((sections, 3, sizes.size))

@@ -90,7 +90,7 @@ def integrate(
 
 
 @njit(cache=True, nogil=True)
-def _accumulate(values, level, theta):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def _accumulate(values: NDArray[np.float64], level: float, theta: NDArray[np.float64]) -> None:
     total = theta[0]
     for i in range(values.size):
         total += values[i] - level
@@ -98,7 +98,12 @@ def _accumulate(values, level, theta):  # type: ignore[no-untyped-def]  # noqa: 
 
 
 @njit(cache=True, nogil=True)
-def _accumulate_present(values, level, theta, present):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def _accumulate_present(
+    values: NDArray[np.float64],
+    level: float,
+    theta: NDArray[np.float64],
+    present: NDArray[np.int32],
+) -> None:
     total, number = theta[0], present[0]
     for i in range(values.size):
         if not np.isnan(values[i]):
@@ -109,7 +114,9 @@ def _accumulate_present(values, level, theta, present):  # type: ignore[no-untyp
 
 
 @njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})
-def sum_squares(first, middle, last):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN201
+def sum_squares(
+    first: NDArray[np.float64], middle: NDArray[np.float64], last: NDArray[np.float64]
+) -> float:
     """Return the sum of (last - 2 middle + first)^2 over arrays of one length."""
     total = 0.0
     for i in range(first.size):

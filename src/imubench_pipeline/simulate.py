@@ -80,7 +80,7 @@ def simulate_blocks(
 
 
 @njit(cache=True, nogil=True)
-def _add_state(log, state, transition, drive, output):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def _add_state(log: Array, state: float, transition: float, drive: Array, output: float) -> float:
     """Add a state to a log and return the state after its last sample."""
     for i in range(log.size):
         log[i] += output * state
@@ -168,7 +168,7 @@ def _from_block_sums(
 
 
 @njit(cache=True, nogil=True)
-def _variances(theta, sizes):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def _variances(theta: Array, sizes: NDArray[np.int64]) -> Array:
     """Return Allan variances without limits, for the members of an ensemble."""
     variances = np.empty(sizes.size)
     for j in range(sizes.size):
@@ -220,7 +220,17 @@ def block_sums(
 
 
 @njit(cache=True, nogil=True)
-def _add_block_sums(sums, state, decay, gain, first, second, to_state, shared, own):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def _add_block_sums(
+    sums: Array,
+    state: float,
+    decay: float,
+    gain: float,
+    first: Array,
+    second: Array,
+    to_state: float,
+    shared: float,
+    own: float,
+) -> None:
     for i in range(sums.size):
         sums[i] += gain * state + shared * first[i] + own * second[i]
         state = decay * state + to_state * first[i]

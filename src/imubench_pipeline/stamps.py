@@ -135,7 +135,15 @@ def tracked(stamps: Stamps, interval: float, longest_hole: float) -> Track:
 
 
 @njit(cache=True, nogil=True)
-def _follow(block, longest_hole, grid, state, points, breaks, counts):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def _follow(
+    block: NDArray[np.float64],
+    longest_hole: float,
+    grid: int,
+    state: NDArray[np.float64],
+    points: NDArray[np.int64],
+    breaks: NDArray[np.int64],
+    counts: NDArray[np.int64],
+) -> float:
     """Give each stamp its grid point; return the seconds between stamps.
 
     ``state``: time of the last grid point, last stamp, interval, last stamped grid point.

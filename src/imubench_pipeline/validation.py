@@ -75,7 +75,7 @@ def parse(model: type[_Model], data: object, file: str) -> _Model:
         )
 
 
-def _fault(file: str, fault: Any, model: type[BaseModel]) -> str:  # noqa: ANN401  (pydantic's)
+def _fault(file: str, fault: Any, model: type[BaseModel]) -> str:
     key = ".".join(str(part) for part in fault["loc"]) or "(top level)"
     found = fault["input"]
     message = re.sub(r"^(Value error|Assertion failed), ", "", fault["msg"])

@@ -226,7 +226,7 @@ class CsvFile(LogFile):
         # Nanoseconds since 1970 do not fit into the 53 bits of a float64.
         return pa.int64() if self.log.time.unit == "ns" else pa.float64()
 
-    def _first(self, stamps: NDArray[Any]) -> Any:  # noqa: ANN401  (int64 or float64)
+    def _first(self, stamps: NDArray[Any]) -> Any:
         valid = stamps[~np.isnan(stamps)] if stamps.dtype.kind == "f" else stamps
         if not len(valid):
             raise RecordingError(f"{self.path.name}: no time stamp in the first records")
@@ -235,7 +235,7 @@ class CsvFile(LogFile):
             self.started = str(np.datetime64(int(valid[0]), "ns"))[:23]
         return valid[0]
 
-    def _seconds(self, stamps: NDArray[Any], first: Any) -> NDArray[np.float64]:  # noqa: ANN401
+    def _seconds(self, stamps: NDArray[Any], first: Any) -> NDArray[np.float64]:
         assert self.log.time is not None
         return np.asarray((stamps - first) * SECONDS[self.log.time.unit or "ns"], np.float64)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from importlib.metadata import version
 from typing import Any
 
@@ -116,7 +116,7 @@ def _method_row(
     }
 
 
-def _cell(row: Mapping[str, Any], text: Any) -> dict[str, str]:  # noqa: ANN401
+def _cell(row: Mapping[str, Any], text: Callable[[float | None], str]) -> dict[str, str]:
     status = row["status"].replace("_", " ")
     if row["value"] is None:
         return {"text": status, "note": row["reason"] or "", "class": "none"}
@@ -124,7 +124,9 @@ def _cell(row: Mapping[str, Any], text: Any) -> dict[str, str]:  # noqa: ANN401
     return {"text": text(row["value"]) + flag, "note": row["reason"] or "", "class": "number"}
 
 
-def _truth_cell(view: ChannelView, symbol: str, text: Any) -> dict[str, str]:  # noqa: ANN401
+def _truth_cell(
+    view: ChannelView, symbol: str, text: Callable[[float | None], str]
+) -> dict[str, str]:
     row = view.truth.get(symbol)
     if row is None:
         return {"text": "none", "note": "", "class": "none"}
