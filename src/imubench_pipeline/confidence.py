@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.special import gammaincinv
 
 _FEWEST_CLUSTERS = 30
-_MOST_CLUSTERS = 1 << 13
+_MOST_CLUSTERS = 1 << 12
 _ALL_LAGS = 2048
 
 
