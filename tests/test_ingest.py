@@ -89,6 +89,18 @@ def test_holes_are_put_on_the_grid(tmp_path: Path, rng: np.random.Generator) -> 
     assert columns == ["time", "sample", "gyro_x", "gyro_y"]
 
 
+def test_a_hole_beside_a_repeated_record_is_still_a_hole(tmp_path: Path) -> None:
+    time = np.arange(1000) / 100.0
+    time[[500, 501]] = time[[501, 500]]
+    source = write_csv(tmp_path / "a.csv", t=time, wx=np.sin(np.arange(1000.0)))
+    result, values = kept(source, tmp_path / "out", {"gyro_x": XY["gyro_x"]}, time=TIME)
+    assert np.isnan(values["gyro_x"]).sum() == 1
+    assert channel_logs(tmp_path / "out")["gyro_x"].holes
+    assert result.summary["samples"] == 999
+    found = {finding.finding: finding.value for finding in result.findings}
+    assert found == {"missing_samples": 1, "repeated_stamps": 1}
+
+
 def test_a_uniform_time_is_not_kept(tmp_path: Path, rng: np.random.Generator) -> None:
     source = write_csv(tmp_path / "a.csv", t=np.arange(500) / 50, wx=rng.standard_normal(500))
     result, _ = kept(source, tmp_path / "out", {"gyro_x": XY["gyro_x"]}, time=TIME)

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from imubench_pipeline.phase import Phase, sum_squares
+from imubench_pipeline.phase import Phase, sum_present, sum_squares
 from imubench_pipeline.threads import in_threads
 
 BLOCK = 1 << 14
@@ -97,19 +97,8 @@ def _full_with_holes(
         start = (low + block) * BLOCK
         for j in range(sizes.size):
             n = sizes[j]
-            total = 0.0
-            thinned = 0.0
-            number = 0
-            for i in range(start, min(start + BLOCK, points - 2 * n)):
-                first = present[i + n] - present[i]
-                second = present[i + 2 * n] - present[i + n]
-                if first >= enough[j] and second >= enough[j]:
-                    difference = (theta[i + 2 * n] - theta[i + n]) / second - (
-                        theta[i + n] - theta[i]
-                    ) / first
-                    total += difference * difference
-                    thinned += 0.5 / first + 0.5 / second
-                    number += 1
+            stop = min(start + BLOCK, points - 2 * n)
+            total, thinned, number = sum_present(theta, present, n, enough[j], start, stop)
             sums[block, j] = total
             inverse[block, j] = thinned
             numbers[block, j] = number

@@ -345,7 +345,7 @@ def _summary(
     return {
         "started": started,
         "rate": base.rate,
-        "samples": base.rows,
+        "samples": base.samples,
         "duration": base.grid / base.rate,
         "temperature_min": temperature.low if known else None,
         "temperature_max": temperature.high if known else None,

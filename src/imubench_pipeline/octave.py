@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from imubench_pipeline.phase import Phase, integrate, sum_squares
+from imubench_pipeline.phase import Phase, accumulate_present, integrate, sum_present, sum_squares
 from imubench_pipeline.threads import in_threads
 
 Array = NDArray[np.float64]
@@ -287,10 +287,7 @@ def _sections_with_holes(
         present = np.empty(stop - begin + 1, dtype=np.int64)
         theta[0] = 0.0
         present[0] = 0
-        for i in range(stop - begin):
-            missing = np.isnan(samples[begin + i])
-            theta[i + 1] = theta[i] + (0.0 if missing else samples[begin + i] - bias)
-            present[i + 1] = present[i] + (0 if missing else 1)
+        accumulate_present(samples[begin:stop], bias, theta, present)
         edges[section, -1] = theta[own]
         counts[section, -1] = present[own]
         points = theta.size
@@ -300,16 +297,10 @@ def _sections_with_holes(
                 if levels[j] == level:
                     m = sizes[j] >> level
                     most = min(starts, points - 2 * m)
-                    for i in range(most):
-                        first = present[i + m] - present[i]
-                        second = present[i + 2 * m] - present[i + m]
-                        if first >= enough[j] and second >= enough[j]:
-                            difference = (theta[i + 2 * m] - theta[i + m]) / second - (
-                                theta[i + m] - theta[i]
-                            ) / first
-                            sums[section, 0, j] += difference * difference
-                            sums[section, 1, j] += 0.5 / first + 0.5 / second
-                            sums[section, 2, j] += 1
+                    total, thinned, number = sum_present(theta, present, m, enough[j], 0, most)
+                    sums[section, 0, j] = total
+                    sums[section, 1, j] = thinned
+                    sums[section, 2, j] = number
                     possible[section, j] = max(most, 0)
             points = (points + 1) // 2
             for i in range(points):

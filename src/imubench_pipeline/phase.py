@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -78,7 +79,7 @@ def integrate(
             _accumulate(values, level or 0.0, theta[reached : stop + 1])
         else:
             reach = slice(reached, stop + 1)
-            _accumulate_present(values, level or 0.0, theta[reach], present[reach])
+            accumulate_present(values, level or 0.0, theta[reach], present[reach])
         reached = stop
     if reached != samples:
         raise ValueError(f"the blocks hold {reached} samples, {samples} were stated")
@@ -98,12 +99,13 @@ def _accumulate(values: NDArray[np.float64], level: float, theta: NDArray[np.flo
 
 
 @njit(cache=True, nogil=True)
-def _accumulate_present(
+def accumulate_present(
     values: NDArray[np.float64],
     level: float,
     theta: NDArray[np.float64],
-    present: NDArray[np.int32],
+    present: NDArray[Any],
 ) -> None:
+    """Sum samples less a level and count them, from the first entries on; NaN adds nothing."""
     total, number = theta[0], present[0]
     for i in range(values.size):
         if not np.isnan(values[i]):
@@ -123,3 +125,46 @@ def sum_squares(
         difference = last[i] - 2.0 * middle[i] + first[i]
         total += difference * difference
     return total
+
+
+@njit(cache=True, nogil=True)
+def sum_present(
+    theta: NDArray[np.float64],
+    present: NDArray[Any],
+    m: int,
+    enough: int,
+    start: int,
+    stop: int,
+) -> tuple[float, float, int]:
+    """Sum squared differences of adjacent means over the samples present.
+
+    Parameters
+    ----------
+    theta, present : ndarray
+        Cumulative sums, and numbers of samples present, at one stride.
+    m : int
+        Steps of that stride in a cluster.
+    enough : int
+        Samples that a cluster must have.
+    start, stop : int
+        First and one-past-last point at which the first cluster of a pair begins.
+
+    Returns
+    -------
+    (float, float, int)
+        Sum of squares, sum of the mean inverse numbers of samples, and number of pairs.
+    """
+    total = 0.0
+    thinned = 0.0
+    number = 0
+    for i in range(start, stop):
+        first = present[i + m] - present[i]
+        second = present[i + 2 * m] - present[i + m]
+        if first >= enough and second >= enough:
+            difference = (theta[i + 2 * m] - theta[i + m]) / second - (
+                theta[i + m] - theta[i]
+            ) / first
+            total += difference * difference
+            thinned += 0.5 / first + 0.5 / second
+            number += 1
+    return total, thinned, number

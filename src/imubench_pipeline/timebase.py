@@ -46,6 +46,8 @@ class TimeBase:
     findings : tuple of Finding
     tracking_interval : float or None
         Interval with which the stamps were put on the grid, s.
+    repeated : int
+        Records left out, since an earlier one has their grid point.
     """
 
     rate: float
@@ -57,11 +59,17 @@ class TimeBase:
     stamped: bool
     findings: tuple[Finding, ...] = ()
     tracking_interval: float | None = None
+    repeated: int = 0
 
     @property
     def missing(self) -> int:
         """Grid points without a sample."""
-        return self.grid - self.rows
+        return self.grid - self.samples
+
+    @property
+    def samples(self) -> int:
+        """Records that have a grid point of their own."""
+        return self.rows - self.repeated
 
 
 def without_stamps(rows: int, rate: float) -> TimeBase:
@@ -111,6 +119,7 @@ def from_stamps(stamps: Stamps, stated: float | None, settings: QualitySettings)
         True,
         tuple(findings),
         found.interval,
+        found.duplicates,
     )
 
 
