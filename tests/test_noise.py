@@ -8,9 +8,13 @@ from scipy.integrate import quad
 from imubench_pipeline.noise import (
     FLOOR,
     PEAK_TAU,
+    Flicker,
     GaussMarkov,
     NoiseModel,
+    Quantization,
+    Ramp,
     RandomWalk,
+    Sinusoid,
     WhiteNoise,
     bias_instability,
     driving_density,
@@ -37,7 +41,9 @@ def test_gauss_markov_to_ten_digits_at_every_tau(log_ratio: float, log_time: flo
     assert term.allan_variance(np.array([tau]))[0] == pytest.approx(expected, rel=1e-10)
 
 
-@pytest.mark.parametrize("term", [WhiteNoise(0.3), GaussMarkov(0.7, 5.0), RandomWalk(0.2)])
+@pytest.mark.parametrize(
+    "term", [WhiteNoise(0.3), GaussMarkov(0.7, 5.0), RandomWalk(0.2), Flicker(0.4)]
+)
 @pytest.mark.parametrize("tau", [0.5, 3.0, 40.0])
 def test_allan_variance_is_the_integral_of_the_spectrum(term, tau: float) -> None:
     # sigma^2 = 4 int S sin^4(pi f tau) / (pi f tau)^2 df, with x = pi f tau
@@ -78,7 +84,16 @@ def test_sampled_random_walk_is_the_sum_of_covariances(n: int) -> None:
     assert found == pytest.approx(expected, rel=1e-12)
 
 
-@pytest.mark.parametrize("term", [WhiteNoise(0.3), GaussMarkov(0.7, 5.0), RandomWalk(0.2)])
+@pytest.mark.parametrize(
+    "term",
+    [
+        WhiteNoise(0.3),
+        GaussMarkov(0.7, 5.0),
+        RandomWalk(0.2),
+        Flicker(0.4),
+        Quantization(0.1),
+    ],
+)
 def test_sampled_spectrum_gives_the_sampled_allan_variance(term) -> None:
     interval, points = 0.1, 1 << 16
     omega = np.pi * (np.arange(points) + 0.5) / points
@@ -106,11 +121,12 @@ def test_state_space_is_exact() -> None:
     space = MTI_7.state_space(100.0)
     term = GaussMarkov(MTI_7.B, 89.5)
     stationary = term.density * 89.5 / 2
-    np.testing.assert_allclose(space.transition, [np.exp(-0.01 / 89.5), 1.0])
+    decay = np.exp(-0.01 / 89.5)
+    np.testing.assert_allclose(space.transition, np.diag([decay, 1.0]))
     np.testing.assert_allclose(
-        space.process_noise, [stationary * (1 - space.transition[0] ** 2), 8.2e-7**2 * 0.01]
+        space.process_noise, np.diag([stationary * (1 - decay**2), 8.2e-7**2 * 0.01])
     )
-    np.testing.assert_allclose(space.initial_variance, [stationary, 0.0])
+    np.testing.assert_allclose(space.initial_variance, np.diag([stationary, 0.0]))
     assert space.measurement_noise == pytest.approx(8.4e-5**2 * 100.0)
 
 
@@ -125,8 +141,79 @@ def test_a_model_is_the_sum_of_its_terms() -> None:
 
 
 @pytest.mark.parametrize(
-    "values", [{"N": -1.0}, {"K": np.nan}, {"B": 1.0}, {"B": 1.0, "T_B": 0.0}, {"N": np.inf}]
+    "values", [{"N": -1.0}, {"K": np.nan}, {"R": np.inf}, {"B": 1.0, "T_B": 0.0}, {"N": np.inf}]
 )
 def test_impossible_models(values: dict) -> None:
     with pytest.raises(ValueError, match="expected"):
         NoiseModel(**values)
+
+
+def sampled_variance(space, n: int, interval: float) -> float:
+    """Allan variance of the output of a state space, from the covariances of its samples."""
+    mean, covariance = space.initial_mean, space.initial_variance
+    means, between = [], np.zeros((2 * n, 2 * n))
+    for i in range(2 * n):
+        means.append(space.output @ mean)
+        ahead = covariance
+        for j in range(i, 2 * n):
+            between[i, j] = between[j, i] = space.output @ ahead @ space.output
+            ahead = space.transition @ ahead
+        between[i, i] += space.measurement_noise
+        mean = space.transition @ mean
+        covariance = space.transition @ covariance @ space.transition.T + space.process_noise
+    weights = np.concatenate([-np.ones(n), np.ones(n)]) / n
+    return float(weights @ (between + np.outer(means, means)) @ weights / 2)
+
+
+@pytest.mark.parametrize("n", [1, 2, 7])
+def test_the_state_space_has_the_sampled_allan_variance(n: int) -> None:
+    model = NoiseModel(
+        Q=0.01,
+        N=0.2,
+        B=0.5,
+        T_B=3.0,
+        K=0.1,
+        R=0.3,
+        further=[GaussMarkov(0.4, 0.3)],
+    )
+    expected = model.allan_variance([n * 0.1], 10.0)[0]
+    assert sampled_variance(model.state_space(10.0), n, 0.1) == pytest.approx(expected, rel=1e-9)
+    assert model.name == "Q+N+GM+GM+K+R"
+
+
+def test_a_sinusoid_averaged_over_its_phase_has_its_allan_variance() -> None:
+    line = Sinusoid(0.7, 0.23)
+    for n in (1, 5, 40):
+        expected = line.sampled_allan_variance(np.array([float(n)]), 0.1)[0]
+        space = line.state_space(0.1)
+        assert sampled_variance(space, n, 0.1) == pytest.approx(expected, rel=1e-9)
+    tau = np.array([401.0])
+    fine = line.sampled_allan_variance(tau / 1e-4, 1e-4)
+    np.testing.assert_allclose(fine, line.allan_variance(tau), rtol=1e-6)
+
+
+def test_ramp_and_quantization_in_closed_form() -> None:
+    tau = np.array([0.5, 2.0, 30.0])
+    np.testing.assert_allclose(Ramp(-0.2).allan_variance(tau), 0.04 * tau**2 / 2)
+    np.testing.assert_allclose(Quantization(0.3).allan_variance(tau), 3 * 0.09 / tau**2)
+    with pytest.raises(ValueError, match="depends on the rate"):
+        NoiseModel(Q=1.0).psd([1.0])
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 17, 60])
+def test_sampled_flicker_is_its_integral(n: int) -> None:
+    def of(x: float) -> float:
+        return np.sin(n * x) ** 4 / np.sin(x) ** 3
+
+    integral = quad(of, 0, np.pi / 2, limit=1000)[0]
+    found = Flicker(1.0).sampled_allan_variance(np.array([float(n)]), 0.1)[0]
+    assert found == pytest.approx(2 / np.pi * integral / n**2, rel=1e-8)
+
+
+def test_the_flicker_table_and_its_continuation_meet() -> None:
+    n = np.array([4095.0, 4096.0, 4097.0, 4098.0])
+    values = Flicker(1.0).sampled_allan_variance(n, 1.0)
+    steps = np.diff(values)
+    assert (steps < 0).all()
+    np.testing.assert_allclose(steps, steps.mean(), rtol=1e-2)
+    assert values[-1] == pytest.approx(FLOOR**2, rel=1e-6)

@@ -17,7 +17,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from imubench_pipeline.allan import of_phase
-from imubench_pipeline.noise import GaussMarkov, NoiseModel, RandomWalk
+from imubench_pipeline.noise import NoiseModel, Quantization, Ramp, Sinusoid, WhiteNoise
 from imubench_pipeline.phase import integrate
 
 Array = NDArray[np.float64]
@@ -55,8 +55,9 @@ def simulate(model: NoiseModel, rate: float, samples: int, rng: np.random.Genera
     Returns
     -------
     ndarray, shape (samples,)
-        rad/s or m/s². The Gauss-Markov process starts in its stationary distribution, the
-        random walk at 0.
+        rad/s or m/s². Stationary processes start in their stationary distribution, the random
+        walk and the ramp at 0, sinusoids at a random phase; flicker noise is a bank of
+        Gauss-Markov processes up to the length of the log.
     """
     blocks = list(simulate_blocks(model, rate, samples, rng))
     return np.concatenate(blocks) if blocks else np.empty(0)
@@ -66,26 +67,52 @@ def simulate_blocks(
     model: NoiseModel, rate: float, samples: int, rng: np.random.Generator, block: int = _BLOCK
 ) -> Iterator[Array]:
     """Yield a simulated log in blocks; the log does not depend on their size (see `simulate`)."""
-    space = model.state_space(rate)
-    white, initial, *streams = rng.spawn(2 + len(space.transition))
-    state = np.sqrt(space.initial_variance) * initial.standard_normal(len(space.transition))
+    interval = 1.0 / rate
+    terms = model.realised(interval, max(samples, 2) * interval)
+    white, *streams = rng.spawn(1 + len(terms))
+    spaces = [term.state_space(interval) for term in terms]
+    states = [term.start(stream, interval) for term, stream in zip(terms, streams, strict=True)]
+    spread = math.sqrt(sum(space.measurement_noise for space in spaces))
     for start in range(0, samples, block):
         size = min(block, samples - start)
-        log = white.standard_normal(size) * math.sqrt(space.measurement_noise)
-        for i, stream in enumerate(streams):
-            drive = stream.standard_normal(size)
-            drive *= math.sqrt(space.process_noise[i])
-            state[i] = _add_state(log, state[i], space.transition[i], drive, space.output[i])
+        log = white.standard_normal(size) * spread
+        for space, state, stream in zip(spaces, states, streams, strict=True):
+            if len(state):
+                driven = np.flatnonzero(np.diag(space.process_noise))
+                drive = stream.standard_normal((size, len(driven)))
+                drive *= np.sqrt(np.diag(space.process_noise)[driven])
+                _add_states(log, state, space.transition, driven, drive, space.output)
         yield log
 
 
 @njit(cache=True, nogil=True)
-def _add_state(log: Array, state: float, transition: float, drive: Array, output: float) -> float:
-    """Add a state to a log and return the state after its last sample."""
+def _add_states(
+    log: Array,
+    state: Array,
+    transition: Array,
+    driven: NDArray[np.int64],
+    drive: Array,
+    output: Array,
+) -> None:
+    """Add the output of states to a log, and leave the states as they are after its last sample."""
+    if state.size == 1 and driven.size == 1:
+        x, phi, h = state[0], transition[0, 0], output[0]
+        for i in range(log.size):
+            log[i] += h * x
+            x = phi * x + drive[i, 0]
+        state[0] = x
+        return
+    before = np.empty_like(state)
     for i in range(log.size):
-        log[i] += output * state
-        state = transition * state + drive[i]
-    return state
+        for a in range(state.size):
+            log[i] += output[a] * state[a]
+            before[a] = state[a]
+        for a in range(state.size):
+            state[a] = 0.0
+            for b in range(state.size):
+                state[a] += transition[a, b] * before[b]
+        for j in range(driven.size):
+            state[driven[j]] += drive[i, j]
 
 
 def reconstructed_variance(
@@ -190,17 +217,27 @@ def block_sums(
     The sum over a block and the state after it are jointly Gaussian, given the state before.
     """
     interval = 1.0 / rate
-    sums = rng.standard_normal(blocks) * math.sqrt(width * model.N**2 * rate)
-    for term in model.terms:
-        if isinstance(term, GaussMarkov):
-            variance = term.density * term.T_B / 2.0
-            start = rng.standard_normal() * math.sqrt(variance)
-            p = math.exp(-interval / term.T_B)
-            drive = -variance * math.expm1(-2.0 * interval / term.T_B)
-        elif isinstance(term, RandomWalk):
-            start, p, drive = 0.0, 1.0, term.K**2 * interval
-        else:
+    sums = np.zeros(blocks)
+    firsts = np.arange(blocks) * width
+    for term in model.realised(interval, max(blocks * width, 2) * interval):
+        if isinstance(term, WhiteNoise):
+            sums += rng.standard_normal(blocks) * math.sqrt(width * term.N**2 * rate)
             continue
+        if isinstance(term, Quantization):
+            sums += np.diff(rng.standard_normal(blocks + 1)) * term.Q * rate
+            continue
+        if isinstance(term, Ramp):
+            sums += term.R * interval * (firsts + (width - 1) / 2.0) * width
+            continue
+        if isinstance(term, Sinusoid):
+            half = math.pi * term.frequency * interval
+            gain = term.amplitude * math.sin(width * half) / math.sin(half)
+            phase = rng.uniform(0.0, 2.0 * math.pi)
+            sums += gain * np.cos(half * (2.0 * firsts + width - 1) + phase)
+            continue
+        space = term.state_space(interval)
+        p, drive = float(space.transition[0, 0]), float(space.process_noise[0, 0])
+        start = float(term.start(rng, interval)[0])
         # The sample i of a block is p^i x + sum_{j<i} p^(i-1-j) w_j.
         powers = p ** np.arange(width + 1)
         reach = np.concatenate(([0.0], np.cumsum(powers)))

@@ -71,9 +71,15 @@ def _blocks(
     bias = {}
     for channel, settings in recording.channels.items():
         truth = settings.si(channel)
-        bias[channel] = truth.pop("bias", 0.0)
+        bias[channel] = truth.get("bias", 0.0)
         rng = channel_rng(recording.seed, recording.sensor, recording.recording, channel)
-        streams[channel] = simulate_blocks(NoiseModel(**truth), rate, samples, rng, _BLOCK)
+        model = NoiseModel(
+            N=truth.get("N", 0.0),
+            B=truth.get("B", 0.0),
+            T_B=truth.get("T_B"),
+            K=truth.get("K", 0.0),
+        )
+        streams[channel] = simulate_blocks(model, rate, samples, rng, _BLOCK)
     for _ in range(0, samples, _BLOCK):
         yield {str(name): next(stream) + bias[name] for name, stream in streams.items()}
 
