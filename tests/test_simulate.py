@@ -116,9 +116,6 @@ def test_every_term_is_simulated_as_its_allan_variance_says(rng, model: NoiseMod
     found = np.array([reconstructed_variance(model, RATE, 8000, sizes, rng) for _ in range(300)])
     error = found.std(axis=0) / np.sqrt(len(found))
     expected = model.allan_variance(sizes / RATE, RATE)
-    if model.B and model.T_B is None:
-        # the bank follows the continuous plateau; sampled flicker is above it at one sample
-        expected = NoiseModel(N=model.N, B=model.B).allan_variance(sizes / RATE)
     tolerance = 4.5 * error + 5e-3 * expected
     assert (np.abs(found.mean(axis=0) - expected) < tolerance).all()
 
@@ -132,7 +129,7 @@ def test_the_ensemble_is_that_of_full_length_logs(rng) -> None:
     for quantile, allowed in ((0.025, 0.45), (0.5, 0.2), (0.975, 0.6)):
         difference = np.quantile(drawn, quantile, axis=0) - np.quantile(full, quantile, axis=0)
         assert (np.abs(difference) < allowed * spread).all(), quantile
-    np.testing.assert_allclose(drawn.std(axis=0) / spread, 1.0, atol=0.15)
+    np.testing.assert_allclose(drawn.std(axis=0) / spread, 1.0, atol=0.2)
 
 
 def test_neighbouring_taus_go_together_in_the_ensemble(rng) -> None:

@@ -9,81 +9,91 @@ import numpy as np
 from scipy.optimize import nnls
 
 from imubench_pipeline.noise_terms import (
-    FLOOR,
     PEAK_TAU,
     Array,
     Flicker,
     GaussMarkov,
-    gauss_markov_shape,
+    Term,
+    WhiteNoise,
+    sampled_gauss_markov_shape,
 )
 
 _MEMBERS_A_DECADE = 2.5
 _POINTS_A_DECADE = 20
 _BEYOND = 4.0
-"""How far the correlation times of the bank go beyond those that peak at the ends of its band."""
+"""How far the correlation times of the bank go beyond the one that peaks at the end of its band."""
 
 
-def bank(B: float, shortest: float, longest: float) -> list[GaussMarkov]:
-    """Return Gauss-Markov processes whose sum has the Allan variance of flicker noise in a band.
+def bank(B: float, interval: float, longest: float) -> list[Term]:
+    """Return Gauss-Markov processes whose samples have the Allan variance of flicker noise.
 
-    Their correlation times are spaced evenly on a log scale, five in two decades, and their
-    variances are fitted by non-negative least squares.
+    Their correlation times are spaced evenly on a log scale from half a sampling interval, five
+    in two decades; a white part stands for the shorter ones. The variances are fitted to the
+    Allan variance of sampled flicker noise by non-negative least squares.
 
     Parameters
     ----------
     B : float
         Bias instability, rad/s or m/s²; the plateau is 0.664 B.
-    shortest, longest : float
-        Tau at the ends of the band, s.
+    interval : float
+        Sampling interval, s: the shortest tau of the band.
+    longest : float
+        Longest tau of the band, s.
 
     Returns
     -------
-    list of GaussMarkov
+    list of Term
+        Gauss-Markov processes, and white noise.
 
     Raises
     ------
     ValueError
         If the band is empty.
     """
-    if not 0 < shortest < longest:
-        raise ValueError(f"the band from {shortest} to {longest} s is empty")
-    times, levels = _unit_bank(round(math.log10(longest / shortest), 6))
-    return [
-        GaussMarkov(B * level, shortest * time)
+    if not 0 < interval < longest:
+        raise ValueError(f"the band from {interval} to {longest} s is empty")
+    times, levels, white = _unit_bank(round(math.log10(longest / interval), 6))
+    terms: list[Term] = [
+        GaussMarkov(B * level, interval * time)
         for time, level in zip(times, levels, strict=True)
         if level > 0
     ]
+    return [*terms, WhiteNoise(B * white * math.sqrt(interval))] if white else terms
 
 
-def ripple(shortest: float, longest: float) -> tuple[float, float]:
+def ripple(interval: float, longest: float) -> tuple[float, float]:
     """Return the largest relative errors of a bank inside its band.
 
     Returns
     -------
     (float, float)
-        Of the Allan variance at tau from ``shortest`` to ``longest``, and of the power spectral
-        density at frequencies from 1 / (2 longest) to 1 / (2 shortest), both against flicker
-        noise.
+        Of the sampled Allan variance at tau from ``interval`` to ``longest``, and of the
+        spectrum of the samples at frequencies from 1 / (2 longest) to Nyquist, both against
+        sampled flicker noise.
     """
-    terms = bank(1.0, shortest, longest)
-    points = math.ceil(math.log10(longest / shortest) * _POINTS_A_DECADE * 2)
-    tau = np.geomspace(shortest, longest, points)
-    frequency = 0.5 / tau
-    variance = np.sum([term.allan_variance(tau) for term in terms], axis=0)
-    density = np.sum([term.psd(frequency) for term in terms], axis=0)
+    terms = bank(1.0, interval, longest)
+    points = math.ceil(math.log10(longest / interval) * _POINTS_A_DECADE * 2)
+    n = np.unique(np.rint(np.geomspace(1.0, longest / interval, points)))
+    omega = np.pi / n
+    variance = np.sum([term.sampled_allan_variance(n, interval) for term in terms], axis=0)
+    density = np.sum([term.sampled_spectrum(omega, interval) for term in terms], axis=0)
+    flicker = Flicker(1.0)
     return (
-        float(np.max(np.abs(variance / FLOOR**2 - 1.0))),
-        float(np.max(np.abs(density / Flicker(1.0).psd(frequency) - 1.0))),
+        float(np.max(np.abs(variance / flicker.sampled_allan_variance(n, interval) - 1.0))),
+        float(np.max(np.abs(density / flicker.sampled_spectrum(omega, interval) - 1.0))),
     )
 
 
 @lru_cache(maxsize=16)
-def _unit_bank(decades: float) -> tuple[Array, Array]:
-    """Return correlation times and B of a bank for B = 1 from tau = 1 s to 10^decades s."""
-    first, last = 1.0 / PEAK_TAU / _BEYOND, 10.0**decades / PEAK_TAU * _BEYOND
+def _unit_bank(decades: float) -> tuple[Array, Array, float]:
+    """Return correlation times, their B, and N, for B = 1 and tau from 1 s to 10^decades s."""
+    first, last = 0.5, max(10.0**decades / PEAK_TAU * _BEYOND, 1.0)
     members = 1 + math.ceil(math.log10(last / first) * _MEMBERS_A_DECADE)
     times = np.geomspace(first, last, members)
-    tau = np.geomspace(1.0, 10.0**decades, 1 + math.ceil(decades * _POINTS_A_DECADE))
-    shapes = [GaussMarkov(1.0, time).density * gauss_markov_shape(tau, time) for time in times]
-    powers, _ = nnls(np.column_stack(shapes) / FLOOR**2, np.ones_like(tau))
-    return times, np.sqrt(powers)
+    n = np.unique(np.rint(np.geomspace(1.0, 10.0**decades, 2 + int(decades * _POINTS_A_DECADE))))
+    wanted = Flicker(1.0).sampled_allan_variance(n, 1.0)
+    shapes = [
+        GaussMarkov(1.0, time).density * sampled_gauss_markov_shape(n, 1.0, time) for time in times
+    ]
+    powers, _ = nnls(np.column_stack([*shapes, 1.0 / n]) / wanted[:, None], np.ones_like(n))
+    return times, np.sqrt(powers[:-1]), math.sqrt(powers[-1])

@@ -179,17 +179,19 @@ class NoiseModel:
         w = np.asarray(omega, dtype=np.float64)
         return _sum([term.sampled_spectrum(w, 1.0 / rate) for term in self.terms], w)
 
-    def realised(self, shortest: float, longest: float) -> Sequence[Term]:
+    def realised(self, interval: float, longest: float) -> Sequence[Term]:
         """Return the terms with flicker noise as Gauss-Markov processes (`flicker.bank`).
 
         Parameters
         ----------
-        shortest, longest : float
-            Tau between which the flicker noise is followed, s.
+        interval : float
+            Sampling interval, s.
+        longest : float
+            Tau up to which the flicker noise is followed, s.
         """
         terms: list[Term] = []
         for term in self.terms:
-            terms.extend(bank(term.B, shortest, longest) if isinstance(term, Flicker) else [term])
+            terms.extend(bank(term.B, interval, longest) if isinstance(term, Flicker) else [term])
         return terms
 
     def state_space(self, rate: float, longest: float = _LONGEST_FLICKER) -> StateSpace:
