@@ -15,6 +15,7 @@ except ConfigError as error:
 
 RESULTS = str(plan.run.results)
 FOLDER = RESULTS + "/recordings/{sensor}/{recording}"
+ESTIMATED = ("parameters", "models", "lines", "spectrum", "fixed_bias")
 FOLDERS = [FOLDER.format(sensor=s, recording=r) for s, r in plan.recordings]
 
 
@@ -72,9 +73,9 @@ rule estimate:
         quality=FOLDER + "/quality.json",
         allan=FOLDER + "/allan.parquet",
     output:
-        FOLDER + "/parameters.parquet",
+        **{table: f"{FOLDER}/{table}.parquet" for table in ESTIMATED},
     params:
-        settings=plan.settings("estimate"),
+        settings=lambda w: plan.estimate_settings(w.sensor, w.recording),
         code=plan.code("estimate"),
     script:
         "workflow/scripts/estimate.py"
@@ -111,9 +112,12 @@ rule datasheet:
 
 rule tables:
     input:
+        **{
+            table: [f"{folder}/{table}.parquet" for folder in FOLDERS]
+            for table in ESTIMATED
+        },
         quality=[f"{folder}/quality.json" for folder in FOLDERS],
         allan=[f"{folder}/allan.parquet" for folder in FOLDERS],
-        parameters=[f"{folder}/parameters.parquet" for folder in FOLDERS],
         reconstruction=[f"{folder}/reconstruction.parquet" for folder in FOLDERS],
         scores=[f"{folder}/scores.parquet" for folder in FOLDERS],
         datasheet=[f"{folder}/datasheet.parquet" for folder in FOLDERS],

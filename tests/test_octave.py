@@ -1,3 +1,5 @@
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 
@@ -19,7 +21,7 @@ def make(rng: np.random.Generator, kind: str, samples: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("kind", ["white", "walk", "both"])
-@pytest.mark.parametrize("samples", [300, 3000, SECTION, SECTION + 2049, 3 * SECTION + 17])
+@pytest.mark.parametrize("samples", [300, 3000, SECTION, SECTION + 6145, 5 * SECTION + 17])
 @pytest.mark.parametrize("loss", [0.0, 0.02])
 def test_equal_to_full_overlap_within_a_tenth_of_its_error(rng, kind, samples, loss) -> None:
     log = make(rng, kind, samples)
@@ -42,16 +44,62 @@ def test_short_clusters_overlap_fully(rng: np.random.Generator) -> None:
     np.testing.assert_allclose(octave.variance, full.variance, rtol=1e-9)
 
 
-@pytest.mark.parametrize("holes", [False, True])
-def test_blocks_and_threads_do_not_change_a_bit(rng: np.random.Generator, holes: bool) -> None:
+@pytest.mark.parametrize("missing", ["none", "everywhere", "in one place"])
+def test_blocks_and_threads_do_not_change_a_bit(rng: np.random.Generator, missing: str) -> None:
     log = rng.standard_normal(500_000)
-    if holes:
+    if missing == "everywhere":
         log[rng.random(500_000) < 0.05] = np.nan
+    elif missing == "in one place":
+        log[200_000:200_100] = np.nan
+    holes = missing != "none"
     whole = of_blocks([log], len(log), 1.0, holes=holes)
-    parts = np.split(log, [5, 100_000, 100_001, 333_333])
-    again = of_blocks(parts, len(log), 1.0, holes=holes, threads=2)
-    np.testing.assert_array_equal(whole.variance, again.variance)
-    np.testing.assert_array_equal(whole.exponent, again.exponent)
+    random = np.sort(rng.integers(0, len(log), 200))
+    for cuts in ([5, 100_000, 100_001, 333_333], [SECTION + 6000], [SECTION + 6144], random):
+        for threads in (1, 2, 3):
+            parts = np.split(log, cuts)
+            again = of_blocks(parts, len(log), 1.0, holes=holes, threads=threads)
+            np.testing.assert_array_equal(whole.variance, again.variance)
+            np.testing.assert_array_equal(whole.exponent, again.exponent)
+            np.testing.assert_array_equal(whole.averaged, again.averaged)
+
+
+def test_sections_without_a_hole_are_summed_as_in_a_log_without(rng: np.random.Generator) -> None:
+    log = 9.81 + 1e-3 * rng.standard_normal(300_000)
+    without = of_blocks([log], len(log), 1.0, holes=False)
+    flagged = of_blocks([log], len(log), 1.0, holes=True)
+    np.testing.assert_allclose(flagged.variance, without.variance, rtol=1e-9)
+    np.testing.assert_allclose(flagged.averaged, without.averaged, rtol=1e-12)
+    log[150_000] = np.nan
+    holed = of_blocks([log], len(log), 1.0, holes=True)
+    np.testing.assert_allclose(holed.variance, without.variance, rtol=1e-2)
+
+
+def test_single_precision_is_the_same_log(rng: np.random.Generator) -> None:
+    log = (9.81 + 1e-3 * rng.standard_normal(300_000)).astype(np.float32)
+    double = of_blocks([log.astype(np.float64)], len(log), 1.0, holes=False)
+    single = of_blocks(np.split(log, [100_000]), len(log), 1.0, holes=False)
+    mixed = of_blocks([log[:90_000], log[90_000:].astype(float)], len(log), 1.0, holes=False)
+    np.testing.assert_array_equal(single.variance, double.variance)
+    np.testing.assert_array_equal(mixed.variance, double.variance)
+
+
+def test_noise_types_are_those_of_full_overlap(rng: np.random.Generator) -> None:
+    log = make(rng, "both", 1 << 20)
+    octave = of_blocks([log], len(log), 1.0, holes=False)
+    full = allan_variance(log, 1.0, cluster_sizes=octave.cluster_size)
+    np.testing.assert_array_equal(octave.exponent[:5], 0)
+    assert -2 in octave.exponent
+    assert (octave.exponent == full.exponent).mean() > 0.9
+
+
+def test_what_goes_wrong_in_the_blocks_is_told(rng: np.random.Generator) -> None:
+    def blocks() -> Iterator[np.ndarray]:
+        yield rng.standard_normal(100_000)
+        raise OSError("the disk is gone")
+
+    for threads in (1, 2):
+        with pytest.raises(OSError, match="disk is gone"):
+            of_blocks(blocks(), 200_000, 1.0, holes=False, threads=threads)
 
 
 def test_no_difference_spans_segments(rng: np.random.Generator) -> None:
@@ -94,3 +142,19 @@ def test_wrong_blocks() -> None:
         of_blocks([np.array([0.0, np.nan, 1.0, 2.0])], 4, 1.0, holes=False)
     with pytest.raises(ValueError, match="missing or infinite"):
         of_blocks([np.full(100_000, np.nan)], 100_000, 1.0, holes=False)
+    for position in (70_000, 100_002):
+        log = np.zeros(100_003)
+        log[position] = np.inf
+        with pytest.raises(ValueError, match="infinite"):
+            of_blocks([log], len(log), 1.0, holes=True)
+        log[position] = np.nan
+        with pytest.raises(ValueError, match="missing or infinite"):
+            of_blocks([log], len(log), 1.0, holes=False)
+    with pytest.raises(ValueError, match="end before sample 200000"):
+        of_blocks(
+            [np.zeros(150_000)],
+            200_000,
+            1.0,
+            holes=False,
+            segments=[(0, 100_000), (100_000, 200_000)],
+        )

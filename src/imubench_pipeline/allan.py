@@ -12,26 +12,29 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from itertools import groupby
+from operator import itemgetter
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from imubench_pipeline.confidence import deviation_limits, equivalent_degrees, noise_exponent
-from imubench_pipeline.full_overlap import PRESENT, full_sums
+from imubench_pipeline.full_overlap import full_sums
 from imubench_pipeline.octave import (
     DECIMATION,
     SHORTEST,
     OctaveSums,
     octave_sizes,
-    split,
 )
-from imubench_pipeline.phase import Phase, integrate
+from imubench_pipeline.phase import Phase, integrate, split
+from imubench_pipeline.threads import read_ahead
 
 _MANY_CLUSTERS = 100
+_FEW_STEPS = 2
 
-Edges = Callable[[int], tuple[NDArray[np.float64], NDArray[Any] | None]]
-"""Cumulative sums and counts at the edges of adjacent clusters of a size, of one segment."""
+Edges = Callable[[int], tuple[NDArray[np.float64], NDArray[Any] | None, int]]
+"""Cumulative sums and counts at the edges of adjacent clusters of about a size, and the size."""
 
 
 @dataclass(frozen=True)
@@ -172,7 +175,7 @@ def allan_variance(
 
 
 def of_blocks(
-    blocks: Iterable[NDArray[np.float64]],
+    blocks: Iterable[NDArray[np.floating[Any]]],
     samples: int,
     rate: float,
     sizes: ArrayLike | None = None,
@@ -189,7 +192,7 @@ def of_blocks(
     Parameters
     ----------
     blocks : iterable of ndarray
-        The log in order, in SI; NaN where a sample is missing.
+        The log in order, in SI; NaN where a sample is missing. Blocks of float32 are not copied.
     samples : int
         L, the length of all blocks together.
     rate : float
@@ -201,6 +204,7 @@ def of_blocks(
     segments : sequence of (int, int), optional
         First and one-past-last sample of each; one segment by default.
     threads : int
+        With more than one, the next block is made while the last is summed.
 
     Raises
     ------
@@ -213,27 +217,34 @@ def of_blocks(
     if samples < SHORTEST:
         phase = integrate(blocks, samples, holes=holes, segments=spans)
         return of_phase(phase, rate, wanted, threads=threads)
-    parts = [OctaveSums(wanted, share=PRESENT, holes=holes, threads=threads) for _ in spans]
-    for number, block in split(blocks, spans):
-        parts[number].push(np.asarray(block, dtype=np.float64))
-    for part, (start, stop) in zip(parts, spans, strict=True):
+    longest: OctaveSums | None = None
+    sums: list[NDArray[Any]] = []
+    done = 0
+    if threads > 1:
+        blocks = read_ahead(blocks)
+    for number, group in groupby(split(blocks, spans), key=itemgetter(0)):
+        start, stop = spans[number]
+        part = OctaveSums(wanted, stop - start, holes=holes, threads=threads)
+        for _, block in group:
+            part.push(block if block.dtype == np.float32 else np.asarray(block, np.float64))
+        if part.received != stop - start:
+            break
         part.finish()
-        if part.samples != stop - start:
-            raise ValueError(f"the blocks end before sample {stop}")
-        if not np.isfinite(part.theta[-1]):
-            raise ValueError("a sample is missing or infinite" + " although holes is False")
-    sums = [
-        np.sum(column, axis=0) for column in zip(*(part.results for part in parts), strict=True)
-    ]
-    longest = max(parts, key=lambda part: part.samples)
+        sums = [a + b for a, b in zip(sums, part.results, strict=True)] if sums else part.results
+        if longest is None or part.received > longest.received:
+            longest = part
+        done += 1
+    if longest is None or done < len(spans):
+        raise ValueError(f"the blocks end before sample {spans[done][1]}")
     first = longest.first
 
-    def edges(n: int) -> tuple[NDArray[np.float64], NDArray[Any] | None]:
-        if n % DECIMATION:
-            return first.theta[::n], None if first.present is None else first.present[::n]
-        step = n // DECIMATION
+    def edges(n: int) -> tuple[NDArray[np.float64], NDArray[Any] | None, int]:
+        if n < _FEW_STEPS * DECIMATION:
+            return first.theta[::n], None if first.present is None else first.present[::n], n
+        # The noise type is the same at the nearest multiple of the stride.
+        step = round(n / DECIMATION)
         held = longest.present
-        return longest.theta[::step], None if held is None else held[::step]
+        return longest.theta[::step], None if held is None else held[::step], step * DECIMATION
 
     return _curve(rate, wanted, samples, spans, sums, edges)
 
@@ -248,11 +259,12 @@ def of_phase(
     wanted = _checked(rate, sizes, phase.samples, phase.segments)
     start, stop = max(phase.segments, key=lambda segment: segment[1] - segment[0])
 
-    def edges(n: int) -> tuple[NDArray[np.float64], NDArray[Any] | None]:
+    def edges(n: int) -> tuple[NDArray[np.float64], NDArray[Any] | None, int]:
         held = phase.present
         return (
             phase.theta[start : stop + 1 : n],
             None if held is None else held[start : stop + 1 : n],
+            n,
         )
 
     sums = full_sums(phase, wanted, threads)
@@ -316,8 +328,8 @@ def _exponents(edges: Edges, sizes: NDArray[np.int64]) -> list[int]:
     """
     exponents: list[int] = []
     for n in sizes:
-        theta, held = edges(int(n))
-        found = noise_exponent(theta, held, int(n))
+        theta, held, size = edges(int(n))
+        found = noise_exponent(theta, held, size)
         before = exponents[-1] if exponents else 0
         if found is None:
             found = before

@@ -87,20 +87,34 @@ class AllanSettings(Strict):
     """The grid of tau and the kernel."""
 
     overlap: Literal["full", "octave"] = Field(
-        "full", description="full: every cluster; octave: starts 1/48 of a cluster apart, faster"
+        "octave",
+        description="octave: clusters that start 1/48 of their length apart, fast and as sure; "
+        "full: every cluster",
     )
     per_decade: int = Field(10, ge=1, le=100, description="cluster sizes per decade of tau")
     longest: FractionOfLog = Field(0.5, description="longest tau, as a part of the log")
 
 
-Method = Literal["curve", "paper", "weighted"]
+Method = Literal["likelihood", "likelihood_gm", "curve", "paper", "weighted"]
 
 
 class EstimateSettings(Strict):
     """How the noise parameters are estimated."""
 
-    methods: tuple[Method, ...] = Field(("curve", "paper", "weighted"), min_length=1)
-    longest: FractionOfLog = Field(1 / 9, description="longest tau of a fit, as a part of the log")
+    methods: tuple[Method, ...] = Field(
+        ("likelihood", "likelihood_gm", "curve", "paper", "weighted"), min_length=1
+    )
+    longest: FractionOfLog = Field(
+        1 / 9, description="longest tau of a fit to the curve, as a part of the log"
+    )
+    band: Frequency | None = Field(
+        None,
+        description="highest frequency in the likelihood; null: found from the spectrum and the "
+        "bandwidth that the sensor file states",
+    )
+    seed: int = Field(
+        20260101, ge=0, description="of the draws that give the intervals, and fill holes"
+    )
 
 
 class ReconstructionSettings(Strict):

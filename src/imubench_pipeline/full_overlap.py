@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from imubench_pipeline.phase import Phase, sum_present, sum_squares
+from imubench_pipeline.phase import Phase, sum_present, sum_sizes
 from imubench_pipeline.threads import in_threads
 
 BLOCK = 1 << 14
@@ -18,10 +19,25 @@ PRESENT = 0.9
 """Part of a cluster's samples that must be there for its mean to count."""
 
 
+def enough_present(sizes: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return how many samples a cluster must have for its mean to count, by size."""
+    return np.ceil(PRESENT * sizes - 1e-9).astype(np.int64)
+
+
 def full_sums(
-    phase: Phase, sizes: NDArray[np.int64], threads: int
+    phase: Phase, sizes: NDArray[np.int64], threads: int, *, stride: int = 1
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
     """Sum over the differences of means, by size.
+
+    Parameters
+    ----------
+    phase : Phase
+    sizes : ndarray of int
+        Points of the phase in a cluster.
+    threads : int
+        The sums have the same bits for any number.
+    stride : int
+        Samples from one point of the phase to the next.
 
     Returns
     -------
@@ -36,6 +52,7 @@ def full_sums(
     thinned = np.zeros(len(sizes))
     terms = np.zeros(len(sizes), dtype=np.int64)
     possible = np.zeros(len(sizes), dtype=np.int64)
+    samples = sizes * stride
     for start, stop in phase.segments:
         theta = phase.theta[start : stop + 1]
         blocks = -(-len(theta) // BLOCK)
@@ -43,13 +60,12 @@ def full_sums(
         possible += most
         if phase.present is None:
             (sums,) = in_threads(partial(_full, theta, sizes), blocks, threads)
-            total += sums.sum(axis=0) / sizes.astype(np.float64) ** 2
-            thinned += most / sizes
+            total += sums.sum(axis=0) / samples.astype(np.float64) ** 2
+            thinned += most / samples
             terms += most
         else:
             counts = phase.present[start : stop + 1]
-            enough = np.ceil(PRESENT * sizes - 1e-9).astype(np.int64)
-            work = partial(_full_with_holes, theta, counts, sizes, enough)
+            work = partial(_full_with_holes, theta, counts, sizes, enough_present(samples))
             sums, inverse, numbers = in_threads(work, blocks, threads)
             total += sums.sum(axis=0)
             thinned += inverse.sum(axis=0)
@@ -62,27 +78,17 @@ def _full(
     theta: NDArray[np.float64], sizes: NDArray[np.int64], low: int, high: int
 ) -> tuple[NDArray[np.float64]]:
     """Return the sum of squared second differences of each block and size."""
-    points = theta.size
     sums = np.zeros((high - low, sizes.size))
     for block in range(high - low):
         start = (low + block) * BLOCK
-        for j in range(sizes.size):
-            n = sizes[j]
-            stop = min(start + BLOCK, points - 2 * n)
-            if stop > start:
-                # Slices first: an index i + 2 n inside the loop would keep it scalar.
-                sums[block, j] = sum_squares(
-                    theta[start:stop],
-                    theta[start + n : stop + n],
-                    theta[start + 2 * n : stop + 2 * n],
-                )
+        sum_sizes(theta, start, start + BLOCK, sizes, sums[block])
     return (sums,)
 
 
 @njit(cache=True, nogil=True)
 def _full_with_holes(
     theta: NDArray[np.float64],
-    present: NDArray[np.int32],
+    present: NDArray[np.integer[Any]],
     sizes: NDArray[np.int64],
     enough: NDArray[np.int64],
     low: int,

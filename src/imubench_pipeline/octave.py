@@ -8,16 +8,34 @@ are taken from the phase of the whole log at that stride.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from queue import SimpleQueue
+from typing import Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from imubench_pipeline.phase import Phase, accumulate_present, integrate, sum_present, sum_squares
+from imubench_pipeline.full_overlap import enough_present, full_sums
+from imubench_pipeline.phase import (
+    Phase,
+    accumulate,
+    accumulate_present,
+    finite_mean,
+    integrate,
+    sum_present,
+    sum_sizes,
+)
 from imubench_pipeline.threads import in_threads
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Samples = NDArray[np.floating[Any]]
+
+Grid = tuple[Integers, Integers, Integers]
+"""Ascending sizes of short clusters, their levels, and the samples that must be there."""
+
+Room = tuple[Array, Array, Integers]
+"""Arrays that a thread uses again and again."""
 
 STEPS = 48
 """Starts of clusters within a cluster's length, at least."""
@@ -25,27 +43,29 @@ STEPS = 48
 DECIMATION = 64
 """Stride of the phase that is kept of the whole log."""
 
-SECTION = 1 << 17
-"""Samples that are summed together: their phase fits the cache."""
+SECTION = 1 << 16
+"""Samples that are summed together: their phase fits the L2 cache."""
 
-INNER = 1 << 11
-"""Starts whose clusters of all sizes are summed while their phase is in the L1 cache."""
+FIRST = 1 << 17
+"""Samples at the beginning whose phase is kept whole: it tells the noise type of short clusters."""
 
 SHORTEST = 1 << 16
 """Samples of a log that is worth a decimation; the clusters of a shorter one overlap fully."""
 
 _LEVELS = 6  # strides 1, 2 ... 32 inside a section
-_AHEAD = 2 * STEPS * DECIMATION  # two of the longest clusters of a section
-_FIRST = 1 << 18
+_REACH = 4 * STEPS  # points of any stride that the two longest clusters span
+_AHEAD = _REACH * DECIMATION // 2
+_LANES = 4  # parts of a section whose phases are interleaved
+_INNER = 1 << 11  # starts whose clusters of all sizes are summed while they are in the L1 cache
 
 
-def octave_sizes(sizes: NDArray[np.int64]) -> NDArray[np.int64]:
+def octave_sizes(sizes: Integers) -> Integers:
     """Round cluster sizes to multiples of the stride of their octave (by 1 % at most)."""
     stride = np.left_shift(1, _level(sizes))
     return np.unique(np.rint(sizes / stride).astype(np.int64) * stride)
 
 
-def _level(sizes: NDArray[np.int64]) -> NDArray[np.int64]:
+def _level(sizes: Integers) -> Integers:
     return np.maximum(0, np.floor(np.log2(sizes / STEPS) + 1e-12)).astype(np.int64)
 
 
@@ -56,257 +76,307 @@ class OctaveSums:
     ----------
     sizes : ndarray of int, shape (m,)
         n of each tau, as `octave_sizes` gives them.
-    share : float
-        Part of a cluster's samples that must be there for its mean to count.
+    samples : int
+        Length of the segment.
     holes : bool
         Samples may be missing (NaN).
     threads : int
         The sums have the same bits for any number.
+
+    Attributes
+    ----------
+    first : Phase
+        Cumulative sums of the first samples.
+    theta : ndarray
+        Cumulative sum of the samples less a constant, every `DECIMATION` samples.
+    present : ndarray of int, or None
+        Cumulative number of samples present at the same points; None: all are.
     """
 
-    def __init__(
-        self, sizes: NDArray[np.int64], *, share: float, holes: bool, threads: int = 1
-    ) -> None:
-        self._sizes, self._holes, self._threads = sizes, holes, threads
-        self._enough = np.ceil(share * sizes - 1e-9).astype(np.int64)
+    def __init__(self, sizes: Integers, samples: int, *, holes: bool, threads: int = 1) -> None:
+        self._sizes, self._samples = sizes, samples
+        self._holes, self._threads = holes, threads
         self._short = _level(sizes) < _LEVELS
-        self._sums = np.zeros((3, len(sizes)))
-        self._possible = np.zeros(len(sizes), dtype=np.int64)
-        self._edges: list[Array] = []
-        self._counts: list[NDArray[np.int64]] = []
+        short = sizes[self._short]
+        self._grid = (short, _level(short), enough_present(short))
+        self._sums = np.zeros((4, len(short)))
+        # The end of the log is a point of the grid only if it falls on it.
+        points = samples // DECIMATION + 1
+        self.theta = np.zeros(points)
+        self.present = np.zeros(points, dtype=np.int64) if holes else None
+        self._filled = 0
         self._at, self._present_at = 0.0, 0
-        self._rest = np.empty(0)
-        self._bias: float | None = None
-        self._first: list[Array] = []
-        self.samples = 0
+        self._begin: list[Samples] = []
+        self._bias = 0.0
+        self._rest: Samples = np.empty(0, dtype=np.float32)
+        self._rooms: SimpleQueue[Room] = SimpleQueue()
+        for _ in range(threads):
+            self._rooms.put(_room(holes))
+        self.received = 0
 
-    def push(self, block: Array) -> None:
+    def push(self, block: Samples) -> None:
         """Take the next samples, in SI; NaN where one is missing."""
-        if self.samples < _FIRST:
-            self._first.append(block[: _FIRST - self.samples].copy())
-        self.samples += len(block)
-        joined = np.concatenate((self._rest, block)) if len(self._rest) else block
-        ready = max(0, (len(joined) - _AHEAD) // SECTION)
-        self._sum(joined, ready)
-        self._rest = joined[ready * SECTION :].copy()
+        block = np.ascontiguousarray(block)
+        if self.received < FIRST:
+            self._begin.append(block[: FIRST - self.received].copy())
+        self.received += len(block)
+        rest = self._rest
+        ready = max(0, (len(rest) + len(block) - _AHEAD) // SECTION)
+        used = ready * SECTION - len(rest)
+        if ready:
+            # Only sections that begin in the rest are copied, with the samples they need.
+            heads = min(ready, -(-len(rest) // SECTION))
+            head = np.concatenate((rest, block[: heads * SECTION + _AHEAD - len(rest)]))
+            body = block[heads * SECTION - len(rest) :] if ready > heads else block[:0]
+            self._sum(head, heads, body, ready)
+        self._rest = block[used:].copy() if used >= 0 else np.concatenate((rest[used:], block))
 
     def finish(self) -> None:
-        """Sum up what is left, and the long clusters."""
+        """Sum up what is left."""
         sections = -(-len(self._rest) // SECTION)
-        self._sum(self._rest, sections)
-        self._rest = np.empty(0)
-        theta = np.concatenate([*self._edges, [self._at]]) if self._edges else np.zeros(1)
-        # The edge after the last section is a point of the grid only if the log ends on it.
-        points = self.samples // DECIMATION + 1
-        self.theta = theta[:points]
-        self.present: NDArray[np.int64] | None = None
-        if self._holes:
-            self.present = np.concatenate([*self._counts, [self._present_at]])[:points]
-        for j in np.flatnonzero(~self._short):
-            self._add_long(int(j))
+        if sections:
+            self._sum(self._rest, sections, self._rest[:0], sections)
+        self._rest = self._rest[:0]
+        if self._filled < len(self.theta):
+            self.theta[self._filled] = self._at
+            if self.present is not None:
+                self.present[self._filled] = self._present_at
+        if not np.isfinite(self._at):
+            raise ValueError(
+                "a sample is infinite"
+                if self._holes
+                else "a sample is missing or infinite, but holes=False"
+            )
+        self.first = integrate(self._begin, sum(map(len, self._begin)), holes=self._holes)
 
     @property
-    def first(self) -> Phase:
-        """Cumulative sums of the first samples."""
-        begin = np.concatenate(self._first)
-        return integrate([begin], len(begin), holes=self._holes)
-
-    @property
-    def results(self) -> tuple[Array, Array, NDArray[np.int64], NDArray[np.int64]]:
+    def results(self) -> list[NDArray[Any]]:
         """Sum of squares, sum of mean inverse counts, differences, and the most there could be."""
-        squares, thinned, terms = self._sums
-        return squares, thinned, np.rint(terms).astype(np.int64), self._possible
+        phase = Phase(self.theta, self.present, ((0, len(self.theta) - 1),))
+        steps = self._sizes[~self._short] // DECIMATION
+        long = full_sums(phase, steps, self._threads, stride=DECIMATION)
+        return [
+            np.concatenate((of_short.astype(of_long.dtype), of_long))
+            for of_short, of_long in zip(self._sums, long, strict=True)
+        ]
 
-    def _add_long(self, j: int) -> None:
-        theta, present = self.theta, self.present
-        m = int(self._sizes[j]) // DECIMATION
-        most = max(0, len(theta) - 2 * m)
-        if most == 0:
-            return
-        if present is None:
-            square = sum_squares(theta[: -2 * m], theta[m:-m], theta[2 * m :])
-            n = float(self._sizes[j])
-            self._sums[:, j] += np.array([square / n**2, most / n, most])
-        else:
-            counts = present[m:] - present[:-m]
-            good = counts >= self._enough[j]
-            means = (theta[m:] - theta[:-m]) / np.maximum(counts, 1)
-            both = good[m:] & good[:-m]
-            difference = (means[m:] - means[:-m])[both]
-            thinned = 0.5 / counts[m:][both] + 0.5 / counts[:-m][both]
-            self._sums[:, j] += np.array([difference @ difference, thinned.sum(), len(difference)])
-        self._possible[j] += most
+    def _sum(self, head: Samples, heads: int, body: Samples, sections: int) -> None:
+        """Sum the short clusters that begin in complete sections, and keep the decimated phase.
 
-    def _sum(self, samples: Array, sections: int) -> None:
-        """Sum the short clusters that begin in complete sections, and keep the decimated phase."""
-        if sections == 0:
-            return
-        if self._bias is None:
-            begin = samples[: min(SECTION, len(samples))]
-            finite = begin[np.isfinite(begin)]
-            self._bias = float(finite.mean()) if len(finite) else 0.0
-        sizes = self._sizes[self._short]
-        kernel = _sections_with_holes if self._holes else _sections
-        arguments = (self._bias, sizes, _level(sizes), self._enough[self._short])
-        sums, possible, edges, present = in_threads(
-            lambda low, high: kernel(samples, low, high, *arguments), sections, self._threads
-        )
-        for section in range(sections):
-            self._sums[:, self._short] += sums[section]
-            self._possible[self._short] += possible[section]
-            start = section * SECTION
-            kept = min(SECTION, len(samples) - start)
-            points = -(-kept // DECIMATION)
-            self._edges.append(self._at + edges[section, :points])
-            self._at += edges[section, -1]
-            if self._holes:
-                self._counts.append(self._present_at + present[section, :points])
-                self._present_at += int(present[section, -1])
+        The first sections are those of ``head``, the others follow in ``body``.
+        """
+        if not self._filled:
+            self._bias = finite_mean((head if heads else body)[:SECTION])
+        # Of one type, whatever the blocks were: the kernel is compiled once.
+        head, body = head.view(), body.astype(head.dtype, copy=False).view()
+        head.flags.writeable = body.flags.writeable = False
+        arguments = (head, heads, body, self._bias, self._holes, self._grid)
+
+        def work(low: int, high: int) -> tuple[NDArray[Any], ...]:
+            room = self._rooms.get()
+            try:
+                return _sections(low, high, *arguments, room)
+            finally:
+                self._rooms.put(room)
+
+        sums, totals, edges, counts = in_threads(work, sections, self._threads)
+        for row in sums:
+            self._sums += row  # one by one: the order must not depend on the blocks
+        # What begins in the last section may be less than a section, at the end of the log.
+        kept = len(head) if heads == sections else sections * SECTION
+        points = -(-min(sections * SECTION, kept) // DECIMATION)
+        filled = slice(self._filled, self._filled + points)
+        before = np.cumsum(np.concatenate(([self._at], totals)))
+        edges += before[:-1, None]
+        self.theta[filled] = edges.reshape(-1)[:points]
+        self._at = float(before[-1])
+        if self.present is not None:
+            present = np.cumsum(np.concatenate(([self._present_at], counts[:, -1])))
+            counts += present[:-1, None]
+            self.present[filled] = counts[:, :-1].reshape(-1)[:points]
+            self._present_at = int(present[-1])
+        self._filled += points
 
 
-def split(
-    blocks: Iterable[Array], segments: Sequence[tuple[int, int]]
-) -> Iterator[tuple[int, Array]]:
-    """Yield blocks cut at the ends of segments, each with the number of its segment."""
-    reached, number = 0, 0
-    for block in blocks:
-        begin = 0
-        while begin < len(block) and number < len(segments):
-            start, stop = segments[number]
-            low = max(start - reached, begin)
-            high = min(stop - reached, len(block))
-            if high > low:
-                yield number, block[low:high]
-            if stop - reached <= len(block):
-                number += 1
-                begin = max(begin, high)
-            else:
-                break
-        reached += len(block)
-
-
-@njit(cache=True, nogil=True)
-def _local_phase(samples: Array, bias: float, theta: Array) -> None:
-    """Sum samples up in four chains at once: one chain waits for each addition."""
-    quarter = samples.size // 4
-    a = b = c = d = 0.0
-    theta[0] = 0.0
-    for i in range(quarter):
-        a += samples[i] - bias
-        b += samples[quarter + i] - bias
-        c += samples[2 * quarter + i] - bias
-        d += samples[3 * quarter + i] - bias
-        theta[i + 1] = a
-        theta[quarter + i + 1] = b
-        theta[2 * quarter + i + 1] = c
-        theta[3 * quarter + i + 1] = d
-    for i in range(quarter):
-        theta[quarter + i + 1] += a
-    b += a
-    for i in range(quarter):
-        theta[2 * quarter + i + 1] += b
-    c += b
-    for i in range(quarter):
-        theta[3 * quarter + i + 1] += c
-    d += c
-    for i in range(4 * quarter, samples.size):
-        d += samples[i] - bias
-        theta[i + 1] = d
+def _room(holes: bool) -> Room:
+    """Return room for the phase of a section, of what follows it, and for counts."""
+    points = SECTION + _AHEAD + 1
+    phase = np.empty(points + 8)
+    # It begins a cache line: a load that lies across two takes twice the time.
+    start = -phase.ctypes.data % 64 // 8
+    return (
+        phase[start : start + points],
+        np.empty(_AHEAD + 1),
+        np.empty(points if holes else 0, dtype=np.int64),
+    )
 
 
 @njit(cache=True, nogil=True)
 def _sections(
-    samples: Array,
     low: int,
     high: int,
+    head: Samples,
+    heads: int,
+    body: Samples,
     bias: float,
-    sizes: NDArray[np.int64],
-    levels: NDArray[np.int64],
-    enough: NDArray[np.int64],
-) -> tuple[Array, NDArray[np.int64], Array, NDArray[np.int64]]:
-    """Sum the clusters that begin in sections ``low`` to ``high``; return them, and the phase."""
-    sections = high - low
-    sums = np.zeros((sections, 3, sizes.size))
-    possible = np.zeros((sections, sizes.size), dtype=np.int64)
-    edges = np.zeros((sections, SECTION // DECIMATION + 1))
-    counts = np.zeros((sections, 1), dtype=np.int64)
-    for section in range(sections):
+    holes: bool,
+    grid: Grid,
+    room: Room,
+) -> tuple[Array, Array, Array, Integers]:
+    """Sum the clusters that begin in sections ``low`` to ``high``.
+
+    Returns
+    -------
+    sums : ndarray, shape (sections, 4, sizes)
+        As `OctaveSums.results`.
+    totals : ndarray, shape (sections,)
+        Sum of the samples less the bias.
+    edges : ndarray, shape (sections, SECTION / DECIMATION)
+        Cumulative sums within the section.
+    counts : ndarray of int
+        Cumulative numbers of samples present at the edges, and of the section; empty: all are.
+    """
+    theta, tail, present = room
+    points = SECTION // DECIMATION
+    sums = np.zeros((high - low, 4, grid[0].size))
+    totals = np.zeros(high - low)
+    edges = np.zeros((high - low, points))
+    counts = np.zeros((high - low, points + 1 if holes else 0), dtype=np.int64)
+    for section in range(high - low):
         begin = (low + section) * SECTION
-        stop = min(begin + SECTION + _AHEAD, samples.size)
-        own = min(SECTION, samples.size - begin)
-        theta = np.empty(stop - begin + 1)
-        _local_phase(samples[begin:stop], bias, theta)
-        edges[section, -1] = theta[own]
-        points = theta.size
-        for level in range(_LEVELS):
-            starts = (own + (1 << level) - 1) >> level
-            for block in range(0, starts, INNER):
-                for j in range(sizes.size):
-                    if levels[j] == level:
-                        m = sizes[j] >> level
-                        stop_at = min(block + INNER, starts, points - 2 * m)
-                        if stop_at > block:
-                            square = sum_squares(
-                                theta[block:stop_at],
-                                theta[block + m : stop_at + m],
-                                theta[block + 2 * m : stop_at + 2 * m],
-                            )
-                            sums[section, 0, j] += square / (sizes[j] * sizes[j])
-                            sums[section, 1, j] += (stop_at - block) / sizes[j]
-                            sums[section, 2, j] += stop_at - block
-                            possible[section, j] += stop_at - block
-            points = (points + 1) // 2
-            for i in range(points):
-                theta[i] = theta[2 * i]
-        for i in range((own + DECIMATION - 1) // DECIMATION):
-            edges[section, i] = theta[i]
-    return sums, possible, edges, counts
+        source = head
+        if low + section >= heads:
+            begin -= heads * SECTION
+            source = body
+        samples = source[begin : min(begin + SECTION + _AHEAD, source.size)]
+        own = min(SECTION, samples.size)
+        kept = (own + DECIMATION - 1) // DECIMATION
+        if samples.size == SECTION + _AHEAD:
+            offsets = _phase_in_lanes(samples, bias, theta, tail)
+            totals[section] = offsets[-1]
+            whole = np.isfinite(offsets[-1] + tail[_AHEAD])
+            if whole:
+                _lanes(offsets, theta, tail, grid, sums[section], edges[section])
+        else:
+            theta[0] = 0.0
+            accumulate(samples, bias, theta)
+            totals[section] = theta[own]
+            whole = np.isfinite(theta[samples.size])
+            if whole:
+                _one_lane(own, samples.size + 1, theta, grid, sums[section])
+                edges[section, :kept] = theta[:kept]
+        if holes and whole:
+            counts[section] = np.arange(points + 1) * DECIMATION
+            counts[section, points] = own
+        elif holes:
+            theta[0] = 0.0
+            present[0] = 0
+            accumulate_present(samples, bias, theta, present)
+            totals[section] = theta[own]
+            counts[section, points] = present[own]
+            _with_holes(own, samples.size + 1, theta, present, grid, sums[section])
+            edges[section, :kept] = theta[:kept]
+            counts[section, :kept] = present[:kept]
+    return sums, totals, edges, counts
 
 
 @njit(cache=True, nogil=True)
-def _sections_with_holes(
-    samples: Array,
-    low: int,
-    high: int,
-    bias: float,
-    sizes: NDArray[np.int64],
-    levels: NDArray[np.int64],
-    enough: NDArray[np.int64],
-) -> tuple[Array, NDArray[np.int64], Array, NDArray[np.int64]]:
-    """Sum the clusters that begin in sections ``low`` to ``high``; return them, and the phase."""
-    sections = high - low
-    sums = np.zeros((sections, 3, sizes.size))
-    possible = np.zeros((sections, sizes.size), dtype=np.int64)
-    edges = np.zeros((sections, SECTION // DECIMATION + 1))
-    counts = np.zeros((sections, SECTION // DECIMATION + 1), dtype=np.int64)
-    for section in range(sections):
-        begin = (low + section) * SECTION
-        stop = min(begin + SECTION + _AHEAD, samples.size)
-        own = min(SECTION, samples.size - begin)
-        theta = np.empty(stop - begin + 1)
-        present = np.empty(stop - begin + 1, dtype=np.int64)
-        theta[0] = 0.0
-        present[0] = 0
-        accumulate_present(samples[begin:stop], bias, theta, present)
-        edges[section, -1] = theta[own]
-        counts[section, -1] = present[own]
-        points = theta.size
-        for level in range(_LEVELS):
-            starts = (own + (1 << level) - 1) >> level
-            for j in range(sizes.size):
-                if levels[j] == level:
-                    m = sizes[j] >> level
-                    most = min(starts, points - 2 * m)
-                    total, thinned, number = sum_present(theta, present, m, enough[j], 0, most)
-                    sums[section, 0, j] = total
-                    sums[section, 1, j] = thinned
-                    sums[section, 2, j] = number
-                    possible[section, j] = max(most, 0)
-            points = (points + 1) // 2
-            for i in range(points):
-                theta[i] = theta[2 * i]
-                present[i] = present[2 * i]
-        for i in range((own + DECIMATION - 1) // DECIMATION):
-            edges[section, i] = theta[i]
-            counts[section, i] = present[i]
-    return sums, possible, edges, counts
+def _phase_in_lanes(samples: Samples, bias: float, theta: Array, tail: Array) -> Array:
+    """Sum up a section in four lanes, interleaved, and what follows it; return where each begins.
+
+    One sum alone would wait for each addition; and of interleaved lanes the loads that sum
+    differences are aligned, for any size.
+    """
+    rows = SECTION // _LANES
+    # Slices first, of one length: the loop then has no check left.
+    first, second = samples[:rows], samples[rows : 2 * rows]
+    third, fourth = samples[2 * rows : 3 * rows], samples[3 * rows : 4 * rows]
+    a = b = c = d = 0.0
+    for i in range(rows):
+        theta[_LANES * i] = a
+        theta[_LANES * i + 1] = b
+        theta[_LANES * i + 2] = c
+        theta[_LANES * i + 3] = d
+        a += first[i] - bias
+        b += second[i] - bias
+        c += third[i] - bias
+        d += fourth[i] - bias
+    tail[0] = 0.0
+    accumulate(samples[SECTION:], bias, tail)
+    return np.array([0.0, a, a + b, a + b + c, a + b + c + d])
+
+
+@njit(cache=True, nogil=True)
+def _lanes(
+    offsets: Array, theta: Array, tail: Array, grid: Grid, sums: Array, edges: Array
+) -> None:
+    """Sum the clusters that begin in a section in lanes, and decimate its phase."""
+    rows = SECTION // _LANES
+    lengths = np.diff(offsets)
+    for level in range(_LEVELS):
+        # A lane goes on where the next one begins.
+        for i in range(_REACH):
+            for lane in range(_LANES - 1):
+                theta[(rows + i) * _LANES + lane] = lengths[lane] + theta[i * _LANES + lane + 1]
+            theta[(rows + i) * _LANES + _LANES - 1] = lengths[_LANES - 1] + tail[i]
+        _sum_level(theta, _LANES, _LANES * rows, _LANES * (rows + _REACH), level, grid, sums)
+        rows //= 2
+        for i in range(rows):
+            for lane in range(_LANES):
+                theta[i * _LANES + lane] = theta[2 * i * _LANES + lane]
+        for i in range((_REACH << (_LEVELS - 1 - level)) // 2):
+            tail[i] = tail[2 * i]
+    for lane in range(_LANES):
+        for i in range(rows):
+            edges[lane * rows + i] = offsets[lane] + theta[i * _LANES + lane]
+
+
+@njit(cache=True, nogil=True)
+def _one_lane(own: int, points: int, theta: Array, grid: Grid, sums: Array) -> None:
+    """Sum the clusters that begin in a section at the end of the log, and decimate its phase."""
+    for level in range(_LEVELS):
+        starts = (own + (1 << level) - 1) >> level
+        _sum_level(theta, 1, starts, points, level, grid, sums)
+        points = (points + 1) // 2
+        for i in range(points):
+            theta[i] = theta[2 * i]
+
+
+@njit(cache=True, nogil=True)
+def _sum_level(
+    theta: Array, lanes: int, starts: int, points: int, level: int, grid: Grid, sums: Array
+) -> None:
+    """Sum the differences of the clusters whose starts are one stride apart, over all lanes."""
+    sizes, levels, _ = grid
+    low, high = int(np.searchsorted(levels, level)), int(np.searchsorted(levels, level + 1))
+    steps = (sizes[low:high] >> level) * lanes
+    for block in range(0, starts, _INNER):
+        stop = min(block + _INNER, starts)
+        sum_sizes(theta[:points], block, stop, steps, sums[0, low:high])
+    for j in range(low, high):
+        most = max(0, min(starts, points - 2 * (sizes[j] >> level) * lanes))
+        sums[0, j] /= sizes[j] * sizes[j]
+        sums[1, j] = most / sizes[j]
+        sums[2, j] = most
+        sums[3, j] = most
+
+
+@njit(cache=True, nogil=True)
+def _with_holes(
+    own: int, points: int, theta: Array, present: Integers, grid: Grid, sums: Array
+) -> None:
+    """Sum the clusters that begin in a section where samples are missing; decimate its phase."""
+    sizes, levels, enough = grid
+    for level in range(_LEVELS):
+        starts = (own + (1 << level) - 1) >> level
+        for j in range(sizes.size):
+            if levels[j] == level:
+                m = sizes[j] >> level
+                most = max(0, min(starts, points - 2 * m))
+                found = sum_present(theta, present, m, enough[j], 0, most)
+                sums[0, j], sums[1, j], sums[2, j] = found[0], found[1], float(found[2])
+                sums[3, j] = most
+        points = (points + 1) // 2
+        for i in range(points):
+            theta[i] = theta[2 * i]
+            present[i] = present[2 * i]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,14 +19,14 @@ class Phase:
     ----------
     theta : ndarray of float64, shape (L + 1,)
         Cumulative sum of the samples less a constant; missing samples add nothing.
-    present : ndarray of int32, shape (L + 1,), or None
+    present : ndarray of int, shape (L + 1,), or None
         Cumulative number of samples present; None: all are.
     segments : tuple of (int, int)
         Grid points that begin and end each segment.
     """
 
     theta: NDArray[np.float64]
-    present: NDArray[np.int32] | None
+    present: NDArray[np.integer[Any]] | None
     segments: tuple[tuple[int, int], ...]
 
     @property
@@ -36,7 +36,7 @@ class Phase:
 
 
 def integrate(
-    blocks: Iterable[NDArray[np.float64]],
+    blocks: Iterable[NDArray[np.floating[Any]]],
     samples: int,
     *,
     holes: bool,
@@ -71,12 +71,11 @@ def integrate(
         stop = reached + len(values)
         if stop > samples:
             raise ValueError(f"the blocks hold more than the {samples} samples stated")
-        finite = values[np.isfinite(values)] if level is None else values
-        if level is None and len(finite):
+        if level is None and not np.isnan(values).all():
             # A constant drops out of the variance, but 9.81 would eat the digits of the sum.
-            level = float(finite.mean())
+            level = finite_mean(values)
         if present is None:
-            _accumulate(values, level or 0.0, theta[reached : stop + 1])
+            accumulate(values, level or 0.0, theta[reached : stop + 1])
         else:
             reach = slice(reached, stop + 1)
             accumulate_present(values, level or 0.0, theta[reach], present[reach])
@@ -90,8 +89,40 @@ def integrate(
     return Phase(theta, present, tuple(segments) if segments else ((0, samples),))
 
 
+def split(
+    blocks: Iterable[NDArray[Any]], segments: Sequence[tuple[int, int]]
+) -> Iterator[tuple[int, NDArray[Any]]]:
+    """Yield blocks cut at the ends of segments, each with the number of its segment."""
+    reached, number = 0, 0
+    for block in blocks:
+        begin = 0
+        while begin < len(block) and number < len(segments):
+            start, stop = segments[number]
+            low = max(start - reached, begin)
+            high = min(stop - reached, len(block))
+            if high > low:
+                yield number, block[low:high]
+            if stop - reached <= len(block):
+                number += 1
+                begin = max(begin, high)
+            else:
+                break
+        reached += len(block)
+
+
+def finite_mean(samples: NDArray[np.floating[Any]]) -> float:
+    """Return the mean of the samples that are finite; 0 where none is."""
+    with np.errstate(invalid="ignore"):
+        mean = float(samples.mean(dtype=np.float64))
+    if not np.isfinite(mean):
+        finite = samples[np.isfinite(samples)]
+        mean = float(finite.mean(dtype=np.float64)) if len(finite) else 0.0
+    return mean
+
+
 @njit(cache=True, nogil=True)
-def _accumulate(values: NDArray[np.float64], level: float, theta: NDArray[np.float64]) -> None:
+def accumulate(values: NDArray[np.floating[Any]], level: float, theta: NDArray[np.float64]) -> None:
+    """Sum samples less a level, from the first entry on."""
     total = theta[0]
     for i in range(values.size):
         total += values[i] - level
@@ -100,7 +131,7 @@ def _accumulate(values: NDArray[np.float64], level: float, theta: NDArray[np.flo
 
 @njit(cache=True, nogil=True)
 def accumulate_present(
-    values: NDArray[np.float64],
+    values: NDArray[np.floating[Any]],
     level: float,
     theta: NDArray[np.float64],
     present: NDArray[Any],
@@ -116,7 +147,7 @@ def accumulate_present(
 
 
 @njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})
-def sum_squares(
+def _sum_squares(
     first: NDArray[np.float64], middle: NDArray[np.float64], last: NDArray[np.float64]
 ) -> float:
     """Return the sum of (last - 2 middle + first)^2 over arrays of one length."""
@@ -127,7 +158,73 @@ def sum_squares(
     return total
 
 
+@njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})
+def _sum_squares_twice(
+    first: NDArray[np.float64],
+    middle: NDArray[np.float64],
+    last: NDArray[np.float64],
+    longer_middle: NDArray[np.float64],
+    longer_last: NDArray[np.float64],
+) -> tuple[float, float]:
+    """Return what `_sum_squares` does, for two sizes at once: the loads are what takes the time."""
+    total = 0.0
+    longer_total = 0.0
+    for i in range(first.size):
+        begin = first[i]
+        difference = last[i] - 2.0 * middle[i] + begin
+        total += difference * difference
+        longer = longer_last[i] - 2.0 * longer_middle[i] + begin
+        longer_total += longer * longer
+    return total, longer_total
+
+
 @njit(cache=True, nogil=True)
+def sum_sizes(
+    theta: NDArray[np.float64],
+    start: int,
+    stop: int,
+    sizes: NDArray[np.int64],
+    sums: NDArray[np.float64],
+) -> None:
+    """Add the squared second differences that begin at points ``start`` to ``stop``, by size.
+
+    Parameters
+    ----------
+    theta : ndarray
+    start, stop : int
+    sizes : ndarray of int
+        Points in a cluster.
+    sums : ndarray
+        What is added to, by size.
+    """
+    j = 0
+    while j < sizes.size:
+        n = sizes[j]
+        end = max(start, min(stop, theta.size - 2 * n))
+        # Slices first: an index i + 2 n inside the loop would keep it scalar.
+        first, middle, last = (
+            theta[start:end],
+            theta[start + n : end + n],
+            theta[start + 2 * n : end + 2 * n],
+        )
+        next_n = sizes[min(j + 1, sizes.size - 1)]
+        if j + 1 < sizes.size and end == min(stop, theta.size - 2 * next_n):
+            both = _sum_squares_twice(
+                first,
+                middle,
+                last,
+                theta[start + next_n : end + next_n],
+                theta[start + 2 * next_n : end + 2 * next_n],
+            )
+            sums[j] += both[0]
+            sums[j + 1] += both[1]
+            j += 2
+        else:
+            sums[j] += _sum_squares(first, middle, last)
+            j += 1
+
+
+@njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})
 def sum_present(
     theta: NDArray[np.float64],
     present: NDArray[Any],
@@ -157,14 +254,22 @@ def sum_present(
     total = 0.0
     thinned = 0.0
     number = 0
-    for i in range(start, stop):
-        first = present[i + m] - present[i]
-        second = present[i + 2 * m] - present[i + m]
-        if first >= enough and second >= enough:
-            difference = (theta[i + 2 * m] - theta[i + m]) / second - (
-                theta[i + m] - theta[i]
-            ) / first
-            total += difference * difference
-            thinned += 0.5 / first + 0.5 / second
-            number += 1
+    length = max(0, stop - start)
+    # Slices first and no branch: the loop then becomes vector instructions.
+    theta_0, present_0 = theta[start:][:length], present[start:][:length]
+    theta_1, present_1 = theta[start + m :][:length], present[start + m :][:length]
+    theta_2, present_2 = theta[start + 2 * m :][:length], present[start + 2 * m :][:length]
+    for i in range(length):
+        first = present_1[i] - present_0[i]
+        second = present_2[i] - present_1[i]
+        good = (first >= enough) & (second >= enough)
+        inverse_first = 1.0 / max(first, 1)
+        inverse_second = 1.0 / max(second, 1)
+        difference = (theta_2[i] - theta_1[i]) * inverse_second - (
+            theta_1[i] - theta_0[i]
+        ) * inverse_first
+        weight = 1.0 if good else 0.0
+        total += weight * difference * difference
+        thinned += weight * 0.5 * (inverse_first + inverse_second)
+        number += good
     return total, thinned, number

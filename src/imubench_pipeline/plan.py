@@ -19,6 +19,7 @@ from imubench_pipeline.provenance import source_digest
 from imubench_pipeline.readers import log_files
 from imubench_pipeline.sensor import RecordingNotes, Sensor, merged_log, read_sensors
 from imubench_pipeline.tables import read
+from imubench_pipeline.units import quantity_to_si
 from imubench_pipeline.validation import ConfigError, parse, read_yaml
 
 _NOT_LOGS = {".yaml", ".yml", ".md", ".part", ".tmp", ".filepart", ".crdownload"}
@@ -30,7 +31,7 @@ STEPS: Mapping[str, tuple[str, ...]] = {
     "simulate": ("simulated_logs",),
     "ingest": ("ingest", "results"),
     "allan": ("allan", "recording", "results"),
-    "estimate": ("estimators", "results"),
+    "estimate": ("estimation",),
     "reconstruct": ("reconstruction",),
     "datasheet": ("datasheet", "results"),
     "tables": ("results",),
@@ -165,6 +166,17 @@ class Plan:
         except ConfigError as error:
             settings["error"] = str(error)
         return _text(settings)
+
+    def estimate_settings(self, sensor: str, name: str) -> str:
+        """Return what the estimates of a recording depend on."""
+        log = json.loads(self.ingest_settings(sensor, name)).get("log") or {}
+        bandwidth = log.get("bandwidth")
+        return _text(
+            {
+                "estimate": self.run.estimate.model_dump(mode="json"),
+                "bandwidth": quantity_to_si(bandwidth, "frequency") if bandwidth else None,
+            }
+        )
 
     def simulated_settings(self, sensor: str, name: str) -> str:
         """Return the parameters of a simulated recording and the layout that it is written in."""

@@ -91,6 +91,21 @@ class LogWriter:
         self._rows -= rows
 
 
+def _to_numpy(column: pa.ChunkedArray) -> NDArray[Any]:
+    """Return a column of numbers, NaN where it is null.
+
+    Its own ``to_numpy`` imports pandas, where that is installed: 40 MB in memory.
+    """
+    array = column.chunk(0) if column.num_chunks == 1 else pa.concat_arrays(column.chunks)
+    held, data = array.buffers()
+    part = slice(array.offset, array.offset + len(array))
+    values = np.frombuffer(data, array.type.to_pandas_dtype())[part]
+    if array.null_count:
+        bits = np.unpackbits(np.frombuffer(held, np.uint8), bitorder="little")[part]
+        values = np.where(bits, values, np.nan)
+    return values
+
+
 @dataclass(frozen=True)
 class ChannelLog:
     """One channel of a kept recording.
@@ -125,11 +140,11 @@ class ChannelLog:
             reached = 0
             for number in range(file.num_row_groups):
                 table = file.read_row_group(number, columns=columns, use_threads=False)
-                values = table.column(self.channel).to_numpy()
+                values = _to_numpy(table.column(self.channel))
                 if not placed:
                     yield values
                     continue
-                points = table.column("sample").to_numpy()
+                points = _to_numpy(table.column("sample"))
                 start = 0
                 while start < len(points):
                     # Long holes: a row group can stand for many times its rows on the grid.
@@ -139,6 +154,15 @@ class ChannelLog:
                     reached = int(points[stop - 1]) + 1
                     start = stop
                     yield block
+
+    def mean(self) -> float:
+        """Return the mean of the samples present, SI."""
+        total, number = 0.0, 0
+        for values in self.blocks():
+            there = values[np.isfinite(values)]
+            total += float(there.sum(dtype=np.float64))
+            number += len(there)
+        return total / number
 
 
 def read_metadata(path: Path) -> dict[str, Any]:

@@ -14,6 +14,7 @@ import pyarrow as pa
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.config import SimulatedRecording
 from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate, Parameter, Status
+from imubench_pipeline.pooled import pooled_rows
 from imubench_pipeline.sensor import quantity_of
 from imubench_pipeline.tables import build, read
 
@@ -79,12 +80,12 @@ def curves(path: Path, quality: Quality) -> dict[str, AllanCurve]:
 def parameter_rows(key: Key, estimate: Estimate, *, recommended: bool) -> Iterator[Row]:
     """Yield the rows of the table ``parameters``."""
     units = SI_UNITS[quantity_of(key.channel)]
-    for name, parameter in estimate.parameters.items():
+    for component, name, parameter in estimate.components():
         yield asdict(key) | {
             "method": estimate.method,
             "recommended": recommended,
             "model": estimate.model.name,
-            "component": 1,
+            "component": component,
             "parameter": name,
             "unit": units[name],
             **asdict(parameter),
@@ -101,19 +102,22 @@ def estimates(path: Path) -> dict[str, list[Estimate]]:
 
 def estimate_of(method: str, rows: Iterable[Row]) -> Estimate:
     """Return the estimate that rows of the table ``parameters`` stand for."""
-    return Estimate(
-        method,
-        {
-            row["parameter"]: Parameter(
-                row["value"],
-                cast(Status, row["status"]),
-                row["reason"],
-                row["lower"],
-                row["upper"],
-            )
-            for row in rows
-        },
-    )
+    components: dict[int, dict[str, Parameter]] = {}
+    lines: dict[int, dict[str, Parameter]] = {}
+    for row in rows:
+        name = row["parameter"]
+        group = lines if name in ("amplitude", "frequency") else components
+        group.setdefault(row["component"], {})[name] = Parameter(
+            row["value"],
+            cast(Status, row["status"]),
+            row["reason"],
+            row["lower"],
+            row["upper"],
+            row["duration_needed"],
+            row["fitted"],
+        )
+    first = components.pop(1, {})
+    return Estimate(method, first, list(components.values()), list(lines.values()))
 
 
 def _by(table: pa.Table, *names: str) -> dict[tuple[str, ...], pa.Table]:
@@ -142,7 +146,14 @@ def joined_tables(parts: Mapping[str, list[Path]], truths: str) -> dict[str, pa.
     """
     qualities = [Quality.read(path) for path in parts["quality"]]
     joined = {name: read(name, paths) for name, paths in parts.items() if name != "quality"}
-    joined["recordings"] = build("recordings", [quality.recording for quality in qualities])
+    about = [quality.recording for quality in qualities]
+    devices = {(row["sensor"], row["recording"]): row["device"] for row in about}
+    recommended = joined["parameters"].filter(joined["parameters"]["recommended"])
+    joined["pooled"] = build(
+        "pooled",
+        pooled_rows(recommended.to_pylist(), joined["fixed_bias"].to_pylist(), devices),
+    )
+    joined["recordings"] = build("recordings", about)
     joined["findings"] = build("findings", [row for q in qualities for row in q.findings])
     joined["simulated_truth"] = build("simulated_truth", truth_rows(truths))
     return joined

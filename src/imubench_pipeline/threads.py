@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+_SHARES = 4
+"""Shares of the work a thread takes, one after the other: no thread waits long for the last."""
+
 
 def in_threads(
     work: Callable[[int, int], tuple[NDArray[Any], ...]], pieces: int, threads: int
 ) -> tuple[NDArray[Any], ...]:
-    """Do work on pieces 0 to ``pieces`` in contiguous shares, one a thread, and join the results.
+    """Do work on pieces 0 to ``pieces``, a few at a time, and join the results.
 
     Parameters
     ----------
@@ -28,10 +31,21 @@ def in_threads(
     tuple of ndarray
         The rows of all pieces in order.
     """
-    shares = max(1, min(threads, pieces))
-    if shares == 1:
+    threads = max(1, min(threads, pieces))
+    if threads == 1:
         return work(0, pieces)
+    shares = min(pieces, threads * _SHARES)
     cuts = [pieces * share // shares for share in range(shares + 1)]
-    with ThreadPoolExecutor(shares) as pool:
+    with ThreadPoolExecutor(threads) as pool:
         parts = list(pool.map(work, cuts[:-1], cuts[1:]))
     return tuple(np.concatenate(rows) for rows in zip(*parts, strict=True))
+
+
+def read_ahead(blocks: Iterable[NDArray[Any]]) -> Iterator[NDArray[Any]]:
+    """Yield blocks while the next one is made in another thread: one block more is in memory."""
+    coming = iter(blocks)
+    with ThreadPoolExecutor(1) as pool:
+        waiting = pool.submit(next, coming, None)
+        while (block := waiting.result()) is not None:
+            waiting = pool.submit(next, coming, None)
+            yield block

@@ -2,20 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
 
 Status = Literal["ok", "not_shown", "at_bound", "not_identified", "absent"]
 
 PARAMETERS = ("N", "B", "T_B", "K")
 """The parameters of the papers' model."""
 
+FAMILY = ("Q", "N", "B", "T_B", "K", "R")
+"""Those of the whole family of terms; lines have an amplitude and a frequency."""
+
 SI_UNITS: dict[str, dict[str, str]] = {
-    "gyro": {"N": "rad/s/sqrt(Hz)", "B": "rad/s", "T_B": "s", "K": "rad/s/sqrt(s)"},
-    "accel": {"N": "m/s^2/sqrt(Hz)", "B": "m/s^2", "T_B": "s", "K": "m/s^2/sqrt(s)"},
+    "gyro": {
+        "Q": "rad",
+        "N": "rad/s/sqrt(Hz)",
+        "B": "rad/s",
+        "T_B": "s",
+        "K": "rad/s/sqrt(s)",
+        "R": "rad/s^2",
+        "amplitude": "rad/s",
+        "frequency": "Hz",
+    },
+    "accel": {
+        "Q": "m/s",
+        "N": "m/s^2/sqrt(Hz)",
+        "B": "m/s^2",
+        "T_B": "s",
+        "K": "m/s^2/sqrt(s)",
+        "R": "m/s^3",
+        "amplitude": "m/s^2",
+        "frequency": "Hz",
+    },
 }
 """SI unit of each parameter, by quantity."""
 
@@ -35,6 +56,10 @@ class Parameter:
     reason : str or None
     lower, upper : float or None
         95 % limits, where the method gives them.
+    duration_needed : float or None
+        Length of a log that would tell the value to 10 %, s.
+    fitted : float or None
+        What the fitted model has, where ``value`` is not to be quoted; not an estimate.
     """
 
     value: float | None
@@ -42,23 +67,59 @@ class Parameter:
     reason: str | None = None
     lower: float | None = None
     upper: float | None = None
+    duration_needed: float | None = None
+    fitted: float | None = None
+
+    @property
+    def in_model(self) -> float | None:
+        """What the model takes."""
+        return self.fitted if self.value is None else self.value
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """The parameters of one channel by one method."""
+    """The parameters of one channel by one method.
+
+    Attributes
+    ----------
+    method : str
+    parameters : mapping of str to Parameter
+        Q, N, B, T_B, K, R as far as the method knows them.
+    further : sequence of mapping
+        Components beyond the first: B and T_B of a second Gauss-Markov process.
+    lines : sequence of mapping
+        Amplitude and frequency of each sinusoid.
+    """
 
     method: str
     parameters: Mapping[str, Parameter]
+    further: Sequence[Mapping[str, Parameter]] = ()
+    lines: Sequence[Mapping[str, Parameter]] = ()
+
+    def components(self) -> Iterator[tuple[int, str, Parameter]]:
+        """Yield component number, name and parameter, the first component first."""
+        for name, parameter in self.parameters.items():
+            yield 1, name, parameter
+        for number, group in enumerate(self.further, start=2):
+            for name, parameter in group.items():
+                yield number, name, parameter
+        for number, group in enumerate(self.lines, start=1):
+            for name, parameter in group.items():
+                yield number, name, parameter
 
     @property
     def model(self) -> NoiseModel:
-        """The noise model of the parameters that have a value."""
-        values = {name: parameter.value for name, parameter in self.parameters.items()}
-        with_bias = values.get("B") is not None and values.get("T_B") is not None
+        """The noise model of the parameters that have a value, or are fitted."""
+        values = {name: parameter.in_model for name, parameter in self.parameters.items()}
+        pairs = [(group["B"].in_model, group["T_B"].in_model) for group in self.further]
+        waves = [(group["amplitude"].in_model, group["frequency"].in_model) for group in self.lines]
         return NoiseModel(
+            Q=values.get("Q") or 0.0,
             N=values.get("N") or 0.0,
-            B=(values["B"] or 0.0) if with_bias else 0.0,
-            T_B=values["T_B"] if with_bias else None,
+            B=values.get("B") or 0.0,
+            T_B=values.get("T_B"),
             K=values.get("K") or 0.0,
+            R=values.get("R") or 0.0,
+            further=[GaussMarkov(B, T_B) for B, T_B in pairs if B and T_B],
+            sinusoids=[Sinusoid(A, f) for A, f in waves if A and f],
         )

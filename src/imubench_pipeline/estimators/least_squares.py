@@ -16,6 +16,7 @@ from scipy.optimize import minimize_scalar, nnls
 
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.estimators.limits import with_limits
 from imubench_pipeline.noise import (
     PEAK_TAU,
     NoiseModel,
@@ -69,8 +70,10 @@ def fit(
     Returns
     -------
     Estimate
-        SI. ``absent``: the fit is best without the term; ``at_bound``: T_B at the end of the
-        search, which goes as far as the process still peaks inside the tau used.
+        SI, with 95 % limits from the covariance of the Allan variances. ``absent``: the fit is
+        best without the term; ``at_bound``: T_B at the end of the search, which goes as far as
+        the process still peaks inside the tau used; ``not_identified``: the log cannot tell
+        the value, see `imubench_pipeline.estimators.limits.with_limits`.
 
     Raises
     ------
@@ -86,19 +89,15 @@ def fit(
     if method not in ("weighted", "paper"):
         raise ValueError(f"method {method!r} is not known, expected 'weighted' or 'paper'")
     used &= curve.cluster_size >= _first_unbent(curve, used, method)
-    estimate = _fit(curve, used, method)
+    parameters = dict(_fit(curve, used, method).parameters)
     first = int(np.flatnonzero(used)[0])
-    if first == 0:
-        return estimate
-    parameters = dict(estimate.parameters)
-    if parameters["N"].value is None:
-        return estimate
-    parameters["N"] = replace(
-        parameters["N"],
-        reason=f"from tau = {curve.tau[first]:.3g} s: at shorter tau the curve is bent, as by the "
-        "sensor's own filter",
-    )
-    return Estimate(method, parameters)
+    if first > 0 and parameters["N"].value is not None:
+        parameters["N"] = replace(
+            parameters["N"],
+            reason=f"from tau = {curve.tau[first]:.3g} s: at shorter tau the curve is bent, as by "
+            "the sensor's own filter",
+        )
+    return with_limits(Estimate(method, parameters), curve, used)
 
 
 def _first_unbent(

@@ -1,0 +1,140 @@
+"""The estimates of one channel by every method, as rows of the tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from imubench_pipeline.allan import AllanCurve
+from imubench_pipeline.config import EstimateSettings
+from imubench_pipeline.estimators import curve as reading
+from imubench_pipeline.estimators import least_squares, likelihood
+from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate
+from imubench_pipeline.estimators.likelihood import Likelihood
+from imubench_pipeline.estimators.model_choice import disagreement
+from imubench_pipeline.recording import ChannelLog
+from imubench_pipeline.results import Key, parameter_rows
+from imubench_pipeline.sensor import quantity_of
+from imubench_pipeline.simulate import channel_rng
+from imubench_pipeline.units import quantity_to_si
+
+Row = Mapping[str, Any]
+
+
+@dataclass
+class Estimation:
+    """Rows of the tables that the estimation of a recording leaves."""
+
+    parameters: list[Row] = field(default_factory=list)
+    models: list[Row] = field(default_factory=list)
+    lines: list[Row] = field(default_factory=list)
+    spectrum: list[Row] = field(default_factory=list)
+    fixed_bias: list[Row] = field(default_factory=list)
+
+
+def estimate_channel(
+    key: Key,
+    log: ChannelLog,
+    curve: AllanCurve,
+    settings: EstimateSettings,
+    bandwidth: float | None,
+    into: Estimation,
+) -> None:
+    """Estimate the noise of a channel by every method of the settings.
+
+    Parameters
+    ----------
+    key : Key
+    log : ChannelLog
+    curve : AllanCurve
+        Of the log.
+    settings : EstimateSettings
+    bandwidth : float or None
+        Cut-off of the sensor's own filter, where it is known, Hz.
+    into : Estimation
+        Takes the rows.
+    """
+    estimates: dict[str, Estimate] = {}
+    if "curve" in settings.methods:
+        estimates["curve"] = reading.read(curve, longest=settings.longest)
+    for method in ("paper", "weighted"):
+        if method in settings.methods:
+            estimates[method] = least_squares.fit(curve, method=method, longest=settings.longest)
+    if {"likelihood", "likelihood_gm"} & set(settings.methods):
+        found = likelihood.fit_blocks(
+            log.blocks,
+            log.grid,
+            log.rate,
+            holes=log.holes,
+            segments=log.segments,
+            band=quantity_to_si(settings.band, "frequency") if settings.band else None,
+            bandwidth=bandwidth,
+            rng=channel_rng(settings.seed, *asdict(key).values(), "posterior"),
+        )
+        estimates |= {estimate.method: estimate for estimate in found.estimates}
+        into.models += _model_rows(key, found)
+        into.lines += _line_rows(key, found)
+        into.spectrum += _spectrum_rows(key, found)
+    best = next(method for method in _BEST_FIRST if method in settings.methods)
+    for method in settings.methods:
+        into.parameters += parameter_rows(key, estimates[method], recommended=method == best)
+    unit = SI_UNITS[quantity_of(key.channel)]["B"]
+    into.fixed_bias.append(asdict(key) | {"value": log.mean(), "unit": unit})
+
+
+_BEST_FIRST = ("likelihood", "likelihood_gm", "weighted", "paper", "curve")
+"""The method to use is the first of these that is asked for."""
+
+
+def _model_rows(key: Key, found: Likelihood) -> Iterator[Row]:
+    """Yield the rows of the table ``models``, the chosen model first."""
+    for place, candidate in enumerate(found.candidates):
+        terms = candidate.found.terms
+        yield asdict(key) | {
+            "model": terms.name,
+            "chosen": place == 0,
+            "free": terms.parameters,
+            "log_likelihood": -candidate.found.cost,
+            "bic": candidate.bic,
+            "aic": candidate.aic,
+            "weight": candidate.weight,
+            "deviance": candidate.goodness.deviance,
+            "chance": candidate.goodness.chance,
+            "verdict": candidate.goodness.verdict,
+            "note": _note(found) if place == 0 else candidate.goodness.where,
+            "bins": int(found.used.sum()),
+            "band": found.band.highest if found.band else None,
+            "band_source": found.band.source if found.band else None,
+        }
+
+
+def _note(found: Likelihood) -> str:
+    notes = [found.candidates[0].goodness.where, disagreement(found.candidates)]
+    return "; ".join(note for note in notes if note)
+
+
+def _line_rows(key: Key, found: Likelihood) -> Iterator[Row]:
+    """Yield the rows of the table ``lines``."""
+    for line in found.lines:
+        row = asdict(line)
+        row.pop("resolution")
+        yield asdict(key) | row | {"kind": "sinusoid" if line.narrow else "band"}
+
+
+def _spectrum_rows(key: Key, found: Likelihood) -> Iterator[Row]:
+    """Yield the rows of the table ``spectrum``."""
+    spectrum, fitted = found.spectrum, found.fitted
+    names = ("frequency", "lower", "upper", "ordinates", "density")
+    columns = [getattr(spectrum, name) for name in names]
+    for i, values in enumerate(zip(*columns, strict=True)):
+        yield (
+            asdict(key)
+            | dict(zip(names, map(float, values), strict=True))
+            | {
+                "fitted": float(fitted[i]) if np.isfinite(fitted[i]) else None,
+                "used": bool(found.used[i]),
+            }
+        )

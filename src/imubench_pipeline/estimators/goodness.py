@@ -1,0 +1,97 @@
+"""How well a model explains a spectrum: do the standardised residuals look like it says."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import erfc, polygamma, psi
+
+Array = NDArray[np.float64]
+
+DOUBT = 1e-3
+"""Chance below which a fit is called poor."""
+
+
+@dataclass(frozen=True)
+class Goodness:
+    """How well a model explains a spectrum.
+
+    Attributes
+    ----------
+    deviance : float
+        Mean deviance of a bin; about 1.0 where the model is right.
+    chance : float
+        Chance of so large a deviance, or so long runs of bins on one side, if the model is right.
+    verdict : str
+        ``explained`` or ``not explained``.
+    where : str
+        The frequencies at which the spectrum is furthest from the model.
+    """
+
+    deviance: float
+    chance: float
+    verdict: str
+    where: str
+
+
+def goodness(nu: Array, data: Array, density: Array, frequency: Array, parameters: int) -> Goodness:
+    """Judge the standardised residuals of a binned spectrum.
+
+    Two tests, each at half the chance: the deviance sum nu (r - 1 - log r) with r = I / S, whose
+    mean and variance are those of chi-squared variates; and the correlation of neighbouring
+    residuals, which shows a shape that the model does not have.
+
+    Parameters
+    ----------
+    nu, data, density : ndarray, shape (b,)
+        Ordinates, measured and fitted density of each bin.
+    frequency : ndarray, shape (b,)
+        Hz.
+    parameters : int
+        Free parameters of the model.
+    """
+    ratio = np.maximum(data, 1e-300 * density) / density
+    deviance = nu * (ratio - 1.0 - np.log(ratio))
+    # With x = nu r chi-squared: E[r - 1 - log r] = log(nu/2) - psi(nu/2).
+    expected = nu * (np.log(nu / 2.0) - psi(nu / 2.0))
+    variance = nu**2 * (polygamma(1, nu / 2.0) - 2.0 / nu)
+    bins = len(nu)
+    free = max(bins - parameters, 1)
+    far = (deviance.sum() - expected.sum() * free / bins) / math.sqrt(float(variance.sum()))
+    # Wilson and Hilferty: the cube root of r is very nearly normal.
+    ninth = 2.0 / (9.0 * nu)
+    residual = (np.cbrt(ratio) - (1.0 - ninth)) / np.sqrt(ninth)
+    residual = residual - residual.mean()
+    spread = max(float(residual @ residual), 1e-300)
+    correlation = float(residual[1:] @ residual[:-1]) / spread * math.sqrt(bins)
+    chance = min(1.0, 2.0 * min(_upper(far), _upper(correlation)))
+    return Goodness(
+        deviance=float(deviance.sum() / expected.sum() * bins / free),
+        chance=chance,
+        verdict="explained" if chance >= DOUBT else "not explained",
+        where=_where(residual, frequency),
+    )
+
+
+def _upper(z: float) -> float:
+    return 0.5 * float(erfc(z / math.sqrt(2.0)))
+
+
+def _where(residual: Array, frequency: Array) -> str:
+    """Name the sixth of a decade in which the residuals go furthest to one side."""
+    group = np.floor(np.log10(frequency) * 6.0)
+    best, text = -1.0, ""
+    for number in np.unique(group):
+        inside = group == number
+        total = float(residual[inside].sum()) / math.sqrt(float(inside.sum()))
+        if abs(total) > best:
+            best = abs(total)
+            side = "above" if total > 0 else "below"
+            text = (
+                f"furthest from the model from {frequency[inside][0]:.3g} to "
+                f"{frequency[inside][-1]:.3g} Hz: {side} it by {best:.1f} standard errors"
+            )
+    return text

@@ -1,0 +1,184 @@
+"""The Cramér-Rao bound of a model: what a log can tell, and how long one would have to be."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.spectrum import SINGLE, WIDTH, Spectrum
+
+Array = NDArray[np.float64]
+
+NOT_IDENTIFIED = 0.5
+"""Relative standard deviation beyond which a B or T_B is not given as a number."""
+
+NOT_IDENTIFIED_LEVEL = 0.6
+"""That of the other parameters: their bound at the fitted value scatters with the value."""
+
+WANTED = 0.1
+"""Relative standard deviation that `durations_needed` asks for."""
+
+_SHORTEST, _LONGEST = 1e-4, 1e4
+_A_DECADE = 6
+
+
+def relative_errors(whittle: Whittle, found: Maximum) -> Array:
+    """Return the Cramér-Rao bound of each parameter of a fit, relative to it.
+
+    Shape (m,): the parameters in the order of `Maximum.powers`, then T_B, then R; infinite for a
+    term that is 0.
+    """
+    information = whittle.information(found)
+    if found.terms.ramp:
+        information[-1] *= found.ramp
+        information[:, -1] *= found.ramp
+    return _bounds(information)
+
+
+def _bounds(information: Array) -> Array:
+    """Return the square roots of the diagonal of the inverse."""
+    result = np.full(len(information), np.inf)
+    size = np.sqrt(np.diag(information))
+    there = size > 1e-9
+    if there.any():
+        scaled = information[np.ix_(there, there)] / np.outer(size[there], size[there])
+        inverse = np.linalg.pinv(scaled, rcond=1e-12, hermitian=True)
+        result[there] = np.sqrt(np.diag(inverse)) / size[there]
+    return result
+
+
+def ideal_spectrum(rate: float, duration: float, highest: float) -> Spectrum:
+    """Return the bins of a whole log of a duration, up to a frequency, without data.
+
+    Raises
+    ------
+    ValueError
+        If no ordinate lies below the frequency.
+    """
+    count = math.floor(min(highest, 0.5 * rate * (1 - 1e-9)) * 2.0 * duration)
+    if count < 1:
+        raise ValueError(f"a log of {duration:.3g} s has no ordinate up to {highest:.3g} Hz")
+    edges = list(range(1, min(SINGLE, count) + 1))
+    while edges[-1] < count:
+        edges.append(min(max(edges[-1] + 1, int(edges[-1] * WIDTH)), count))
+    first = np.array([*edges[:-1], count] if count <= SINGLE else edges[:-1], dtype=np.float64)
+    last = np.append(first[1:], count + 1.0) - 1.0
+    frequency = (first + last) / 4.0 / duration
+    odd = np.where((first == last) & (first % 2 == 1), 1.0, 0.0)
+    return Spectrum(
+        frequency=frequency,
+        lower=(first - 0.5) / 2.0 / duration,
+        upper=(last + 0.5) / 2.0 / duration,
+        ordinates=last - first + 1.0,
+        density=np.ones(len(first)),
+        block=np.ones(len(first), dtype=np.int64),
+        length=np.full(len(first), duration),
+        # The coefficients of a unit ramp, for k << L.
+        ramp=odd * 8.0 * duration**3 / (np.pi * np.maximum(first, 1.0)) ** 4,
+        cross=np.zeros(len(first)),
+        rate=rate,
+        duration=duration,
+        mean=0.0,
+    )
+
+
+def bounds_of(model: NoiseModel, rate: float, duration: float, highest: float) -> dict[str, float]:
+    """Return the Cramér-Rao bounds of a model's parameters in a log, relative to them.
+
+    Parameters
+    ----------
+    model : NoiseModel
+        Lines apart.
+    rate, duration, highest : float
+        Hz, s, and the highest frequency used, Hz.
+
+    Returns
+    -------
+    dict
+        By the names of `parameter_names`.
+    """
+    found = _as_maximum(model)
+    spectrum = ideal_spectrum(rate, duration, highest)
+    return dict(
+        zip(
+            parameter_names(found.terms),
+            _errors(spectrum, found),
+            strict=True,
+        )
+    )
+
+
+def parameter_names(terms: Terms) -> list[str]:
+    """Return the names of the parameters in the order of the bounds: a second B is B 2."""
+    names = ["B" if letter == "F" else letter for letter in terms.linear]
+    offset = "F" in terms.linear
+    numbers = [f" {i}" if i > 1 else "" for i in range(1 + offset, 1 + offset + terms.gauss_markov)]
+    names += [f"B{number}" for number in numbers] + [f"T_B{number}" for number in numbers]
+    return names + ["R"] * terms.ramp
+
+
+def durations_needed(
+    found: Maximum, rate: float, duration: float, highest: float
+) -> list[float | None]:
+    """Return how long a log would tell each parameter to `WANTED`, s.
+
+    Parameters
+    ----------
+    found : Maximum
+    rate, duration, highest : float
+        Of the log: Hz, s, and the highest frequency used, Hz.
+
+    Returns
+    -------
+    list of float or None
+        In the order of `relative_errors`; None where 10,000 times the log would not do.
+    """
+    lengths = np.geomspace(
+        duration * _SHORTEST,
+        duration * _LONGEST,
+        1 + round(math.log10(_LONGEST / _SHORTEST) * _A_DECADE),
+    )
+    lengths = lengths[lengths * 2.0 * min(highest, 0.5 * rate) > 4.0 * found.terms.parameters]
+    errors = np.array([_errors(ideal_spectrum(rate, length, highest), found) for length in lengths])
+    return [_crossing(np.log(lengths), column) for column in errors.T]
+
+
+def _crossing(log_lengths: Array, errors: Array) -> float | None:
+    enough = np.flatnonzero(errors <= WANTED)
+    if len(enough) == 0:
+        return None
+    i = int(enough[0])
+    if i == 0 or not np.isfinite(errors[i - 1]):
+        return float(np.exp(log_lengths[i]))
+    falling = np.log(errors[i - 1 : i + 1])
+    part = (falling[0] - math.log(WANTED)) / (falling[0] - falling[1])
+    return float(np.exp(log_lengths[i - 1] + part * (log_lengths[i] - log_lengths[i - 1])))
+
+
+def _errors(spectrum: Spectrum, found: Maximum) -> Array:
+    """Return the relative bounds of a model in a spectrum's bins."""
+    times = found.times if len(found.times) else np.array([1.0])
+    # A narrow table around the correlation times is enough for their derivatives.
+    shapes = 3 if len(times) == 1 else 24
+    whittle = Whittle(spectrum, float(times[0]) / 1.2, float(times[-1]) * 1.2, shapes)
+    return relative_errors(whittle, found)
+
+
+def _as_maximum(model: NoiseModel) -> Maximum:
+    values = {"Q": model.Q, "N": model.N, "F": 0.0 if model.T_B else model.B, "K": model.K}
+    letters = "".join(letter for letter in "QNFK" if values[letter] > 0)
+    processes = [(model.B, model.T_B)] if model.B > 0 and model.T_B else []
+    processes += [(process.B, process.T_B) for process in model.further]
+    processes.sort(key=lambda process: process[1])
+    powers = [values[letter] ** 2 for letter in letters] + [B**2 for B, _ in processes]
+    return Maximum(
+        Terms(letters, len(processes), model.R != 0),
+        np.array(powers),
+        np.array([time for _, time in processes], dtype=np.float64),
+        model.R,
+        0.0,
+    )

@@ -1,0 +1,419 @@
+"""The DCT-Whittle likelihood of a log: the model that the data favour, and the papers' model.
+
+It is as sure as the Cramér-Rao bound allows, to a few per cent, and says how sure it is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from imubench_pipeline.allan import of_blocks
+from imubench_pipeline.estimators import least_squares
+from imubench_pipeline.estimators.band import Band, find_band
+from imubench_pipeline.estimators.estimate import FAMILY, Estimate, Parameter
+from imubench_pipeline.estimators.identifiability import (
+    NOT_IDENTIFIED,
+    NOT_IDENTIFIED_LEVEL,
+    durations_needed,
+    parameter_names,
+    relative_errors,
+)
+from imubench_pipeline.estimators.lines import Line, find, without_lines
+from imubench_pipeline.estimators.model_choice import PAPERS, Candidate, compare
+from imubench_pipeline.estimators.posterior import DRAWS, Posterior, sample
+from imubench_pipeline.estimators.whittle import SHAPES, Maximum, Terms, Whittle
+from imubench_pipeline.missing import block_means, divided, filled, slow_part
+from imubench_pipeline.noise import GaussMarkov, NoiseModel
+from imubench_pipeline.spectrum import LineSpectrum, Spectrum, spectra
+
+Array = NDArray[np.float64]
+
+_SHORTEST_CORRELATION = 20
+"""Sampling intervals: a shorter correlation is that of a filter, not a bias instability."""
+
+_LONGEST_CORRELATION = 1 / 5
+"""Part of the log: a longer correlation cannot be told from a random walk."""
+
+_COARSE = 48
+_FEWEST_BINS = 16
+_LEAST_SHARE = 0.05
+"""Candidates of a smaller share do not enter the intervals."""
+
+_FEWEST_DRAWS = 4_000
+_AT_BOUND = 0.985
+_WIDTH_OF_INTERVAL = 3.92
+_QUANTIZATION_BAND = 1 / 10
+"""Part of the rate that the band must reach for quantization noise to show."""
+
+_ABSENT = "the data do not ask for it"
+
+
+@dataclass(frozen=True)
+class Likelihood:
+    """What the likelihood says of a channel.
+
+    Attributes
+    ----------
+    estimates : tuple of Estimate
+        ``likelihood``, the model that the data favour, and ``likelihood_gm``, the papers' N, B,
+        T_B and K.
+    candidates : sequence of Candidate
+        The models tried, the best first; empty for a log that is too short.
+    papers : Candidate or None
+        The papers' model among them.
+    lines : sequence of Line
+    band : Band or None
+        The frequencies used.
+    spectrum : Spectrum
+    used : ndarray of bool, shape (b,)
+        The bins used: below the end of the band, and clear of lines.
+    fitted : ndarray, shape (b,)
+        Density of the chosen model in each bin, its ramp included; NaN where there is none.
+    """
+
+    estimates: tuple[Estimate, Estimate]
+    candidates: Sequence[Candidate]
+    lines: Sequence[Line]
+    band: Band | None
+    spectrum: Spectrum
+    used: NDArray[np.bool_]
+    fitted: Array
+
+
+def fit(
+    samples: ArrayLike,
+    rate: float,
+    *,
+    segments: Sequence[tuple[int, int]] | None = None,
+    band: float | None = None,
+    bandwidth: float | None = None,
+    rng: np.random.Generator | None = None,
+) -> Likelihood:
+    """Estimate the noise parameters of a log by their likelihood.
+
+    Parameters
+    ----------
+    samples : array_like, shape (L,)
+        The log on its uniform grid, rad/s or m/s²; NaN marks a missing sample.
+    rate : float
+        Hz.
+    segments : sequence of (int, int), optional
+        First and one-past-last sample of each part that no time relates to the others.
+    band : float, optional
+        Highest frequency to use, Hz; by default it is found from the spectrum.
+    bandwidth : float, optional
+        Cut-off of the sensor's own filter, where it is known, Hz.
+    rng : numpy.random.Generator, optional
+        For the posterior draws, and for missing samples; by default always the same.
+
+    Returns
+    -------
+    Likelihood
+
+    Raises
+    ------
+    ValueError
+        If the log has fewer than 16 samples.
+
+    References
+    ----------
+    P. Whittle, "Estimation and information in stationary time series", Arkiv för Matematik 2,
+    1953.
+    """
+    values = np.asarray(samples, dtype=np.float64)
+    return fit_blocks(
+        lambda: [values],
+        len(values),
+        rate,
+        segments=segments,
+        holes=not bool(np.isfinite(values).all()),
+        band=band,
+        bandwidth=bandwidth,
+        rng=rng or np.random.default_rng(0),
+    )
+
+
+def fit_blocks(
+    blocks: Callable[[], Iterable[Array]],
+    samples: int,
+    rate: float,
+    *,
+    holes: bool,
+    segments: Sequence[tuple[int, int]] | None = None,
+    band: float | None = None,
+    bandwidth: float | None = None,
+    rng: np.random.Generator,
+) -> Likelihood:
+    """Estimate the noise parameters of a log that comes in blocks, in bounded memory (see `fit`).
+
+    Missing samples are drawn from their distribution, first by the model of the Allan variance,
+    then by that of the likelihood itself; the bins count for the samples present only.
+
+    Parameters
+    ----------
+    blocks : callable
+        Gives the log in order, in SI, as often as it is called; NaN where a sample is missing.
+    samples : int
+        L, the length of all blocks together.
+    rate, segments, band, bandwidth, rng
+        As in `fit`.
+    holes : bool
+        Samples may be missing.
+    """
+    spans = tuple(segments) if segments else ((0, samples),)
+    if not holes:
+        spectrum, lines = spectra(blocks(), samples, rate, spans)
+        return fit_spectrum(spectrum, lines, band=band, bandwidth=bandwidth, rng=rng)
+    curve = of_blocks(blocks(), samples, rate, holes=True, segments=spans)
+    model = least_squares.fit(curve).model
+    means = block_means(blocks(), samples)
+    parts = divided(means, spans)
+    present = float(means.count.sum()) / sum(stop - start for start, stop in parts)
+    for last in (False, True):
+        path = slow_part(means, parts, model, rate, rng)
+        complete = filled(blocks(), path, model, rate, rng)
+        spectrum, lines = spectra(complete, samples, rate, parts)
+        spectrum = replace(spectrum, ordinates=spectrum.ordinates * present)
+        if not last:
+            _, used, limit = _prepared(spectrum, lines, band, bandwidth)
+            if used.sum() < _FEWEST_BINS:
+                break
+            whittle = whittle_of(spectrum.taken(used), limit.highest)
+            model = model_of(compare(whittle, quantization=False)[0].found)
+    return fit_spectrum(spectrum, lines, band=band, bandwidth=bandwidth, rng=rng)
+
+
+def fit_spectrum(
+    spectrum: Spectrum,
+    line_spectra: Sequence[LineSpectrum],
+    *,
+    band: float | None = None,
+    bandwidth: float | None = None,
+    rng: np.random.Generator,
+) -> Likelihood:
+    """Estimate the noise parameters from a spectrum (see `fit`)."""
+    lines, used, limit = _prepared(spectrum, line_spectra, band, bandwidth)
+    if used.sum() < _FEWEST_BINS:
+        reason = f"the spectrum has {used.sum()} bins, {_FEWEST_BINS} are needed: too short a log"
+        nothing = {name: Parameter(None, "not_shown", reason) for name in FAMILY}
+        return Likelihood(
+            (Estimate("likelihood", nothing), Estimate("likelihood_gm", _papers_only(nothing))),
+            (),
+            lines,
+            None,
+            spectrum,
+            used,
+            np.full(len(used), np.nan),
+        )
+    whittle = whittle_of(spectrum.taken(used), limit.highest)
+    quantization = limit.highest >= _QUANTIZATION_BAND * spectrum.rate
+    candidates = compare(whittle, quantization=quantization)
+    sinusoids = [_line_parameters(line) for line in lines if line.narrow]
+    chosen = candidates[0]
+    draws: dict[Terms, Posterior] = {}
+    alike = [c for c in candidates if c is chosen or c.share >= _LEAST_SHARE]
+    for candidate in candidates:
+        terms = candidate.found.terms
+        if candidate in alike or terms == PAPERS:
+            part = 1.0 if terms == PAPERS or candidate is chosen else candidate.share
+            number = max(_FEWEST_DRAWS, round(part * DRAWS))
+            draws[terms] = sample(whittle, candidate.found, rng, number)
+    estimate = _estimate("likelihood", whittle, chosen, alike, draws, limit)
+    papers = next((c for c in candidates if c.found.terms == PAPERS), None)
+    if papers is None:
+        raise ValueError(f"{used.sum()} bins are too few for the papers' model")
+    gauss_markov = _estimate("likelihood_gm", whittle, papers, [papers], draws, limit)
+    return Likelihood(
+        (
+            replace(estimate, lines=sinusoids),
+            replace(
+                gauss_markov, parameters=_papers_only(gauss_markov.parameters), lines=sinusoids
+            ),
+        ),
+        candidates,
+        lines,
+        limit,
+        spectrum,
+        used,
+        whittle_of(spectrum, limit.highest, _COARSE).density(chosen.found)
+        + chosen.found.ramp**2 * spectrum.ramp,
+    )
+
+
+def whittle_of(spectrum: Spectrum, highest: float, shapes: int = SHAPES) -> Whittle:
+    """Return the likelihood of a spectrum, with the correlation times that it can show."""
+    longest = _LONGEST_CORRELATION * float(spectrum.length.max())
+    shortest = max(_SHORTEST_CORRELATION / spectrum.rate, 1.0 / (np.pi * highest))
+    return Whittle(spectrum, min(shortest, longest / 4.0), longest, shapes)
+
+
+def _prepared(
+    spectrum: Spectrum,
+    line_spectra: Sequence[LineSpectrum],
+    asked: float | None,
+    bandwidth: float | None,
+) -> tuple[list[Line], NDArray[np.bool_], Band]:
+    """Find lines and the band; return them, and the bins to use."""
+    everything = np.ones(len(spectrum.frequency), dtype=np.bool_)
+    start = min(asked or np.inf, 0.05 * spectrum.rate)
+    below = spectrum.upper <= start
+    if below.sum() < _FEWEST_BINS:
+        below = everything
+    found = whittle_of(spectrum.taken(below), start, _COARSE).maximum(Terms("NFK", 1))
+    low = spectrum.block > 1
+    crossover = float(spectrum.upper[low].max()) if low.any() else 0.0
+    lines = find(line_spectra, model_of(found), spectrum.rate, crossover)
+    clear = everything
+    if lines:
+        density = whittle_of(spectrum, 0.5 * spectrum.rate, _COARSE).density(found)
+        clear = without_lines(spectrum, lines, density)
+    band = find_band(spectrum, clear, asked=asked, bandwidth=bandwidth)
+    return lines, clear & (spectrum.upper <= band.highest * (1.0 + 1e-9)), band
+
+
+def model_of(found: Maximum) -> NoiseModel:
+    """Return the noise model of a fit; flicker noise comes first, then processes by T_B."""
+    terms = found.terms
+    values = {letter: found.parameter(letter) for letter in terms.linear}
+    processes = [
+        GaussMarkov(float(B), float(time))
+        for B, time in zip(found.biases, found.times, strict=True)
+    ]
+    first = None if "F" in values or not processes else processes.pop(0)
+    return NoiseModel(
+        Q=values.get("Q", 0.0),
+        N=values.get("N", 0.0),
+        B=values.get("F", first.B if first else 0.0),
+        T_B=first.T_B if first else None,
+        K=values.get("K", 0.0),
+        R=found.ramp,
+        further=[process for process in processes if process.B > 0],
+    )
+
+
+def _papers_only(parameters: Mapping[str, Parameter]) -> dict[str, Parameter]:
+    return {name: parameters[name] for name in ("N", "B", "T_B", "K")}
+
+
+def _estimate(
+    method: str,
+    whittle: Whittle,
+    chosen: Candidate,
+    alike: Sequence[Candidate],
+    draws: dict[Terms, Posterior],
+    band: Band,
+) -> Estimate:
+    """Describe a fit: values with intervals, what is not identified, and what is absent."""
+    found = chosen.found
+    names = parameter_names(found.terms)
+    values = [*np.sqrt(found.powers), *found.times] + [found.ramp] * found.terms.ramp
+    errors = relative_errors(whittle, found)
+    needed = durations_needed(
+        found, whittle.spectrum.rate, float(whittle.spectrum.duration), band.highest
+    )
+    described: dict[str, Parameter] = {}
+    for i, (name, value) in enumerate(zip(names, values, strict=True)):
+        lower, upper = _interval(name, i, found.terms, alike, draws)
+        described[name] = _parameter(
+            name, float(value), float(errors[i]), lower, upper, needed[i], whittle
+        )
+    for number in ("", " 2"):
+        if f"B{number}" in described and described[f"B{number}"].status == "absent":
+            described[f"T_B{number}"] = replace(
+                described[f"B{number}"], lower=None, upper=None, duration_needed=None
+            )
+    absent = Parameter(None, "absent", _ABSENT)
+    parameters = {name: described.get(name, absent) for name in FAMILY}
+    if "B" in described and "T_B" not in described:
+        parameters["T_B"] = Parameter(
+            None, "absent", "bias instability is flicker noise here, which has no correlation time"
+        )
+    further = []
+    if "B 2" in described:
+        further.append({"B": described["B 2"], "T_B": described["T_B 2"]})
+    return Estimate(method, parameters, further)
+
+
+def _parameter(
+    name: str,
+    value: float,
+    error: float,
+    lower: float,
+    upper: float,
+    needed: float | None,
+    whittle: Whittle,
+) -> Parameter:
+    if value == 0.0:
+        reason = f"{_ABSENT}; with 95 % it is below the upper limit"
+        return Parameter(None, "absent", reason, 0.0, upper)
+    if name.startswith("T_B"):
+        for bound, end in ((whittle.longest, "longest"), (whittle.shortest, "shortest")):
+            near = value > bound * _AT_BOUND if end == "longest" else value < bound / _AT_BOUND
+            if near:
+                reason = f"the {end} correlation time that the log can show is {bound:.4g} s"
+                return Parameter(value, "at_bound", reason, lower, upper, needed)
+    most = NOT_IDENTIFIED_LEVEL
+    if name.startswith(("B", "T_B")) and lower > 0.0:
+        # B and T_B trade off along a ridge that the bound, which is local, does not see.
+        error = max(error, math.log(upper / lower) / _WIDTH_OF_INTERVAL)
+        most = NOT_IDENTIFIED
+    if error > most:
+        reason = (
+            f"a log of this length tells it to {100 * error:.0f} % (standard error); only "
+            "its interval is given"
+        )
+        return Parameter(None, "not_identified", reason, lower, upper, needed, value)
+    return Parameter(value, "ok", None, lower, upper, needed)
+
+
+def _interval(
+    name: str,
+    index: int,
+    terms: Terms,
+    alike: Sequence[Candidate],
+    draws: dict[Terms, Posterior],
+) -> tuple[float, float]:
+    """Return the 95 % interval of a parameter, over the models that have it, by their weights."""
+    columns, weights = [], []
+    for candidate in alike:
+        other = candidate.found.terms
+        if other != terms and not _comparable(name, terms, other):
+            continue
+        posterior = draws[other]
+        everything = np.column_stack([posterior.parameters, posterior.times, posterior.ramps])
+        columns.append(everything[:, parameter_names(other).index(name)])
+        weights.append(np.full(len(everything), candidate.share / len(everything)))
+    values, mass = np.concatenate(columns), np.concatenate(weights)
+    order = np.argsort(values)
+    share = np.cumsum(mass[order])
+    cuts = np.searchsorted(share / share[-1], [0.025, 0.975])
+    lower, upper = values[order][np.minimum(cuts, len(values) - 1)]
+    return float(lower), float(upper)
+
+
+def _comparable(name: str, terms: Terms, other: Terms) -> bool:
+    """Tell whether a parameter means the same in two models."""
+    if name not in parameter_names(other):
+        return False
+    if not name.startswith(("B", "T_B")):
+        return True
+    alike = "F" in terms.linear, terms.gauss_markov
+    others = "F" in other.linear, other.gauss_markov
+    # One bias instability is one level, flicker or not; of several each has its own.
+    return alike == others or (name == "B" and sum(alike) == sum(others) == 1)
+
+
+def _line_parameters(line: Line) -> dict[str, Parameter]:
+    return {
+        "amplitude": Parameter(
+            line.amplitude, lower=line.amplitude_lower, upper=line.amplitude_upper
+        ),
+        "frequency": Parameter(
+            line.frequency, lower=line.frequency_lower, upper=line.frequency_upper
+        ),
+    }

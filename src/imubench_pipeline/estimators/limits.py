@@ -1,0 +1,288 @@
+"""Limits of the parameters of a weighted fit, and which of them the log can tell.
+
+A fit weighs the Allan variances as if each stood alone. Its errors follow from their true
+covariance C, that of the fitted model, with J the derivatives of the relative Allan variance by
+the logarithms of the parameters and W the weights (the "sandwich"):
+
+    Cov = G C G^T,   G = (J^T W J)^-1 J^T W.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.allan import AllanCurve
+from imubench_pipeline.confidence import equivalent_degrees
+from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.variance_covariance import variance_covariance
+
+Array = NDArray[np.float64]
+
+_SIGMAS = 1.96
+"""Half the width of a 95 % interval."""
+
+_MOST_ERROR = 0.5
+"""Relative standard error beyond which a parameter is not identified."""
+
+_MOST_ERROR_TIME = 0.75
+"""That of T_B beyond which B is not identified either.
+
+The best of many T_B fits the chance waves of any curve: in white logs B alone often has a
+standard error below a half, but its T_B has one of 0.75 or less in fewer than 1 of 200.
+"""
+
+_MOST_ERROR_HELD = 0.25
+"""That of B at a T_B held at its bound, and of K with a B held that is not identified.
+
+B^2 or K^2 is then two standard errors from 0.
+"""
+
+_NOTHING_KNOWN = 10.0
+"""Relative standard errors beyond this say no more, and their limits would overflow."""
+
+_STEP = 1e-3
+"""Of log T_B, for the derivative."""
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Covariance of the logarithms of the parameters of a fit.
+
+    Attributes
+    ----------
+    names : sequence of str
+        The parameters, m of them.
+    covariance : ndarray, shape (m, m)
+    """
+
+    names: Sequence[str]
+    covariance: Array
+
+    def of(self, name: str) -> float:
+        """Return the relative standard error of a parameter, at most 10."""
+        variance = float(self._at(name, name))
+        return min(math.sqrt(max(variance, 0.0)), _NOTHING_KNOWN)
+
+    def factors(
+        self, name: str, doubtful: Sequence[str], held: float | None = None
+    ) -> tuple[float, float]:
+        """Return the factors from a parameter to its 95 % limits.
+
+        They hold with and without the ``doubtful`` terms: without one, the parameter moves by
+        what its correlation with the density of that term tells. ``held`` is the standard error
+        with those terms held; by default they vary. An amplitude whose square is closer to 0
+        than 1.96 standard errors may be 0.
+        """
+        error = self.of(name) if held is None else held
+        low, high = -_SIGMAS * error, _SIGMAS * error
+        for term in doubtful:
+            if term == name or not self.of(term) < _NOTHING_KNOWN:
+                continue
+            slope = self._at(name, term) / self._at(term, term)
+            # The density is the square: that it falls to 0 is -1/2 in the logarithm of the root.
+            moved = -0.5 * slope
+            rest = error
+            if held is None:
+                rest = math.sqrt(max(error**2 - slope * self._at(name, term), 0.0))
+            low = min(low, moved - _SIGMAS * rest)
+            high = max(high, moved + _SIGMAS * rest)
+        most = _SIGMAS * _NOTHING_KNOWN
+        may_be_zero = name != "T_B" and 2.0 * error > 1.0 / _SIGMAS
+        return 0.0 if may_be_zero else math.exp(max(low, -most)), math.exp(min(high, most))
+
+    def _at(self, first: str, second: str) -> float:
+        return float(self.covariance[self.names.index(first), self.names.index(second)])
+
+
+def fit_errors(
+    curve: AllanCurve,
+    used: NDArray[np.bool_],
+    model: NoiseModel,
+    method: str,
+    *,
+    held: Sequence[str] = (),
+) -> Errors:
+    """Return the errors of a weighted least squares fit.
+
+    Parameters
+    ----------
+    curve : AllanCurve
+    used : ndarray of bool, shape (m,)
+        The tau of the fit.
+    model : NoiseModel
+        The model that was fitted; the errors are those at its values.
+    method : {"weighted", "paper"}
+        Weights of the fit, see `imubench_pipeline.estimators.least_squares.fit`.
+    held : sequence of str
+        Parameters that the fit did not vary.
+    """
+    expected, derivatives = _derivatives(curve, used, model)
+    names = [name for name in derivatives if name not in held]
+    jacobian = np.column_stack([derivatives[name] for name in names])
+    # The weights of the relative variances: w times the variance squared, to a factor.
+    weight = 1.0 / curve.cluster_size[used]
+    if method == "paper":
+        weight = weight * expected
+    root = np.sqrt(weight)
+    columns = jacobian * root[:, None]
+    size = np.linalg.norm(columns, axis=0)
+    if len(columns) < len(names) or not (size > 0).all():
+        return Errors(names, np.diag(np.full(len(names), np.inf)))
+    gain = np.linalg.pinv(columns / size) * root / size[:, None]
+    covariance = gain @ _relative_covariance(curve, used, model) @ gain.T
+    return Errors(names, covariance)
+
+
+def _derivatives(
+    curve: AllanCurve, used: NDArray[np.bool_], model: NoiseModel
+) -> tuple[Array, dict[str, Array]]:
+    """Return the model's Allan variances, and their relative derivatives by log parameters."""
+    tau, rate = curve.tau[used], _rate(curve)
+    parts: dict[str, Array] = {}
+    if model.N > 0:
+        # White noise is averaged over the samples present, fewer than n where some are missing.
+        parts["N"] = model.N**2 * rate / curve.averaged[used]
+    slope: Array | None = None
+    if model.B > 0 and model.T_B is not None:
+        earlier, parts["B"], later = (
+            NoiseModel(B=model.B, T_B=model.T_B * math.exp(step)).allan_variance(tau, rate)
+            for step in (-_STEP, 0.0, _STEP)
+        )
+        slope = (later - earlier) / (2.0 * _STEP)
+    if model.K > 0:
+        parts["K"] = NoiseModel(K=model.K).allan_variance(tau, rate)
+    expected = np.asarray(np.sum(list(parts.values()), axis=0))
+    derivatives = {name: 2.0 * part / expected for name, part in parts.items()}
+    if slope is not None:
+        derivatives["T_B"] = slope / expected
+    return expected, derivatives
+
+
+def _relative_covariance(
+    curve: AllanCurve, used: NDArray[np.bool_], model: NoiseModel
+) -> NDArray[np.float64]:
+    """Return the covariance of the Allan variances over the model's, shape (m, m)."""
+    sizes, rate = curve.cluster_size[used], _rate(curve)
+    expected = model.allan_variance(curve.tau[used], rate)
+    covariance = variance_covariance(model, rate, curve.samples, sizes)
+    # Holes and segments leave fewer differences, which the degrees of freedom know.
+    whole = [
+        equivalent_degrees(int(alpha), int(n), curve.samples - 2 * int(n) + 1)
+        for alpha, n in zip(curve.exponent[used], sizes, strict=True)
+    ]
+    scale = np.sqrt(np.maximum(np.array(whole) / curve.edf[used], 1.0)) / expected
+    return np.asarray(covariance * np.outer(scale, scale))
+
+
+def _rate(curve: AllanCurve) -> float:
+    return float(curve.cluster_size[0] / curve.tau[0])
+
+
+def with_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) -> Estimate:
+    """Return an estimate with 95 % limits, and without the values that the log cannot tell.
+
+    A parameter of a relative standard error above 50 % is ``not_identified``; so are B and T_B
+    where the T_B of the peak is not known to 75 %, and where B at a T_B that ran into its bound
+    is not known to 25 %. Beside such a B, N and K are judged as if it were held, to 25 %.
+
+    The limits of an amplitude that is not identified begin at 0; a limit is None where nothing
+    is known. A B or T_B that stays ``at_bound`` has none.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        A fit in which every term that is there has a value.
+    curve : AllanCurve
+    used : ndarray of bool, shape (m,)
+        The tau of the fit.
+    """
+    model = estimate.model
+    if not model.terms:
+        return estimate
+    errors = fit_errors(curve, used, model, estimate.method)
+    unknown: dict[str, str] = {}
+    if estimate.parameters["T_B"].status == "at_bound":
+        there = fit_errors(curve, used, model, estimate.method, held=["T_B"])
+        unknown = _unknown_at_bound(there.of("B"))
+    elif "B" in errors.names:
+        unknown = _unknown_bias(errors.of("B"), errors.of("T_B"))
+    apart = errors
+    if "B" in unknown:
+        apart = fit_errors(curve, used, model, estimate.method, held=["B", "T_B"])
+    for name in ("N", "K"):
+        if name not in errors.names or errors.of(name) <= _MOST_ERROR:
+            continue
+        if "B" in unknown and apart.of(name) <= _MOST_ERROR_HELD:
+            # What the curve shows is this term; only a B that it does not show could replace it.
+            continue
+        unknown[name] = f"its relative standard error is {_percent(errors.of(name))}, above 50 %"
+    doubtful = [name for name in ("B", "K") if name in unknown]
+    parameters = dict(estimate.parameters)
+    for name, found in estimate.parameters.items():
+        if found.value is None:
+            continue
+        parameters[name] = replace(found, fitted=found.value)
+        if name in unknown:
+            lower, upper = _wide_limits(name, found.value, errors)
+            reason = f"{found.reason}; {unknown[name]}" if found.reason else unknown[name]
+            parameters[name] = Parameter(
+                None, "not_identified", reason, lower, upper, fitted=found.value
+            )
+        elif found.status == "ok":
+            # Beyond a half it has a value only as what the curve shows beside a doubtful B.
+            held = apart.of(name) if errors.of(name) > _MOST_ERROR else None
+            low, high = errors.factors(name, doubtful, held)
+            parameters[name] = replace(
+                parameters[name], lower=found.value * low, upper=found.value * high
+            )
+    return Estimate(estimate.method, parameters)
+
+
+def _unknown_at_bound(error: float) -> dict[str, str]:
+    """Return why B and a T_B at its bound are not identified, if so, by the error of B there."""
+    if error <= _MOST_ERROR_HELD:
+        return {}
+    reason = f"the relative standard error of B there is {_percent(error)}, above 25 %"
+    return {"B": reason, "T_B": reason}
+
+
+def _unknown_bias(error: float, error_of_time: float) -> dict[str, str]:
+    """Return why B and T_B are not identified, by their errors: both, T_B or none."""
+    of_time = f"the relative standard error of T_B is {_percent(error_of_time)}"
+    if error > _MOST_ERROR:
+        of_bias = f"the relative standard error of B is {_percent(error)}, above 50 %"
+        return {"B": of_bias, "T_B": f"{of_bias}; {of_time}"}
+    if error_of_time > _MOST_ERROR_TIME:
+        no_peak = "no peak of a Gauss-Markov process is shown"
+        return {
+            "B": f"{no_peak}: the relative standard error of B is {_percent(error)}, but {of_time}",
+            "T_B": f"{no_peak}: {of_time}",
+        }
+    if error_of_time > _MOST_ERROR:
+        return {"T_B": f"{of_time}, above 50 %"}
+    return {}
+
+
+def _percent(error: float) -> str:
+    if error >= _NOTHING_KNOWN:
+        return f"{100.0 * _NOTHING_KNOWN:.0f} % or more"
+    return f"{100.0 * error:.0f} %"
+
+
+def _wide_limits(name: str, value: float, errors: Errors) -> tuple[float | None, float | None]:
+    """Return limits of what is not identified: an amplitude may be 0.
+
+    Its upper limit is linear in the amplitude: with a logarithm it would run away.
+    """
+    error = errors.of(name)
+    known = error < _NOTHING_KNOWN
+    if name == "T_B":
+        low, high = errors.factors(name, [])
+        return (value * low, value * high) if known else (None, None)
+    return 0.0, value * (1.0 + _SIGMAS * error) if known else None

@@ -1,0 +1,226 @@
+"""Lines: sinusoids that stand out of the fitted spectrum.
+
+They are looked for in Hann-windowed Fourier spectra averaged over segments, so a line need not
+keep its phase over the whole log. Under the model the density of a bin over its expectation is
+chi-squared with two degrees of freedom for each segment.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+from scipy.special import betainc, gammainccinv
+
+from imubench_pipeline.noise import NoiseModel, Sinusoid
+from imubench_pipeline.spectrum import LineSpectrum, Spectrum
+
+Array = NDArray[np.float64]
+
+FALSE_ALARM = 0.01
+"""Chance that a channel without lines shows one."""
+
+_LEVEL = 129
+"""Bins over which the median tells how far the model is from the spectrum around a bin."""
+
+_MEDIAN_KNOWS = 1.0 / (1.94 * 1.57)
+"""Independent bins in a bin of the median: neighbours are correlated, and a median wastes some."""
+
+_DISTURBED = 2
+_FIRST = 4
+_BESIDE = 3
+"""Bins on either side of a line that hold its power."""
+
+_WIDEST = 8
+_LEAKS = 0.3
+"""Part of the standard error of a bin of the likelihood by which a line may raise it."""
+
+# Sums over the bins of a line of the squared correlations of Hann-windowed Fourier coefficients
+# (1, 2/3 and 1/6 at a distance of 0, 1 and 2 bins), without and with the distances as weights;
+# and what a line on a bin makes of them.
+_NOISE_POWER, _NOISE_PLACE = 12.6, 42.5
+_CROSS_POWER, _CROSS_PLACE = 35.0 / 18.0, 5.0 / 18.0
+_FLOOR_POWER, _FLOOR_PLACE = 4e-3, 5e-3
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line that was found.
+
+    Attributes
+    ----------
+    frequency, frequency_lower, frequency_upper : float
+        Hz, with 95 % limits.
+    amplitude, amplitude_lower, amplitude_upper : float
+        Omega_0, rad/s or m/s², with 95 % limits.
+    ratio : float
+        Its highest density over that of the noise there.
+    false_alarm : float
+        Chance of such a ratio somewhere in the spectrum of a channel without lines.
+    width : float
+        How wide it is, Hz; a sinusoid is not wider than the resolution.
+    resolution : float
+        Distance of the bins, Hz.
+    """
+
+    frequency: float
+    frequency_lower: float
+    frequency_upper: float
+    amplitude: float
+    amplitude_lower: float
+    amplitude_upper: float
+    ratio: float
+    false_alarm: float
+    width: float
+    resolution: float
+
+    @property
+    def narrow(self) -> bool:
+        """Whether it is as narrow as a sinusoid is; if not, a band of noise."""
+        return self.width <= _WIDEST * self.resolution
+
+    @property
+    def term(self) -> Sinusoid:
+        """The noise term."""
+        return Sinusoid(self.amplitude, self.frequency)
+
+
+def find(
+    spectra: Sequence[LineSpectrum], model: NoiseModel, rate: float, crossover: float
+) -> list[Line]:
+    """Find the lines of a log.
+
+    Parameters
+    ----------
+    spectra : sequence of LineSpectrum
+        Of block means for frequencies up to ``crossover``, and of samples beyond; or one alone.
+    model : NoiseModel
+        What was fitted to the spectrum; a median over neighbouring bins mends it where it does
+        not follow.
+    rate : float
+        Hz.
+    crossover : float
+        Highest frequency that is looked at in block means, Hz.
+
+    Returns
+    -------
+    list of Line
+        By frequency.
+    """
+    searched = [_range(spectrum, rate, crossover) for spectrum in spectra]
+    total = sum(max(0, high - low) for low, high in searched)
+    found: list[Line] = []
+    for spectrum, (low, high) in zip(spectra, searched, strict=True):
+        if high > low:
+            found += _lines(spectrum, model, rate, low, high, total)
+    return sorted(found, key=lambda line: line.frequency)
+
+
+def _range(spectrum: LineSpectrum, rate: float, crossover: float) -> tuple[int, int]:
+    step = spectrum.frequency[1]
+    if spectrum.block > 1:
+        return _FIRST, int(crossover / step)
+    first = _FIRST if spectrum.points < 1 << 15 or crossover <= 0 else int(crossover / step)
+    return max(_FIRST, first), len(spectrum.frequency) - 1
+
+
+def _lines(
+    spectrum: LineSpectrum, model: NoiseModel, rate: float, low: int, high: int, total: int
+) -> list[Line]:
+    n = spectrum.segments
+    omega = 2.0 * np.pi * spectrum.frequency / rate
+    omega[0] = omega[1]
+    fitted = model.sampled_spectrum(omega, rate) / rate
+    # The lowest bins have lost their power with the mean of the segments.
+    ratio = spectrum.density[_DISTURBED:] / fitted[_DISTURBED:]
+    size = min(_LEVEL, len(ratio))
+    level = median_filter(ratio, size=size, mode="reflect") / (gammainccinv(n, 0.5) / n)
+    level = np.concatenate((np.ones(_DISTURBED), level))
+    noise = fitted * level
+    standing = spectrum.density / noise
+    # The level is uncertain too, as the median of correlated bins is: Fisher's F distribution.
+    m = n * size * _MEDIAN_KNOWS
+    chance = total * betainc(m, n, m / (m + n * standing))
+    significant = np.flatnonzero(chance[low:high] < FALSE_ALARM) + low
+    if len(significant) == 0:
+        return []
+    groups = np.split(significant, np.flatnonzero(np.diff(significant) > _BESIDE) + 1)
+    return [_line(spectrum, noise, standing, chance, group, rate) for group in groups]
+
+
+def _line(
+    spectrum: LineSpectrum,
+    noise: Array,
+    standing: Array,
+    chance: Array,
+    group: NDArray[np.int64],
+    rate: float,
+) -> Line:
+    step = float(spectrum.frequency[1])
+    n = spectrum.segments
+    peak = int(group[np.argmax(standing[group])])
+    wide = group[-1] - group[0] + 1 > _WIDEST
+    first = max(1, (int(group[0]) if wide else peak) - _BESIDE)
+    last = min(len(noise) - 1, (int(group[-1]) if wide else peak) + _BESIDE)
+    bins = np.arange(first, last + 1)
+    excess = spectrum.density[bins] - noise[bins]
+    power = max(float(excess.sum()), float(excess.max()))
+    places = spectrum.frequency[bins]
+    place = float(np.clip(excess @ places / power, places[0], places[-1]))
+    to_noise = power / float(noise[peak])
+    power_error = math.hypot(
+        math.sqrt((_NOISE_POWER / to_noise**2 + 2.0 * _CROSS_POWER / to_noise) / n), _FLOOR_POWER
+    )
+    place_error = step * math.hypot(
+        math.sqrt((_NOISE_PLACE / to_noise**2 + 2.0 * _CROSS_PLACE / to_noise) / n), _FLOOR_PLACE
+    )
+    if wide:
+        place_error = math.hypot(place_error, step * len(group) / math.sqrt(12.0 * n))
+    # A line of amplitude A has the power A^2 / 4 at +f; block means see it damped.
+    half = math.pi * place / rate
+    m = spectrum.block
+    gain = math.sin(m * half) / (m * math.sin(half)) if m > 1 else 1.0
+    amplitude = 2.0 * math.sqrt(power * step) / abs(gain)
+    low, high = (math.sqrt(max(0.0, 1.0 + sign * 1.96 * power_error)) for sign in (-1, 1))
+    return Line(
+        frequency=place,
+        frequency_lower=place - 1.96 * place_error,
+        frequency_upper=place + 1.96 * place_error,
+        amplitude=amplitude,
+        amplitude_lower=amplitude * low,
+        amplitude_upper=amplitude * high,
+        ratio=float(standing[peak]),
+        false_alarm=float(min(1.0, chance[group].min())),
+        width=float(len(group)) * step,
+        resolution=step,
+    )
+
+
+def without_lines(spectrum: Spectrum, lines: Sequence[Line], density: Array) -> NDArray[np.bool_]:
+    """Return the bins of a spectrum that lines leave as they are.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+    lines : sequence of Line
+    density : ndarray, shape (b,)
+        Fitted density of each bin: a strong line reaches further, as 1/f², than a weak one.
+
+    Returns
+    -------
+    ndarray of bool, shape (b,)
+    """
+    clear = np.ones(len(spectrum.frequency), dtype=np.bool_)
+    allowed = _LEAKS * density * np.minimum(np.sqrt(2.0 / spectrum.ordinates), 1.0)
+    for line in lines:
+        reach = line.amplitude / (math.pi * np.sqrt(8.0 * allowed * spectrum.length))
+        wide = 0.5 * line.resolution if line.narrow else 0.5 * line.width
+        reach = np.maximum(reach, 1.0 / spectrum.length) + wide
+        clear &= (spectrum.upper < line.frequency - reach) | (
+            spectrum.lower > line.frequency + reach
+        )
+    return clear

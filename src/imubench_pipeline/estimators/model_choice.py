@@ -1,0 +1,124 @@
+"""Which model the data favour: candidates compared by BIC over the bins, AIC beside it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.estimators.goodness import Goodness, goodness
+from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
+
+PAPERS = Terms("NK", 1)
+"""N, B, T_B and K: the model of the papers."""
+
+CANDIDATES = (
+    Terms("N"),
+    Terms("NK"),
+    Terms("N", 1),
+    PAPERS,
+    Terms("NF"),
+    Terms("NFK"),
+    Terms("NF", 1),
+    Terms("NFK", 1),
+    Terms("N", 2),
+    Terms("NK", 2),
+)
+"""Models that are always tried; then a ramp and quantization noise are added to the best."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A model, its best fit and its scores.
+
+    Attributes
+    ----------
+    found : Maximum
+    bic, aic : float
+        2 (-log L) + p log(number of bins), and + 2 p.
+    weight : float
+        Weight of the model among the candidates, proportional to e^(-BIC/2).
+    share : float
+        That of e^(-AIC/2): an interval over models must not hang on a choice that the log
+        hardly makes, and BIC leaves out what is weak.
+    goodness : Goodness
+    """
+
+    found: Maximum
+    bic: float
+    aic: float
+    weight: float
+    share: float
+    goodness: Goodness
+
+
+def compare(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
+    """Fit all candidates and sort them, the best by BIC first.
+
+    Parameters
+    ----------
+    whittle : Whittle
+    quantization : bool
+        Try quantization noise too; the band must reach frequencies that show it.
+    """
+    bins = len(whittle.spectrum.density)
+    penalty = math.log(bins)
+    tried: dict[Terms, Maximum] = {}
+
+    def bic(found: Maximum) -> float:
+        return 2.0 * found.cost + found.terms.parameters * penalty
+
+    def add(terms: Terms) -> None:
+        if terms not in tried and terms.parameters < bins // 4:
+            tried[terms] = whittle.maximum(terms)
+
+    for terms in CANDIDATES:
+        add(terms)
+    if quantization:
+        best = min(tried.values(), key=bic).terms
+        add(Terms("Q" + best.linear, best.gauss_markov))
+    # A single walk often looks like a ramp: a ramp is only believed beside a random walk.
+    best = min(tried.values(), key=bic).terms
+    linear = best.linear if "K" in best.linear else best.linear + "K"
+    add(Terms(linear, best.gauss_markov, ramp=True))
+    order = sorted(tried.values(), key=bic)
+    bics = np.array([bic(found) for found in order])
+    aics = np.array([2.0 * (found.cost + found.terms.parameters) for found in order])
+    weights, shares = _relative(bics), _relative(aics)
+    return [
+        Candidate(
+            found,
+            float(bics[i]),
+            float(aics[i]),
+            float(weights[i]),
+            float(shares[i]),
+            goodness(
+                whittle.spectrum.ordinates,
+                whittle.data(found),
+                whittle.density(found),
+                whittle.spectrum.frequency,
+                found.terms.parameters,
+            ),
+        )
+        for i, found in enumerate(order)
+    ]
+
+
+def _relative(scores: NDArray[np.float64]) -> NDArray[np.float64]:
+    weights = np.exp(-0.5 * (scores - scores.min()))
+    return np.asarray(weights / weights.sum())
+
+
+def disagreement(candidates: Sequence[Candidate]) -> str | None:
+    """Say so where AIC favours another model than BIC."""
+    by_aic = min(candidates, key=lambda candidate: candidate.aic)
+    chosen = candidates[0]
+    if by_aic is chosen:
+        return None
+    return (
+        f"AIC favours {by_aic.found.terms.name} by {chosen.aic - by_aic.aic:.1f}, "
+        f"BIC {chosen.found.terms.name} by {by_aic.bic - chosen.bic:.1f}"
+    )

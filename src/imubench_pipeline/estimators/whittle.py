@@ -1,0 +1,207 @@
+"""The Whittle likelihood of a binned spectrum, and its maximum over the densities of the terms.
+
+-log L = 1/2 sum_i nu_i (log S_i + I_i / S_i) up to a constant, with nu ordinates of mean density
+I in bin i. For given correlation times S is linear in the squared parameters, which are at least
+0: iteratively reweighted non-negative least squares. A ramp R is a mean, not a variance: it moves
+I to I - 2 R cross + R^2 ramp, and is profiled out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.estimators.whittle_kernels import (
+    best_powers,
+    one_process,
+    shape_at,
+    two_processes,
+)
+from imubench_pipeline.spectral_shapes import Shapes
+from imubench_pipeline.spectrum import Spectrum
+
+Array = NDArray[np.float64]
+
+SHAPES = 192
+"""Correlation times at which the shape of a Gauss-Markov process is tabulated."""
+
+
+@dataclass(frozen=True)
+class Terms:
+    """Which terms a model has: letters of Q, N, F, K, Gauss-Markov processes, and a ramp."""
+
+    linear: str
+    gauss_markov: int = 0
+    ramp: bool = False
+
+    @property
+    def name(self) -> str:
+        """The terms, such as ``N+GM+K``."""
+        names = [letter for letter in "QNF" if letter in self.linear]
+        names += ["GM"] * self.gauss_markov
+        names += ["K"] * ("K" in self.linear) + ["R"] * self.ramp
+        return "+".join(names)
+
+    @property
+    def parameters(self) -> int:
+        """Number of free parameters."""
+        return len(self.linear) + 2 * self.gauss_markov + self.ramp
+
+
+@dataclass(frozen=True)
+class Maximum:
+    """The best fit of a model.
+
+    Attributes
+    ----------
+    terms : Terms
+    powers : ndarray, shape (p,)
+        Squared parameters of the linear terms in their order, then B^2 of each process, SI.
+    times : ndarray, shape (g,)
+        T_B of each process, s, rising.
+    ramp : float
+        R, SI.
+    cost : float
+        -log L, up to a constant that all models of a spectrum share.
+    """
+
+    terms: Terms
+    powers: Array
+    times: Array
+    ramp: float
+    cost: float
+
+    def parameter(self, letter: str) -> float:
+        """Return Q, N, B of flicker noise (F) or K."""
+        return float(np.sqrt(self.powers[self.terms.linear.index(letter)]))
+
+    @property
+    def biases(self) -> Array:
+        """B of each Gauss-Markov process."""
+        return np.asarray(np.sqrt(self.powers[len(self.terms.linear) :]))
+
+
+@dataclass
+class Whittle:
+    """The likelihood of one spectrum.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        The bins to use.
+    shortest, longest : float
+        Correlation times between which a Gauss-Markov process is looked for, s.
+    shapes : int
+        Correlation times at which its shape is tabulated.
+    """
+
+    spectrum: Spectrum
+    shortest: float
+    longest: float
+    shapes: int = SHAPES
+    scale: float = field(init=False)
+    columns: dict[str, Array] = field(init=False)
+    shape_of: Shapes = field(init=False)
+    times: Array = field(init=False)
+    table: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.shape_of = Shapes(self.spectrum)
+        self.scale = float(np.median(self.spectrum.density))
+        self.columns = {}
+        self.times = np.geomspace(self.shortest, self.longest, self.shapes)
+        self.table = np.log(np.array([self.shape_of.gauss_markov(time) for time in self.times]))
+        self._nu = self.spectrum.ordinates
+        self._data = (
+            self.spectrum.density / self.scale,
+            self.spectrum.cross / self.scale,
+            self.spectrum.ramp / self.scale,
+        )
+
+    def column(self, letter: str) -> Array:
+        """Return the density of a unit linear term (Q, N, F or K) in each bin."""
+        if letter not in self.columns:
+            make = {
+                "Q": self.shape_of.quantization,
+                "N": self.shape_of.white,
+                "F": self.shape_of.flicker,
+                "K": self.shape_of.random_walk,
+            }
+            self.columns[letter] = make[letter]()
+        return self.columns[letter]
+
+    def gauss_markov(self, time: float) -> Array:
+        """Return the density of a Gauss-Markov process of B = 1 in each bin."""
+        shape = np.empty(len(self._nu))
+        shape_at(np.log(time), *self.grid, self.table, shape)
+        return shape
+
+    @property
+    def grid(self) -> tuple[float, float]:
+        """First of the logarithms of the tabulated correlation times, and their step."""
+        first = float(np.log(self.times[0]))
+        return first, (float(np.log(self.times[-1])) - first) / (self.shapes - 1)
+
+    def matrix(self, terms: Terms, times: Array) -> Array:
+        """Return the densities of unit terms, shape (b, p)."""
+        columns = [self.column(letter) for letter in terms.linear]
+        columns += [self.gauss_markov(float(time)) for time in times]
+        return np.column_stack(columns)
+
+    def density(self, found: Maximum) -> Array:
+        """Return the density of a fitted model in each bin, without its ramp."""
+        return np.asarray(self.matrix(found.terms, found.times) @ found.powers)
+
+    def data(self, found: Maximum) -> Array:
+        """Return the measured density in each bin, less the ramp of a model."""
+        spectrum, R = self.spectrum, found.ramp
+        return np.asarray(spectrum.density - 2.0 * R * spectrum.cross + R**2 * spectrum.ramp)
+
+    def maximum(self, terms: Terms) -> Maximum:
+        """Return the best fit of a model."""
+        fixed = np.column_stack([self.column(letter) for letter in terms.linear])
+        size = fixed.mean(axis=0)
+        fixed = np.ascontiguousarray(fixed / size)
+        arguments = (fixed, self._nu, *self._data, terms.ramp)
+        where = np.empty(0)
+        if terms.gauss_markov:
+            search = one_process if terms.gauss_markov == 1 else two_processes
+            where = search(*arguments, *self.grid, self.table)
+        times = np.sort(np.exp(where))
+        processes = [self.gauss_markov(float(time)) for time in times]
+        columns = np.ascontiguousarray(np.column_stack([fixed, *processes]))
+        norm = columns.mean(axis=0)
+        powers, ramp, cost = best_powers(columns / norm, *arguments[1:])
+        powers = powers / norm * self.scale
+        powers[: len(size)] /= size
+        return Maximum(terms, powers, times, ramp, cost)
+
+    def information(self, found: Maximum) -> Array:
+        """Return the Fisher information of (log of each parameter ..., log T_B ..., R).
+
+        Shape (m, m); the parameters stand in the order of `Maximum.powers`, then `times`.
+        """
+        total = self.density(found)
+        matrix = self.matrix(found.terms, found.times)
+        rows = [
+            2.0 * power * column / total
+            for power, column in zip(found.powers, matrix.T, strict=True)
+        ]
+        step = 0.05
+        for power, time in zip(found.powers[len(found.terms.linear) :], found.times, strict=True):
+            low, high = (
+                max(time / (1 + step), self.times[0]),
+                min(time * (1 + step), self.times[-1]),
+            )
+            change = self.gauss_markov(high) - self.gauss_markov(low)
+            rows.append(power * change / np.log(high / low) / total)
+        jacobian = np.array(rows)
+        information = (jacobian * self._nu / 2.0) @ jacobian.T
+        if not found.terms.ramp:
+            return np.asarray(information)
+        full = np.zeros((len(rows) + 1, len(rows) + 1))
+        full[:-1, :-1] = information
+        full[-1, -1] = np.sum(self._nu * self.spectrum.ramp / total)
+        return full

@@ -1,0 +1,318 @@
+"""The compiled inner loops of the Whittle likelihood.
+
+Data and densities are in units in which they are near 1. ``fixed`` holds the densities of the
+linear terms, shape (b, p), and ``table`` the logarithms of those of a Gauss-Markov process at
+correlation times whose logarithms begin at ``first`` and are ``step`` apart.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_SCAN_STEP = 4
+_PAIR_STEP = 12
+_CLOSEST_PAIR = 2.5
+"""Least ratio of two correlation times that are told apart."""
+
+_TOLERANCE = 1e-7
+_MOST_STEPS = 60
+_GOLDEN = 0.6180339887498949
+
+
+@njit(cache=True)
+def shape_at(where: float, first: float, step: float, table: Array, shape: Array) -> None:
+    """Interpolate the logarithm of a tabulated shape linearly in log T_B."""
+    place = min(max((where - first) / step, 0.0), table.shape[0] - 1.000001)
+    i = int(place)
+    part = place - i
+    for j in range(shape.size):
+        shape[j] = np.exp(table[i, j] + part * (table[i + 1, j] - table[i, j]))
+
+
+@njit(cache=True)
+def cost_of(nu: Array, data: Array, density: Array) -> float:
+    """Return 1/2 sum nu (log S + I / S); infinite where a density is not above 0."""
+    total = 0.0
+    for i in range(nu.size):
+        if not density[i] > 0.0:
+            return np.inf
+        total += nu[i] * (np.log(density[i]) + data[i] / density[i])
+    return 0.5 * total
+
+
+@njit(cache=True)
+def _non_negative(gram: Array, target: Array) -> Array:
+    """Minimise x' gram x / 2 - target' x over x >= 0 (Lawson and Hanson's active sets)."""
+    p = target.size
+    x = np.zeros(p)
+    free = np.zeros(p, dtype=np.bool_)
+    for _ in range(10 * p):
+        gradient = target - gram @ x
+        best, steepest = -1, 1e-12 * np.max(np.abs(target))
+        for j in range(p):
+            if not free[j] and gradient[j] > steepest:
+                best, steepest = j, gradient[j]
+        if best < 0:
+            return x
+        free[best] = True
+        while True:
+            chosen = np.flatnonzero(free)
+            m = chosen.size
+            small = np.empty((m, m))
+            right = np.empty(m)
+            for a in range(m):
+                right[a] = target[chosen[a]]
+                for b in range(m):
+                    small[a, b] = gram[chosen[a], chosen[b]]
+                small[a, a] *= 1.0 + 1e-12
+            solution = np.linalg.solve(small, right)
+            step, blocking = 1.0, -1
+            for a in range(m):
+                if solution[a] <= 0.0:
+                    old = x[chosen[a]]
+                    reach = old / (old - solution[a]) if old > 0.0 else 0.0
+                    if reach < step or blocking < 0:
+                        step, blocking = min(step, reach), a
+            for a in range(m):
+                x[chosen[a]] += step * (solution[a] - x[chosen[a]])
+            if blocking < 0:
+                break
+            x[chosen[blocking]] = 0.0
+            free[chosen[blocking]] = False
+            if m == 1:
+                break
+    return x
+
+
+@njit(cache=True)
+def best_powers(
+    columns: Array, nu: Array, density: Array, cross: Array, ramp: Array, with_ramp: bool
+) -> tuple[Array, float, float]:
+    """Return the squared parameters, R and the cost that fit best."""
+    b, p = columns.shape
+    R = 0.0
+    data = density.copy()
+    # From above: the weights of a first guess must not be ruled by bins that happen to be low.
+    model = np.empty(b)
+    for i in range(b):
+        model[i] = density[i] + 1e-3
+    powers = np.zeros(p)
+    cost = np.inf
+    for iteration in range(_MOST_STEPS):
+        if with_ramp and iteration > 0:
+            above, below = 0.0, 0.0
+            for i in range(b):
+                above += nu[i] * cross[i] / model[i]
+                below += nu[i] * ramp[i] / model[i]
+            R = above / below if below > 0.0 else 0.0
+            for i in range(b):
+                data[i] = max(density[i] - 2.0 * R * cross[i] + R * R * ramp[i], 0.0)
+            cost = cost_of(nu, data, model)
+        gram = np.zeros((p, p))
+        target = np.zeros(p)
+        for i in range(b):
+            weight = nu[i] / (model[i] * model[i])
+            for j in range(p):
+                left = weight * columns[i, j]
+                target[j] += left * data[i]
+                for k in range(j + 1):
+                    gram[j, k] += left * columns[i, k]
+        for j in range(p):
+            for k in range(j):
+                gram[k, j] = gram[j, k]
+        wanted = _non_negative(gram, target)
+        if iteration == 0:
+            powers = wanted
+            model = columns @ powers
+            floor = 1e-12 * np.max(model)
+            for i in range(b):
+                model[i] = max(model[i], floor)
+            cost = cost_of(nu, data, model)
+            continue
+        step = 1.0
+        moved = False
+        for _ in range(14):
+            tried = powers + step * (wanted - powers)
+            tried_model = columns @ tried
+            tried_cost = cost_of(nu, data, tried_model)
+            if tried_cost <= cost:
+                moved = True
+                break
+            step *= 0.5
+        if not moved:
+            break
+        gain = cost - tried_cost
+        powers, model, cost = tried, tried_model, tried_cost
+        if gain < _TOLERANCE:
+            break
+    return powers, R, cost
+
+
+@njit(cache=True)
+def _cost_at(
+    places: Array,
+    fixed: Array,
+    nu: Array,
+    density: Array,
+    cross: Array,
+    ramp: Array,
+    with_ramp: bool,
+    first: float,
+    step: float,
+    table: Array,
+) -> float:
+    """Return the cost at logarithms of correlation times, profiled over everything else."""
+    b, p = fixed.shape
+    columns = np.empty((b, p + places.size))
+    columns[:, :p] = fixed
+    shape = np.empty(b)
+    for g in range(places.size):
+        shape_at(places[g], first, step, table, shape)
+        columns[:, p + g] = shape / shape.mean()
+    return best_powers(columns, nu, density, cross, ramp, with_ramp)[2]
+
+
+@njit(cache=True)
+def _polished(
+    places: Array,
+    which: int,
+    low: float,
+    high: float,
+    fixed: Array,
+    nu: Array,
+    density: Array,
+    cross: Array,
+    ramp: Array,
+    with_ramp: bool,
+    first: float,
+    step: float,
+    table: Array,
+) -> tuple[float, float]:
+    """Minimise the cost over one correlation time by golden section."""
+    here = places.copy()
+    a, d = low, high
+    b, c = d - _GOLDEN * (d - a), a + _GOLDEN * (d - a)
+    here[which] = b
+    cost_b = _cost_at(here, fixed, nu, density, cross, ramp, with_ramp, first, step, table)
+    here[which] = c
+    cost_c = _cost_at(here, fixed, nu, density, cross, ramp, with_ramp, first, step, table)
+    while d - a > 2e-4:
+        if cost_b <= cost_c:
+            d, c, cost_c = c, b, cost_b
+            b = d - _GOLDEN * (d - a)
+            here[which] = b
+            cost_b = _cost_at(here, fixed, nu, density, cross, ramp, with_ramp, first, step, table)
+        else:
+            a, b, cost_b = b, c, cost_c
+            c = a + _GOLDEN * (d - a)
+            here[which] = c
+            cost_c = _cost_at(here, fixed, nu, density, cross, ramp, with_ramp, first, step, table)
+    return (b, cost_b) if cost_b <= cost_c else (c, cost_c)
+
+
+@njit(cache=True)
+def one_process(
+    fixed: Array,
+    nu: Array,
+    density: Array,
+    cross: Array,
+    ramp: Array,
+    with_ramp: bool,
+    first: float,
+    step: float,
+    table: Array,
+) -> Array:
+    """Scan the correlation time, then polish the best."""
+    last = first + step * (table.shape[0] - 1)
+    best, lowest = first, np.inf
+    place = np.empty(1)
+    for i in range(0, table.shape[0], _SCAN_STEP):
+        place[0] = first + i * step
+        cost = _cost_at(place, fixed, nu, density, cross, ramp, with_ramp, first, step, table)
+        if cost < lowest:
+            best, lowest = place[0], cost
+    reach = _SCAN_STEP * step
+    place[0] = best
+    found, cost = _polished(
+        place,
+        0,
+        max(first, best - reach),
+        min(last, best + reach),
+        fixed,
+        nu,
+        density,
+        cross,
+        ramp,
+        with_ramp,
+        first,
+        step,
+        table,
+    )
+    place[0] = found if cost < lowest else best
+    return place
+
+
+@njit(cache=True)
+def two_processes(
+    fixed: Array,
+    nu: Array,
+    density: Array,
+    cross: Array,
+    ramp: Array,
+    with_ramp: bool,
+    first: float,
+    step: float,
+    table: Array,
+) -> Array:
+    """Scan pairs of correlation times, then polish each in turn."""
+    last = first + step * (table.shape[0] - 1)
+    apart = np.log(_CLOSEST_PAIR)
+    lowest = np.inf
+    best = np.array([first, last])
+    places = np.empty(2)
+    for i in range(0, table.shape[0], _PAIR_STEP):
+        for j in range(i + _PAIR_STEP, table.shape[0], _PAIR_STEP):
+            places[0], places[1] = first + i * step, first + j * step
+            if places[1] - places[0] < apart:
+                continue
+            cost = _cost_at(places, fixed, nu, density, cross, ramp, with_ramp, first, step, table)
+            if cost < lowest:
+                lowest = cost
+                best = places.copy()
+    reach = _PAIR_STEP * step
+    for _ in range(6):
+        before = lowest
+        for g in range(2):
+            low, high = max(first, best[g] - reach), min(last, best[g] + reach)
+            if g == 0:
+                high = min(high, best[1] - apart)
+            else:
+                low = max(low, best[0] + apart)
+            if high <= low:
+                continue
+            found, cost = _polished(
+                best,
+                g,
+                low,
+                high,
+                fixed,
+                nu,
+                density,
+                cross,
+                ramp,
+                with_ramp,
+                first,
+                step,
+                table,
+            )
+            if cost < lowest:
+                lowest = cost
+                best[g] = found
+        reach *= 0.5
+        if before - lowest < 1e-4:
+            break
+    return best
