@@ -10,8 +10,8 @@ from imubench_pipeline.simulate import (
     reconstructed_variance,
     simulate,
     simulate_blocks,
-    variance_covariance,
 )
+from imubench_pipeline.variance_covariance import variance_covariance
 
 MODEL = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=20.0, K=8.2e-6)
 RATE = 10.0

@@ -31,7 +31,7 @@ from imubench_pipeline.phase import Phase, integrate, split
 from imubench_pipeline.threads import read_ahead
 
 _MANY_CLUSTERS = 100
-_FEW_STEPS = 2
+_FEW_STEPS = 2  # strides in a cluster: for shorter ones the noise type needs every sample
 
 Edges = Callable[[int], tuple[NDArray[np.float64], NDArray[Any] | None, int]]
 """Cumulative sums and counts at the edges of adjacent clusters of about a size, and the size."""

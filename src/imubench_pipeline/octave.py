@@ -94,8 +94,7 @@ class OctaveSums:
     """
 
     def __init__(self, sizes: Integers, samples: int, *, holes: bool, threads: int = 1) -> None:
-        self._sizes, self._samples = sizes, samples
-        self._holes, self._threads = holes, threads
+        self._sizes, self._holes, self._threads = sizes, holes, max(1, threads)
         self._short = _level(sizes) < _LEVELS
         short = sizes[self._short]
         self._grid = (short, _level(short), enough_present(short))
@@ -110,7 +109,7 @@ class OctaveSums:
         self._bias = 0.0
         self._rest: Samples = np.empty(0, dtype=np.float32)
         self._rooms: SimpleQueue[Room] = SimpleQueue()
-        for _ in range(threads):
+        for _ in range(self._threads):
             self._rooms.put(_room(holes))
         self.received = 0
 

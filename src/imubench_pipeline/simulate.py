@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from imubench_pipeline.allan import of_phase
 from imubench_pipeline.noise import NoiseModel, Quantization, Ramp, Sinusoid, WhiteNoise
 from imubench_pipeline.phase import integrate
+from imubench_pipeline.variance_covariance import variance_covariance
 
 Array = NDArray[np.float64]
 
@@ -28,9 +29,6 @@ _SUMS = 1 << 14
 
 _BLOCKS_IN_CLUSTER = 16
 """Clusters of fewer blocks are drawn from the covariance of the Allan variances."""
-
-_POINTS_IN_PERIOD = 32
-_FREQUENCIES_AT_ONCE = 1 << 15
 
 
 def channel_rng(seed: int, *names: str) -> np.random.Generator:
@@ -291,35 +289,3 @@ def _from_covariance(
     normal = rng.standard_normal((members, len(sizes))) @ root.T
     ninth = spread**2 / 9.0  # 2 / (9 edf) with spread^2 = 2 / edf
     return np.asarray(mean * (1.0 - ninth + np.sqrt(ninth) * normal) ** 3)
-
-
-def variance_covariance(
-    model: NoiseModel, rate: float, samples: int, sizes: NDArray[np.int64]
-) -> Array:
-    """Return the covariance of the Allan variance estimates of a long Gaussian log.
-
-    With P the spectrum of the samples and |H_n|^2 = 4 sin^4(n w/2) / (n^2 sin^2(w/2)),
-
-        cov(n, m) = 1/(2 M) 1/(2 pi) int P^2 |H_n|^2 |H_m|^2 dw,   M = L - n - m,
-
-    for clusters much shorter than the log.
-
-    Returns
-    -------
-    ndarray, shape (m, m)
-        (rad/s)^4 or (m/s²)^4.
-    """
-    points = 1 << math.ceil(math.log2(max(_POINTS_IN_PERIOD * int(sizes.max()), 1 << 12)))
-    total = np.zeros((len(sizes), len(sizes)))
-    for start in range(0, points, _FREQUENCIES_AT_ONCE):
-        index = np.arange(start, min(start + _FREQUENCIES_AT_ONCE, points))
-        omega = np.pi * (index + 0.5) / points
-        shaped = (
-            model.sampled_spectrum(omega, rate)
-            * 4.0
-            * np.sin(np.outer(sizes, omega / 2.0)) ** 4
-            / (sizes[:, None] ** 2 * np.sin(omega / 2.0) ** 2)
-        )
-        total += shaped @ shaped.T
-    terms = samples - np.add.outer(sizes, sizes)
-    return np.asarray(total / points / (2.0 * terms))

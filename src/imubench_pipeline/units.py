@@ -26,6 +26,10 @@ SI_UNITS: dict[str, str] = {
     "accel_density": "m/s^2/sqrt(Hz)",
     "gyro_random_walk": "rad/s/sqrt(s)",
     "accel_random_walk": "m/s^2/sqrt(s)",
+    "gyro_quantization": "rad",
+    "accel_quantization": "m/s",
+    "gyro_ramp": "rad/s^2",
+    "accel_ramp": "m/s^3",
     "gyro_temperature_coefficient": "rad/s/K",
     "accel_temperature_coefficient": "m/s^2/K",
 }
@@ -41,6 +45,10 @@ _EXAMPLES: dict[str, str] = {
     "accel_density": "ug/sqrt(Hz) or m/s/sqrt(h)",
     "gyro_random_walk": "deg/h/sqrt(h) or deg/s^(3/2)",
     "accel_random_walk": "ug/sqrt(h) or m/s^(5/2)",
+    "gyro_quantization": "deg or arcsec",
+    "accel_quantization": "m/s or mm/s",
+    "gyro_ramp": "deg/h/h or deg/s^2",
+    "accel_ramp": "ug/h or m/s^3",
     "gyro_temperature_coefficient": "deg/s/K",
     "accel_temperature_coefficient": "mg/K",
 }

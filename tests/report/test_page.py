@@ -39,7 +39,8 @@ def channel(name: str) -> dict[str, list[dict[str, Any]]]:
             for t in tau
         ],
         "parameters": [
-            parameter | {"parameter": "N", "value": degree / 60, "unit": "x", "status": "ok"},
+            parameter | {"parameter": "N", "value": degree / 60, "unit": "x", "status": "ok",
+                         "lower": degree / 66, "upper": degree / 55},
             *(
                 parameter | {"parameter": p, "unit": "x", "status": "absent", "reason": "not there"}
                 for p in ("B", "T_B", "K")
@@ -96,7 +97,7 @@ def test_a_page_is_whole_and_needs_nothing_else() -> None:
 def test_values_have_the_units_of_engineers() -> None:
     page = render(tables(recordings=[recording("r")], **channel("r")), SETTINGS)
     assert "N (°/√h)" in page
-    assert '<td class="number">1</td>' in page
+    assert '<td class="number">1<br>0.909 to 1.09</td>' in page
     assert 'title="not there">absent<sup' in page
     assert "not published" in page
     si = render(
@@ -139,6 +140,55 @@ def test_a_simulated_log_is_called_so_wherever_it_appears() -> None:
         "simulated" in base64.b64decode(figure).decode()
         for figure in re.findall(r"base64,([^\"]+)", page)
     )
+
+
+def test_the_page_says_what_the_likelihood_says() -> None:
+    key = {"sensor": "s", "recording": "r", "channel": "gyro_x"}
+    model = key | {"free": 2, "log_likelihood": 1.0, "aic": 1.0, "weight": 0.5, "deviance": 1.234,
+                   "chance": 0.4, "verdict": "explained", "bins": 10}  # fmt: skip
+    parts = channel("r")
+    for rows in parts.values():
+        for row in rows:
+            if row.get("method"):
+                row["method"] = "likelihood"
+    parts["parameters"][1] |= {
+        "status": "not_identified", "lower": np.pi / 180 / 3600, "upper": np.pi / 180 / 360,
+        "duration_needed": 7200.0, "fitted": 1e-5,
+    }  # fmt: skip
+    line = {"kind": "sinusoid", "frequency": 0.5, "frequency_lower": 0.49, "frequency_upper": 0.51,
+            "amplitude": np.pi / 180 / 3600, "amplitude_lower": 0.0, "amplitude_upper": 1e-5,
+            "ratio": 30.0}  # fmt: skip
+    spectrum = {"lower": 0.1, "upper": 2.0, "ordinates": 3.0, "density": 1.0}
+    page = render(
+        tables(
+            recordings=[recording("r")],
+            models=[
+                model | {"model": "N+F", "chosen": True, "bic": 10.0, "note": "AIC says else"},
+                model | {"model": "N+GM+K", "chosen": False, "bic": 13.5},
+            ],
+            lines=[key | line],
+            spectrum=[
+                key | spectrum | {"frequency": 0.2, "fitted": 1.1, "used": True},
+                key | spectrum | {"frequency": 1.0, "used": False},
+            ],
+            pooled=[
+                {"sensor": "s", "channel": "gyro_x", "parameter": "bias", "recordings": 3,
+                 "left_out": 0, "value": np.pi / 180 / 3600, "unit": "rad/s", "spread": 1e-6,
+                 "reason": "because"},
+            ],
+            **parts,
+        ),
+        SETTINGS,
+    )  # fmt: skip
+    links = Links()
+    links.feed(page)
+    assert set(links.targets) <= links.ids
+    assert "not identified<br>1 to 10" in page
+    assert "a log of 2 h tells it to 10 %" in page
+    assert "N+GM+K +3.5" in page and "1.23" in page and "AIC says else" in page
+    assert "0.49 to 0.51" in page
+    assert "fixed bias" in page and "because" in page
+    assert len(re.findall(r"base64,", page)) == 4  # and the spectrum
 
 
 def test_nothing_to_show_is_still_a_page() -> None:

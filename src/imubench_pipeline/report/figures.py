@@ -18,9 +18,11 @@ from imubench_pipeline.report.view import METHOD_NAMES, ChannelView
 # Okabe and Ito's palette, told apart by the colour-blind; black is the measurement.
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C564B")
 _METHOD_STYLE = {
+    "likelihood": ("#009E73", "-"),
+    "likelihood_gm": ("#E69F00", (0, (5, 1))),
     "curve": ("#D55E00", "--"),
     "paper": ("#CC79A7", "-."),
-    "weighted": ("#0072B2", "-"),
+    "weighted": ("#0072B2", ":"),
 }
 _LINES = ("-", "--", ":", "-.")
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
@@ -73,8 +75,9 @@ def channel_figure(view: ChannelView, system: System) -> str:
     )
     axes.plot(view.tau, view.adev * scale, color="black", marker="o", ms=2.5, label=what)
     for method, curve in view.reconstruction.items():
-        colour, style = _METHOD_STYLE.get(method, ("#009E73", ":"))
-        if method == view.recommended:
+        colour, style = _METHOD_STYLE[method]
+        best = method == view.recommended
+        if best:
             axes.fill_between(
                 curve["tau"],
                 curve["lower"] * scale,
@@ -85,18 +88,66 @@ def channel_figure(view: ChannelView, system: System) -> str:
                 label="95 % band of reconstructions",
             )
         model = np.sqrt(view.model(method).allan_variance(curve["tau"]))
-        label = METHOD_NAMES.get(method, method)
+        label = METHOD_NAMES[method]
         axes.plot(
-            curve["tau"], model * scale, color=colour, ls=style, lw=1, label=f"{label}: model"
+            curve["tau"], model * scale, color=colour, ls=style, lw=1.6 if best else 1, label=label
         )
-        axes.plot(
-            curve["tau"],
-            curve["reconstructed"] * scale,
-            color=colour,
-            ls="none",
-            marker=".",
-            ms=3,
-            label=f"{label}: reconstruction",
+        if best:
+            axes.plot(
+                curve["tau"],
+                curve["reconstructed"] * scale,
+                color=colour,
+                ls="none",
+                marker=".",
+                ms=3,
+                label="a log simulated from it",
+            )
+    _legend(figure, axes)
+    return _svg(figure)
+
+
+def spectrum_figure(view: ChannelView, system: System) -> str | None:
+    """Draw the root of the two-sided spectrum with the chosen model and the lines, if known."""
+    if not view.spectrum:
+        return None
+    figure = Figure(figsize=(6.4, 5.0), layout="constrained")
+    axes = figure.add_subplot()
+    unit = page_unit(view.quantity, "psd", system)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlabel("frequency f (Hz)")
+    axes.set_ylabel(f"root of the two-sided density ({unit.sign})")
+    spectrum = view.spectrum
+    used = spectrum["used"] > 0
+    for chosen, colour, label in (
+        (used, "black", "bins used"),
+        (~used, "0.6", "bins left out: lines, or beyond the band"),
+    ):
+        if chosen.any():
+            axes.plot(
+                spectrum["frequency"][chosen],
+                np.sqrt(spectrum["density"][chosen]) * unit.per_si,
+                color=colour,
+                ls="none",
+                marker=".",
+                ms=3,
+                label=label,
+            )
+    colour, style = _METHOD_STYLE["likelihood"]
+    axes.plot(
+        spectrum["frequency"],
+        np.sqrt(spectrum["fitted"]) * unit.per_si,
+        color=colour,
+        ls=style,
+        label=f"likelihood: {next(row['model'] for row in view.models if row['chosen'])}",
+    )
+    for number, line in enumerate(view.lines):
+        axes.axvline(
+            line["frequency"],
+            color="#D55E00",
+            lw=0.6,
+            ls=":",
+            label="lines" if number == 0 else None,
         )
     _legend(figure, axes)
     return _svg(figure)
@@ -143,7 +194,7 @@ def datasheet_figure(view: ChannelView, system: System) -> str | None:
     what = "simulated log" if view.simulated else "measured"
     axes.plot(view.tau, view.adev * scale, color="black", marker="o", ms=2.5, label=what)
     for method, curve in view.reconstruction.items():
-        if method in ("curve", view.recommended):
+        if method == view.recommended:
             colour, style = _METHOD_STYLE[method]
             model = np.sqrt(view.model(method).allan_variance(curve["tau"]))
             axes.plot(

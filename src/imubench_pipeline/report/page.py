@@ -10,9 +10,14 @@ from typing import Any
 import jinja2
 import pyarrow as pa
 
-from imubench_pipeline.estimators.estimate import PARAMETERS
-from imubench_pipeline.report.figures import channel_figure, comparison_figure, datasheet_figure
-from imubench_pipeline.report.practical import System, page_unit
+from imubench_pipeline.estimators.estimate import FAMILY, PARAMETERS
+from imubench_pipeline.report.figures import (
+    channel_figure,
+    comparison_figure,
+    datasheet_figure,
+    spectrum_figure,
+)
+from imubench_pipeline.report.practical import PageUnit, System, page_unit
 from imubench_pipeline.report.view import METHOD_NAMES, ChannelView, channel_views
 
 _LIBRARIES = ("imubench_pipeline", "numpy", "scipy", "numba", "pyarrow", "snakemake")
@@ -55,11 +60,15 @@ def render(tables: Mapping[str, pa.Table], settings: Mapping[str, Any]) -> str:
         comparisons=list(_comparisons(views, system)),
         parameter_tables=list(_parameter_tables(views, system)),
         score_tables=list(_score_tables(views, system)),
+        models=list(_models(views)),
+        lines=list(_lines(views, system)),
+        pooled=list(_pooled(tables["pooled"].to_pylist(), system)),
         channels=[
             {
                 "view": view,
                 "curve": channel_figure(view, system),
                 "datasheet": datasheet_figure(view, system),
+                "spectrum": spectrum_figure(view, system),
             }
             for view in views
         ],
@@ -90,23 +99,25 @@ def _parameter_tables(views: list[ChannelView], system: System) -> Iterator[dict
         chosen = [view for view in views if view.quantity == quantity]
         if not chosen:
             continue
-        units = {symbol: page_unit(quantity, symbol, system) for symbol in PARAMETERS}
+        symbols = _shown(chosen)
+        units = {symbol: page_unit(quantity, symbol, system) for symbol in symbols}
         groups = []
         for view in chosen:
-            rows = [
-                _method_row(view, method, [_cell(parameters[s], units[s].text) for s in PARAMETERS])
-                for method, parameters in view.parameters.items()
-            ]
+            rows = []
+            for method in view.parameters:
+                cells = [_cell(view.named(method, s), units[s]) for s in symbols]
+                model = view.parameters[method][0]["model"]
+                rows.append(_method_row(view, method, [_plain(model), *cells]))
             if view.truth:
-                truth = [_truth_cell(view, symbol, units[symbol].text) for symbol in PARAMETERS]
-                rows.append(_method_row(view, "truth of the simulation", truth))
+                truth = [_truth_cell(view, symbol, units[symbol].text) for symbol in symbols]
+                rows.append(_method_row(view, "truth of the simulation", [_plain(""), *truth]))
             groups.append({"view": view, "rows": rows})
-        heads = [f"{symbol} ({units[symbol].sign})" for symbol in PARAMETERS]
+        heads = ["model", *(f"{symbol} ({units[symbol].sign})" for symbol in symbols)]
         yield {"title": f"{title}: parameters", "heads": heads, "groups": groups}
 
 
 def _method_row(
-    view: ChannelView, method: str, cells: list[dict[str, str]], note: str = ""
+    view: ChannelView, method: str, cells: list[dict[str, Any]], note: str = ""
 ) -> dict[str, Any]:
     return {
         "method": METHOD_NAMES.get(method, method),
@@ -116,22 +127,57 @@ def _method_row(
     }
 
 
-def _cell(row: Mapping[str, Any], text: Callable[[float | None], str]) -> dict[str, str]:
-    status = row["status"].replace("_", " ")
-    if row["value"] is None:
-        return {"text": status, "note": row["reason"] or "", "class": "none"}
-    flag = "" if row["status"] == "ok" else f" ({status})"
-    return {"text": text(row["value"]) + flag, "note": row["reason"] or "", "class": "number"}
+def _shown(views: list[ChannelView]) -> list[str]:
+    """Return the parameters of the papers' model, and those others that a channel has."""
+    there = {
+        row["parameter"]
+        for view in views
+        for rows in view.parameters.values()
+        for row in rows
+        if row["status"] != "absent"
+    }
+    return [symbol for symbol in FAMILY if symbol in PARAMETERS or symbol in there]
+
+
+def _plain(text: str) -> dict[str, Any]:
+    return {"lines": [text], "note": "", "class": ""}
+
+
+def _cell(rows: list[Mapping[str, Any]], unit: PageUnit) -> dict[str, Any]:
+    """Return a cell with a line for each component: its value, and its interval."""
+    if not rows:
+        return {"lines": ["–"], "note": "", "class": "none"}
+    lines = []
+    for row in rows:
+        status = row["status"].replace("_", " ")
+        flag = "" if row["status"] == "ok" else f" ({status})"
+        lines.append(status if row["value"] is None else unit.text(row["value"]) + flag)
+        if row["upper"] is not None and row["status"] != "absent":
+            lines.append(f"{unit.text(row['lower'], 3)} to {unit.text(row['upper'], 3)}")
+    notes = [row["reason"] for row in rows if row["reason"]]
+    needed = rows[0]["duration_needed"]
+    if needed is not None and rows[0]["status"] != "absent":
+        notes.append(f"a log of {_duration(needed)} tells it to 10 %")
+    empty = all(row["value"] is None for row in rows)
+    return {"lines": lines, "note": "; ".join(notes), "class": "none" if empty else "number"}
+
+
+def _duration(seconds: float) -> str:
+    """Return a time in the unit in which it is easily read."""
+    for size, name in ((86400.0, "days"), (3600.0, "h"), (60.0, "min")):
+        if seconds >= 2.0 * size:
+            return f"{seconds / size:.3g} {name}"
+    return f"{seconds:.3g} s"
 
 
 def _truth_cell(
     view: ChannelView, symbol: str, text: Callable[[float | None], str]
-) -> dict[str, str]:
+) -> dict[str, Any]:
     row = view.truth.get(symbol)
     if row is None:
-        return {"text": "none", "note": "", "class": "none"}
+        return {"lines": ["none"], "note": "", "class": "none"}
     assumed = " (assumed)" if row["assumed"] else ""
-    return {"text": text(row["value"]) + assumed, "note": row["source"], "class": "number"}
+    return {"lines": [text(row["value"]) + assumed], "note": row["source"], "class": "number"}
 
 
 def _score_tables(views: list[ChannelView], system: System) -> Iterator[dict[str, Any]]:
@@ -150,7 +196,7 @@ def _score_tables(views: list[ChannelView], system: System) -> Iterator[dict[str
                     f"{score['rms_log10']:.3f}" if known else "–",
                     f"{100 * score['inside_band']:.0f} %" if known else "–",
                 ]
-                cells = [{"text": text, "note": "", "class": "number"} for text in texts]
+                cells = [{"lines": [text], "note": "", "class": "number"} for text in texts]
                 rows.append(_method_row(view, method, cells, score["reason"] or ""))
             groups.append({"view": view, "rows": rows})
         heads = [f"RMS ({unit.sign})", "RMS of log10 (decades)", "inside the 95 % band"]
@@ -181,3 +227,69 @@ def _deltas(views: list[ChannelView], system: System) -> Iterator[dict[str, Any]
             )
         if rows:
             yield {"view": view, "rows": rows}
+
+
+def _models(views: list[ChannelView]) -> Iterator[dict[str, Any]]:
+    """Yield what the likelihood says of the models of each channel."""
+    for view in views:
+        if not view.models:
+            continue
+        chosen, *others = view.models
+        papers = next((row for row in view.models if row["model"] == "N+GM+K"), None)
+        runner = others[0] if others else None
+        yield {
+            "view": view,
+            "model": chosen["model"],
+            "runner": f"{runner['model']} +{runner['bic'] - chosen['bic']:.1f}" if runner else "–",
+            "papers": f"+{papers['bic'] - chosen['bic']:.1f}" if papers else "–",
+            "deviance": f"{chosen['deviance']:.2f}",
+            "verdict": chosen["verdict"],
+            "chance": f"{chosen['chance']:.2g}",
+            "note": "; ".join(t for t in (chosen["note"], chosen["band_source"]) if t),
+        }
+
+
+def _lines(views: list[ChannelView], system: System) -> Iterator[dict[str, Any]]:
+    """Yield the lines of each channel that has some."""
+    for view in views:
+        unit = page_unit(view.quantity, "adev", system)
+        rows = [
+            {
+                "frequency": f"{row['frequency']:.5g}",
+                "frequency_limits": f"{row['frequency_lower']:.5g} to {row['frequency_upper']:.5g}",
+                "amplitude": unit.text(row["amplitude"]),
+                "amplitude_limits": f"{unit.text(row['amplitude_lower'])} to "
+                f"{unit.text(row['amplitude_upper'])}",
+                "unit": unit.sign,
+                "ratio": f"{row['ratio']:.3g}",
+                "kind": row["kind"],
+            }
+            for row in view.lines
+        ]
+        if rows:
+            yield {"view": view, "rows": rows}
+
+
+def _pooled(rows: list[Mapping[str, Any]], system: System) -> Iterator[dict[str, Any]]:
+    """Yield the pools of several recordings."""
+    for row in rows:
+        quantity = row["channel"].split("_", maxsplit=1)[0]
+        symbol = "B" if row["parameter"] == "bias" else row["parameter"]
+        unit = page_unit(quantity, symbol, system)
+        limits = "–"
+        if row["lower"] is not None and row["upper"] is not None:
+            limits = f"{unit.text(row['lower'])} to {unit.text(row['upper'])}"
+        yield {
+            "sensor": row["sensor"],
+            "device": row["device"] or "all",
+            "channel": row["channel"],
+            "parameter": "fixed bias" if row["parameter"] == "bias" else row["parameter"],
+            "recordings": row["recordings"],
+            "value": unit.text(row["value"]),
+            "limits": limits,
+            "spread": unit.text(row["spread"]),
+            "unit": unit.sign,
+            "verdict": row["verdict"] or "–",
+            "p_value": "–" if row["p_value"] is None else f"{row['p_value']:.2g}",
+            "reason": row["reason"] or "",
+        }

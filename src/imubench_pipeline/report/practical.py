@@ -18,20 +18,56 @@ class PageUnit:
     sign: str
     per_si: float
 
-    def text(self, value: float | None) -> str:
-        """Return a SI value in this unit with four digits; a dash where there is none."""
+    def text(self, value: float | None, digits: int = 4) -> str:
+        """Return a SI value in this unit, rounded to some digits; a dash where there is none."""
         if value is None:
             return "–"
-        return f"{value * self.per_si:.4g}"
+        return f"{value * self.per_si:.{digits}g}"
 
 
 _PRACTICAL: dict[str, dict[str, str]] = {
-    "gyro": {"N": "°/√h", "B": "°/h", "K": "°/h/√h", "T_B": "s", "adev": "°/h"},
-    "accel": {"N": "µg/√Hz", "B": "µg", "K": "µg/√h", "T_B": "s", "adev": "µg"},
+    "gyro": {
+        "Q": "°",
+        "N": "°/√h",
+        "B": "°/h",
+        "T_B": "s",
+        "K": "°/h/√h",
+        "R": "°/h/h",
+        "adev": "°/h",
+        "psd": "°/s/√Hz",
+    },
+    "accel": {
+        "Q": "m/s",
+        "N": "µg/√Hz",
+        "B": "µg",
+        "T_B": "s",
+        "K": "µg/√h",
+        "R": "µg/h",
+        "adev": "µg",
+        "psd": "µg/√Hz",
+    },
 }
 _SI: dict[str, dict[str, str]] = {
-    "gyro": {"N": "rad/s/√Hz", "B": "rad/s", "K": "rad/s/√s", "T_B": "s", "adev": "rad/s"},
-    "accel": {"N": "m/s²/√Hz", "B": "m/s²", "K": "m/s²/√s", "T_B": "s", "adev": "m/s²"},
+    "gyro": {
+        "Q": "rad",
+        "N": "rad/s/√Hz",
+        "B": "rad/s",
+        "T_B": "s",
+        "K": "rad/s/√s",
+        "R": "rad/s²",
+        "adev": "rad/s",
+        "psd": "rad/s/√Hz",
+    },
+    "accel": {
+        "Q": "m/s",
+        "N": "m/s²/√Hz",
+        "B": "m/s²",
+        "T_B": "s",
+        "K": "m/s²/√s",
+        "R": "m/s³",
+        "adev": "m/s²",
+        "psd": "m/s²/√Hz",
+    },
 }
 
 
@@ -39,6 +75,9 @@ def page_unit(quantity: str, symbol: str, system: System) -> PageUnit:
     """Return the unit in which a page shows a parameter, or ``adev``, of a quantity."""
     sign = (_PRACTICAL if system == "practical" else _SI)[quantity][symbol]
     dimension = {
+        "Q": f"{quantity}_quantization",
+        "R": f"{quantity}_ramp",
+        "psd": f"{quantity}_density",
         "N": f"{quantity}_density",
         "K": f"{quantity}_random_walk",
         "T_B": "time",

@@ -16,9 +16,11 @@ from imubench_pipeline.results import estimate_of
 Row = Mapping[str, Any]
 Name = tuple[str, str, str]
 METHOD_NAMES = {
+    "likelihood": "likelihood",
+    "likelihood_gm": "likelihood, papers' model",
     "curve": "read from the curve",
-    "paper": "least squares, weights as printed",
-    "weighted": "least squares, right weights",
+    "paper": "fit, weights as printed",
+    "weighted": "fit, right weights",
 }
 
 
@@ -34,12 +36,15 @@ class ChannelView:
     adev: NDArray[np.float64]
     lower: NDArray[np.float64]
     upper: NDArray[np.float64]
-    parameters: dict[str, dict[str, Row]] = field(default_factory=dict)
+    parameters: dict[str, list[Row]] = field(default_factory=dict)
     recommended: str = ""
     reconstruction: dict[str, dict[str, NDArray[np.float64]]] = field(default_factory=dict)
     scores: dict[str, Row] = field(default_factory=dict)
     datasheet: list[Row] = field(default_factory=list)
     truth: dict[str, Row] = field(default_factory=dict)
+    models: list[Row] = field(default_factory=list)
+    lines: list[Row] = field(default_factory=list)
+    spectrum: dict[str, NDArray[np.float64]] = field(default_factory=dict)
 
     @property
     def quantity(self) -> str:
@@ -58,7 +63,11 @@ class ChannelView:
 
     def model(self, method: str) -> NoiseModel:
         """Return the noise model that a method estimated."""
-        return estimate_of(method, self.parameters[method].values()).model
+        return estimate_of(method, self.parameters[method]).model
+
+    def named(self, method: str, symbol: str) -> list[Row]:
+        """Return the rows of a parameter of a method, one a component."""
+        return [row for row in self.parameters[method] if row["parameter"] == symbol]
 
 
 def channel_views(tables: Mapping[str, pa.Table]) -> list[ChannelView]:
@@ -79,7 +88,7 @@ def channel_views(tables: Mapping[str, pa.Table]) -> list[ChannelView]:
         )
     for row in tables["parameters"].to_pylist():
         view = views[_name(row)]
-        view.parameters.setdefault(row["method"], {})[row["parameter"]] = row
+        view.parameters.setdefault(row["method"], []).append(row)
         if row["recommended"]:
             view.recommended = row["method"]
     for name, part in _by_channel(tables["reconstruction"]).items():
@@ -90,6 +99,14 @@ def channel_views(tables: Mapping[str, pa.Table]) -> list[ChannelView]:
                 column: _floats(chosen, column)
                 for column in ("tau", "adev", "lower", "upper", "reconstructed")
             }
+    for table in ("models", "lines"):
+        for row in tables[table].to_pylist():
+            getattr(views[_name(row)], table).append(row)
+    for name, part in _by_channel(tables["spectrum"]).items():
+        views[name].spectrum = {
+            column: _floats(part, column)
+            for column in ("frequency", "ordinates", "density", "fitted", "used")
+        }
     for row in tables["scores"].to_pylist():
         views[_name(row)].scores[row["method"]] = row
     for row in tables["datasheet"].to_pylist():
