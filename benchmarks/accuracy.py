@@ -1,59 +1,144 @@
-"""Errors of the methods on simulated logs, against the truth.
+"""Errors and intervals of the methods on simulated logs, against the Cramér-Rao bound.
 
-python benchmarks/accuracy.py [--logs 50] [--hours 10]
+python benchmarks/accuracy.py [--logs 1000] [--others 200] [--processes 2]
+
+The likelihood estimates every log; the fits to the Allan variance, and the formulas of other
+programs, the first ``others`` of them.
 """
 
 from __future__ import annotations
 
 import argparse
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
 
 from imubench_pipeline.allan import allan_variance
-from imubench_pipeline.estimators import estimate
-from imubench_pipeline.estimators.estimate import PARAMETERS
+from imubench_pipeline.estimators import curve as reading
+from imubench_pipeline.estimators import least_squares
+from imubench_pipeline.estimators.estimate import PARAMETERS, Estimate, Parameter
+from imubench_pipeline.estimators.identifiability import bounds_of
+from imubench_pipeline.estimators.likelihood import fit_spectrum, whittle_of
+from imubench_pipeline.estimators.model_choice import PAPERS
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.simulate import simulate
+from imubench_pipeline.spectrum import spectra
+from peers import PEERS
 
-CASES = {
-    "MTi-7 gyro, 100 Hz": (NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7), 100.0),
-    "C102 accelerometer, 50 Hz": (NoiseModel(N=1.1e-3, B=7.2e-4, T_B=148.9, K=2.0e-5), 50.0),
-}
-METHODS: tuple[Literal["curve", "paper", "weighted"], ...] = ("curve", "paper", "weighted")
+
+@dataclass(frozen=True)
+class Case:
+    """Simulated logs of one model."""
+
+    name: str
+    model: NoiseModel
+    rate: float
+    hours: float = 10.0
+
+
+CASES = (
+    Case("MTi-7 gyro, 100 Hz", NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7), 100.0),
+    Case("C102 accelerometer, 50 Hz", NoiseModel(N=1.1e-3, B=7.2e-4, T_B=148.9, K=2.0e-5), 50.0),
+    Case("weak B, 100 Hz", NoiseModel(N=1e-3, B=1e-4, T_B=100.0, K=1e-5), 100.0),
+)
+_LIMITED = 1 / 20
+
+Found = dict[str, dict[str, Parameter]]
+
+
+def of_log(case: Case, others: int, number: int) -> tuple[Found, str]:
+    """Return the estimates of one simulated log by method, and the model that was chosen."""
+    rng = np.random.default_rng([number, CASES.index(case)])
+    log = simulate(case.model, case.rate, round(case.hours * 3600 * case.rate), rng)
+    spectrum, lines = spectra([log], len(log), case.rate)
+    result = fit_spectrum(spectrum, lines, band=0.5 * case.rate, rng=rng)
+    found: Found = {estimate.method: dict(estimate.parameters) for estimate in result.estimates}
+    if number < others:
+        limit = _LIMITED * case.rate
+        whittle = whittle_of(spectrum.taken(spectrum.upper <= limit), limit)
+        best = whittle.maximum(PAPERS)
+        values = [best.parameter("N"), float(best.biases[0]), float(best.times[0])]
+        values.append(best.parameter("K"))
+        found["likelihood_gm, rate/20"] = {
+            name: Parameter(value if value > 0 else None)
+            for name, value in zip(PARAMETERS, values, strict=True)
+        }
+        curve = allan_variance(log, case.rate, overlap="octave")
+        fits: list[Estimate] = [reading.read(curve, longest=1 / 9)]
+        methods: tuple[Literal["paper", "weighted"], ...] = ("paper", "weighted")
+        fits += [least_squares.fit(curve, method=method) for method in methods]
+        found |= {estimate.method: dict(estimate.parameters) for estimate in fits}
+        for peer in PEERS:
+            printed = peer.estimate(log, case.rate)
+            found[peer.name] = {name: Parameter(printed[name]) for name in PARAMETERS}
+    return found, result.candidates[0].found.terms.name
+
+
+def table(case: Case, found: list[tuple[Found, str]]) -> Iterator[str]:
+    """Yield the lines of a table."""
+    duration = case.hours * 3600.0
+    bounds = bounds_of(case.model, case.rate, duration, 0.5 * case.rate)
+    limited = bounds_of(case.model, case.rate, duration, _LIMITED * case.rate)
+    yield f"{case.name}, {len(found)} simulated logs of {case.hours:g} h"
+    yield "Cramér-Rao bound: " + ", ".join(f"{n} {100 * bounds[n]:.3g} %" for n in PARAMETERS)
+    yield f"  up to rate/20: N {100 * limited['N']:.3g} %"
+    chosen = Counter(model for _, model in found).most_common(6)
+    yield "chosen: " + ", ".join(f"{model} {number}" for model, number in chosen)
+    yield (
+        f"{'method':24}{'':5}{'logs':>6}{'value':>7}{'not id.':>8}{'absent':>7}{'RMSE/bound':>12}"
+        f"{'bias/bound':>12}{'covered %':>11}{'width/bound':>13}"
+    )
+    methods = dict.fromkeys(method for estimates, _ in found for method in estimates)
+    for method in methods:
+        for name in PARAMETERS:
+            rows = [estimates[method][name] for estimates, _ in found if method in estimates]
+            bound = limited if method.endswith("rate/20") else bounds
+            yield f"{method:24}{name:5}" + row(rows, getattr(case.model, name), bound[name])
+
+
+def row(parameters: list[Parameter], truth: float, bound: float) -> str:
+    """Return the figures of one parameter of one method."""
+    status = Counter(parameter.status for parameter in parameters)
+    values = [p for p in parameters if p.value is not None and p.status != "at_bound"]
+    counts = (
+        f"{len(parameters):6d}{len(values):7d}{status['not_identified']:8d}{status['absent']:7d}"
+    )
+    if not values:
+        return counts
+    errors = np.array([p.value for p in values], dtype=np.float64) / truth - 1.0
+    text = f"{np.sqrt(np.mean(errors**2)) / bound:12.3f}{errors.mean() / bound:12.2f}"
+    limits = [(p.lower, p.upper) for p in values if p.lower is not None and p.upper is not None]
+    if limits:
+        lower, upper = np.array(limits).T
+        covered = np.mean((lower <= truth) & (truth <= upper))
+        width = np.median(upper - lower) / truth / (3.92 * bound)
+        text += f"{100 * covered:11.1f}{width:13.3f}"
+    return counts + text
 
 
 def main() -> None:
-    """Print a table of relative RMSE in per cent, and how many logs gave a value."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--logs", type=int, default=50)
-    parser.add_argument("--hours", type=float, default=10.0)
+    """Print a table for each case."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--logs", type=int, default=1000)
+    parser.add_argument("--others", type=int, default=200)
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--case", type=int, choices=range(len(CASES)), help="one case only")
     given = parser.parse_args()
-    for name, (model, rate) in CASES.items():
-        rng = np.random.default_rng(1)
-        errors: dict[tuple[str, str], list[float]] = {}
-        for _ in range(given.logs):
-            log = simulate(model, rate, round(given.hours * 3600 * rate), rng)
-            curve = allan_variance(log, rate)
-            for method in METHODS:
-                found = estimate(curve, method, longest=1 / 9).parameters
-                for symbol in PARAMETERS:
-                    value = found[symbol].value
-                    if value is not None:
-                        error = value / getattr(model, symbol) - 1
-                        errors.setdefault((method, symbol), []).append(error)
-        print(
-            f"{name}, {given.logs} simulated logs of {given.hours:g} h: "
-            "RMSE in % (logs with a value)"
-        )
-        print("method    " + "".join(f"{symbol:>16}" for symbol in PARAMETERS))
-        for method in METHODS:
-            cells = ""
-            for symbol in PARAMETERS:
-                found_errors = errors.get((method, symbol), [])
-                rmse = 100 * np.sqrt(np.mean(np.square(found_errors))) if found_errors else np.nan
-                cells += f"{rmse:10.3f} ({len(found_errors):3d})"
-            print(f"{method:10}" + cells)
+    chosen = CASES if given.case is None else (CASES[given.case],)
+    with ProcessPoolExecutor(given.processes) as pool:
+        for case in chosen:
+            found = []
+            for result in pool.map(partial(of_log, case, given.others), range(given.logs)):
+                found.append(result)
+                if len(found) % 50 == 0:
+                    print(f"{case.name}: {len(found)} of {given.logs}", file=sys.stderr)
+            print("\n".join(table(case, found)), end="\n\n", flush=True)
 
 
 if __name__ == "__main__":

@@ -5,8 +5,7 @@ It is as sure as the Cramér-Rao bound allows, to a few per cent, and says how s
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,13 +15,7 @@ from imubench_pipeline.allan import of_blocks
 from imubench_pipeline.estimators import least_squares
 from imubench_pipeline.estimators.band import Band, find_band
 from imubench_pipeline.estimators.estimate import FAMILY, Estimate, Parameter
-from imubench_pipeline.estimators.identifiability import (
-    NOT_IDENTIFIED,
-    NOT_IDENTIFIED_LEVEL,
-    durations_needed,
-    parameter_names,
-    relative_errors,
-)
+from imubench_pipeline.estimators.intervals import describe, papers_only
 from imubench_pipeline.estimators.lines import Line, find, without_lines
 from imubench_pipeline.estimators.model_choice import PAPERS, Candidate, compare
 from imubench_pipeline.estimators.posterior import DRAWS, Posterior, sample
@@ -45,12 +38,8 @@ _LEAST_SHARE = 0.05
 """Candidates of a smaller share do not enter the intervals."""
 
 _FEWEST_DRAWS = 4_000
-_AT_BOUND = 0.985
-_WIDTH_OF_INTERVAL = 3.92
 _QUANTIZATION_BAND = 1 / 10
 """Part of the rate that the band must reach for quantization noise to show."""
-
-_ABSENT = "the data do not ask for it"
 
 
 @dataclass(frozen=True)
@@ -64,8 +53,6 @@ class Likelihood:
         T_B and K.
     candidates : sequence of Candidate
         The models tried, the best first; empty for a log that is too short.
-    papers : Candidate or None
-        The papers' model among them.
     lines : sequence of Line
     band : Band or None
         The frequencies used.
@@ -202,7 +189,7 @@ def fit_spectrum(
         reason = f"the spectrum has {used.sum()} bins, {_FEWEST_BINS} are needed: too short a log"
         nothing = {name: Parameter(None, "not_shown", reason) for name in FAMILY}
         return Likelihood(
-            (Estimate("likelihood", nothing), Estimate("likelihood_gm", _papers_only(nothing))),
+            (Estimate("likelihood", nothing), Estimate("likelihood_gm", papers_only(nothing))),
             (),
             lines,
             None,
@@ -216,24 +203,25 @@ def fit_spectrum(
     sinusoids = [_line_parameters(line) for line in lines if line.narrow]
     chosen = candidates[0]
     draws: dict[Terms, Posterior] = {}
-    alike = [c for c in candidates if c is chosen or c.share >= _LEAST_SHARE]
+    # A ramp is no noise: it is believed or not, and does not widen intervals as a possibility.
+    alike = [
+        c for c in candidates if c is chosen or (c.share >= _LEAST_SHARE and not c.found.terms.ramp)
+    ]
     for candidate in candidates:
         terms = candidate.found.terms
         if candidate in alike or terms == PAPERS:
             part = 1.0 if terms == PAPERS or candidate is chosen else candidate.share
             number = max(_FEWEST_DRAWS, round(part * DRAWS))
             draws[terms] = sample(whittle, candidate.found, rng, number)
-    estimate = _estimate("likelihood", whittle, chosen, alike, draws, limit)
+    estimate = describe("likelihood", whittle, chosen, alike, draws, limit)
     papers = next((c for c in candidates if c.found.terms == PAPERS), None)
     if papers is None:
         raise ValueError(f"{used.sum()} bins are too few for the papers' model")
-    gauss_markov = _estimate("likelihood_gm", whittle, papers, [papers], draws, limit)
+    gauss_markov = describe("likelihood_gm", whittle, papers, [papers], draws, limit)
     return Likelihood(
         (
             replace(estimate, lines=sinusoids),
-            replace(
-                gauss_markov, parameters=_papers_only(gauss_markov.parameters), lines=sinusoids
-            ),
+            replace(gauss_markov, parameters=papers_only(gauss_markov.parameters), lines=sinusoids),
         ),
         candidates,
         lines,
@@ -294,118 +282,6 @@ def model_of(found: Maximum) -> NoiseModel:
         R=found.ramp,
         further=[process for process in processes if process.B > 0],
     )
-
-
-def _papers_only(parameters: Mapping[str, Parameter]) -> dict[str, Parameter]:
-    return {name: parameters[name] for name in ("N", "B", "T_B", "K")}
-
-
-def _estimate(
-    method: str,
-    whittle: Whittle,
-    chosen: Candidate,
-    alike: Sequence[Candidate],
-    draws: dict[Terms, Posterior],
-    band: Band,
-) -> Estimate:
-    """Describe a fit: values with intervals, what is not identified, and what is absent."""
-    found = chosen.found
-    names = parameter_names(found.terms)
-    values = [*np.sqrt(found.powers), *found.times] + [found.ramp] * found.terms.ramp
-    errors = relative_errors(whittle, found)
-    needed = durations_needed(
-        found, whittle.spectrum.rate, float(whittle.spectrum.duration), band.highest
-    )
-    described: dict[str, Parameter] = {}
-    for i, (name, value) in enumerate(zip(names, values, strict=True)):
-        lower, upper = _interval(name, i, found.terms, alike, draws)
-        described[name] = _parameter(
-            name, float(value), float(errors[i]), lower, upper, needed[i], whittle
-        )
-    for number in ("", " 2"):
-        if f"B{number}" in described and described[f"B{number}"].status == "absent":
-            described[f"T_B{number}"] = replace(
-                described[f"B{number}"], lower=None, upper=None, duration_needed=None
-            )
-    absent = Parameter(None, "absent", _ABSENT)
-    parameters = {name: described.get(name, absent) for name in FAMILY}
-    if "B" in described and "T_B" not in described:
-        parameters["T_B"] = Parameter(
-            None, "absent", "bias instability is flicker noise here, which has no correlation time"
-        )
-    further = []
-    if "B 2" in described:
-        further.append({"B": described["B 2"], "T_B": described["T_B 2"]})
-    return Estimate(method, parameters, further)
-
-
-def _parameter(
-    name: str,
-    value: float,
-    error: float,
-    lower: float,
-    upper: float,
-    needed: float | None,
-    whittle: Whittle,
-) -> Parameter:
-    if value == 0.0:
-        reason = f"{_ABSENT}; with 95 % it is below the upper limit"
-        return Parameter(None, "absent", reason, 0.0, upper)
-    if name.startswith("T_B"):
-        for bound, end in ((whittle.longest, "longest"), (whittle.shortest, "shortest")):
-            near = value > bound * _AT_BOUND if end == "longest" else value < bound / _AT_BOUND
-            if near:
-                reason = f"the {end} correlation time that the log can show is {bound:.4g} s"
-                return Parameter(value, "at_bound", reason, lower, upper, needed)
-    most = NOT_IDENTIFIED_LEVEL
-    if name.startswith(("B", "T_B")) and lower > 0.0:
-        # B and T_B trade off along a ridge that the bound, which is local, does not see.
-        error = max(error, math.log(upper / lower) / _WIDTH_OF_INTERVAL)
-        most = NOT_IDENTIFIED
-    if error > most:
-        reason = (
-            f"a log of this length tells it to {100 * error:.0f} % (standard error); only "
-            "its interval is given"
-        )
-        return Parameter(None, "not_identified", reason, lower, upper, needed, value)
-    return Parameter(value, "ok", None, lower, upper, needed)
-
-
-def _interval(
-    name: str,
-    index: int,
-    terms: Terms,
-    alike: Sequence[Candidate],
-    draws: dict[Terms, Posterior],
-) -> tuple[float, float]:
-    """Return the 95 % interval of a parameter, over the models that have it, by their weights."""
-    columns, weights = [], []
-    for candidate in alike:
-        other = candidate.found.terms
-        if other != terms and not _comparable(name, terms, other):
-            continue
-        posterior = draws[other]
-        everything = np.column_stack([posterior.parameters, posterior.times, posterior.ramps])
-        columns.append(everything[:, parameter_names(other).index(name)])
-        weights.append(np.full(len(everything), candidate.share / len(everything)))
-    values, mass = np.concatenate(columns), np.concatenate(weights)
-    order = np.argsort(values)
-    share = np.cumsum(mass[order])
-    cuts = np.searchsorted(share / share[-1], [0.025, 0.975])
-    lower, upper = values[order][np.minimum(cuts, len(values) - 1)]
-    return float(lower), float(upper)
-
-
-def _comparable(name: str, terms: Terms, other: Terms) -> bool:
-    """Tell whether a parameter means the same in two models."""
-    if name not in parameter_names(other):
-        return False
-    if not name.startswith(("B", "T_B")):
-        return True
-    alike = "F" in terms.linear, terms.gauss_markov
-    others = "F" in other.linear, other.gauss_markov
-    # One bias instability is one level, flicker or not; of several each has its own.
-    return alike == others or (name == "B" and sum(alike) == sum(others) == 1)
 
 
 def _line_parameters(line: Line) -> dict[str, Parameter]:

@@ -1,0 +1,160 @@
+"""What a likelihood fit says of each parameter: value, 95 % interval, and whether it is known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from imubench_pipeline.estimators.band import Band
+from imubench_pipeline.estimators.estimate import FAMILY, Estimate, Parameter
+from imubench_pipeline.estimators.identifiability import (
+    NOT_IDENTIFIED,
+    NOT_IDENTIFIED_LEVEL,
+    durations_needed,
+    parameter_names,
+    relative_errors,
+)
+from imubench_pipeline.estimators.model_choice import Candidate
+from imubench_pipeline.estimators.posterior import Posterior
+from imubench_pipeline.estimators.whittle import Terms, Whittle
+
+_AT_BOUND = 0.985
+_WIDTH_OF_INTERVAL = 3.92
+_ABSENT = "the data do not ask for it"
+
+
+def papers_only(parameters: Mapping[str, Parameter]) -> dict[str, Parameter]:
+    """Return the four parameters of the papers' model."""
+    return {name: parameters[name] for name in ("N", "B", "T_B", "K")}
+
+
+def describe(
+    method: str,
+    whittle: Whittle,
+    chosen: Candidate,
+    alike: Sequence[Candidate],
+    draws: dict[Terms, Posterior],
+    band: Band,
+) -> Estimate:
+    """Describe a fit: values with intervals, what is not identified, and what is absent.
+
+    Parameters
+    ----------
+    method : str
+        Name of the estimate.
+    whittle : Whittle
+        The likelihood that was maximised.
+    chosen : Candidate
+        The model to describe.
+    alike : sequence of Candidate
+        The models, ``chosen`` among them, over which the intervals go, by their shares.
+    draws : dict of Terms to Posterior
+        Of the models ``alike``.
+    band : Band
+        The frequencies used.
+
+    Returns
+    -------
+    Estimate
+        Of all the family's parameters.
+    """
+    found = chosen.found
+    names = parameter_names(found.terms)
+    values = [*np.sqrt(found.powers), *found.times] + [found.ramp] * found.terms.ramp
+    errors = relative_errors(whittle, found)
+    needed = durations_needed(
+        found, whittle.spectrum.rate, float(whittle.spectrum.duration), band.highest
+    )
+    described: dict[str, Parameter] = {}
+    for i, (name, value) in enumerate(zip(names, values, strict=True)):
+        lower, upper = _interval(name, i, found.terms, alike, draws)
+        described[name] = _parameter(
+            name, float(value), float(errors[i]), lower, upper, needed[i], whittle
+        )
+    for number in ("", " 2"):
+        if f"B{number}" in described and described[f"B{number}"].status == "absent":
+            described[f"T_B{number}"] = replace(
+                described[f"B{number}"], lower=None, upper=None, duration_needed=None
+            )
+    absent = Parameter(None, "absent", _ABSENT)
+    parameters = {name: described.get(name, absent) for name in FAMILY}
+    if "B" in described and "T_B" not in described:
+        parameters["T_B"] = Parameter(
+            None, "absent", "bias instability is flicker noise here, which has no correlation time"
+        )
+    further = []
+    if "B 2" in described:
+        further.append({"B": described["B 2"], "T_B": described["T_B 2"]})
+    return Estimate(method, parameters, further)
+
+
+def _parameter(
+    name: str,
+    value: float,
+    error: float,
+    lower: float,
+    upper: float,
+    needed: float | None,
+    whittle: Whittle,
+) -> Parameter:
+    if value == 0.0:
+        reason = f"{_ABSENT}; with 95 % it is below the upper limit"
+        return Parameter(None, "absent", reason, 0.0, upper)
+    if name.startswith("T_B"):
+        for bound, end in ((whittle.longest, "longest"), (whittle.shortest, "shortest")):
+            near = value > bound * _AT_BOUND if end == "longest" else value < bound / _AT_BOUND
+            if near:
+                reason = f"the {end} correlation time that the log can show is {bound:.4g} s"
+                return Parameter(value, "at_bound", reason, lower, upper, needed)
+    most = NOT_IDENTIFIED_LEVEL
+    if name.startswith(("B", "T_B")) and lower > 0.0:
+        # B and T_B trade off along a ridge that the bound, which is local, does not see.
+        error = max(error, math.log(upper / lower) / _WIDTH_OF_INTERVAL)
+        most = NOT_IDENTIFIED
+    if error > most:
+        reason = (
+            f"a log of this length tells it to {100 * error:.0f} % (standard error); only "
+            "its interval is given"
+        )
+        return Parameter(None, "not_identified", reason, lower, upper, needed, value)
+    return Parameter(value, "ok", None, lower, upper, needed)
+
+
+def _interval(
+    name: str,
+    index: int,
+    terms: Terms,
+    alike: Sequence[Candidate],
+    draws: dict[Terms, Posterior],
+) -> tuple[float, float]:
+    """Return the 95 % interval of a parameter, over the models that have it, by their weights."""
+    columns, weights = [], []
+    for candidate in alike:
+        other = candidate.found.terms
+        if other != terms and not _comparable(name, terms, other):
+            continue
+        posterior = draws[other]
+        everything = np.column_stack([posterior.parameters, posterior.times, posterior.ramps])
+        columns.append(everything[:, parameter_names(other).index(name)])
+        weights.append(np.full(len(everything), candidate.share / len(everything)))
+    values, mass = np.concatenate(columns), np.concatenate(weights)
+    order = np.argsort(values)
+    share = np.cumsum(mass[order])
+    cuts = np.searchsorted(share / share[-1], [0.025, 0.975])
+    lower, upper = values[order][np.minimum(cuts, len(values) - 1)]
+    return float(lower), float(upper)
+
+
+def _comparable(name: str, terms: Terms, other: Terms) -> bool:
+    """Tell whether a parameter means the same in two models."""
+    if name not in parameter_names(other):
+        return False
+    if not name.startswith(("B", "T_B")):
+        return True
+    alike = "F" in terms.linear, terms.gauss_markov
+    others = "F" in other.linear, other.gauss_markov
+    # One bias instability is one level, flicker or not; of several each has its own.
+    return alike == others or (name == "B" and sum(alike) == sum(others) == 1)
