@@ -39,39 +39,76 @@ _DIFFUSE = 1e4
 
 @dataclass(frozen=True)
 class BlockMeans:
-    """Means over the samples present in blocks of `BLOCK`.
+    """Means over the samples present in blocks of `BLOCK`, no block over two segments.
 
     Attributes
     ----------
+    begin, end : ndarray of int, shape (b,)
+        First and one-past-last sample of each block.
     mean : ndarray, shape (b,)
         rad/s or m/s²; 0 where no sample is present.
     count : ndarray of int, shape (b,)
         Samples present.
     """
 
+    begin: NDArray[np.int64]
+    end: NDArray[np.int64]
     mean: Array
     count: NDArray[np.int64]
 
-    def present(self, samples: int) -> float:
-        """Return the share of samples that are present."""
-        return float(self.count.sum()) / samples
+    def within(self, start: int, stop: int) -> slice:
+        """Return the blocks from one sample to another."""
+        first, last = np.searchsorted(self.begin, [start, stop])
+        return slice(int(first), int(last))
 
 
-def block_means(blocks: Iterable[Array], samples: int) -> BlockMeans:
-    """Return the means of blocks of a log with missing samples (NaN), in one pass."""
-    number = -(-samples // BLOCK)
-    total, count = np.zeros(number), np.zeros(number, dtype=np.int64)
+@dataclass(frozen=True)
+class SlowPath:
+    """The slow part of the noise, the level of the log included, linear between knots.
+
+    Attributes
+    ----------
+    sample : ndarray, shape (k,)
+        Place of the knots on the grid of the log: the middles of blocks, and the ends of parts.
+    value : ndarray, shape (k,)
+        rad/s or m/s².
+    """
+
+    sample: Array
+    value: Array
+
+    def at(self, samples: NDArray[np.int64]) -> Array:
+        """Return the slow part at samples of the log."""
+        return np.interp(samples, self.sample, self.value)
+
+
+def block_means(blocks: Iterable[Array], segments: Sequence[tuple[int, int]]) -> BlockMeans:
+    """Return the means of blocks of a log with missing samples (NaN), in one pass.
+
+    Parameters
+    ----------
+    blocks : iterable of ndarray
+        The log in order.
+    segments : sequence of (int, int)
+        First and one-past-last sample of each, in order.
+    """
+    begin = np.concatenate([np.arange(start, stop, BLOCK) for start, stop in segments])
+    ends = np.concatenate([np.full(-(-(b - a) // BLOCK), b) for a, b in segments])
+    end = np.minimum(begin + BLOCK, ends)
+    total, count = np.zeros(len(begin)), np.zeros(len(begin), dtype=np.int64)
     reached = 0
     for values in blocks:
-        there = np.isfinite(values)
-        place = (reached + np.flatnonzero(there)) // BLOCK
-        first = reached // BLOCK
-        width = (reached + len(values) - 1) // BLOCK + 1 - first if len(values) else 0
-        part = slice(first, first + width)
-        total[part] += np.bincount(place - first, weights=values[there], minlength=width)
-        count[part] += np.bincount(place - first, minlength=width)
+        there = np.flatnonzero(np.isfinite(values))
+        place = np.searchsorted(begin, reached + there, side="right") - 1
+        inside = (place >= 0) & (reached + there < end[place])
+        there, place = there[inside], place[inside]
+        if len(place):
+            first, width = place[0], place[-1] + 1 - place[0]
+            part = slice(first, first + width)
+            total[part] += np.bincount(place - first, weights=values[there], minlength=width)
+            count[part] += np.bincount(place - first, minlength=width)
         reached += len(values)
-    return BlockMeans(total / np.maximum(count, 1), count)
+    return BlockMeans(begin, end, total / np.maximum(count, 1), count)
 
 
 def divided(means: BlockMeans, segments: Sequence[tuple[int, int]]) -> tuple[tuple[int, int], ...]:
@@ -81,26 +118,23 @@ def divided(means: BlockMeans, segments: Sequence[tuple[int, int]]) -> tuple[tup
     ----------
     means : BlockMeans
     segments : sequence of (int, int)
-        First and one-past-last sample of each.
+        First and one-past-last sample of each, as `block_means` had them.
 
     Returns
     -------
     tuple of (int, int)
-        Parts in which every hole can be filled.
+        Parts in which every hole can be filled, from the beginning of a block to the end of one.
     """
     parts: list[tuple[int, int]] = []
     for start, stop in segments:
-        first, last = start // BLOCK, -(-stop // BLOCK)
-        there = np.flatnonzero(means.count[first:last] > 0) + first
+        chosen = means.within(start, stop)
+        there = np.flatnonzero(means.count[chosen] > 0) + chosen.start
         if len(there) == 0:
             continue
         cuts = np.flatnonzero(np.diff(there) > _AHEAD)
-        begins = there[np.concatenate(([0], cuts + 1))] * BLOCK
-        ends = (there[np.append(cuts, len(there) - 1)] + 1) * BLOCK
-        parts += [
-            (max(int(begin), start), min(int(end), stop))
-            for begin, end in zip(begins, ends, strict=True)
-        ]
+        begins = means.begin[there[np.concatenate(([0], cuts + 1))]]
+        ends = means.end[there[np.append(cuts, len(there) - 1)]]
+        parts += zip(begins.tolist(), ends.tolist(), strict=True)
     return tuple(parts)
 
 
@@ -110,14 +144,14 @@ def slow_part(
     model: NoiseModel,
     rate: float,
     rng: np.random.Generator,
-) -> Array:
-    """Draw the slow part of the noise in the middle of each block, given the block means.
+) -> SlowPath:
+    """Draw the slow part of the noise, given the block means.
 
     Parameters
     ----------
     means : BlockMeans
     parts : sequence of (int, int)
-        First and one-past-last sample of each part of the log.
+        First and one-past-last sample of each part of the log (`divided`).
     model : NoiseModel
     rate : float
         Hz.
@@ -125,15 +159,17 @@ def slow_part(
 
     Returns
     -------
-    ndarray, shape (b,)
-        rad/s or m/s², the level of the log included; 0 outside the parts.
+    SlowPath
+        Its jumps lie between the parts.
     """
     interval = BLOCK / rate
-    path = np.zeros(len(means.mean))
     white = max(model.N**2 * rate, 1e-300)
+    places, values = [], []
     for start, stop in parts:
-        chosen = slice(start // BLOCK, -(-stop // BLOCK))
-        mean, count = means.mean[chosen], means.count[chosen]
+        chosen = means.within(start, stop)
+        middle = 0.5 * (means.begin[chosen] + means.end[chosen] - 1)
+        ramp = model.R * middle / rate
+        mean, count = means.mean[chosen] - ramp, means.count[chosen]
         spread = float(np.std(mean[count > 0])) + math.sqrt(white)
         level = float(mean[count > 0].mean())
         terms = [
@@ -150,14 +186,23 @@ def slow_part(
         normals = rng.standard_normal((len(mean), len(terms) + 1))
         state = np.sqrt(np.append(begin[:-1], 0.0)) * rng.standard_normal(len(terms))
         error = white / np.maximum(count, 1)
-        path[chosen] = level + _smoothed(
+        path = level + _smoothed(
             mean - level, count > 0, error, decay, drive, begin, state, normals
         )
-    return path
+        # The path is level from the last middle to the end of the part, which lies before a
+        # jump: between this knot and the first of the next part there is no sample.
+        place = np.concatenate(([start - 0.25], middle, [stop - 0.75]))
+        places.append(place)
+        values.append(np.concatenate((path[:1], path, path[-1:])) + model.R * place / rate)
+    return SlowPath(np.concatenate(places), np.concatenate(values))
 
 
 def filled(
-    blocks: Iterable[Array], path: Array, model: NoiseModel, rate: float, rng: np.random.Generator
+    blocks: Iterable[Array],
+    path: SlowPath,
+    model: NoiseModel,
+    rate: float,
+    rng: np.random.Generator,
 ) -> Iterator[Array]:
     """Yield the blocks of a log with each missing sample replaced by a draw.
 
@@ -165,15 +210,13 @@ def filled(
     ----------
     blocks : iterable of ndarray
         The log in order, NaN where a sample is missing.
-    path : ndarray
-        As `slow_part` gives it.
+    path : SlowPath
     model : NoiseModel
         Its N is the white part.
     rate : float
         Hz.
     rng : numpy.random.Generator
     """
-    middle = np.arange(len(path)) * BLOCK + (BLOCK - 1) / 2.0
     reached = 0
     for values in blocks:
         missing = np.flatnonzero(~np.isfinite(values))
@@ -181,7 +224,7 @@ def filled(
         if len(missing):
             complete = np.array(values, dtype=np.float64)
             white = model.N * math.sqrt(rate) * rng.standard_normal(len(missing))
-            complete[missing] = np.interp(reached + missing, middle, path) + white
+            complete[missing] = path.at(reached + missing) + white
         reached += len(values)
         yield complete
 

@@ -158,7 +158,7 @@ def fit_blocks(
         return fit_spectrum(spectrum, lines, band=band, bandwidth=bandwidth, rng=rng)
     curve = of_blocks(blocks(), samples, rate, holes=True, segments=spans)
     model = least_squares.fit(curve).model
-    means = block_means(blocks(), samples)
+    means = block_means(blocks(), spans)
     parts = divided(means, spans)
     present = float(means.count.sum()) / sum(stop - start for start, stop in parts)
     for last in (False, True):
