@@ -70,7 +70,7 @@ def describe(
     )
     described: dict[str, Parameter] = {}
     for i, (name, value) in enumerate(zip(names, values, strict=True)):
-        lower, upper = _interval(name, i, found.terms, alike, draws)
+        lower, upper = _interval(name, chosen, alike, draws)
         described[name] = _parameter(
             name, float(value), float(errors[i]), lower, upper, needed[i], whittle
         )
@@ -125,13 +125,13 @@ def _parameter(
 
 def _interval(
     name: str,
-    index: int,
-    terms: Terms,
+    chosen: Candidate,
     alike: Sequence[Candidate],
     draws: dict[Terms, Posterior],
 ) -> tuple[float, float]:
-    """Return the 95 % interval of a parameter, over the models that have it, by their weights."""
+    """Return the 95 % interval of a parameter, over the models that have it, by their AIC."""
     columns, weights = [], []
+    terms = chosen.found.terms
     for candidate in alike:
         other = candidate.found.terms
         if other != terms and not _comparable(name, terms, other):
@@ -139,7 +139,8 @@ def _interval(
         posterior = draws[other]
         everything = np.column_stack([posterior.parameters, posterior.times, posterior.ramps])
         columns.append(everything[:, parameter_names(other).index(name)])
-        weights.append(np.full(len(everything), candidate.share / len(everything)))
+        weight = math.exp(0.5 * (chosen.aic - candidate.aic))
+        weights.append(np.full(len(everything), weight / len(everything)))
     values, mass = np.concatenate(columns), np.concatenate(weights)
     order = np.argsort(values)
     share = np.cumsum(mass[order])

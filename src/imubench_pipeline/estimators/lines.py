@@ -111,21 +111,29 @@ def find(
     list of Line
         By frequency.
     """
-    searched = [_range(spectrum, rate, crossover) for spectrum in spectra]
+    divided = crossover if len(spectra) > 1 else 0.0
+    searched = [_range(spectrum, divided) for spectrum in spectra]
     total = sum(max(0, high - low) for low, high in searched)
     found: list[Line] = []
     for spectrum, (low, high) in zip(spectra, searched, strict=True):
         if high > low:
-            found += _lines(spectrum, model, rate, low, high, total)
+            new = _lines(spectrum, model, rate, low, high, total)
+            # A line near the crossover shows in both, sharper in the first.
+            found += [line for line in new if not any(_same(line, other) for other in found)]
     return sorted(found, key=lambda line: line.frequency)
 
 
-def _range(spectrum: LineSpectrum, rate: float, crossover: float) -> tuple[int, int]:
-    step = spectrum.frequency[1]
+def _range(spectrum: LineSpectrum, crossover: float) -> tuple[int, int]:
+    """Return the first bin to look at, and the one past the last."""
+    between = int(crossover / spectrum.frequency[1])
     if spectrum.block > 1:
-        return _FIRST, int(crossover / step)
-    first = _FIRST if spectrum.points < 1 << 15 or crossover <= 0 else int(crossover / step)
-    return max(_FIRST, first), len(spectrum.frequency) - 1
+        return _FIRST, between
+    return max(_FIRST, between), len(spectrum.frequency) - 1
+
+
+def _same(line: Line, other: Line) -> bool:
+    wide = _BESIDE * line.resolution + 0.5 * other.width
+    return abs(line.frequency - other.frequency) <= wide
 
 
 def _lines(
