@@ -26,8 +26,6 @@ BY_NAME = {peer.name: peer for peer in peers.PEERS}
 
 
 def of_program(name: str, log: np.ndarray, rate: float = RATE) -> dict[str, float | None]:
-    if name == "allan-variance":
-        pytest.importorskip("allan_variance")
     return BY_NAME[name].estimate(log, rate)
 
 
