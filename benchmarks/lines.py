@@ -17,8 +17,9 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
-from imubench_pipeline.estimators.likelihood import fit
+from imubench_pipeline.estimators.likelihood import lines_and_band
 from imubench_pipeline.estimators.lines import Line
 from imubench_pipeline.noise import NoiseModel, Sinusoid
 from imubench_pipeline.simulate import simulate
@@ -37,7 +38,12 @@ RATIOS = (2.0, 4.0, 8.0, 20.0, 100.0)
 def without(name: str, number: int) -> bool:
     """Tell whether a line is found in a log that has none."""
     rng = np.random.default_rng([number, len(name)])
-    return bool(fit(simulate(MODELS[name], RATE, SAMPLES, rng), RATE, rng=rng).lines)
+    return bool(found_in(simulate(MODELS[name], RATE, SAMPLES, rng)))
+
+
+def found_in(log: NDArray[np.float64]) -> list[Line]:
+    """Return the lines that the likelihood leaves out."""
+    return lines_and_band(*spectra([log], len(log), RATE))[0]
 
 
 def bin_width(frequency: float) -> float:
@@ -62,8 +68,7 @@ def with_line(ratio: float, number: int) -> tuple[Sinusoid, float, list[Line]]:
     time = np.arange(SAMPLES) / RATE
     log = simulate(model, RATE, SAMPLES, rng)
     log += line.amplitude * np.sin(2.0 * np.pi * frequency * time + phase)
-    found = fit(log, RATE, rng=rng).lines
-    return line, ratio * width * SAMPLES / RATE, list(found)
+    return line, ratio * width * SAMPLES / RATE, found_in(log)
 
 
 def row(ratio: float, logs: list[tuple[Sinusoid, float, list[Line]]]) -> Iterator[str]:

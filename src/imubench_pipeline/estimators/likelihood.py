@@ -167,7 +167,7 @@ def fit_blocks(
         spectrum, lines = spectra(complete, samples, rate, parts)
         spectrum = replace(spectrum, ordinates=spectrum.ordinates * present)
         if not last:
-            _, used, limit = _prepared(spectrum, lines, band, bandwidth)
+            _, used, limit = lines_and_band(spectrum, lines, band, bandwidth)
             if used.sum() < _FEWEST_BINS:
                 break
             whittle = whittle_of(spectrum.taken(used), limit.highest)
@@ -184,7 +184,7 @@ def fit_spectrum(
     rng: np.random.Generator,
 ) -> Likelihood:
     """Estimate the noise parameters from a spectrum (see `fit`)."""
-    lines, used, limit = _prepared(spectrum, line_spectra, band, bandwidth)
+    lines, used, limit = lines_and_band(spectrum, line_spectra, band, bandwidth)
     if used.sum() < _FEWEST_BINS:
         reason = f"the spectrum has {used.sum()} bins, {_FEWEST_BINS} are needed: too short a log"
         nothing = {name: Parameter(None, "not_shown", reason) for name in FAMILY}
@@ -240,13 +240,29 @@ def whittle_of(spectrum: Spectrum, highest: float, shapes: int = SHAPES) -> Whit
     return Whittle(spectrum, min(shortest, longest / 4.0), longest, shapes)
 
 
-def _prepared(
+def lines_and_band(
     spectrum: Spectrum,
     line_spectra: Sequence[LineSpectrum],
-    asked: float | None,
-    bandwidth: float | None,
+    asked: float | None = None,
+    bandwidth: float | None = None,
 ) -> tuple[list[Line], NDArray[np.bool_], Band]:
-    """Find lines and the band; return them, and the bins to use."""
+    """Find the lines of a spectrum, and the bins that show noise and nothing else.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+    line_spectra : sequence of LineSpectrum
+        As `imubench_pipeline.spectrum.spectra` gives them.
+    asked, bandwidth : float, optional
+        ``band`` and ``bandwidth`` of `fit`.
+
+    Returns
+    -------
+    lines : list of Line
+    used : ndarray of bool, shape (b,)
+        The bins below the end of the band, and clear of lines.
+    band : Band
+    """
     everything = np.ones(len(spectrum.frequency), dtype=np.bool_)
     start = min(asked or np.inf, 0.05 * spectrum.rate)
     below = spectrum.upper <= start

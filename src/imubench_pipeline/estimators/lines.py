@@ -21,7 +21,7 @@ from imubench_pipeline.spectrum import LineSpectrum, Spectrum
 
 Array = NDArray[np.float64]
 
-FALSE_ALARM = 0.01
+FALSE_ALARM = 0.005
 """Chance that a channel without lines shows one."""
 
 _LEVEL = 129
