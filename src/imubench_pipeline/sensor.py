@@ -37,7 +37,9 @@ class ColumnSource(Strict):
         None, description="file inside a recording that is a folder; null: the only one"
     )
     variable: str | None = Field(
-        None, description="MATLAB variable; null: the only one of the file"
+        None,
+        description="variable or dataset of a MATLAB, NumPy or HDF5 file, topic of a ROS bag; "
+        "null: the only one of the file",
     )
     scale: float = Field(1.0, description="unit per count or volt")
     offset: float = Field(0.0, description="counts or volts at zero: scale * (raw - offset)")
@@ -55,22 +57,39 @@ class TimeSource(Strict):
     """Where the time stamps are found, and how they are written."""
 
     column: str | int = Field(description="name in the header, or position counted from 1")
-    unit: Literal["s", "ms", "us", "ns"] | None = Field(None, description="unit of numeric stamps")
+    unit: Literal["s", "ms", "us", "ns", "samples"] | None = Field(
+        None,
+        description="unit of numeric stamps; samples: the column counts samples, and 'rate' "
+        "says how long one lasts",
+    )
     format: Literal["iso8601"] | None = Field(None, description="format of stamps in text")
+    wraps: float | None = Field(
+        None,
+        gt=0,
+        description="where the stamps start again from 0, in their unit, such as 65536 for a "
+        "counter of 16 bits; null: they never do",
+    )
 
     @model_validator(mode="after")
     def _one_way(self) -> TimeSource:
         if (self.unit is None) == (self.format is None):
-            raise ValueError("expected either 'unit' (s, ms, us, ns) or 'format' (iso8601)")
+            raise ValueError(
+                "expected either 'unit' (s, ms, us, ns, samples) or 'format' (iso8601)"
+            )
         if isinstance(self.column, int) and self.column < 1:
             raise ValueError(f"column {self.column}: columns are counted from 1")
         return self
 
 
+Reader = Literal["csv", "vectornav", "ubx", "rosbag", "matlab", "numpy", "arrow", "hdf5"]
+
+
 class LogFormat(Strict):
     """How the logs of a sensor are written."""
 
-    reader: Literal["csv", "matlab"] = Field("csv", description="format of the files")
+    reader: Reader | None = Field(
+        None, description="format of the files; null: found in the file by its first bytes"
+    )
     rate: Frequency | None = Field(
         None, description="sampling rate with its unit; needed where there are no stamps"
     )
@@ -95,6 +114,8 @@ class LogFormat(Strict):
     def _consistent(self) -> LogFormat:
         if self.rate is None and self.time is None:
             raise ValueError("expected 'rate' (such as 100 Hz) or 'time': neither is there")
+        if self.time is not None and self.time.unit == "samples" and self.rate is None:
+            raise ValueError("'time' counts samples; expected 'rate' (such as 100 Hz) with it")
         for channel, source in self.channels.items():
             _check_unit(source.unit, QUANTITIES[quantity_of(channel)], f"channels.{channel}.unit")
         if self.temperature is not None:

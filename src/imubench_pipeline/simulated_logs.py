@@ -39,7 +39,7 @@ def write_simulated(recording: SimulatedRecording, log: LogFormat, folder: Path)
     ConfigError
         If the logs of the sensor are not text.
     """
-    if log.reader != "csv":
+    if log.reader not in (None, "csv"):
         raise ConfigError(
             f"{recording.sensor}: simulated logs are written as text, the sensor file has "
             f"reader {log.reader!r}"

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 
 from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
 from imubench_pipeline.noise import NoiseModel
@@ -32,22 +33,23 @@ def relative_errors(whittle: Whittle, found: Maximum) -> Array:
     Shape (m,): the parameters in the order of `Maximum.powers`, then T_B, then R; infinite for a
     term that is 0.
     """
-    information = whittle.information(found)
+    sensitivity = whittle.sensitivity(found)
     if found.terms.ramp:
-        information[-1] *= found.ramp
-        information[:, -1] *= found.ramp
-    return _bounds(information)
+        sensitivity[-1] *= found.ramp
+    return _bounds(sensitivity)
 
 
-def _bounds(information: Array) -> Array:
-    """Return the square roots of the diagonal of the inverse."""
-    result = np.full(len(information), np.inf)
-    size = np.sqrt(np.diag(information))
+def _bounds(sensitivity: Array) -> Array:
+    """Return the square roots of the diagonal of the inverse of the information."""
+    result = np.full(len(sensitivity), np.inf)
+    size = np.linalg.norm(sensitivity, axis=1)
     there = size > 1e-9
     if there.any():
-        scaled = information[np.ix_(there, there)] / np.outer(size[there], size[there])
-        inverse = np.linalg.pinv(scaled, rcond=1e-12, hermitian=True)
-        result[there] = np.sqrt(np.diag(inverse)) / size[there]
+        # Not from the information itself: squared, what can hardly be told apart is lost.
+        root = np.linalg.qr((sensitivity[there] / size[there, None]).T, mode="r")
+        if np.abs(np.diag(root)).min() > 0.0:
+            inverse = solve_triangular(root, np.eye(len(root)))
+            result[there] = np.linalg.norm(inverse, axis=1) / size[there]
     return result
 
 
@@ -59,7 +61,8 @@ def ideal_spectrum(rate: float, duration: float, highest: float) -> Spectrum:
     ValueError
         If no ordinate lies below the frequency.
     """
-    count = math.floor(min(highest, 0.5 * rate * (1 - 1e-9)) * 2.0 * duration)
+    samples = math.floor(rate * duration + 1e-6)
+    count = min(math.floor(2.0 * highest * duration + 1e-6), samples - 1)
     if count < 1:
         raise ValueError(f"a log of {duration:.3g} s has no ordinate up to {highest:.3g} Hz")
     edges = list(range(1, min(SINGLE, count) + 1))
@@ -163,7 +166,7 @@ def _errors(spectrum: Spectrum, found: Maximum) -> Array:
     """Return the relative bounds of a model in a spectrum's bins."""
     times = found.times if len(found.times) else np.array([1.0])
     # A narrow table around the correlation times is enough for their derivatives.
-    shapes = 3 if len(times) == 1 else 24
+    shapes = 3 if len(times) == 1 else 96
     whittle = Whittle(spectrum, float(times[0]) / 1.2, float(times[-1]) * 1.2, shapes)
     return relative_errors(whittle, found)
 

@@ -1,6 +1,7 @@
 """Posterior intervals of the parameters of a model: adaptive Metropolis on the Whittle likelihood.
 
-Flat in log N, in log T_B up to a fifth of the log, in R, and in the amplitudes Q, B and K.
+Flat in the amplitudes Q, N, B and K, in R, and in log T_B up to a fifth of the log. (Flat in log N
+has no lower end: where another term explains the spectrum without N, all of it would go there.)
 """
 
 from __future__ import annotations
@@ -75,8 +76,6 @@ def sample(
     p, g = linear + terms.gauss_markov, terms.gauss_markov
     fixed = np.column_stack([whittle.column(letter) for letter in terms.linear])
     first, step = whittle.grid
-    # Flat in the amplitude a is e^x in x = log a; white noise is flat in x itself.
-    flat = np.array([letter != "N" for letter in terms.linear] + [True] * g, dtype=np.float64)
     ramp_unit = float(np.sqrt(1.0 / max(_ramp_information(whittle, start), 1e-300)))
     at = [*np.log(np.sqrt(start.powers)), *np.log(start.times)]
     if terms.ramp:
@@ -95,7 +94,6 @@ def sample(
         whittle.spectrum.density / whittle.scale,
         whittle.spectrum.cross / whittle.scale * ramp_unit,
         whittle.spectrum.ramp / whittle.scale * ramp_unit**2,
-        flat,
         g,
         terms.ramp,
         first,
@@ -144,7 +142,6 @@ def _log_posterior(
     density: Array,
     cross: Array,
     ramp: Array,
-    flat: Array,
     processes: int,
     with_ramp: bool,
     first: float,
@@ -159,7 +156,7 @@ def _log_posterior(
     last = first + step * (table.shape[0] - 1)
     prior = 0.0
     for j in range(p):
-        prior += flat[j] * x[j]
+        prior += x[j]  # flat in the amplitude a is e^x in x = log a
     for i in range(nu.size):
         total = 0.0
         for j in range(linear):
@@ -192,7 +189,6 @@ def _metropolis(
     density: Array,
     cross: Array,
     ramp: Array,
-    flat: Array,
     processes: int,
     with_ramp: bool,
     first: float,
@@ -207,7 +203,6 @@ def _metropolis(
         density,
         cross,
         ramp,
-        flat,
         processes,
         with_ramp,
         first,

@@ -178,10 +178,11 @@ class Whittle:
         powers[: len(size)] /= size
         return Maximum(terms, powers, times, ramp, cost)
 
-    def information(self, found: Maximum) -> Array:
-        """Return the Fisher information of (log of each parameter ..., log T_B ..., R).
+    def sensitivity(self, found: Maximum) -> Array:
+        """Return S with S S^T the Fisher information of (log parameter ..., log T_B ..., R).
 
-        Shape (m, m); the parameters stand in the order of `Maximum.powers`, then `times`.
+        Shape (m, b), or (m, 2 b) with a ramp, which shares no information with the others; the
+        parameters stand in the order of `Maximum.powers`, then `times`.
         """
         total = self.density(found)
         matrix = self.matrix(found.terms, found.times)
@@ -197,11 +198,16 @@ class Whittle:
             )
             change = self.gauss_markov(high) - self.gauss_markov(low)
             rows.append(power * change / np.log(high / low) / total)
-        jacobian = np.array(rows)
-        information = (jacobian * self._nu / 2.0) @ jacobian.T
+        noise = np.array(rows) * np.sqrt(self._nu / 2.0)
         if not found.terms.ramp:
-            return np.asarray(information)
-        full = np.zeros((len(rows) + 1, len(rows) + 1))
-        full[:-1, :-1] = information
-        full[-1, -1] = np.sum(self._nu * self.spectrum.ramp / total)
+            return np.asarray(noise)
+        bins = len(total)
+        full = np.zeros((len(rows) + 1, 2 * bins))
+        full[:-1, :bins] = noise
+        full[-1, bins:] = np.sqrt(self._nu * self.spectrum.ramp / total)
         return full
+
+    def information(self, found: Maximum) -> Array:
+        """Return the Fisher information of (log of each parameter ..., log T_B ..., R)."""
+        sensitivity = self.sensitivity(found)
+        return np.asarray(sensitivity @ sensitivity.T)

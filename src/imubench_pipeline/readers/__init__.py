@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 
 from imubench_pipeline.readers.batch import TEMPERATURE, Batch, LogFile, RecordingError
-from imubench_pipeline.sensor import ColumnSource, LogFormat
+from imubench_pipeline.readers.content import is_ros_2_bag, reader_of
+from imubench_pipeline.sensor import ColumnSource, LogFormat, Reader
+
+_CLASSES: dict[Reader, tuple[str, str]] = {
+    "csv": ("imubench_pipeline.readers.csv", "CsvFile"),
+    "matlab": ("imubench_pipeline.readers.matlab", "MatlabFile"),
+}
+"""Module and class of each reader: only those that a run needs are imported."""
 
 __all__ = ["TEMPERATURE", "Batch", "LogFile", "RecordingError", "log_files", "read"]
 
@@ -50,6 +58,8 @@ def read(path: Path, log: LogFormat) -> list[LogFile]:
 
 
 def _file_of(path: Path, source: ColumnSource, name: str) -> Path:
+    if is_ros_2_bag(path):
+        return path
     present = log_files(path)
     if source.file is not None:
         if not path.is_dir():
@@ -73,10 +83,7 @@ def _file_of(path: Path, source: ColumnSource, name: str) -> Path:
 
 
 def _open(file: Path, log: LogFormat, sources: dict[str, ColumnSource]) -> LogFile:
-    if log.reader == "matlab":
-        from imubench_pipeline.readers.matlab import MatlabFile
-
-        return MatlabFile(file, log, sources)
-    from imubench_pipeline.readers.csv import CsvFile
-
-    return CsvFile(file, log, sources)
+    reader = log.reader or reader_of(file)
+    module, name = _CLASSES[reader]
+    kind: type[LogFile] = getattr(import_module(module), name)
+    return kind(file, log, sources)

@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +58,8 @@ class LogFile(ABC):
         The columns that are taken from this file: channels, and perhaps temperature.
     started : str or None
         ISO 8601 date and time of the first sample, known after the first batch.
+    rate : float or None
+        Sampling rate that the file itself states, Hz; known after the first batch.
     findings : list of Finding
         What was left out or passed over; complete once `batches` is exhausted.
     """
@@ -65,6 +68,7 @@ class LogFile(ABC):
     log: LogFormat
     sources: Mapping[str, ColumnSource]
     started: str | None = None
+    rate: float | None = None
     findings: list[Finding] = field(default_factory=list)
 
     @abstractmethod
@@ -76,6 +80,15 @@ class LogFile(ABC):
         RecordingError
             If the file is not what its sensor file says, or is corrupt inside.
         """
+
+    def seconds(self, stamps: NDArray[Any], first: Any) -> NDArray[np.float64]:
+        """Convert stamps as written to s since the first one; integers lose no digit."""
+        assert self.log.time is not None  # asked for where there are stamps
+        unit = self.log.time.unit or "ns"
+        if unit == "samples":
+            assert self.log.rate_hz is not None  # checked with the sensor file
+            return np.asarray((stamps - first) / self.log.rate_hz, np.float64)
+        return np.asarray((stamps - first) * SECONDS[unit], np.float64)
 
     def to_si(self, name: str, raw: NDArray[np.float64]) -> NDArray[np.float64]:
         """Convert the figures of a column as written to SI: scale * (raw - offset), then unit."""

@@ -14,7 +14,7 @@ import pyarrow.csv as pacsv
 from numpy.typing import NDArray
 
 from imubench_pipeline.findings import Finding
-from imubench_pipeline.readers.batch import SECONDS, Batch, LogFile, RecordingError
+from imubench_pipeline.readers.batch import Batch, LogFile, RecordingError
 from imubench_pipeline.readers.complete_lines import CompleteLines, first_lines, open_text
 
 _BLOCK_BYTES = 4 << 20
@@ -91,7 +91,7 @@ class CsvFile(LogFile):
                         stamps = _stamps(part.column(time_name))
                         if first_stamp is None:
                             first_stamp = self._first(stamps)
-                        time = self._seconds(stamps, first_stamp)
+                        time = self.seconds(stamps, first_stamp)
                     yield Batch(
                         time,
                         {
@@ -234,10 +234,6 @@ class CsvFile(LogFile):
         if self.log.time.format == "iso8601":
             self.started = str(np.datetime64(int(valid[0]), "ns"))[:23]
         return valid[0]
-
-    def _seconds(self, stamps: NDArray[Any], first: Any) -> NDArray[np.float64]:
-        assert self.log.time is not None
-        return np.asarray((stamps - first) * SECONDS[self.log.time.unit or "ns"], np.float64)
 
     # --------------------------------------------------------------------------- faults
 

@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.readers.batch import SECONDS, Batch, LogFile, RecordingError
+from imubench_pipeline.readers.batch import Batch, LogFile, RecordingError
 
 _BLOCK_ROWS = 1 << 18
 
@@ -61,7 +61,7 @@ class MatlabFile(LogFile):
                 finite = read[np.isfinite(read)]
                 if first is None and len(finite):
                     first = finite[0]
-                stamps = (read - (first or 0.0)) * SECONDS[self.log.time.unit or "s"]
+                stamps = self.seconds(read, first or 0.0)
             yield Batch(
                 stamps,
                 {name: self.to_si(name, column.block(start)) for name, column in columns.items()},
