@@ -24,8 +24,9 @@ from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators import least_squares
 from imubench_pipeline.estimators.estimate import PARAMETERS, Estimate, Parameter
 from imubench_pipeline.estimators.identifiability import bounds_of
-from imubench_pipeline.estimators.likelihood import fit_spectrum, whittle_of
+from imubench_pipeline.estimators.likelihood import fit_spectrum
 from imubench_pipeline.estimators.model_choice import PAPERS
+from imubench_pipeline.estimators.whittle import whittle_of
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.simulate import simulate
 from imubench_pipeline.spectrum import spectra

@@ -13,9 +13,10 @@ from typing import TypeVar
 import numpy as np
 import scipy.fft
 
-from imubench_pipeline.estimators.likelihood import fit, whittle_of
+from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.estimators.model_choice import PAPERS, compare
 from imubench_pipeline.estimators.posterior import sample
+from imubench_pipeline.estimators.whittle import whittle_of
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.simulate import simulate
 from imubench_pipeline.spectrum import spectra

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from imubench_pipeline.sensor import QUANTITIES, Channel, Sensor, quantity_of
 from imubench_pipeline.units import UnitError, quantity_to_si
@@ -104,6 +104,7 @@ class EstimateSettings(Strict):
     methods: tuple[Method, ...] = Field(
         ("likelihood", "likelihood_gm", "curve", "paper", "weighted"), min_length=1
     )
+
     longest: FractionOfLog = Field(
         1 / 9, description="longest tau of a fit to the curve, as a part of the log"
     )
@@ -115,6 +116,13 @@ class EstimateSettings(Strict):
     seed: int = Field(
         20260101, ge=0, description="of the draws that give the intervals, and fill holes"
     )
+
+    @field_validator("methods")
+    @classmethod
+    def _once(cls, methods: tuple[Method, ...]) -> tuple[Method, ...]:
+        if len(set(methods)) < len(methods):
+            raise ValueError(f"{', '.join(methods)}: a method stands twice")
+        return methods
 
 
 class ReconstructionSettings(Strict):

@@ -12,8 +12,7 @@ from imubench_pipeline.estimators.identifiability import (
     parameter_names,
     relative_errors,
 )
-from imubench_pipeline.estimators.likelihood import whittle_of
-from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
+from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle, whittle_of
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from tests.estimators.test_least_squares import C102, MTI_7
 

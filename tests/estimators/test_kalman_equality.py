@@ -9,8 +9,7 @@ from scipy import optimize
 from scipy.integrate import quad
 
 from imubench_pipeline.estimators.identifiability import NOT_IDENTIFIED, bounds_of
-from imubench_pipeline.estimators.likelihood import whittle_of
-from imubench_pipeline.estimators.whittle import Maximum, Terms
+from imubench_pipeline.estimators.whittle import Maximum, Terms, whittle_of
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.simulate import block_sums, simulate
 from imubench_pipeline.spectrum import spectra

@@ -3,9 +3,8 @@ import pytest
 from scipy import stats
 from scipy.interpolate import PchipInterpolator
 
-from imubench_pipeline.estimators.likelihood import whittle_of
 from imubench_pipeline.estimators.posterior import DRAWS, sample
-from imubench_pipeline.estimators.whittle import SHAPES, Maximum, Terms, Whittle
+from imubench_pipeline.estimators.whittle import SHAPES, Maximum, Terms, Whittle, whittle_of
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.simulate import simulate
 from imubench_pipeline.spectrum import spectra

@@ -6,8 +6,7 @@ import pytest
 import scipy.fft
 from scipy import optimize, stats
 
-from imubench_pipeline.estimators.likelihood import whittle_of
-from imubench_pipeline.estimators.whittle import SHAPES, Maximum, Terms, Whittle
+from imubench_pipeline.estimators.whittle import SHAPES, Maximum, Terms, Whittle, whittle_of
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.simulate import simulate
 from imubench_pipeline.spectral_shapes import Shapes

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
+from imubench_pipeline.estimators.whittle import COARSE, Maximum, Terms, Whittle, whittle_of
 from imubench_pipeline.spectrum import Spectrum
 
 Array = NDArray[np.float64]
@@ -23,9 +23,12 @@ _FILTER = 10.0
 _BENT_SIGMAS = 4.0
 _GROUP = 4
 _MOST_STEPS = 8
+_AS_A_FILTER = 100
+"""Sampling intervals: a correlation may be shorter only where white noise shows beside it."""
+
 _FEWEST_BINS = 24
 _SETTLED = 0.95
-_FLEXIBLE = Terms("NFK")
+_FLEXIBLE = Terms("NFK", 1)
 
 
 @dataclass(frozen=True)
@@ -124,25 +127,49 @@ def _departure(
     terms: Terms,
 ) -> tuple[float, float] | None:
     """Return frequency and relative size of the first departure beyond some bins, if any."""
-    whittle = _whittle(spectrum.taken(below))
+    chosen = spectrum.taken(below)
+    whittle = _whittle(chosen)
     found = whittle.maximum(terms)
+    if _looks_like_a_filter(whittle, found):
+        found = whittle.maximum(replace(terms, gauss_markov=0))
     beyond = clear & ~below & (spectrum.upper <= cap * (1 + 1e-9))
     if not beyond.any():
         return None
-    return _first_departure(spectrum.taken(beyond), found, float(spectrum.ordinates[below].sum()))
+    return _first_departure(spectrum.taken(beyond), whittle, found)
+
+
+def _looks_like_a_filter(whittle: Whittle, found: Maximum) -> bool:
+    """Tell whether a short correlation leaves no white noise to be seen beyond its corner.
+
+    White noise behind a first-order filter is a Gauss-Markov process.
+    """
+    if not len(found.times) or found.times[0] > _AS_A_FILTER / whittle.spectrum.rate:
+        return False
+    process = found.powers[-1] * whittle.gauss_markov(float(found.times[0]))[-1]
+    return bool(process > found.powers[found.terms.linear.index("N")] * whittle.column("N")[-1])
 
 
 def _first_departure(
-    rest: Spectrum, found: Maximum, ordinates: float
+    rest: Spectrum, whittle: Whittle, found: Maximum
 ) -> tuple[float, float] | None:
-    ratio = rest.density / _whittle(rest).density(found) - 1.0
-    known = 2.0 / ordinates
+    """Return frequency and relative size of the first departure from a fit, if any.
+
+    A departure is measured by the errors of the bins, and of the fit carried on to them.
+    """
+    there = whittle.sensitivity(found)
+    _, strength, directions = np.linalg.svd(there.T, full_matrices=False)
+    carried = Whittle(rest, whittle.shortest, whittle.longest, len(whittle.times))
+    ratio = rest.density / carried.density(found) - 1.0
+    slopes = carried.sensitivity(found) / np.sqrt(rest.ordinates / 2.0)
+    kept = strength > 1e-9 * strength[0]
+    errors = (directions[kept] / strength[kept, None]) @ slopes
     for i in range(0, len(ratio), _GROUP):
         nu = rest.ordinates[i : i + _GROUP]
-        mean = float(ratio[i : i + _GROUP] @ nu / nu.sum())
+        share = nu / nu.sum()
+        mean = float(ratio[i : i + _GROUP] @ share)
+        known = float(np.sum((errors[:, i : i + _GROUP] @ share) ** 2))
         if abs(mean) > _BENT_SIGMAS * math.sqrt(2.0 / nu.sum() + known):
-            frequency = float(rest.frequency[i : i + _GROUP] @ nu / nu.sum())
-            return frequency, abs(mean)
+            return float(rest.frequency[i : i + _GROUP] @ share), abs(mean)
     return None
 
 
@@ -150,13 +177,13 @@ def _quantized(spectrum: Spectrum, clear: NDArray[np.bool_], cap: float) -> bool
     """Tell whether quantization noise explains the spectrum up to Nyquist."""
     inside = clear & (spectrum.upper <= cap * (1 + 1e-9))
     chosen = spectrum.taken(inside)
-    found = _whittle(chosen).maximum(Terms("QNFK"))
+    whittle = _whittle(chosen)
+    found = whittle.maximum(Terms("QNFK"))
     if found.parameter("Q") == 0.0:
         return False
     high = chosen.taken(chosen.frequency > _DEFAULT * spectrum.rate)
-    return _first_departure(high, found, float(chosen.ordinates.sum())) is None
+    return _first_departure(high, whittle, found) is None
 
 
 def _whittle(spectrum: Spectrum) -> Whittle:
-    """Return the likelihood of models that need no correlation times."""
-    return Whittle(spectrum, 1.0, 2.0, shapes=2)
+    return whittle_of(spectrum, float(spectrum.upper.max()), COARSE)

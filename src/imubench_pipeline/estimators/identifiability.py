@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 NOT_IDENTIFIED = 0.5
 """Relative standard deviation beyond which a B or T_B is not given as a number."""
 
-NOT_IDENTIFIED_LEVEL = 0.6
+NOT_IDENTIFIED_LEVEL = 0.75
 """That of the other parameters: their bound at the fitted value scatters with the value."""
 
 WANTED = 0.1

@@ -24,6 +24,30 @@ from imubench_pipeline.estimators.whittle import Terms, Whittle
 _AT_BOUND = 0.985
 _WIDTH_OF_INTERVAL = 3.92
 _ABSENT = "the data do not ask for it"
+_ABSENT_BELOW = f"{_ABSENT}; with 95 % it is below the upper limit"
+
+
+def with_upper_limits(
+    estimate: Estimate, wider: Sequence[Candidate], draws: dict[Terms, Posterior]
+) -> Estimate:
+    """Return an estimate with upper limits of the K and B that its model does not have.
+
+    Parameters
+    ----------
+    estimate : Estimate
+    wider : sequence of Candidate
+        The model with a random walk, or with flicker noise, beside its terms.
+    draws : dict of Terms to Posterior
+    """
+    parameters = dict(estimate.parameters)
+    for candidate in wider:
+        terms = candidate.found.terms
+        for name, letter in (("K", "K"), ("B", "F")):
+            if letter in terms.linear and parameters[name].status == "absent":
+                column = draws[terms].parameters[:, terms.linear.index(letter)]
+                upper = float(np.quantile(column, 0.975))
+                parameters[name] = Parameter(None, "absent", _ABSENT_BELOW, 0.0, upper)
+    return replace(estimate, parameters=parameters)
 
 
 def papers_only(parameters: Mapping[str, Parameter]) -> dict[str, Parameter]:
@@ -101,8 +125,9 @@ def _parameter(
     whittle: Whittle,
 ) -> Parameter:
     if value == 0.0:
-        reason = f"{_ABSENT}; with 95 % it is below the upper limit"
-        return Parameter(None, "absent", reason, 0.0, upper)
+        return Parameter(None, "absent", _ABSENT_BELOW, 0.0, upper)
+    # At the end of a search, or where draws are few, the best value lies at the edge.
+    lower, upper = min(lower, value), max(upper, value)
     if name.startswith("T_B"):
         for bound, end in ((whittle.longest, "longest"), (whittle.shortest, "shortest")):
             near = value > bound * _AT_BOUND if end == "longest" else value < bound / _AT_BOUND

@@ -5,6 +5,7 @@ It is as sure as the Cramér-Rao bound allows, to a few per cent, and says how s
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -15,29 +16,27 @@ from imubench_pipeline.allan import of_blocks
 from imubench_pipeline.estimators import least_squares
 from imubench_pipeline.estimators.band import Band, find_band
 from imubench_pipeline.estimators.estimate import FAMILY, Estimate, Parameter
-from imubench_pipeline.estimators.intervals import describe, papers_only
+from imubench_pipeline.estimators.intervals import describe, papers_only, with_upper_limits
 from imubench_pipeline.estimators.lines import Line, find, without_lines
 from imubench_pipeline.estimators.model_choice import PAPERS, Candidate, compare
 from imubench_pipeline.estimators.posterior import DRAWS, Posterior, sample
-from imubench_pipeline.estimators.whittle import SHAPES, Maximum, Terms, Whittle
+from imubench_pipeline.estimators.whittle import COARSE, Maximum, Terms, whittle_of
 from imubench_pipeline.missing import block_means, divided, filled, slow_part
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.spectrum import LineSpectrum, Spectrum, spectra
 
 Array = NDArray[np.float64]
+Span = tuple[int, int]
 
-_SHORTEST_CORRELATION = 20
-"""Sampling intervals: a shorter correlation is that of a filter, not a bias instability."""
+_FEWEST_BINS = 4 * (PAPERS.parameters + 1)
+"""The papers' model can be fitted to so many, and to spare."""
 
-_LONGEST_CORRELATION = 1 / 5
-"""Part of the log: a longer correlation cannot be told from a random walk."""
-
-_COARSE = 48
-_FEWEST_BINS = 16
 _LEAST_SHARE = 0.05
 """Candidates of a smaller share do not enter the intervals."""
 
 _FEWEST_DRAWS = 4_000
+_FORGOTTEN = 1e-3
+_MOST_ROUNDS = 12
 _QUANTIZATION_BAND = 1 / 10
 """Part of the rate that the band must reach for quantization noise to show."""
 
@@ -139,7 +138,8 @@ def fit_blocks(
     """Estimate the noise parameters of a log that comes in blocks, in bounded memory (see `fit`).
 
     Missing samples are drawn from their distribution, first by the model of the Allan variance,
-    then by that of the likelihood itself; the bins count for the samples present only.
+    then by that of the likelihood itself, the more often the more are missing; the bins count
+    for the samples present only.
 
     Parameters
     ----------
@@ -156,23 +156,43 @@ def fit_blocks(
     if not holes:
         spectrum, lines = spectra(blocks(), samples, rate, spans)
         return fit_spectrum(spectrum, lines, band=band, bandwidth=bandwidth, rng=rng)
-    curve = of_blocks(blocks(), samples, rate, holes=True, segments=spans)
-    model = least_squares.fit(curve).model
     means = block_means(blocks(), spans)
     parts = divided(means, spans)
+    if not parts:
+        raise ValueError(f"none of the {samples} samples is present")
     present = float(means.count.sum()) / sum(stop - start for start, stop in parts)
-    for last in (False, True):
+    model = _first_model(blocks, samples, rate, spans)
+    rounds = _rounds(1.0 - present)
+    for number in range(1, rounds + 1):
         path = slow_part(means, parts, model, rate, rng)
         complete = filled(blocks(), path, model, rate, rng)
         spectrum, lines = spectra(complete, samples, rate, parts)
         spectrum = replace(spectrum, ordinates=spectrum.ordinates * present)
-        if not last:
+        if number < rounds:
             _, used, limit = lines_and_band(spectrum, lines, band, bandwidth)
             if used.sum() < _FEWEST_BINS:
                 break
             whittle = whittle_of(spectrum.taken(used), limit.highest)
             model = model_of(compare(whittle, quantization=False)[0].found)
     return fit_spectrum(spectrum, lines, band=band, bandwidth=bandwidth, rng=rng)
+
+
+def _rounds(missing: float) -> int:
+    """Return how often to fill and fit: what is left of the first error shrinks as missing^n."""
+    needed = math.log(_FORGOTTEN) / math.log(min(max(missing, 1e-6), 0.9))
+    return min(max(2, math.ceil(needed)), _MOST_ROUNDS)
+
+
+def _first_model(
+    blocks: Callable[[], Iterable[Array]], samples: int, rate: float, spans: Sequence[Span]
+) -> NoiseModel:
+    """Return what the Allan variance says, or white noise where too few clusters are complete."""
+    curve = of_blocks(blocks(), samples, rate, holes=True, segments=spans)
+    try:
+        return least_squares.fit(curve).model
+    except ValueError:
+        there = np.concatenate([part[np.isfinite(part)] for part in blocks()])
+        return NoiseModel(N=float(np.std(there)) / math.sqrt(rate))
 
 
 def fit_spectrum(
@@ -207,16 +227,16 @@ def fit_spectrum(
     alike = [
         c for c in candidates if c is chosen or (c.share >= _LEAST_SHARE and not c.found.terms.ramp)
     ]
+    wider = [c for c in candidates if c.found.terms in _with_one_more(chosen.found.terms)]
     for candidate in candidates:
         terms = candidate.found.terms
-        if candidate in alike or terms == PAPERS:
+        if candidate in alike or candidate in wider or terms == PAPERS:
             part = 1.0 if terms == PAPERS or candidate is chosen else candidate.share
             number = max(_FEWEST_DRAWS, round(part * DRAWS))
             draws[terms] = sample(whittle, candidate.found, rng, number)
     estimate = describe("likelihood", whittle, chosen, alike, draws, limit)
-    papers = next((c for c in candidates if c.found.terms == PAPERS), None)
-    if papers is None:
-        raise ValueError(f"{used.sum()} bins are too few for the papers' model")
+    estimate = with_upper_limits(estimate, wider, draws)
+    papers = next(c for c in candidates if c.found.terms == PAPERS)
     gauss_markov = describe("likelihood_gm", whittle, papers, [papers], draws, limit)
     return Likelihood(
         (
@@ -228,16 +248,19 @@ def fit_spectrum(
         limit,
         spectrum,
         used,
-        whittle_of(spectrum, limit.highest, _COARSE).density(chosen.found)
+        whittle_of(spectrum, limit.highest, COARSE).density(chosen.found)
         + chosen.found.ramp**2 * spectrum.ramp,
     )
 
 
-def whittle_of(spectrum: Spectrum, highest: float, shapes: int = SHAPES) -> Whittle:
-    """Return the likelihood of a spectrum, with the correlation times that it can show."""
-    longest = _LONGEST_CORRELATION * float(spectrum.length.max())
-    shortest = max(_SHORTEST_CORRELATION / spectrum.rate, 1.0 / (np.pi * highest))
-    return Whittle(spectrum, min(shortest, longest / 4.0), longest, shapes)
+def _with_one_more(terms: Terms) -> list[Terms]:
+    """Return the models that have a random walk, or flicker noise, that a model has not."""
+    wider = []
+    if "K" not in terms.linear:
+        wider.append(replace(terms, linear=terms.linear + "K"))
+    if "F" not in terms.linear and terms.gauss_markov == 0:
+        wider.append(replace(terms, linear=terms.linear.replace("N", "NF")))
+    return wider
 
 
 def lines_and_band(
@@ -268,13 +291,13 @@ def lines_and_band(
     below = spectrum.upper <= start
     if below.sum() < _FEWEST_BINS:
         below = everything
-    found = whittle_of(spectrum.taken(below), start, _COARSE).maximum(Terms("NFK", 1))
+    found = whittle_of(spectrum.taken(below), start, COARSE).maximum(Terms("NFK", 1))
     low = spectrum.block > 1
     crossover = float(spectrum.upper[low].max()) if low.any() else 0.0
     lines = find(line_spectra, model_of(found), spectrum.rate, crossover)
     clear = everything
     if lines:
-        density = whittle_of(spectrum, 0.5 * spectrum.rate, _COARSE).density(found)
+        density = whittle_of(spectrum, 0.5 * spectrum.rate, COARSE).density(found)
         clear = without_lines(spectrum, lines, density)
     band = find_band(spectrum, clear, asked=asked, bandwidth=bandwidth)
     return lines, clear & (spectrum.upper <= band.highest * (1.0 + 1e-9)), band

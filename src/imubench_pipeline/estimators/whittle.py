@@ -27,6 +27,15 @@ Array = NDArray[np.float64]
 SHAPES = 192
 """Correlation times at which the shape of a Gauss-Markov process is tabulated."""
 
+COARSE = 48
+"""So many are enough to look for lines and for the band."""
+
+_SHORTEST_CORRELATION = 20
+"""Sampling intervals: a shorter correlation is that of a filter, not a bias instability."""
+
+_LONGEST_CORRELATION = 1 / 5
+"""Part of the log: a longer correlation cannot be told from a random walk."""
+
 
 @dataclass(frozen=True)
 class Terms:
@@ -211,3 +220,20 @@ class Whittle:
         """Return the Fisher information of (log of each parameter ..., log T_B ..., R)."""
         sensitivity = self.sensitivity(found)
         return np.asarray(sensitivity @ sensitivity.T)
+
+
+def whittle_of(spectrum: Spectrum, highest: float, shapes: int = SHAPES) -> Whittle:
+    """Return the likelihood of a spectrum, with the correlation times that it can show.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        The bins to use.
+    highest : float
+        Frequency up to which they reach, Hz.
+    shapes : int
+        Correlation times to tabulate.
+    """
+    longest = _LONGEST_CORRELATION * float(spectrum.length.max())
+    shortest = max(_SHORTEST_CORRELATION / spectrum.rate, 1.0 / (np.pi * highest))
+    return Whittle(spectrum, min(shortest, longest / 4.0), longest, shapes)
