@@ -121,7 +121,7 @@ def _line_rows(key: Key, found: Likelihood) -> Iterator[Row]:
     for line in found.lines:
         row = asdict(line)
         row.pop("resolution")
-        yield asdict(key) | row | {"kind": "sinusoid" if line.narrow else "band"}
+        yield asdict(key) | row
 
 
 def _spectrum_rows(key: Key, found: Likelihood) -> Iterator[Row]:

@@ -122,7 +122,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
     ),
     "lines": (
         *_KEYS,
-        _text("kind", "sinusoid, or band where it is wider than the resolution"),
+        _text("kind", "sinusoid; band of noise; alias of a faster line in block means"),
         _number("frequency", "Hz", "of the line", required=True),
         _number("frequency_lower", "Hz", "lower 95 % limit"),
         _number("frequency_upper", "Hz", "upper 95 % limit"),

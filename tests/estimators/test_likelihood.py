@@ -220,7 +220,8 @@ def test_a_random_walk_too_weak_to_show_is_below_its_upper_limit(number: int) ->
     assert bounds(truth, RATE, SAMPLES)["K"] > 0.9
     found = found_in(NoiseModel(**truth), number)
     parameter = of(found, "K", "likelihood_gm")
-    assert parameter.value is None
+    # It is given as a number only where its interval is one: far from 0, on this log's side.
+    assert parameter.value is None or parameter.lower > 0
     assert parameter.upper is not None
     assert truth["K"] < parameter.upper
     # A walk of the size of the limit would show, and the limit is not far beyond that.

@@ -235,7 +235,7 @@ def test_a_fast_line_is_not_found_again_at_a_low_frequency(rng) -> None:
         frequency = harmonic * RATE / 64 + 0.045
         log = DEVIATION * rng.standard_normal(LONG) + wave(LONG, A, frequency)
         slow = [line for line in search(log, WHITE)[0] if line.frequency < 1.0]
-        assert slow == []
+        assert [line.kind for line in slow] in ([], ["alias"])
 
 
 @pytest.mark.parametrize("samples", [60_000, LONG])
@@ -279,7 +279,7 @@ def test_a_stronger_line_takes_more_bins(rng) -> None:
     density = np.full(len(spectrum.frequency), N**2)
 
     def taken(A: float) -> int:
-        line = Line(10.0, 9.99, 10.01, A, 0.9 * A, 1.1 * A, 99.0, 0.0, 3 * STEP, STEP)
+        line = Line(10.0, 9.99, 10.01, A, 0.9 * A, 1.1 * A, 99.0, 0.0, 3 * STEP, STEP, "sinusoid")
         return int((~without_lines(spectrum, [line], density)).sum())
 
     amounts = [taken(A) for A in (1e-3, 1e-1, 1.0, 10.0)]

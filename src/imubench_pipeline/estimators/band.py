@@ -26,6 +26,8 @@ _MOST_STEPS = 8
 _AS_A_FILTER = 100
 """Sampling intervals: a correlation may be shorter only where white noise shows beside it."""
 
+_SHOWS_BESIDE = 0.3
+
 _FEWEST_BINS = 24
 _SETTLED = 0.95
 _FLEXIBLE = Terms("NFK", 1)
@@ -146,7 +148,8 @@ def _looks_like_a_filter(whittle: Whittle, found: Maximum) -> bool:
     if not len(found.times) or found.times[0] > _AS_A_FILTER / whittle.spectrum.rate:
         return False
     process = found.powers[-1] * whittle.gauss_markov(float(found.times[0]))[-1]
-    return bool(process > found.powers[found.terms.linear.index("N")] * whittle.column("N")[-1])
+    white = found.powers[found.terms.linear.index("N")] * whittle.column("N")[-1]
+    return bool(process > _SHOWS_BESIDE * white)
 
 
 def _first_departure(

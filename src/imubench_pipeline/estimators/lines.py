@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,13 @@ _BESIDE = 3
 """Bins on either side of a line that hold its power."""
 
 _WIDEST = 8
+_SKIRT = 0.1
+"""Part of the highest excess down to which a line's width is counted."""
+
+_NEAR, _FAR = 5, 20
+"""Bins between which the neighbourhood lies that a sinusoid stands out of."""
+
+_SHARPER = 1.1
 _LEAKS = 0.3
 """Part of the standard error of a bin of the likelihood by which a line may raise it."""
 
@@ -65,6 +73,9 @@ class Line:
         How wide it is, Hz; a sinusoid is not wider than the resolution.
     resolution : float
         Distance of the bins, Hz.
+    kind : {"sinusoid", "band", "alias"}
+        A band of noise is wider, or does not stand out of its neighbourhood; an alias is what
+        block means make of a faster line.
     """
 
     frequency: float
@@ -77,11 +88,12 @@ class Line:
     false_alarm: float
     width: float
     resolution: float
+    kind: Literal["sinusoid", "band", "alias"]
 
     @property
     def narrow(self) -> bool:
-        """Whether it is as narrow as a sinusoid is; if not, a band of noise."""
-        return self.width <= _WIDEST * self.resolution
+        """Whether it is a sinusoid."""
+        return self.kind == "sinusoid"
 
     @property
     def term(self) -> Sinusoid:
@@ -118,9 +130,44 @@ def find(
     for spectrum, (low, high) in zip(spectra, searched, strict=True):
         if high > low:
             new = _lines(spectrum, model, rate, low, high, total)
-            # A line near the crossover shows in both, sharper in the first.
-            found += [line for line in new if not any(_same(line, other) for other in found)]
+            found = _joined(found, new)
+    found = [_without_alias(line, found, spectra[0].block, rate) for line in found]
     return sorted(found, key=lambda line: line.frequency)
+
+
+def _joined(found: list[Line], new: list[Line]) -> list[Line]:
+    """Join the lines of two spectra: one near the crossover shows in both, sharper in the first.
+
+    Of a strong line beyond the crossover the first has the skirt only.
+    """
+    kept = list(found)
+    for line in new:
+        same = [other for other in kept if _same(line, other)]
+        if all(line.amplitude > _SHARPER * other.amplitude for other in same):
+            kept = [other for other in kept if other not in same] + [line]
+    return kept
+
+
+def _without_alias(line: Line, found: list[Line], block: int, rate: float) -> Line:
+    """Return a line of block means, named an alias if a faster line explains it."""
+    blocks = rate / block
+    for other in found:
+        away = other.frequency - round(other.frequency / blocks) * blocks
+        if block == 1 or other.frequency < 0.5 * blocks or line.frequency > 0.5 * blocks:
+            continue
+        # Both are seen through the mean of a block; the amplitude of a line is given without.
+        seen = other.amplitude * _gain(other.frequency, block, rate)
+        there = line.amplitude * _gain(line.frequency, block, rate)
+        close = abs(abs(away) - line.frequency) < _BESIDE * line.resolution + 0.5 * line.width
+        if close and there < 2.0 * seen:
+            return replace(line, kind="alias")
+    return line
+
+
+def _gain(frequency: float, block: int, rate: float) -> float:
+    """Return the amplitude that a sinusoid of 1 has in means of blocks."""
+    half = math.pi * frequency / rate
+    return abs(math.sin(block * half) / (block * math.sin(half))) if block > 1 else 1.0
 
 
 def _range(spectrum: LineSpectrum, crossover: float) -> tuple[int, int]:
@@ -157,7 +204,45 @@ def _lines(
     if len(significant) == 0:
         return []
     groups = np.split(significant, np.flatnonzero(np.diff(significant) > _BESIDE) + 1)
-    return [_line(spectrum, noise, standing, chance, group, rate) for group in groups]
+    lines = [_line(spectrum, noise, standing, chance, group, rate) for group in groups]
+    return _bands_merged(lines)
+
+
+def _bands_merged(lines: list[Line]) -> list[Line]:
+    """Merge neighbouring pieces of a band of noise."""
+    merged: list[Line] = []
+    for line in lines:
+        last = merged[-1] if merged else None
+        beside = last and not (last.narrow or line.narrow)
+        if (
+            last
+            and beside
+            and line.frequency - last.frequency
+            < _FAR * line.resolution + 0.5 * (last.width + line.width)
+        ):
+            merged[-1] = _both(last, line)
+        else:
+            merged.append(line)
+    return merged
+
+
+def _both(first: Line, second: Line) -> Line:
+    """Return a band of noise that holds two."""
+    power = first.amplitude**2 + second.amplitude**2
+    share = first.amplitude**2 / power
+    grown = math.sqrt(power)
+    stronger = first if first.ratio > second.ratio else second
+    return replace(
+        stronger,
+        frequency=share * first.frequency + (1.0 - share) * second.frequency,
+        frequency_lower=first.frequency_lower,
+        frequency_upper=second.frequency_upper,
+        amplitude=grown,
+        amplitude_lower=math.hypot(first.amplitude_lower, second.amplitude_lower),
+        amplitude_upper=math.hypot(first.amplitude_upper, second.amplitude_upper),
+        false_alarm=min(first.false_alarm, second.false_alarm),
+        width=second.frequency - first.frequency + 0.5 * (first.width + second.width),
+    )
 
 
 def _line(
@@ -171,9 +256,12 @@ def _line(
     step = float(spectrum.frequency[1])
     n = spectrum.segments
     peak = int(group[np.argmax(standing[group])])
-    wide = group[-1] - group[0] + 1 > _WIDEST
-    first = max(1, (int(group[0]) if wide else peak) - _BESIDE)
-    last = min(len(noise) - 1, (int(group[-1]) if wide else peak) + _BESIDE)
+    above = spectrum.density[group] - noise[group]
+    high = group[above > _SKIRT * above.max()]
+    across = int(high[-1] - high[0]) + 1
+    wide = across > _WIDEST or not _stands_out(spectrum, peak)
+    first = max(1, (int(high[0]) if wide else peak) - _BESIDE)
+    last = min(len(noise) - 1, (int(high[-1]) if wide else peak) + _BESIDE)
     bins = np.arange(first, last + 1)
     excess = spectrum.density[bins] - noise[bins]
     power = max(float(excess.sum()), float(excess.max()))
@@ -187,12 +275,9 @@ def _line(
         math.sqrt((_NOISE_PLACE / to_noise**2 + 2.0 * _CROSS_PLACE / to_noise) / n), _FLOOR_PLACE
     )
     if wide:
-        place_error = math.hypot(place_error, step * len(group) / math.sqrt(12.0 * n))
+        place_error = math.hypot(place_error, step * across / math.sqrt(12.0 * n))
     # A line of amplitude A has the power A^2 / 4 at +f; block means see it damped.
-    half = math.pi * place / rate
-    m = spectrum.block
-    gain = math.sin(m * half) / (m * math.sin(half)) if m > 1 else 1.0
-    amplitude = 2.0 * math.sqrt(power * step) / abs(gain)
+    amplitude = 2.0 * math.sqrt(power * step) / _gain(place, spectrum.block, rate)
     low, high = (math.sqrt(max(0.0, 1.0 + sign * 1.96 * power_error)) for sign in (-1, 1))
     return Line(
         frequency=place,
@@ -203,9 +288,21 @@ def _line(
         amplitude_upper=amplitude * high,
         ratio=float(standing[peak]),
         false_alarm=float(min(1.0, chance[group].min())),
-        width=float(len(group)) * step,
+        width=float(across) * step,
         resolution=step,
+        kind="band" if wide else "sinusoid",
     )
+
+
+def _stands_out(spectrum: LineSpectrum, peak: int) -> bool:
+    """Tell whether a bin stands out of the bins a little way off, and not only of the model."""
+    beside = np.r_[peak - _FAR : peak - _NEAR + 1, peak + _NEAR : peak + _FAR + 1]
+    beside = beside[(beside >= _DISTURBED) & (beside < len(spectrum.density))]
+    n = spectrum.segments
+    level = float(np.median(spectrum.density[beside])) / (gammainccinv(n, 0.5) / n)
+    m = n * len(beside) * _MEDIAN_KNOWS
+    chance = betainc(m, n, m / (m + n * float(spectrum.density[peak]) / level))
+    return bool(chance * len(spectrum.density) < FALSE_ALARM)
 
 
 def without_lines(spectrum: Spectrum, lines: Sequence[Line], density: Array) -> NDArray[np.bool_]:
