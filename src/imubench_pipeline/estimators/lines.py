@@ -43,6 +43,7 @@ _SKIRT = 0.1
 _NEAR, _FAR = 5, 20
 """Bins between which the neighbourhood lies that a sinusoid stands out of."""
 
+_BY_CHANCE = 1e-4
 _SHARPER = 1.1
 _LEAKS = 0.3
 """Part of the standard error of a bin of the likelihood by which a line may raise it."""
@@ -302,7 +303,7 @@ def _stands_out(spectrum: LineSpectrum, peak: int) -> bool:
     level = float(np.median(spectrum.density[beside])) / (gammainccinv(n, 0.5) / n)
     m = n * len(beside) * _MEDIAN_KNOWS
     chance = betainc(m, n, m / (m + n * float(spectrum.density[peak]) / level))
-    return bool(chance * len(spectrum.density) < FALSE_ALARM)
+    return bool(chance < _BY_CHANCE)
 
 
 def without_lines(spectrum: Spectrum, lines: Sequence[Line], density: Array) -> NDArray[np.bool_]:

@@ -152,7 +152,9 @@ def _cell(rows: list[Mapping[str, Any]], unit: PageUnit) -> dict[str, Any]:
         status = row["status"].replace("_", " ")
         flag = "" if row["status"] == "ok" else f" ({status})"
         lines.append(status if row["value"] is None else unit.text(row["value"]) + flag)
-        if row["upper"] is not None and row["status"] != "absent":
+        if row["upper"] is not None and row["status"] == "absent":
+            lines.append(f"below {unit.text(row['upper'], 3)}")
+        elif row["upper"] is not None:
             lines.append(f"{unit.text(row['lower'], 3)} to {unit.text(row['upper'], 3)}")
     notes = [row["reason"] for row in rows if row["reason"]]
     needed = rows[0]["duration_needed"]
