@@ -15,7 +15,10 @@ from imubench_pipeline.spectrum import SINGLE, WIDTH, Spectrum
 Array = NDArray[np.float64]
 
 NOT_IDENTIFIED = 0.5
-"""Relative standard deviation beyond which a B or T_B is not given as a number."""
+"""Relative standard deviation beyond which a B is not given as a number."""
+
+NOT_IDENTIFIED_TIME = 0.4
+"""That of T_B: of weak processes those whose T_B seems known have it wrong."""
 
 NOT_IDENTIFIED_LEVEL = 0.75
 """That of the other parameters: their bound at the fitted value scatters with the value."""

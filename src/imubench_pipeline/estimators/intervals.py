@@ -13,6 +13,7 @@ from imubench_pipeline.estimators.estimate import FAMILY, Estimate, Parameter
 from imubench_pipeline.estimators.identifiability import (
     NOT_IDENTIFIED,
     NOT_IDENTIFIED_LEVEL,
+    NOT_IDENTIFIED_TIME,
     durations_needed,
     parameter_names,
     relative_errors,
@@ -138,7 +139,7 @@ def _parameter(
     if name.startswith(("B", "T_B")) and lower > 0.0:
         # B and T_B trade off along a ridge that the bound, which is local, does not see.
         error = max(error, math.log(upper / lower) / _WIDTH_OF_INTERVAL)
-        most = NOT_IDENTIFIED
+        most = NOT_IDENTIFIED_TIME if name.startswith("T_B") else NOT_IDENTIFIED
     if error > most:
         reason = (
             f"a log of this length tells it to {100 * error:.0f} % (standard error); only "

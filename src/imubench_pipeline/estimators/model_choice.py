@@ -30,6 +30,14 @@ CANDIDATES = (
 """Models that are always tried; then a ramp and quantization noise are added to the best."""
 
 
+_LIKE_A_WALK = 1 / 10
+"""Part of the longest correlation time beyond which a process looks like a random walk."""
+
+_UNIT_ROOT = 4.0
+"""BIC by which such a process, where there is no walk, must be the better: a walk often looks as
+if it came back to its mean (D. Dickey and W. Fuller, J. Am. Stat. Assoc. 74, 1979)."""
+
+
 @dataclass(frozen=True)
 class Candidate:
     """A model, its best fit and its scores.
@@ -38,7 +46,8 @@ class Candidate:
     ----------
     found : Maximum
     bic, aic : float
-        2 (-log L) + p log(number of bins), and + 2 p.
+        2 (-log L) + p log(number of bins), and + 2 p. Where a Gauss-Markov process stands for a
+        random walk, 4 is added to the BIC.
     weight : float
         Weight of the model among the candidates, proportional to e^(-BIC/2).
     share : float
@@ -69,7 +78,12 @@ def compare(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
     tried: dict[Terms, Maximum] = {}
 
     def bic(found: Maximum) -> float:
-        return 2.0 * found.cost + found.terms.parameters * penalty
+        like_a_walk = (
+            "K" not in found.terms.linear
+            and len(found.times) > 0
+            and found.times[-1] > _LIKE_A_WALK * whittle.longest
+        )
+        return 2.0 * found.cost + found.terms.parameters * penalty + _UNIT_ROOT * like_a_walk
 
     def add(terms: Terms) -> None:
         if terms not in tried and terms.parameters < bins // 4:
