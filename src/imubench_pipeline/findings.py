@@ -25,6 +25,8 @@ class Finding:
         Its size.
     channel : str or None
         None: the whole recording.
+    start, end : float or None
+        The part of the recording that it concerns, s from the first sample; None: all of it.
     """
 
     finding: str
@@ -32,6 +34,8 @@ class Finding:
     detail: str
     value: float
     channel: str | None = None
+    start: float | None = None
+    end: float | None = None
 
     def row(self, sensor: str, recording: str) -> Mapping[str, Any]:
         """Return the row of the table ``findings``."""

@@ -3,48 +3,24 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import shutil
 import tempfile
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
-from numpy.typing import NDArray
-
 from imubench_pipeline import timebase
+from imubench_pipeline.assembly import assemble, counted, names_of
 from imubench_pipeline.config import QualitySettings
 from imubench_pipeline.findings import Finding
-from imubench_pipeline.quality import Spread, column_findings
-from imubench_pipeline.readers import TEMPERATURE, LogFile, RecordingError, log_files, read
-from imubench_pipeline.recording import LogWriter, channel_logs, log_paths
+from imubench_pipeline.parts import Part, leave_out_knocks, read_part
+from imubench_pipeline.quality.columns import column_findings
+from imubench_pipeline.quality.summary import ColumnSummary
+from imubench_pipeline.readers import TEMPERATURE, RecordingError, log_files, read
+from imubench_pipeline.recording import channel_logs, log_paths
 from imubench_pipeline.results import Quality
-from imubench_pipeline.sensor import LogFormat, RecordingNotes, UsedPart, quantity_of
-
-_STAMP_BLOCK = 1 << 20
-
-
-@dataclass
-class _Part:
-    """One file of the recording, read once into columns and stamps."""
-
-    source: LogFile
-    data: Path
-    stamps_path: Path
-    writer: LogWriter
-    rows: int = 0
-    not_used: int = 0
-    spreads: dict[str, Spread] = field(default_factory=dict)
-    stamped: bool = False
-    digest: str = ""
-
-    def stamps(self) -> Iterator[NDArray[np.float64]]:
-        """Yield the stamps in s, from the disk."""
-        for start in range(0, self.rows, _STAMP_BLOCK):
-            yield np.fromfile(self.stamps_path, np.float64, _STAMP_BLOCK, offset=8 * start)
+from imubench_pipeline.sensor import LogFormat, RecordingNotes, UsedPart
 
 
 @dataclass(frozen=True)
@@ -107,7 +83,15 @@ def ingest(
     remove_kept(folder)
     scratch = Path(tempfile.mkdtemp(prefix=".ingest.", suffix=".part", dir=folder))
     try:
-        return _ingest(source, log, notes, settings, folder, scratch, provenance)
+        found = _ingest(source, log, notes, settings, folder, scratch, provenance)
+        end = max((f.end or 0.0 for f in found.findings if f.finding == "warm_up"), default=0.0)
+        if not (settings.trim_warm_up and end):
+            return found
+        later = notes.model_copy(update={"use": UsedPart(start=end, end=notes.use.end)})
+        trimmed = _ingest(source, log, later, settings, folder, scratch, provenance)
+        detail = f"the first {end:.5g} s, a warm-up, are left out (quality.trim_warm_up)"
+        note = Finding("warm_up_trimmed", "note", detail, end, start=0.0, end=end)
+        return replace(trimmed, findings=[note, *trimmed.findings])
     finally:
         shutil.rmtree(scratch)
 
@@ -130,13 +114,13 @@ def _ingest(
     provenance: dict[str, Any],
 ) -> Ingested:
     parts = [
-        _read_part(file, notes.use, scratch, number)
-        for number, file in enumerate(read(source, log))
+        read_part(file, notes.use, scratch, number) for number, file in enumerate(read(source, log))
     ]
     findings = [finding for part in parts for finding in part.source.findings]
     bases = [_base(part, log, settings) for part in parts]
-    for part in parts:
-        findings += column_findings(part.spreads, settings.shortest)
+    for part, base in zip(parts, bases, strict=True):
+        findings += column_findings(part.columns, base.rate, settings)
+        findings += _knock_findings(part, base.rate, settings, scratch)
     unusable = {finding.channel for finding in findings if finding.severity == "fatal"}
     groups = _shared_bases(parts, bases)
     if len({part.rows for part in parts if not part.stamped}) > 1:
@@ -151,7 +135,7 @@ def _ingest(
                 max(rows) - min(rows),
             )
         )
-    names = _names(parts, groups)
+    names = names_of(parts, groups)
     metadata = provenance | {
         "sources": [
             {"name": path.name, "size": path.stat().st_size, "sha256": _sha256(path)}
@@ -162,14 +146,17 @@ def _ingest(
         or next((p.source.started for p in parts if p.source.started), None),
     }
     written: list[tuple[Path, Path]] = []
+    counts: dict[str, dict[str, int]] = {}
     for name, group in zip(names, groups, strict=True):
         base = bases[group[0]]
         findings += [f for f in base.findings if f not in findings]
         chosen = [parts[index] for index in group]
         holes = {
-            channel: bool(base.missing or spread.missing or spread.not_finite)
+            channel: bool(
+                base.missing or column.missing or column.not_finite or part.knocks.get(channel)
+            )
             for part in chosen
-            for channel, spread in part.spreads.items()
+            for channel, column in part.columns.items()
         }
         about = metadata | {
             "rate": base.rate,
@@ -181,7 +168,9 @@ def _ingest(
             "holes": holes,
             "unusable": sorted(channel for channel in unusable if channel),
         }
-        written.append((_assemble(chosen, base, settings, about, scratch / name), folder / name))
+        assembled, repeated = assemble(chosen, base, settings, about, scratch / name)
+        counts |= counted(assembled, chosen, repeated)
+        written.append((assembled, folder / name))
     summary = _summary(parts, bases, metadata["started"])
     if all(channel in unusable for channel in log.channels):
         reasons = "; ".join(f.detail for f in findings if f.severity == "fatal")
@@ -189,75 +178,52 @@ def _ingest(
     for temporary, final in written:
         temporary.replace(final)
     channels = {
-        name: {"rate": kept.rate, "grid": kept.grid, "segments": kept.segments}
+        name: {"rate": kept.rate, "grid": kept.grid, "segments": kept.segments} | counts[name]
         for name, kept in channel_logs(folder).items()
     }
+    begin = notes.use.start
+    findings = [
+        f if f.start is None else replace(f, start=f.start + begin, end=(f.end or 0.0) + begin)
+        for f in findings
+    ]
     return Ingested(summary, findings, channels)
 
 
-def _read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> _Part:
-    data, stamps_path = scratch / f"part{number}.parquet", scratch / f"part{number}.stamps"
-    columns = list(file.sources)
-    writer = LogWriter(data, dict.fromkeys(columns, pa.float64()))
-    part = _Part(file, data, stamps_path, writer, spreads={name: Spread() for name in columns})
-    rate = file.log.rate_hz
-    digest = hashlib.blake2b()
-    read_rows = 0
-    with stamps_path.open("wb") as stamps:
-        for batch in file.batches():
-            time = batch.time
-            if time is None:
-                assert rate is not None  # checked with the sensor file
-                clock = np.arange(read_rows, read_rows + len(batch)) / rate
-            else:
-                clock = time
-                part.stamped = True
-            read_rows += len(batch)
-            # A record without a stamp is not known to lie outside.
-            keep = ~(clock < use.start)
-            if use.end is not None:
-                keep &= ~(clock > use.end)
-            whole = bool(keep.all())
-            part.not_used += len(batch) - int(keep.sum())
-            if time is not None:
-                kept_time = np.ascontiguousarray(time if whole else time[keep])
-                kept_time.tofile(stamps)
-                digest.update(kept_time.tobytes())
-            kept = {
-                name: part.spreads[name].add(values if whole else values[keep])
-                for name, values in batch.columns.items()
-            }
-            part.rows += int(keep.sum())
-            writer.write(kept)
-    if part.rows == 0:
-        raise RecordingError(
-            f"{file.path.name}: none of its {read_rows} samples lies in the part to use "
-            f"(use: start {use.start} s, end {use.end or 'open'})"
-        )
-    if part.not_used:
-        file.findings.append(
+def _knock_findings(
+    part: Part, rate: float, settings: QualitySettings, scratch: Path
+) -> list[Finding]:
+    longest = round(settings.longest_knock * rate)
+    findings = []
+    for channel, found in leave_out_knocks(part, settings.knock, longest, scratch).items():
+        worst = max(found, key=lambda knock: knock.size)
+        at = ", ".join(f"{max(knock.first, 0) / rate:.5g}" for knock in found[:5])
+        more = " ..." if len(found) > 5 else ""
+        findings.append(
             Finding(
-                "not_used",
-                "note",
-                f"{file.path.name}: {part.not_used} samples lie outside the part to use",
-                part.not_used,
+                "knocks",
+                "warning",
+                f"{channel} has {len(found)} knocks, up to {worst.size:.0f} standard deviations "
+                f"(at {at}{more} s); {part.knocks[channel]} samples about them are left out",
+                part.knocks[channel],
+                channel,
+                max(found[0].first, 0) / rate,
+                found[-1].last / rate,
             )
         )
-    part.digest = digest.hexdigest() if part.stamped else ""
-    return part
+    return findings
 
 
-def _base(part: _Part, log: LogFormat, settings: QualitySettings) -> timebase.TimeBase:
+def _base(part: Part, log: LogFormat, settings: QualitySettings) -> timebase.TimeBase:
     if not part.stamped:
         assert log.rate_hz is not None  # checked with the sensor file
         return timebase.without_stamps(part.rows, log.rate_hz)
     try:
-        return timebase.from_stamps(part.stamps, log.rate_hz, settings)
+        return timebase.from_stamps(part.stamps, log.rate_hz or part.source.rate, settings)
     except RecordingError as error:
         raise RecordingError(f"{part.source.path.name}: {error}") from None
 
 
-def _shared_bases(parts: list[_Part], bases: list[timebase.TimeBase]) -> list[list[int]]:
+def _shared_bases(parts: list[Part], bases: list[timebase.TimeBase]) -> list[list[int]]:
     """Group the files that have the same clock: the same stamps, or as many samples and none."""
     groups: dict[tuple[object, ...], list[int]] = {}
     for index, (part, base) in enumerate(zip(parts, bases, strict=True)):
@@ -265,86 +231,22 @@ def _shared_bases(parts: list[_Part], bases: list[timebase.TimeBase]) -> list[li
     return list(groups.values())
 
 
-def _names(parts: list[_Part], groups: list[list[int]]) -> list[str]:
-    """Name the Parquet file of each clock after the quantity or the channels it holds."""
-    if len(groups) == 1:
-        return ["log.parquet"]
-    contents = [[name for index in group for name in parts[index].spreads] for group in groups]
-    quantities = [sorted({quantity_of(name) for name in names}) for names in contents]
-    names = []
-    for held, kinds in zip(contents, quantities, strict=True):
-        alone = len(kinds) == 1 and quantities.count(kinds) == 1
-        names.append(f"log.{kinds[0] if alone else '+'.join(held)}.parquet")
-    return names
-
-
-def _assemble(
-    parts: list[_Part],
-    base: timebase.TimeBase,
-    settings: QualitySettings,
-    metadata: dict[str, Any],
-    path: Path,
-) -> Path:
-    """Close the columns of files that share a clock into one Parquet file."""
-    for part in parts:
-        part.writer.finish(metadata)
-        part.writer.__exit__(None, None, None)
-    if len(parts) == 1 and base.uniform:
-        return parts[0].data
-    columns: dict[str, pa.DataType] = {}
-    if not base.uniform:
-        columns["time"] = pa.float64()
-    if base.stamped and not base.uniform:
-        columns["sample"] = pa.int64()
-    for part in parts:
-        columns |= dict.fromkeys(part.spreads, pa.float64())
-    blocks = _columns_of(parts)
-    with LogWriter(path, columns) as writer:
-        if base.uniform:
-            for block in blocks:
-                writer.write(block)
-        else:
-            first = None
-            places = timebase.positions(base, parts[0].stamps, settings)
-            for block, stamps, points in zip(blocks, parts[0].stamps(), places, strict=True):
-                first = stamps[0] if first is None else first
-                block["time"] = stamps - first
-                if base.stamped:
-                    block["sample"] = points
-                keep = points >= 0
-                writer.write({name: values[keep] for name, values in block.items()})
-        writer.finish(metadata)
-    return path
-
-
-def _columns_of(parts: list[_Part]) -> Iterator[dict[str, NDArray[Any]]]:
-    """Yield the columns of several files side by side, a row group at a time."""
-    files = [pq.ParquetFile(part.data) for part in parts]
-    try:
-        for group in range(files[0].num_row_groups):
-            block: dict[str, NDArray[Any]] = {}
-            for file in files:
-                table = file.read_row_group(group, use_threads=False)
-                block |= {name: table.column(name).to_numpy() for name in table.column_names}
-            yield block
-    finally:
-        for file in files:
-            file.close()
-
-
 def _summary(
-    parts: list[_Part], bases: list[timebase.TimeBase], started: str | None
+    parts: list[Part], bases: list[timebase.TimeBase], started: str | None
 ) -> dict[str, Any]:
-    measured = [i for i, part in enumerate(parts) if set(part.spreads) != {TEMPERATURE}]
+    measured = [i for i, part in enumerate(parts) if set(part.columns) != {TEMPERATURE}]
     longest = max(measured, key=lambda index: bases[index].rows)
     base = bases[longest]
     temperature = next(
-        (part.spreads[TEMPERATURE] for part in parts if TEMPERATURE in part.spreads), Spread()
+        (part.columns[TEMPERATURE] for part in parts if TEMPERATURE in part.columns),
+        ColumnSummary(),
     )
     known = temperature.present > 0
     return {
         "started": started,
         "rate": base.rate,
+        "rate_from": base.source,
+        "rate_error": base.rate_error,
         "samples": base.samples,
         "duration": base.grid / base.rate,
         "temperature_min": temperature.low if known else None,
@@ -355,6 +257,37 @@ def _summary(
 def _sha256(path: Path) -> str:
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def ingest_as_planned(
+    source: Path, settings: str, sensor: str, recording: str, folder: Path
+) -> Quality:
+    """Ingest a recording as the plan says; one that cannot be used is rejected, with its reason.
+
+    Parameters
+    ----------
+    source : Path
+        The log file, or the folder of a recording.
+    settings : str
+        As `imubench_pipeline.plan.Plan.ingest_settings` gives them.
+    sensor, recording : str
+    folder : Path
+        Where the Parquet files go.
+    """
+    given = json.loads(settings)
+    notes = RecordingNotes.model_validate(given.get("notes", {}))
+    names = {"sensor": sensor, "device": notes.device or recording, "recording": recording}
+    names |= {"kind": "static", "simulated": given["simulated"]}
+    try:
+        if "error" in given:
+            raise RecordingError(given["error"])
+        log = LogFormat.model_validate(given["log"])
+        limits = QualitySettings.model_validate(given["quality"])
+        kept = ingest(source, log, notes, limits, folder, names)
+    except RecordingError as error:
+        remove_kept(folder)
+        kept = rejected(error, notes)
+    return kept.quality(names)
 
 
 def rejected(error: RecordingError, notes: RecordingNotes) -> Ingested:

@@ -23,7 +23,7 @@ from imubench_pipeline.units import quantity_to_si
 from imubench_pipeline.validation import ConfigError, parse, read_yaml
 
 _NOT_LOGS = {".yaml", ".yml", ".md", ".part", ".tmp", ".filepart", ".crdownload"}
-_COMPRESSED = {".gz"}
+_COMPRESSED = {".gz", ".zst", ".xz", ".bz2", ".zip"}
 _UNUSABLE_IN_NAMES = re.compile(r"[^\w .+()-]")
 _LONGEST_NAME = 120
 
@@ -169,14 +169,18 @@ class Plan:
 
     def estimate_settings(self, sensor: str, name: str) -> str:
         """Return what the estimates of a recording depend on."""
-        log = json.loads(self.ingest_settings(sensor, name)).get("log") or {}
-        bandwidth = log.get("bandwidth")
         return _text(
             {
                 "estimate": self.run.estimate.model_dump(mode="json"),
-                "bandwidth": quantity_to_si(bandwidth, "frequency") if bandwidth else None,
+                "bandwidth": self.bandwidth(sensor, name),
             }
         )
+
+    def bandwidth(self, sensor: str, name: str) -> float | None:
+        """Return the stated cut-off of the sensor's own filter, Hz."""
+        log = json.loads(self.ingest_settings(sensor, name)).get("log") or {}
+        stated = log.get("bandwidth")
+        return quantity_to_si(stated, "frequency") if stated else None
 
     def simulated_settings(self, sensor: str, name: str) -> str:
         """Return the parameters of a simulated recording and the layout that it is written in."""

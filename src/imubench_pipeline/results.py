@@ -15,6 +15,7 @@ from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.config import SimulatedRecording
 from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate, Parameter, Status
 from imubench_pipeline.pooled import pooled_rows
+from imubench_pipeline.quality.spectral import band_finding, line_findings
 from imubench_pipeline.sensor import quantity_of
 from imubench_pipeline.tables import build, read
 
@@ -154,9 +155,22 @@ def joined_tables(parts: Mapping[str, list[Path]], truths: str) -> dict[str, pa.
         pooled_rows(recommended.to_pylist(), joined["fixed_bias"].to_pylist(), devices),
     )
     joined["recordings"] = build("recordings", about)
-    joined["findings"] = build("findings", [row for q in qualities for row in q.findings])
+    rows = [row for q in qualities for row in q.findings]
+    joined["findings"] = build("findings", [*rows, *spectral_rows(joined)])
     joined["simulated_truth"] = build("simulated_truth", truth_rows(truths))
     return joined
+
+
+def spectral_rows(tables: Mapping[str, pa.Table]) -> Iterator[Row]:
+    """Yield the rows of the table ``findings`` that the tables ``lines`` and ``models`` tell."""
+    for (sensor, recording), lines in _by(tables["lines"], "sensor", "recording").items():
+        for finding in line_findings(lines.to_pylist()):
+            yield finding.row(sensor, recording)
+    models = tables["models"]
+    for row in models.filter(models["chosen"]).to_pylist():
+        if row["band"] is not None:
+            for finding in band_finding(row["channel"], row["band"], row["band_source"] or ""):
+                yield finding.row(row["sensor"], row["recording"])
 
 
 def truth_rows(truths: str) -> Iterator[Row]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
@@ -62,11 +63,22 @@ class TimeSource(Strict):
         description="unit of numeric stamps; samples: the column counts samples, and 'rate' "
         "says how long one lasts",
     )
-    format: Literal["iso8601"] | None = Field(None, description="format of stamps in text")
+    date: str | int | None = Field(
+        None, description="column of the date, where 'column' holds the time of day alone"
+    )
+    scale: float = Field(
+        1.0, gt=0, description="unit per tick, such as 0.1 for a clock that counts 0.1 ms in ms"
+    )
+    format: str | None = Field(
+        None,
+        description="of stamps in text: iso8601, or a pattern as for strptime such as "
+        "%d.%m.%Y %H:%M:%S.%f; of date and time of day with a space between them",
+        examples=["iso8601", "%d.%m.%Y %H:%M:%S.%f"],
+    )
     wraps: float | None = Field(
         None,
         gt=0,
-        description="where the stamps start again from 0, in their unit, such as 65536 for a "
+        description="where the stamps start again from 0, as written, such as 65536 for a "
         "counter of 16 bits; null: they never do",
     )
 
@@ -76,9 +88,36 @@ class TimeSource(Strict):
             raise ValueError(
                 "expected either 'unit' (s, ms, us, ns, samples) or 'format' (iso8601)"
             )
-        if isinstance(self.column, int) and self.column < 1:
-            raise ValueError(f"column {self.column}: columns are counted from 1")
+        for column in (self.column, self.date):
+            if isinstance(column, int) and column < 1:
+                raise ValueError(f"column {column}: columns are counted from 1")
+        if self.date is not None and self.format is None:
+            raise ValueError("'date' is given without 'format'; expected the format of both")
+        if self.format is not None:
+            _check_stamp_format(self.format)
+            if self.wraps is not None or self.scale != 1:
+                raise ValueError("'wraps' and 'scale' are for numeric stamps; expected 'unit'")
         return self
+
+
+_STAMP_FIELDS = "YymbdjHIpMSfzTFR%"
+
+
+def _check_stamp_format(form: str) -> None:
+    if form == "iso8601":
+        return
+    fields = re.findall(r"%(.?)", form)
+    if unknown := [field for field in fields if field not in _STAMP_FIELDS or not field]:
+        raise ValueError(
+            f"format {form!r} has %{unknown[0]}; expected fields of %{' %'.join(_STAMP_FIELDS)}"
+        )
+    if not set(fields) & set("HITR"):
+        raise ValueError(
+            f"found format {form!r}; expected iso8601, or a pattern with the hour such as "
+            "%d.%m.%Y %H:%M:%S.%f"
+        )
+    if repeated := [field for field in fields if field != "%" and fields.count(field) > 1]:
+        raise ValueError(f"format {form!r} has %{repeated[0]} twice")
 
 
 Reader = Literal["csv", "vectornav", "ubx", "rosbag", "matlab", "numpy", "arrow", "hdf5"]
@@ -107,7 +146,12 @@ class LogFormat(Strict):
     )
     skip_lines: int = Field(0, ge=0, description="lines at the top to pass over")
     comment: str | None = Field(
-        None, min_length=1, description="lines at the top that start so are passed over"
+        None,
+        min_length=1,
+        description="lines that start so are passed over; null: those that start with # // % ; !",
+    )
+    decimal: Literal[".", ","] | None = Field(
+        None, description="sign before the decimals; null: found in the file"
     )
 
     @model_validator(mode="after")
@@ -116,6 +160,8 @@ class LogFormat(Strict):
             raise ValueError("expected 'rate' (such as 100 Hz) or 'time': neither is there")
         if self.time is not None and self.time.unit == "samples" and self.rate is None:
             raise ValueError("'time' counts samples; expected 'rate' (such as 100 Hz) with it")
+        if self.decimal is not None and self.decimal == self.delimiter:
+            raise ValueError(f"'delimiter' and 'decimal' are both {self.decimal!r}")
         for channel, source in self.channels.items():
             _check_unit(source.unit, QUANTITIES[quantity_of(channel)], f"channels.{channel}.unit")
         if self.temperature is not None:

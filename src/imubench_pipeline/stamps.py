@@ -58,6 +58,9 @@ def _long_steps_are_regular(steps: NDArray[np.float64], median: float) -> bool:
     return bool(np.mean(np.abs(distances - np.median(distances)) <= 1) > 0.9)
 
 
+_MARK = 1 << 14
+
+
 @dataclass
 class Track:
     """Follows stamps along a grid, and counts what it meets.
@@ -78,6 +81,8 @@ class Track:
         s, and grid points, between stamped records of the same segment.
     starts : list of int
         First grid point of each segment.
+    marks : list of (int, float)
+        Grid point and stamp of a record now and then, to see the rate drift.
     """
 
     interval: float
@@ -92,7 +97,15 @@ class Track:
     elapsed: float = 0.0
     steps: int = 0
     starts: list[int] = field(default_factory=list)
-    _state: NDArray[np.float64] = field(default_factory=lambda: np.full(4, np.nan))
+    marks: list[tuple[int, float]] = field(default_factory=list)
+    _state: NDArray[np.float64] = field(
+        default_factory=lambda: np.array([np.nan, np.nan, np.nan, np.nan, 0.0])
+    )
+
+    @property
+    def scatter(self) -> float:
+        """Sum of the squared distances of stamps from the grid, s²."""
+        return float(self._state[4])
 
     @property
     def segments(self) -> tuple[tuple[int, int], ...]:
@@ -121,6 +134,9 @@ class Track:
         self.longest = max(self.longest, int(counts[4]))
         self.unstamped += int(counts[5])
         self.steps += int(counts[6])
+        for start in range(0, len(block), _MARK):
+            if points[start] >= 0 and np.isfinite(block[start]):
+                self.marks.append((int(points[start]), float(block[start])))
         self.rows += len(block)
         self.grid = max(self.grid, int(points.max(initial=-1)) + 1)
         return points
@@ -146,7 +162,8 @@ def _follow(
 ) -> float:
     """Give each stamp its grid point; return the seconds between stamps.
 
-    ``state``: time of the last grid point, last stamp, interval, last stamped grid point.
+    ``state``: time of the last grid point, last stamp, interval, last stamped grid point, sum of
+    the squared distances from the grid.
     """
     origin, last, interval, stamped = state[0], state[1], state[2], state[3]
     point = grid - 1
@@ -208,6 +225,7 @@ def _follow(
             origin += whole * interval + _TRACKING * error
             interval += _TRACKING**2 / 4.0 * error
             elapsed += step
+            state[4] += error * error
             counts[6] += point - int(stamped)
         last = stamp
         stamped = point

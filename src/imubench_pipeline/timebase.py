@@ -8,6 +8,7 @@ the samples are taken as consecutive, and that is a finding.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -48,6 +49,9 @@ class TimeBase:
         Interval with which the stamps were put on the grid, s.
     repeated : int
         Records left out, since an earlier one has their grid point.
+    rate_error : float or None
+        Standard deviation of the rate, as far as the scatter of the stamps tells, Hz; None for
+        a stated rate.
     """
 
     rate: float
@@ -60,6 +64,7 @@ class TimeBase:
     findings: tuple[Finding, ...] = ()
     tracking_interval: float | None = None
     repeated: int = 0
+    rate_error: float | None = None
 
     @property
     def missing(self) -> int:
@@ -108,6 +113,8 @@ def from_stamps(stamps: Stamps, stated: float | None, settings: QualitySettings)
     findings = _grid_findings(found, exact)
     rate = 1.0 / exact
     findings += _rate_findings(rate, stated, settings)
+    findings += _drift_findings(found, settings)
+    jitter = math.sqrt(found.scatter / max(found.steps, 1))
     uniform = found.grid == found.rows and len(found.starts) == 1 and not found.duplicates
     return TimeBase(
         rate,
@@ -120,6 +127,7 @@ def from_stamps(stamps: Stamps, stated: float | None, settings: QualitySettings)
         tuple(findings),
         found.interval,
         found.duplicates,
+        rate * math.sqrt(2.0) * jitter / max(found.elapsed, exact),
     )
 
 
@@ -190,16 +198,40 @@ def _rate_findings(rate: float, stated: float | None, settings: QualitySettings)
     thousands = np.log10(rate / stated) / 3.0
     if abs(thousands) > 0.9 and abs(thousands - round(thousands)) < 0.01:
         raise RecordingError(
-            f"the stamps say {rate:.6g} Hz, the sensor file states {stated:.6g} Hz: 'unit' of "
+            f"the stamps say {rate:.6g} Hz, stated are {stated:.6g} Hz: 'unit' of "
             "'time' is probably another one of s, ms, us, ns"
         )
     return [
         Finding(
             "rate_contradicts_stamps",
             "warning",
-            f"the sensor file states {stated:.6g} Hz, the stamps say {rate:.6g} Hz, which is "
-            "used; mend 'rate', or drop it",
+            f"stated are {stated:.6g} Hz, in the sensor file or in the log itself; the stamps say "
+            f"{rate:.6g} Hz, which is used; mend 'rate', or drop it",
             rate,
+        )
+    ]
+
+
+def _drift_findings(found: Track, settings: QualitySettings) -> list[Finding]:
+    """Tell whether the interval between samples is another in the second half of the log."""
+    if len(found.starts) > 1 or len(found.marks) < 8:
+        return []
+    points, stamps = np.array(found.marks, dtype=np.float64).T
+    half = len(points) // 2
+    early, late = (
+        (stamps[b] - stamps[a]) / (points[b] - points[a])
+        for a, b in ((0, half), (half, len(points) - 1))
+    )
+    drift = late / early - 1.0
+    if abs(drift) < settings.rate_drift:
+        return []
+    return [
+        Finding(
+            "rate_drifts",
+            "warning",
+            f"the interval between samples is {1e6 * drift:+.0f} ppm longer in the second half of "
+            "the recording: the clock of the sensor or of the host drifts; one rate is used",
+            drift,
         )
     ]
 
@@ -261,7 +293,17 @@ def _arrival_order(
                 len(segments),
             )
         )
-    return TimeBase(rate, "stamps", rows, rows, segments, False, False, tuple(findings))
+    return TimeBase(
+        rate,
+        "stamps",
+        rows,
+        rows,
+        segments,
+        False,
+        False,
+        tuple(findings),
+        rate_error=rate * worst / elapsed,
+    )
 
 
 def _span(stamps: Stamps) -> float:

@@ -1,0 +1,56 @@
+"""`imubench check`: is last night's log good? Everything but the estimation, nothing kept."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+
+from imubench_pipeline.estimators.likelihood import lines_and_band
+from imubench_pipeline.findings import Finding
+from imubench_pipeline.ingest import ingest_as_planned
+from imubench_pipeline.plan import Plan
+from imubench_pipeline.quality.spectral import band_finding, line_findings
+from imubench_pipeline.recording import ChannelLog, channel_logs
+from imubench_pipeline.results import Quality
+from imubench_pipeline.spectrum import spectra
+
+
+def check(plan: Plan) -> Iterator[tuple[str, str, Quality]]:
+    """Yield sensor, recording and quality of each recording that a plan finds.
+
+    Parameters
+    ----------
+    plan : Plan
+        Its simulated recordings are passed over.
+    """
+    for (sensor, name), recording in plan.recordings.items():
+        if recording.simulated:
+            continue
+        with tempfile.TemporaryDirectory(prefix="imubench.") as folder:
+            settings = plan.ingest_settings(sensor, name)
+            quality = ingest_as_planned(recording.path, settings, sensor, name, Path(folder))
+            for channel, log in channel_logs(Path(folder)).items():
+                for finding in spectral_findings(channel, log, plan.bandwidth(sensor, name)):
+                    quality.findings.append(dict(finding.row(sensor, name)))
+        yield sensor, name, quality
+
+
+def spectral_findings(channel: str, log: ChannelLog, bandwidth: float | None) -> list[Finding]:
+    """Return lines and the end of the band of a channel, if its spectrum can be taken.
+
+    Parameters
+    ----------
+    channel : str
+    log : ChannelLog
+    bandwidth : float or None
+        Cut-off of the sensor's own filter, where it is known, Hz.
+    """
+    if log.holes:
+        # Filling holes takes a model: that is the estimation's.
+        return []
+    spectrum, line_spectra = spectra(log.blocks(), log.grid, log.rate, log.segments)
+    lines, _, band = lines_and_band(spectrum, line_spectra, bandwidth=bandwidth)
+    rows = [asdict(line) | {"channel": channel} for line in lines]
+    return [*line_findings(rows), *band_finding(channel, band.highest, band.source)]

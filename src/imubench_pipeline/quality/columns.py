@@ -1,0 +1,198 @@
+"""What is wrong with each column of a recording, in findings with a severity and a time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+
+from imubench_pipeline.config import QualitySettings
+from imubench_pipeline.findings import Finding
+from imubench_pipeline.quality import levels, plausibility, stationarity
+from imubench_pipeline.quality.summary import ColumnSummary
+from imubench_pipeline.readers.batch import TEMPERATURE
+from imubench_pipeline.sensor import quantity_of
+
+
+def column_findings(
+    columns: Mapping[str, ColumnSummary], rate: float, settings: QualitySettings
+) -> list[Finding]:
+    """Return what the columns of one file tell; a channel that cannot be used is fatal.
+
+    Parameters
+    ----------
+    columns : mapping of str to ColumnSummary
+        Channels, and perhaps the temperature.
+    rate : float
+        Hz; the times of the findings follow from it.
+    settings : QualitySettings
+    """
+    findings: list[Finding] = []
+    usable: dict[str, ColumnSummary] = {}
+    for channel, column in columns.items():
+        if channel == TEMPERATURE:
+            findings += _temperature(column)
+            continue
+        fatal = _unusable(channel, column, settings)
+        findings += [fatal] if fatal else []
+        findings += _cells(channel, column)
+        if fatal is None:
+            usable[channel] = column
+    for channel, column in usable.items():
+        findings += _values(channel, column, rate, settings)
+        findings += _changes(channel, column, rate, settings)
+    findings += _repeated(usable, settings)
+    findings += _implausible(usable, rate)
+    return findings
+
+
+def _unusable(channel: str, column: ColumnSummary, settings: QualitySettings) -> Finding | None:
+    if column.present == 0:
+        return Finding("no_samples", "fatal", f"{channel} holds no number", 0, channel)
+    if column.present < settings.shortest:
+        detail = (
+            f"{channel} has {column.present} samples, expected at least {settings.shortest} "
+            "(quality.shortest); record for longer"
+        )
+        return Finding("too_short", "fatal", detail, column.present, channel)
+    if column.low == column.high:
+        detail = (
+            f"{channel} never changes (it stays at {column.low:.6g} in SI); the axis is dead or "
+            "the column is not the one meant"
+        )
+        return Finding("stuck", "fatal", detail, column.low, channel)
+    return None
+
+
+def _cells(channel: str, column: ColumnSummary) -> Iterator[Finding]:
+    if column.missing:
+        detail = f"{channel} has {column.missing} records without a number"
+        detail += "; treated as missing samples"
+        yield Finding("empty_cells", "note", detail, column.missing, channel)
+    if column.not_finite:
+        detail = f"{channel} has {column.not_finite} infinities; treated as missing samples"
+        yield Finding("not_finite", "warning", detail, column.not_finite, channel)
+
+
+def _temperature(column: ColumnSummary) -> Iterator[Finding]:
+    if not (0.0 < column.step < math.inf) or column.high - column.low > 2000.0 * column.step:
+        return
+    detail = (
+        f"the temperature has steps of {column.step:.3g} °C, from {column.low:.4g} to "
+        f"{column.high:.4g} °C"
+    )
+    yield Finding("quantised", "note", detail, column.step, TEMPERATURE)
+
+
+def _values(
+    channel: str, column: ColumnSummary, rate: float, settings: QualitySettings
+) -> Iterator[Finding]:
+    """Yield what the values tell by themselves."""
+    steps = levels.quantisation(column)
+    if steps is not None and steps.levels < settings.fewest_levels:
+        detail = (
+            f"{channel} has {steps.levels:.0f} levels of {steps.step:.4g} in SI, fewer than "
+            f"{settings.fewest_levels}: its noise is that of the rounding; record in more digits "
+            "or in a finer range"
+        )
+        yield Finding("coarse", "warning", detail, steps.levels, channel)
+    elif steps is not None and steps.over_noise > settings.step_over_noise:
+        detail = (
+            f"{channel} is quantised in steps of {steps.step:.4g} in SI, {steps.over_noise:.2g} "
+            "of its noise"
+        )
+        yield Finding("quantised", "note", detail, steps.step, channel)
+    length, end = column.longest_run
+    if length > max(3.0 * levels.longest_by_chance(column), settings.longest_stuck * rate):
+        detail = f"{channel} stays at one value for {length / rate:.4g} s ({length} samples)"
+        yield Finding(
+            "stuck_for_a_while",
+            "warning",
+            detail,
+            length / rate,
+            channel,
+            (end - length) / rate,
+            end / rate,
+        )
+    piled = levels.saturated(column, settings.saturated)
+    if piled is not None:
+        side, number = piled
+        value = column.low if side == "lowest" else column.high
+        detail = (
+            f"{channel} has {number} samples at its {side} value, {value:.5g} in SI: it is "
+            "saturated; use a wider range"
+        )
+        yield Finding("saturated", "warning", detail, number, channel)
+
+
+def _changes(
+    channel: str, column: ColumnSummary, rate: float, settings: QualitySettings
+) -> Iterator[Finding]:
+    """Yield what is not the same from beginning to end."""
+    blocks = column.blocks()
+    for first, last in stationarity.motions(blocks, settings.motion):
+        detail = (
+            f"{channel} is shaken from {first / rate:.5g} s to {last / rate:.5g} s; use a part "
+            "without it ('use:' beside the log)"
+        )
+        yield Finding(
+            "motion", "warning", detail, (last - first) / rate, channel, first / rate, last / rate
+        )
+    for step in stationarity.steps(blocks, settings.step):
+        at = step.sample / rate
+        detail = (
+            f"the mean of {channel} changes by {step.size:.4g} in SI at {at:.5g} s "
+            f"({step.sigmas:.0f} times its usual changes): the sensor was moved, or its range "
+            "or its temperature jumped"
+        )
+        yield Finding("step", "warning", detail, step.size, channel, at, at)
+    warm = stationarity.warm_up(blocks, settings.warm_up)
+    if warm is not None:
+        detail = (
+            f"{channel} drifts by {warm.drift:.4g} in SI in its first {warm.end / rate:.5g} s, "
+            f"{abs(warm.drift) / warm.usual:.0f} times as much as in a later part; leave it out "
+            "with 'use: {start: "
+            f"{math.ceil(warm.end / rate)}"
+            "}' beside the log, or quality.trim_warm_up"
+        )
+        yield Finding("warm_up", "warning", detail, warm.drift, channel, 0.0, warm.end / rate)
+    change = stationarity.variance_change(blocks)
+    if change is not None and change[0] > settings.variance_ratio:
+        ratio, first, last = change
+        detail = (
+            f"the noise of {channel} is {ratio:.3g} times as large from {first / rate:.5g} s to "
+            f"{last / rate:.5g} s as where it is calmest: it is not stationary"
+        )
+        yield Finding(
+            "not_stationary", "warning", detail, ratio, channel, first / rate, last / rate
+        )
+
+
+def _repeated(columns: Mapping[str, ColumnSummary], settings: QualitySettings) -> Iterator[Finding]:
+    """Yield columns whose samples are repeated more often than their steps explain."""
+    for channel, column in columns.items():
+        share = column.repeats / max(column.present - 1, 1)
+        steps = levels.quantisation(column)
+        # Two normal samples rounded to steps of s sigma are equal with a chance of s / 3.54.
+        expected = min(1.0, steps.over_noise / 3.54) if steps else 0.0
+        if share > settings.repeated + 1.5 * expected:
+            detail = (
+                f"{channel} repeats the sample before in {100 * share:.0f} % of the records: it "
+                "is read faster than it samples, or passed through a filter; state its own rate, "
+                "and record each sample once"
+            )
+            yield Finding("repeated_samples", "warning", detail, share, channel)
+
+
+def _implausible(columns: Mapping[str, ColumnSummary], rate: float) -> list[Finding]:
+    means = {name: column.mean for name, column in columns.items()}
+    densities = {
+        name: levels.noise_of(column) / math.sqrt(rate)
+        for name, column in columns.items()
+        if quantity_of(name) == "gyro"
+    }
+    gravity = plausibility.gravity(means)
+    return [
+        *([gravity] if gravity else []),
+        *plausibility.gyro_noise(densities),
+        *plausibility.gyro_offset(means),
+    ]

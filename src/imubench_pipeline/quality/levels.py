@@ -1,0 +1,84 @@
+"""What the values of a column tell by themselves: stuck, saturated, repeated, coarse."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from imubench_pipeline.quality.summary import ColumnSummary
+
+_SURE = 1e-9
+"""Chance of a run by accident below which it is none."""
+
+
+@dataclass(frozen=True)
+class Quantisation:
+    """The steps of a quantised column.
+
+    Attributes
+    ----------
+    step : float
+        Least significant bit, SI.
+    levels : float
+        Steps between the lowest and the highest sample, and one.
+    over_noise : float
+        Step over the standard deviation of the samples.
+    """
+
+    step: float
+    levels: float
+    over_noise: float
+
+
+def quantisation(column: ColumnSummary) -> Quantisation | None:
+    """Return the steps of a column, or None where none show."""
+    spread = noise_of(column)
+    if not (0.0 < column.step < np.inf and spread > 0.0):
+        return None
+    # Two neighbours of n continuous samples come as close as spread / n.
+    if column.step < 20.0 * spread / column.present:
+        return None
+    return Quantisation(
+        column.step, (column.high - column.low) / column.step + 1.0, column.step / spread
+    )
+
+
+def noise_of(column: ColumnSummary) -> float:
+    """Return the usual standard deviation of the samples of a block, SI."""
+    spread = column.blocks().spread
+    there = spread[np.isfinite(spread)]
+    return float(np.median(there)) if len(there) else float("nan")
+
+
+def longest_by_chance(column: ColumnSummary) -> float:
+    """Return how long a run of one value may be by chance, in samples."""
+    share = min(column.repeats / max(column.present - 1, 1), 0.999)
+    if share == 0.0:
+        return 1.0
+    return 1.0 + math.log(_SURE / column.present) / math.log(share)
+
+
+def saturated(column: ColumnSummary, share: float) -> tuple[str, int] | None:
+    """Tell whether samples pile up at an extreme.
+
+    Parameters
+    ----------
+    column : ColumnSummary
+    share : float
+        Part of the samples at an extreme that counts.
+
+    Returns
+    -------
+    (side, number) or None
+        ``lowest`` or ``highest``, and the samples there.
+    """
+    steps = quantisation(column)
+    if steps is not None and steps.levels < 10:
+        return None  # so few levels that an extreme is nothing special
+    for side, number in zip(("lowest", "highest"), column.at_extremes, strict=True):
+        # A Gaussian leaves a few samples at its last level, whatever the step.
+        if number > max(share * column.present, 10):
+            return side, number
+    return None

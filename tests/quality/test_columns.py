@@ -1,0 +1,213 @@
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from imubench_pipeline.config import QualitySettings
+from imubench_pipeline.findings import Finding
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.quality.columns import column_findings
+from imubench_pipeline.quality.summary import ColumnSummary
+from imubench_pipeline.simulate import simulate
+
+RATE = 100.0
+GYRO = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7)
+SIGMA = GYRO.N * np.sqrt(RATE)
+SETTINGS = QualitySettings()
+
+CLEAN = {
+    "gyro": (GYRO, 100.0, 0.01),
+    "accelerometer": (NoiseModel(N=1.1e-3, B=7.2e-4, T_B=148.9, K=2e-5), 50.0, 9.81),
+    "random walk": (NoiseModel(N=1e-4, K=1e-4), 20.0, 0.0),
+    "flicker": (NoiseModel(N=1e-4, B=3e-4), 20.0, 0.0),
+    "white": (NoiseModel(N=1e-4), 100.0, 0.0),
+}
+
+
+def summary(log: np.ndarray, pieces: int = 7) -> ColumnSummary:
+    column = ColumnSummary()
+    for piece in np.array_split(log, pieces):
+        column.add(piece)
+    return column
+
+
+def findings(log: np.ndarray, rate: float = RATE, channel: str = "gyro_x") -> list[Finding]:
+    return column_findings({channel: summary(log)}, rate, SETTINGS)
+
+
+def names(log: np.ndarray, rate: float = RATE, channel: str = "gyro_x") -> list[str]:
+    return [finding.finding for finding in findings(log, rate, channel)]
+
+
+def an_hour(rng: np.random.Generator, seconds: float = 3600.0) -> np.ndarray:
+    return 0.01 + simulate(GYRO, RATE, round(seconds * RATE), rng)
+
+
+@pytest.mark.parametrize("case", CLEAN)
+def test_clean_logs_have_no_findings(rng: np.random.Generator, case: str) -> None:
+    model, rate, bias = CLEAN[case]
+    for hours in (0.05, 0.3, 1.0, 1.0, 2.0):
+        log = bias + simulate(model, rate, round(hours * 3600 * rate), rng)
+        assert names(log, rate, "accel_z" if bias > 9 else "gyro_x") == []
+
+
+def stuck(log: np.ndarray) -> None:
+    log[100_000:101_000] = log[100_000]
+
+
+def saturated(log: np.ndarray) -> None:
+    np.clip(log, None, log.mean() + 2.0 * SIGMA, out=log)
+
+
+def shaken(log: np.ndarray) -> None:
+    log[50_000:50_500] += 10.0 * SIGMA * np.sin(np.arange(500.0))
+
+
+def moved(log: np.ndarray) -> None:
+    log[180_000:] += 1.5 * SIGMA
+
+
+def warming(log: np.ndarray) -> None:
+    log += 2.0 * SIGMA * np.exp(-np.arange(len(log)) / 30_000.0)
+
+
+def noisier(log: np.ndarray) -> None:
+    rng = np.random.default_rng(4)
+    log[200_000:300_000] += 1.5 * SIGMA * rng.standard_normal(100_000)
+
+
+def polled(log: np.ndarray) -> None:
+    log[1::2] = log[::2]
+
+
+def coarse(log: np.ndarray) -> None:
+    log[:] = np.round(log / (3 * SIGMA)) * (3 * SIGMA)
+
+
+def quantised(log: np.ndarray) -> None:
+    log[:] = np.round(log / (0.3 * SIGMA)) * (0.3 * SIGMA)
+
+
+def infinite(log: np.ndarray) -> None:
+    log[[5, 77]] = np.inf
+
+
+def empty(log: np.ndarray) -> None:
+    log[10:20] = np.nan
+
+
+@pytest.mark.parametrize(
+    ("spoil", "found", "severity", "value", "span"),
+    [
+        (stuck, "stuck_for_a_while", "warning", 10.0, (1000.0, 1010.0)),
+        (saturated, "saturated", "warning", None, None),
+        (shaken, "motion", "warning", 5.0, (500.0, 505.0)),
+        (moved, "step", "warning", 1.5 * SIGMA, (1800.0, 1800.0)),
+        (warming, "warm_up", "warning", None, (0.0, None)),
+        (noisier, "not_stationary", "warning", np.sqrt(1 + 1.5**2), None),
+        (polled, "repeated_samples", "warning", 0.5, None),
+        (coarse, "coarse", "warning", None, None),
+        (quantised, "quantised", "note", 0.3 * SIGMA, None),
+        (infinite, "not_finite", "warning", 2.0, None),
+        (empty, "empty_cells", "note", 10.0, None),
+    ],
+)
+def test_what_is_wrong_is_found_with_its_size_and_its_time(
+    rng: np.random.Generator,
+    spoil: Callable[[np.ndarray], None],
+    found: str,
+    severity: str,
+    value: float | None,
+    span: tuple[float, float | None] | None,
+) -> None:
+    log = an_hour(rng)
+    spoil(log)
+    (finding,) = findings(log)
+    assert (finding.finding, finding.severity) == (found, severity)
+    assert finding.channel == "gyro_x"
+    if value is not None:
+        assert finding.value == pytest.approx(value, rel=0.15)
+    if span is not None:
+        assert finding.start == pytest.approx(span[0], abs=10)
+        assert finding.end is not None
+        if span[1] is not None:
+            assert finding.end == pytest.approx(span[1], abs=10)
+
+
+def test_a_warm_up_ends_where_the_drift_does(rng: np.random.Generator) -> None:
+    log = an_hour(rng)
+    warming(log)
+    (finding,) = findings(log)
+    # The drift of 2 sigma e^(-t / 300 s) is below the usual one after some time constants.
+    assert 600.0 < (finding.end or 0.0) < 2400.0
+    assert "use: {start: " in finding.detail
+    assert finding.value == pytest.approx(-2.0 * SIGMA, rel=0.3)
+
+
+@pytest.mark.parametrize("step", [1.5, 0.7, 0.1])
+def test_rounding_is_not_taken_for_repeats_or_for_a_stuck_axis(
+    rng: np.random.Generator, step: float
+) -> None:
+    log = np.round(an_hour(rng) / (step * SIGMA)) * (step * SIGMA)
+    assert set(names(log)) <= {"quantised", "coarse"}
+
+
+def test_gravity_in_a_wrong_unit_is_named(rng: np.random.Generator) -> None:
+    noise = 0.01 * rng.standard_normal((3, 5000))
+    direction = np.array([0.6, 0.0, 0.8])[:, None] * 9.80665
+    for factor, words in (
+        (1 / 9.80665, "state unit g"),
+        (1000 / 9.80665, "state unit mg"),
+        (9.80665, "state unit m/s^2, and not g"),
+        (1e-3 * 9.80665, "state unit m/s^2, and not mg"),
+        (1e-3, "state unit g, and not mg"),
+        (1000.0, "state unit mg, and not g"),
+        (0.0, "taken off already"),
+        (1.7, "check unit, scale"),
+    ):
+        columns = {
+            f"accel_{axis}": summary(values)
+            for axis, values in zip("xyz", factor * direction + noise, strict=True)
+        }
+        (finding,) = [
+            f for f in column_findings(columns, RATE, SETTINGS) if f.finding == "gravity_norm"
+        ]
+        assert words in finding.detail
+    columns = {
+        f"accel_{axis}": summary(values)
+        for axis, values in zip("xyz", direction + noise, strict=True)
+    }
+    assert column_findings(columns, RATE, SETTINGS) == []
+
+
+def test_degrees_taken_for_radians_are_suspected(rng: np.random.Generator) -> None:
+    log = np.degrees(an_hour(rng, 600.0) - 0.009)
+    (finding,) = findings(log)
+    assert finding.finding == "suspicious_unit"
+    assert "are the figures in °/s, and not rad/s" in finding.detail
+    (finding,) = findings(np.radians(an_hour(rng, 600.0)))
+    assert "are the figures in rad/s, and not °/s" in finding.detail
+
+
+def test_a_turning_sensor_is_not_at_rest(rng: np.random.Generator) -> None:
+    assert names(an_hour(rng, 60.0) + 1.0) == ["large_offset"]
+
+
+@pytest.mark.parametrize(
+    ("log", "found"),
+    [
+        (np.full(1000, np.nan), "no_samples"),
+        (np.arange(99.0) * 1e-4, "too_short"),
+        (np.full(1000, 0.25), "stuck"),
+    ],
+)
+def test_a_column_that_cannot_be_used_is_fatal(log: np.ndarray, found: str) -> None:
+    finding = findings(log)[0]
+    assert (finding.finding, finding.severity) == (found, "fatal")
+
+
+def test_steps_of_the_temperature_are_noted(rng: np.random.Generator) -> None:
+    temperature = np.round(25 + 0.02 * np.cumsum(rng.standard_normal(5000)), 1)
+    (finding,) = column_findings({"temperature": summary(temperature)}, 1.0, SETTINGS)
+    assert (finding.finding, finding.severity) == ("quantised", "note")
+    assert finding.value == pytest.approx(0.1)

@@ -1,0 +1,96 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from imubench_pipeline.config import QualitySettings
+from imubench_pipeline.estimators.likelihood import fit
+from imubench_pipeline.ingest import ingest
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.quality.knocks import knocks
+from imubench_pipeline.quality.summary import ColumnSummary
+from imubench_pipeline.recording import channel_logs
+from imubench_pipeline.sensor import LogFormat, RecordingNotes
+from imubench_pipeline.simulate import simulate
+
+RATE = 50.0
+MODEL = NoiseModel(N=1.1e-3, B=2e-3, T_B=30.0, K=2e-4)
+SIGMA = MODEL.N * np.sqrt(RATE)
+
+
+def found_in(log: np.ndarray, sigmas: float = 10.0) -> list[tuple[int, int]]:
+    column = ColumnSummary()
+    column.add(log)
+    pieces = np.array_split(log, 5)
+    return [(k.first, k.last) for k in knocks(pieces, column.blocks(), sigmas, 25)]
+
+
+def test_knocks_are_found_where_they_are(rng: np.random.Generator) -> None:
+    log = 9.81 + simulate(MODEL, RATE, 200_000, rng)
+    places = np.sort(rng.choice(np.arange(200, 199_800, 97), 40, replace=False))
+    for place in places:
+        # A knock rings down in a few samples.
+        log[place : place + 6] += 30 * SIGMA * np.array([1, -0.7, 0.5, -0.3, 0.2, -0.1])
+    found = found_in(log)
+    assert len(found) == 40
+    for place, (first, last) in zip(places, found, strict=True):
+        assert first <= place - 5
+        assert place + 4 <= last <= place + 30
+
+
+def test_single_samples_of_any_sign_and_at_the_ends(rng: np.random.Generator) -> None:
+    log = simulate(MODEL, RATE, 5000, rng)
+    for place, size in ((0, 20), (255, -15), (256, 15), (2000, -500), (4999, 12)):
+        log[place] += size * SIGMA
+    assert len(found_in(log)) == 5
+
+
+def test_quiet_logs_have_none(rng: np.random.Generator) -> None:
+    for model in (MODEL, NoiseModel(N=1e-3, K=1e-2), NoiseModel(N=1e-3, B=1e-2)):
+        assert found_in(simulate(model, RATE, 300_000, rng)) == []
+    assert found_in(np.full(3000, np.nan)) == []
+
+
+def kept(tmp_path: Path, log: np.ndarray) -> tuple[list[str], np.ndarray]:
+    path = tmp_path / "a.csv"
+    path.write_text("ax\n" + "\n".join(f"{value:.9g}" for value in log) + "\n")
+    channels = {"accel_x": {"column": "ax", "unit": "m/s^2"}}
+    layout = LogFormat.model_validate({"rate": "50 Hz", "channels": channels})
+    out = ingest(path, layout, RecordingNotes(), QualitySettings(), tmp_path / "out", {})
+    values = np.concatenate(list(channel_logs(tmp_path / "out")["accel_x"].blocks()))
+    assert channel_logs(tmp_path / "out")["accel_x"].holes
+    counts = out.channels["accel_x"]
+    assert counts["present"] == counts["used"] + counts["knocks"]
+    assert counts["knocks"] == np.isnan(values).sum() - np.isnan(log).sum()
+    return [finding.finding for finding in out.findings], values
+
+
+def test_knocks_leave_the_parameters_unharmed(tmp_path: Path, rng: np.random.Generator) -> None:
+    log = simulate(MODEL, RATE, 200_000, rng)
+    clean = fit(log, RATE).estimates[1].parameters
+    knocked = log.copy()
+    for place in rng.choice(np.arange(500, 199_500), 60, replace=False):
+        knocked[place : place + 4] += rng.choice([-1, 1]) * 40 * SIGMA * 0.5 ** np.arange(4)
+    spoilt = fit(knocked, RATE).estimates[1].parameters
+    assert spoilt["N"].value > 1.3 * MODEL.N
+    names, values = kept(tmp_path, knocked)
+    assert names == ["knocks"]
+    # What is left is the log as it was.
+    there = np.isfinite(values)
+    np.testing.assert_allclose(values[there], log[there], atol=4.2 * SIGMA)
+    mended = fit(values, RATE).estimates[1].parameters
+    for name in ("N", "B", "T_B", "K"):
+        truth = getattr(MODEL, name)
+        assert mended[name].lower <= truth * 1.02
+        assert mended[name].upper >= truth * 0.98
+        width = clean[name].upper - clean[name].lower
+        assert mended[name].value == pytest.approx(clean[name].value, abs=0.25 * width)
+
+
+def test_samples_that_are_missing_stay_missing(tmp_path: Path, rng: np.random.Generator) -> None:
+    log = simulate(MODEL, RATE, 20_000, rng)
+    log[5000] = 50 * SIGMA
+    log[[4990, 10_000]] = np.nan
+    names, values = kept(tmp_path, log)
+    assert set(names) == {"knocks", "empty_cells"}
+    assert np.isnan(values[[4990, 10_000, 5000]]).all()
