@@ -68,7 +68,8 @@ def with_line(ratio: float, number: int) -> tuple[Sinusoid, float, list[Line]]:
     time = np.arange(SAMPLES) / RATE
     log = simulate(model, RATE, SAMPLES, rng)
     log += line.amplitude * np.sin(2.0 * np.pi * frequency * time + phase)
-    return line, ratio * width * SAMPLES / RATE, found_in(log)
+    found = [line for line in found_in(log) if line.kind != "alias"]
+    return line, ratio * width * SAMPLES / RATE, found
 
 
 def row(ratio: float, logs: list[tuple[Sinusoid, float, list[Line]]]) -> Iterator[str]:

@@ -102,7 +102,9 @@ def test_a_hole_beside_a_repeated_record_is_still_a_hole(tmp_path: Path) -> None
 
 
 def test_a_uniform_time_is_not_kept(tmp_path: Path, rng: np.random.Generator) -> None:
-    source = write_csv(tmp_path / "a.csv", t=np.arange(500) / 50, wx=1e-3 * rng.standard_normal(500))
+    source = write_csv(
+        tmp_path / "a.csv", t=np.arange(500) / 50, wx=1e-3 * rng.standard_normal(500)
+    )
     result, _ = kept(source, tmp_path / "out", {"gyro_x": XY["gyro_x"]}, time=TIME)
     assert pq.read_schema(tmp_path / "out/log.parquet").names == ["gyro_x"]
     assert result.channels["gyro_x"]["rate"] == pytest.approx(50.0)
@@ -210,7 +212,9 @@ def test_long_holes_are_read_in_bounded_blocks(tmp_path: Path) -> None:
 
 
 def test_a_second_run_replaces_the_first(tmp_path: Path, rng: np.random.Generator) -> None:
-    first = write_csv(tmp_path / "a.csv", wx=1e-3 * rng.standard_normal(500), wy=1e-3 * rng.standard_normal(500))
+    first = write_csv(
+        tmp_path / "a.csv", wx=1e-3 * rng.standard_normal(500), wy=1e-3 * rng.standard_normal(500)
+    )
     kept(first, tmp_path / "out")
     write_csv(tmp_path / "r/x.csv", w=1e-3 * rng.standard_normal(300))
     write_csv(tmp_path / "r/y.csv", w=1e-3 * rng.standard_normal(200))

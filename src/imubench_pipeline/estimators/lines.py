@@ -51,7 +51,7 @@ _LEAKS = 0.3
 # Sums over the bins of a line of the squared correlations of Hann-windowed Fourier coefficients
 # (1, 2/3 and 1/6 at a distance of 0, 1 and 2 bins), without and with the distances as weights;
 # and what a line on a bin makes of them.
-_NOISE_POWER, _NOISE_PLACE = 12.6, 42.5
+_NOISE_POWER, _NOISE_PLACE = 12.6, 50.0
 _CROSS_POWER, _CROSS_PLACE = 35.0 / 18.0, 5.0 / 18.0
 _FLOOR_POWER, _FLOOR_PLACE = 4e-3, 5e-3
 

@@ -1,0 +1,142 @@
+"""Ingest of a CSV log with all checks, against a bare streaming conversion to Parquet by pyarrow.
+
+python benchmarks/ingest_speed.py [--rows 10000000 30000000] [--runs 3]
+
+Both read the same seven columns with one thread, write zstd level 1 with byte stream split in row
+groups of a million rows, and run each in a process of its own, one after the other.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pacsv
+import pyarrow.parquet as pq
+
+from imubench_pipeline.config import QualitySettings
+from imubench_pipeline.ingest import ingest
+from imubench_pipeline.recording import ROW_GROUP
+from imubench_pipeline.sensor import LogFormat, RecordingNotes
+
+RATE = 100.0
+COLUMNS = ("t", "wx", "wy", "wz", "ax", "ay", "az")
+LAYOUT = {
+    "time": {"column": "t", "unit": "s"},
+    "channels": {
+        **{f"gyro_{axis}": {"column": f"w{axis}", "unit": "deg/s"} for axis in "xyz"},
+        **{f"accel_{axis}": {"column": f"a{axis}", "unit": "g"} for axis in "xyz"},
+    },
+}
+
+
+def write_log(path: Path, rows: int) -> None:
+    """Write a simulated log: white noise, and gravity on one axis."""
+    rng = np.random.default_rng(1)
+    with path.open("wb") as file:
+        for start in range(0, rows, 1 << 20):
+            size = min(1 << 20, rows - start)
+            block = {"t": np.round((start + np.arange(size)) / RATE, 2)}
+            block |= {name: np.round(0.05 * rng.standard_normal(size), 6) for name in COLUMNS[1:4]}
+            block |= {name: np.round(1e-3 * rng.standard_normal(size), 6) for name in COLUMNS[4:]}
+            block["az"] = block["az"] + 1.0
+            options = pacsv.WriteOptions(include_header=start == 0)
+            pacsv.write_csv(pa.table(block), file, options)
+
+
+def ours(source: Path, folder: Path) -> None:
+    """Ingest the log."""
+    layout = LogFormat.model_validate(LAYOUT)
+    found = ingest(source, layout, RecordingNotes(), QualitySettings(), folder, {})
+    assert not [f for f in found.findings if f.severity != "note"], found.findings
+
+
+def bare(source: Path, folder: Path) -> None:
+    """Convert the log with pyarrow alone."""
+    types = dict.fromkeys(COLUMNS, pa.float64())
+    reader = pacsv.open_csv(
+        source,
+        read_options=pacsv.ReadOptions(use_threads=False, block_size=4 << 20),
+        convert_options=pacsv.ConvertOptions(column_types=types),
+    )
+    writer = pq.ParquetWriter(
+        folder / "bare.parquet",
+        reader.schema,
+        compression="zstd",
+        compression_level=1,
+        use_dictionary=False,
+        use_byte_stream_split=list(COLUMNS),
+    )
+    waiting: list[pa.RecordBatch] = []
+    held = 0
+    with writer:
+        for batch in reader:
+            waiting.append(batch)
+            held += len(batch)
+            if held >= ROW_GROUP:
+                writer.write_table(pa.Table.from_batches(waiting), row_group_size=ROW_GROUP)
+                waiting, held = [], 0
+        if waiting:
+            writer.write_table(pa.Table.from_batches(waiting), row_group_size=ROW_GROUP)
+
+
+WAYS = {"ours": ours, "bare": bare}
+
+
+def measured(way: str, source: Path) -> tuple[float, float]:
+    """Run one way in a process of its own; return seconds of work, and peak resident MiB."""
+    with tempfile.TemporaryDirectory(dir=source.parent) as folder:
+        command = [sys.executable, __file__, "--way", way, "--log", str(source), "--to", folder]
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        assert process.stdout is not None
+        seconds = float(process.stdout.read())
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        if process.returncode:
+            raise SystemExit(f"{way}: exit status {process.returncode}")
+    return seconds, usage.ru_maxrss / 1024
+
+
+def main() -> None:
+    """Print the ratio and the memory for each length."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--rows", type=int, nargs="+", default=[10_000_000, 30_000_000])
+    parser.add_argument("--runs", type=int, default=3)
+    parser.add_argument("--way", choices=WAYS, help=argparse.SUPPRESS)
+    parser.add_argument("--log", type=Path, help=argparse.SUPPRESS)
+    parser.add_argument("--to", type=Path, help=argparse.SUPPRESS)
+    given = parser.parse_args()
+    if given.way:
+        # What is compiled or imported once is not counted on either side.
+        small = given.to / "small.csv"
+        write_log(small, 5000)
+        (given.to / "small").mkdir()
+        WAYS[given.way](small, given.to / "small")
+        start = time.perf_counter()
+        WAYS[given.way](given.log, given.to)
+        print(time.perf_counter() - start)
+        return
+    for rows in given.rows:
+        with tempfile.TemporaryDirectory() as name:
+            source = Path(name) / "log.csv"
+            write_log(source, rows)
+            pairs = [[measured(way, source) for way in WAYS] for _ in range(given.runs)]
+        ratios = [ours[0] and bare[0] / ours[0] for ours, bare in pairs]
+        for way, results in zip(WAYS, zip(*pairs, strict=True), strict=True):
+            seconds = np.median([result[0] for result in results])
+            memory = max(result[1] for result in results)
+            print(f"{rows:,} rows x 7, {way}: {seconds:.2f} s, peak resident {memory:.0f} MiB")
+        print(
+            f"speed of ours over the bare conversion, median: {np.median(ratios):.2f}", flush=True
+        )
+
+
+if __name__ == "__main__":
+    main()
