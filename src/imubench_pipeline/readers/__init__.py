@@ -6,14 +6,27 @@ from importlib import import_module
 from pathlib import Path
 
 from imubench_pipeline.readers.batch import TEMPERATURE, Batch, LogFile, RecordingError
+from imubench_pipeline.readers.compressed import (
+    holds_text,
+    is_archive,
+    is_member,
+    members,
+    visible,
+)
 from imubench_pipeline.readers.content import is_ros_2_bag, reader_of
 from imubench_pipeline.sensor import ColumnSource, LogFormat, Reader
 
 _CLASSES: dict[Reader, tuple[str, str]] = {
     "csv": ("imubench_pipeline.readers.csv", "CsvFile"),
+    "vectornav": ("imubench_pipeline.readers.vectornav", "VectorNavFile"),
+    "ubx": ("imubench_pipeline.readers.ubx", "UbxFile"),
+    "rosbag": ("imubench_pipeline.readers.rosbag", "RosbagFile"),
     "matlab": ("imubench_pipeline.readers.matlab", "MatlabFile"),
 }
 """Module and class of each reader: only those that a run needs are imported."""
+
+_STREAMED: tuple[Reader, ...] = ("csv", "vectornav", "ubx")
+"""The readers of logs that may be compressed, or in a zip archive."""
 
 __all__ = ["TEMPERATURE", "Batch", "LogFile", "RecordingError", "log_files", "read"]
 
@@ -22,7 +35,7 @@ def log_files(path: Path) -> list[Path]:
     """Return the files of a recording: the file itself, or the visible files of its folder."""
     if path.is_dir():
         return sorted(
-            file for file in path.iterdir() if file.is_file() and not file.name.startswith(".")
+            file for file in path.rglob("*") if file.is_file() and visible(file.relative_to(path))
         )
     return [path]
 
@@ -33,7 +46,7 @@ def read(path: Path, log: LogFormat) -> list[LogFile]:
     Parameters
     ----------
     path : Path
-        A log file, or the folder of a recording that has several.
+        A log file, or the folder or zip archive of a recording that has several.
     log : LogFormat
         How the files are written.
 
@@ -51,39 +64,62 @@ def read(path: Path, log: LogFormat) -> list[LogFile]:
     sources = {str(name): source for name, source in log.channels.items()}
     if log.temperature is not None:
         sources[TEMPERATURE] = log.temperature
+    present = _present(path, log)
     by_file: dict[Path, dict[str, ColumnSource]] = {}
     for name, source in sources.items():
-        by_file.setdefault(_file_of(path, source, name), {})[name] = source
+        by_file.setdefault(_file_of(path, present, source, name), {})[name] = source
     return [_open(file, log, by_file[file]) for file in sorted(by_file)]
 
 
-def _file_of(path: Path, source: ColumnSource, name: str) -> Path:
+def _present(path: Path, log: LogFormat) -> list[Path] | None:
+    """Return the files of a folder or an archive; None where it is one log."""
     if is_ros_2_bag(path):
-        return path
-    present = log_files(path)
-    if source.file is not None:
-        if not path.is_dir():
-            raise RecordingError(
-                f"{path.name}: is one file, but the sensor file takes {name} from "
-                f"{source.file!r} of a folder; put the files into a folder, or drop 'file:'"
-            )
-        if path / source.file not in present:
-            names = ", ".join(file.name for file in present) or "no file"
-            raise RecordingError(
-                f"{path.name}: no file {source.file!r} for {name}; the folder has {names}"
-            )
-        return path / source.file
-    if len(present) != 1:
-        names = ", ".join(file.name for file in present) or "no file"
+        return None
+    if path.is_dir():
+        return log_files(path)
+    if is_archive(path) and (log.reader or reader_of(path)) in _STREAMED:
+        return members(path)
+    return None
+
+
+def _file_of(path: Path, present: list[Path] | None, source: ColumnSource, name: str) -> Path:
+    if source.file is None:
+        return path if present is None else _only(path, present)
+    if present is None:
         raise RecordingError(
-            f"{path.name}: expected one file, the folder has {names}; name the file of each "
-            "channel with 'file:' in the sensor file"
+            f"{path.name}: is one file, but the sensor file takes {name} from {source.file!r} of "
+            "a folder; put the files into a folder, or drop 'file:'"
         )
-    return present[0]
+    if path / source.file not in present:
+        raise RecordingError(
+            f"{path.name}: no file {source.file!r} for {name}; the folder has "
+            f"{_names(path, present)}; mend 'file' of {name} in the sensor file"
+        )
+    return path / source.file
+
+
+def _only(path: Path, present: list[Path]) -> Path:
+    """Return the one log of a folder or archive; what is in its sub-folders describes it."""
+    found = [file for file in present if file.parent == path] or present
+    if len(found) > 1 and not path.is_dir():
+        found = [file for file in found if holds_text(file)]
+    if len(found) != 1:
+        raise RecordingError(
+            f"{path.name}: expected one file, the folder has {_names(path, present)}; name the "
+            "file of each channel with 'file:' in the sensor file"
+        )
+    return found[0]
+
+
+def _names(path: Path, files: list[Path]) -> str:
+    return ", ".join(file.relative_to(path).as_posix() for file in files[:30]) or "no file"
 
 
 def _open(file: Path, log: LogFormat, sources: dict[str, ColumnSource]) -> LogFile:
-    reader = log.reader or reader_of(file)
+    inside = None if is_member(file) else _present(file, log)
+    if inside is not None:
+        file = _only(file, inside)  # a log that is packed alone, among others
+    reader = log.reader or ("csv" if is_member(file) else reader_of(file))
     module, name = _CLASSES[reader]
     kind: type[LogFile] = getattr(import_module(module), name)
     return kind(file, log, sources)

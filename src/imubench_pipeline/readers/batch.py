@@ -84,11 +84,11 @@ class LogFile(ABC):
     def seconds(self, stamps: NDArray[Any], first: Any) -> NDArray[np.float64]:
         """Convert stamps as written to s since the first one; integers lose no digit."""
         assert self.log.time is not None  # asked for where there are stamps
-        unit = self.log.time.unit or "ns"
+        unit, scale = self.log.time.unit or "ns", self.log.time.scale
         if unit == "samples":
             assert self.log.rate_hz is not None  # checked with the sensor file
-            return np.asarray((stamps - first) / self.log.rate_hz, np.float64)
-        return np.asarray((stamps - first) * SECONDS[unit], np.float64)
+            return np.asarray((stamps - first) * scale / self.log.rate_hz, np.float64)
+        return np.asarray((stamps - first) * (SECONDS[unit] * scale), np.float64)
 
     def to_si(self, name: str, raw: NDArray[np.float64]) -> NDArray[np.float64]:
         """Convert the figures of a column as written to SI: scale * (raw - offset), then unit."""

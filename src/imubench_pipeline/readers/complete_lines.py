@@ -1,120 +1,182 @@
-"""The bytes of a text log, decompressed, up to the last complete line."""
+"""The text of a log as UTF-8 with line feeds, in blocks of complete lines."""
 
 from __future__ import annotations
 
-import gzip
-import io
-import zlib
-from collections.abc import Iterator
+import codecs
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.readers.batch import RecordingError
+from imubench_pipeline.readers.compressed import open_bytes
 
-_GZIP_MAGIC = b"\x1f\x8b"
-_OTHER_COMPRESSION = {
-    b"\x28\xb5\x2f\xfd": "zstd",
-    b"\xfd7zXZ\x00": "xz",
-    b"BZh": "bzip2",
-    b"PK\x03\x04": "zip",
-}
+_SEEN = 1 << 16
 _LONGEST_LINE = 1 << 20
+_BYTE_ORDER_MARKS: Mapping[bytes, str] = {
+    codecs.BOM_UTF8: "",
+    # Before UTF-16, whose mark is the beginning of this one.
+    codecs.BOM_UTF32_LE: "utf-32-le",
+    codecs.BOM_UTF32_BE: "utf-32-be",
+    codecs.BOM_UTF16_LE: "utf-16-le",
+    codecs.BOM_UTF16_BE: "utf-16-be",
+}
 
 
-def open_text(path: Path) -> io.BufferedIOBase:
-    """Open a text log for reading bytes; gzip is seen by its first bytes, not by its name.
+class _Text:
+    """The bytes of a text log, decompressed, in an encoding that ASCII is a part of.
 
-    Raises
-    ------
-    RecordingError
-        If the file cannot be opened, or is compressed in another way.
+    A lone carriage return at the ends of lines is a line feed here, and a byte order mark is
+    gone.
     """
-    try:
-        with path.open("rb") as raw:
-            begin = raw.read(6)
-    except OSError as error:
-        raise RecordingError(f"{path.name}: cannot be opened ({error.strerror})") from None
-    for magic, kind in _OTHER_COMPRESSION.items():
-        if begin.startswith(magic):
-            raise RecordingError(f"{path.name}: is compressed with {kind}; unpack it, or use gzip")
-    return gzip.open(path, "rb") if begin.startswith(_GZIP_MAGIC) else path.open("rb")
+
+    def __init__(self, path: Path, skipped: int) -> None:
+        self._bytes = open_bytes(path)
+        try:
+            self._prepare(skipped)
+        except BaseException:
+            self.close()
+            raise
+
+    def _prepare(self, skipped: int) -> None:
+        begin = b""
+        while len(begin) < _SEEN and (block := self._bytes.read(_SEEN - len(begin))):
+            begin += block
+        mark = next((mark for mark in _BYTE_ORDER_MARKS if begin.startswith(mark)), b"")
+        encoding = _BYTE_ORDER_MARKS.get(mark)
+        self._decoder = (
+            codecs.getincrementaldecoder(encoding)(errors="replace") if encoding else None
+        )
+        self._begin = self._utf_8(begin.removeprefix(mark))
+        self._returns = b"\n" not in self._begin and b"\r" in self._begin[:-1]
+        while skipped > 0 and (block := self.read(skipped)):
+            self._begin = block[skipped:]
+            skipped -= len(block)
+
+    @property
+    def ended_early(self) -> bool:
+        """Whether the compressed data stop before their end."""
+        return self._bytes.ended_early
+
+    def read(self, size: int) -> bytes:
+        """Return the next bytes, about ``size``; none at the end."""
+        block, self._begin = self._begin, b""
+        while not block:
+            read = self._bytes.read(size)
+            if not read:
+                return b""
+            block = self._utf_8(read)
+        return block.replace(b"\r", b"\n") if self._returns else block
+
+    def close(self) -> None:
+        self._bytes.close()
+
+    def _utf_8(self, block: bytes) -> bytes:
+        return self._decoder.decode(block).encode() if self._decoder else block
 
 
-def first_lines(path: Path) -> Iterator[bytes]:
-    """Yield the complete lines of a text log from its beginning, as far as they can be read."""
-    with open_text(path) as stream:
-        while True:
-            try:
-                line = stream.readline(_LONGEST_LINE)
-            except EOFError:
-                return
-            except (OSError, zlib.error) as error:
-                raise RecordingError(
-                    f"{path.name}: corrupt compressed data ({error}); copy it again"
-                ) from None
-            if not line:
-                return
-            yield line
-
-
-class CompleteLines(io.RawIOBase):
-    """A stream that ends with the last complete line.
+class CompleteLines:
+    """A file for reading that ends with the last complete line.
 
     What follows the last line break was being written when the power was cut: a record
     without its line break may have lost digits, so it is left out and noted. A compressed file
     that ends early is read as far as it goes, and noted.
+
+    Parameters
+    ----------
+    path : Path
+    findings : list of Finding
+        Gets what was left out.
+    skipped : int
+        Bytes of the text to pass over.
+    records : callable
+        Makes of complete lines what is read.
+
+    Attributes
+    ----------
+    rest : bytes
+        What follows the last complete line.
+    error : RecordingError or None
+        Kept as well as raised: a parser between us and the caller may wrap the exception.
     """
 
-    def __init__(self, path: Path, stream: io.BufferedIOBase, findings: list[Finding]) -> None:
-        super().__init__()
+    closed = False
+
+    def __init__(
+        self,
+        path: Path,
+        findings: list[Finding],
+        skipped: int = 0,
+        records: Callable[[bytes], bytes] = bytes,
+    ) -> None:
         self._path = path
-        self._stream = stream
         self._findings = findings
+        self._records = records
         self._ready = b""
-        self._rest = b""
         self._ended = False
+        self.rest = b""
         self.error: RecordingError | None = None
+        self._text = _Text(path, skipped)
+
+    def __enter__(self) -> CompleteLines:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file."""
+        self.closed = True
+        self._text.close()
 
     def readable(self) -> bool:
-        """Return True: the stream can be read."""
+        """Return True: the file can be read."""
         return True
 
-    def readinto(self, buffer: object) -> int:
-        """Fill a buffer; 0 at the end."""
-        view = memoryview(buffer)  # type: ignore[arg-type]  # any writable buffer
-        while not self._ready and not self._ended:
-            self._fetch(max(len(view), 1 << 16))
-        taken = self._ready[: len(view)]
-        self._ready = self._ready[len(taken) :]
-        view[: len(taken)] = taken
-        return len(taken)
+    def seekable(self) -> bool:
+        """Return False: it is read from its beginning to its end."""
+        return False
 
-    def _fetch(self, size: int) -> None:
-        blocks, held = [self._rest], 0
-        while held < size:
-            block = self._read(size - held)
-            if not block:
-                self._ended = True
-                break
-            blocks.append(block)
-            held += len(block)
-        read = b"".join(blocks)
-        cut = read.rfind(b"\n") + 1
-        self._ready, self._rest = read[:cut], read[cut:]
-        if not self._rest.strip(b"\0"):
-            self._rest = b""  # what a power cut leaves of a file that was growing
-        elif len(self._rest) > _LONGEST_LINE:
-            self._fail(
-                f"{self._path.name}: no line break in {_LONGEST_LINE} bytes; this is no text log"
-            )
-        if self._ended:
-            self._end()
-
-    def _read(self, size: int) -> bytes:
+    def read(self, size: int) -> bytes:
+        """Return the next complete lines, ``size`` bytes at most or one line; none at the end."""
         try:
-            # read1, for read would throw away what comes before an early end.
-            return self._stream.read1(size)
-        except EOFError:
+            while not self._ready and not self._ended:
+                self._ready = self._records(self._lines(size))
+        except RecordingError as error:
+            self.error = error
+            raise
+        block = self._ready
+        if len(block) > size:
+            block = block[: block.rfind(b"\n", 0, size) + 1 or block.find(b"\n") + 1]
+        self._ready = self._ready[len(block) :]
+        return block
+
+    def _lines(self, size: int) -> bytes:
+        """Return the next complete lines, none where the next line is not yet complete."""
+        block = self._text.read(max(size - len(self.rest), _SEEN))
+        if not block:
+            self._end()
+            return b""
+        cut = block.rfind(b"\n") + 1
+        if not cut:
+            # What a power cut leaves of a file that was growing; one of them is kept, for what
+            # may follow is another record.
+            self.rest += b"\0" if block == bytes(len(block)) else block
+            if self.rest.endswith(b"\0"):
+                self.rest = self.rest.rstrip(b"\0") + b"\0"
+            if len(self.rest) > _LONGEST_LINE:
+                shown = self.rest[:40].decode("utf-8", "replace")
+                raise RecordingError(
+                    f"{self._path.name}: no line break in {_LONGEST_LINE} bytes from {shown!r}; "
+                    "expected shorter lines: this is no text log, or not one record a line"
+                )
+            return b""
+        lines = b"".join((self.rest, memoryview(block)[:cut]))
+        self.rest = block[cut:]
+        return lines
+
+    def _end(self) -> None:
+        self._ended = True
+        if self._text.ended_early:
             self._findings.append(
                 Finding(
                     "truncated_file",
@@ -123,14 +185,8 @@ class CompleteLines(io.RawIOBase):
                     1,
                 )
             )
-            return b""
-        except (OSError, zlib.error) as error:
-            self._fail(f"{self._path.name}: corrupt compressed data ({error}); copy it again")
-            return b""
-
-    def _end(self) -> None:
-        if self._rest.strip(b"\0\r\n\t "):
-            shown = self._rest[:60].decode("utf-8", "replace")
+        if self.rest.strip(b"\0\r\n\t "):
+            shown = self.rest[:60].decode("utf-8", "replace")
             self._findings.append(
                 Finding(
                     "incomplete_last_record",
@@ -141,7 +197,11 @@ class CompleteLines(io.RawIOBase):
                 )
             )
 
-    def _fail(self, reason: str) -> None:
-        # Kept as well as raised: a parser between us and the caller may wrap the exception.
-        self.error = RecordingError(reason)
-        raise self.error
+
+def first_lines(path: Path) -> Iterator[bytes]:
+    """Yield the lines of a text log from its beginning; the last one may lack its line break."""
+    with CompleteLines(path, []) as lines:
+        while block := lines.read(_SEEN):
+            yield from (line + b"\n" for line in block[:-1].split(b"\n"))
+        if lines.rest.strip(b"\0"):
+            yield lines.rest

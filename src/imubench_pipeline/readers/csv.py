@@ -1,12 +1,9 @@
-"""Delimited text: any delimiter, with or without header, numeric or ISO 8601 time, gzip."""
+"""Logs of delimited text: found out how they are written, then read by pyarrow in big blocks."""
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -15,30 +12,24 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.readers.batch import Batch, LogFile, RecordingError
-from imubench_pipeline.readers.complete_lines import CompleteLines, first_lines, open_text
+from imubench_pipeline.readers.complete_lines import CompleteLines, first_lines
+from imubench_pipeline.readers.text_cells import MISSING
+from imubench_pipeline.readers.text_layout import TextLayout, find_layout
+from imubench_pipeline.readers.text_preamble import stated_rate, stated_start
+from imubench_pipeline.readers.text_records import Records
+from imubench_pipeline.readers.text_stamps import StampError
+from imubench_pipeline.readers.text_time import TextTime, time_columns
 
 _BLOCK_BYTES = 4 << 20
-_DELIMITERS = ";\t|, "
-_MISSING = {"", "nan", "na", "n/a", "null"}
-_ZONE = re.compile(r"(Z|[+-]\d\d:?\d\d)$")
 _ADVICE = (
     "either the file is corrupt there (copy it again, or cut it before that line), or the sensor "
-    "file does not describe it (delimiter, header, skip_lines, comment, column)"
+    "file does not describe it (delimiter, decimal, header, skip_lines, comment, column)"
 )
+_NOTHING = "Empty CSV file"
+_OPEN_QUOTE = "out of sync"
 _ARROW_ROW = re.compile(r"Row #(\d+)")
 _ARROW_COLUMN = re.compile(r"In CSV column #(\d+)")
-
-
-@dataclass(frozen=True)
-class _Layout:
-    """How a file is laid out: found from its first lines and its sensor file."""
-
-    lines_before: int
-    bytes_before: int
-    delimiter: str
-    quoted: bool
-    names: list[str]
-    first_record: list[str]
+_ARROW_VALUE = re.compile(r"invalid value '(.*)'|zone offset in '(.*?)'", re.DOTALL)
 
 
 class CsvFile(LogFile):
@@ -46,262 +37,181 @@ class CsvFile(LogFile):
 
     def batches(self) -> Iterator[Batch]:
         """Yield the records in the order of the file (see `LogFile.batches`)."""
-        layout = self._layout()
-        columns = self._columns(layout)
-        types = {layout.names[position]: pa.float64() for position in columns.values()}
-        time_name = None
-        if self.log.time is not None:
-            time_name = layout.names[self._position(layout, self.log.time.column, "time")]
-            types[time_name] = self._time_type(layout, time_name)
-        invalid: list[pacsv.InvalidRow] = []
-
-        def keep(row: pacsv.InvalidRow) -> str:
-            invalid.append(row)
-            return "skip"
-
+        figures = [source.column for source in self.sources.values()]
+        layout = find_layout(self.path, self.log, figures, time_columns(self.log.time))
+        columns = {
+            name: layout.position(source.column, name) for name, source in self.sources.items()
+        }
+        preamble = [line.decode("utf-8", "replace") for line in layout.preamble]
+        self.rate, self.started = stated_rate(preamble), stated_start(preamble)
+        time = None if self.log.time is None else TextTime(self, layout)
+        for name, at in columns.items():
+            if time is not None and at in time.types:
+                raise RecordingError(
+                    f"{self.path.name}: column {layout.names[at]!r} is taken for time and for "
+                    f"{name}; mend 'column' of one of them in the sensor file"
+                )
+        records = layout.records()
         rows = 0
-        first_stamp: np.int64 | np.float64 | None = None
-        with open_text(self.path) as stream:
-            stream.read(layout.bytes_before)
-            lines = CompleteLines(self.path, stream, self.findings)
+        for part in self._parts(layout, set(columns.values()), time, records):
+            try:
+                stamps = None if time is None else time.seconds(part)
+            except StampError as error:
+                assert time is not None  # there are stamps
+                line = self._line(rows + error.row + 1, layout, blank=False)
+                column = layout.names[time.position]
+                raise self._bad_cell(line, column, error.text, time.expected) from None
+            rows += len(part)
+            yield Batch(
+                stamps,
+                {name: self.to_si(name, _numbers(part, at)) for name, at in columns.items()},
+            )
+        if rows == 0:
+            raise RecordingError(f"{self.path.name}: no complete record; expected at least one")
+        self._note(layout, records)
+
+    def _parts(
+        self, layout: TextLayout, figures: set[int], time: TextTime | None, records: Records
+    ) -> Iterator[pa.RecordBatch]:
+        """Yield the wanted columns, named by their positions, block by block."""
+        types = dict.fromkeys(figures, pa.float64()) | (time.types if time else {})
+        fault = _WrongWidth()
+        rows = 0
+        with CompleteLines(self.path, self.findings, layout.bytes_before, records) as lines:
             try:
                 reader = pacsv.open_csv(
                     lines,
                     read_options=pacsv.ReadOptions(
-                        use_threads=False, block_size=_BLOCK_BYTES, column_names=layout.names
+                        use_threads=False,
+                        block_size=_BLOCK_BYTES,
+                        column_names=[str(position) for position in range(len(layout.names))],
                     ),
                     parse_options=pacsv.ParseOptions(
-                        delimiter=layout.delimiter,
+                        delimiter=layout.split.delimiter,
                         # A stray quote would swallow the lines up to the next one.
                         quote_char='"' if layout.quoted else False,
-                        invalid_row_handler=keep,
+                        invalid_row_handler=fault.keep,
                     ),
                     convert_options=pacsv.ConvertOptions(
-                        column_types=types, include_columns=list(types)
+                        column_types={str(at): kind for at, kind in types.items()},
+                        include_columns=[str(at) for at in types],
+                        null_values=MISSING,
+                        decimal_point=layout.decimal,
                     ),
                 )
                 for part in reader:
-                    if len(part) == 0:
-                        continue
-                    if invalid and invalid[0].number <= rows + len(part):
-                        raise self._wrong_width(invalid[0], layout)
                     rows += len(part)
-                    time = None
-                    if time_name is not None:
-                        stamps = _stamps(part.column(time_name))
-                        if first_stamp is None:
-                            first_stamp = self._first(stamps)
-                        time = self.seconds(stamps, first_stamp)
-                    yield Batch(
-                        time,
-                        {
-                            name: self.to_si(name, _numbers(part, layout, position))
-                            for name, position in columns.items()
-                        },
-                    )
-            except pa.ArrowInvalid as error:
-                raise lines.error or self._explained(error, layout, types) from None
-            except UnicodeDecodeError as error:
-                raise RecordingError(f"{self.path.name}: not UTF-8 text ({error})") from None
-        if len(invalid) > 1:
-            raise self._wrong_width(invalid[0], layout)
-        if invalid:
-            self.findings.append(
-                Finding(
-                    "incomplete_last_record",
-                    "note",
-                    f"{self.path.name}: the last record has {invalid[0].actual_columns} of "
-                    f"{invalid[0].expected_columns} columns; left out",
-                    1,
-                )
-            )
-        if rows == 0:
-            raise RecordingError(f"{self.path.name}: no complete record")
-
-    # ------------------------------------------------------------------ the first lines
-
-    def _layout(self) -> _Layout:
-        before, size, header_size = 0, 0, 0
-        head: list[str] = []
-        for number, raw in enumerate(first_lines(self.path)):
-            text = raw.decode("utf-8", "replace").rstrip("\r\n")
-            text = text.removeprefix("\ufeff") if number == 0 else text
-            passed_over = (
-                number < self.log.skip_lines
-                or not text.strip()
-                or (self.log.comment is not None and text.startswith(self.log.comment))
-            )
-            if not passed_over:
-                self._check_text(raw, text)
-                head.append(text)
-            if len(head) == 2:
-                break
-            if head:
-                header_size += len(raw)
-            else:
-                before, size = before + 1, size + len(raw)
-        if not head:
-            raise RecordingError(f"{self.path.name}: the file is empty")
-        delimiter = self.log.delimiter or _delimiter(head)
-        rows = [self._split(text, delimiter) for text in head]
-        header = self._has_header(rows[0])
-        names = [name.strip() for name in rows[0]]
-        if header:
-            before, size = before + 1, size + header_size
-        else:
-            names = [str(number) for number in range(1, len(names) + 1)]
-        records = rows[1:] if header else rows
-        if not records:
-            raise RecordingError(f"{self.path.name}: no record after the header")
-        quoted = '"' in (head[-1] if header else head[0])
-        # A name that stands twice can still be taken by its position.
-        names = [
-            name if names.count(name) == 1 else f"{name} (column {number})"
-            for number, name in enumerate(names, start=1)
-        ]
-        return _Layout(before, size, delimiter, quoted, names, records[0])
-
-    def _check_text(self, raw: bytes, text: str) -> None:
-        if b"\0" in raw:
-            raise RecordingError(f"{self.path.name}: holds binary data, expected text")
-        if "\r" in text:
-            raise RecordingError(
-                f"{self.path.name}: lines end with a carriage return alone; expected line feeds "
-                "(tr '\\r' '\\n' mends it)"
+                    if fault.row is not None and fault.record <= rows:
+                        raise self._wrong_width(fault.row, layout)
+                    if len(part):
+                        yield part
+            except pa.ArrowException as error:
+                if lines.error is not None:
+                    raise lines.error from None
+                if _NOTHING not in str(error):
+                    raise self._explained(error, fault, layout, time) from None
+        if fault.row is not None:
+            self._found(
+                "incomplete_last_record",
+                f"the last record has {fault.row.actual_columns} of {fault.row.expected_columns} "
+                "columns; left out",
+                1,
             )
 
-    def _split(self, text: str, delimiter: str) -> list[str]:
-        try:
-            return next(csv.reader([text], delimiter=delimiter))
-        except csv.Error as error:
-            raise RecordingError(
-                f"{self.path.name}: cannot be read as columns ({error}): {text[:40]!r}"
-            ) from None
+    # ------------------------------------------------------------------- findings, faults
 
-    def _has_header(self, row: list[str]) -> bool:
-        if self.log.header is not None:
-            return self.log.header
-        wanted = [source.column for source in self.sources.values()]
-        if any(isinstance(column, str) for column in wanted):
-            return True
-        positions = [column - 1 for column in wanted if isinstance(column, int)]
-        cells = [row[position] for position in positions if position < len(row)]
-        return not all(_is_number_or_missing(cell) for cell in cells)
+    def _found(self, finding: str, detail: str, value: int) -> None:
+        self.findings.append(Finding(finding, "note", f"{self.path.name}: {detail}", value))
 
-    # ------------------------------------------------------------------------- columns
-
-    def _columns(self, layout: _Layout) -> dict[str, int]:
-        return {
-            name: self._position(layout, source.column, name)
-            for name, source in self.sources.items()
-        }
-
-    def _position(self, layout: _Layout, column: str | int, key: str) -> int:
-        found = ", ".join(layout.names[:20]) + (", ..." if len(layout.names) > 20 else "")
-        if isinstance(column, int):
-            if column > len(layout.names):
-                raise RecordingError(
-                    f"{self.path.name}: no column {column} for {key}; found "
-                    f"{len(layout.names)} columns ({found}) with delimiter {layout.delimiter!r}"
-                )
-            return column - 1
-        if f"{column} (column" in found:
-            raise RecordingError(
-                f"{self.path.name}: column {column!r} for {key} stands twice in the header "
-                f"({found}); take it by its position, as a number"
+    def _note(self, layout: TextLayout, records: Records) -> None:
+        if layout.cut_before:
+            self._found(
+                "incomplete_first_record",
+                f"line {layout.lines_before} lacks the beginning of its record; left out",
+                1,
             )
-        if column not in layout.names:
-            raise RecordingError(
-                f"{self.path.name}: no column {column!r} for {key}; found {found} with "
-                f"delimiter {layout.delimiter!r}; mend 'column' of {key} in the sensor file"
+        if records.restarts:
+            cut = f" after a record cut short in {records.cut} places" if records.cut else ""
+            self._found(
+                "restarted_log",
+                f"the header stands again {records.restarts} times{cut}: the logger was started "
+                "again; these lines are left out",
+                records.restarts,
             )
-        return layout.names.index(column)
 
-    def _time_type(self, layout: _Layout, name: str) -> pa.DataType:
-        assert self.log.time is not None
-        if self.log.time.format == "iso8601":
-            position = layout.names.index(name)
-            text = layout.first_record[position] if position < len(layout.first_record) else ""
-            return pa.timestamp("ns", "UTC" if _ZONE.search(text.strip()) else None)
-        # Nanoseconds since 1970 do not fit into the 53 bits of a float64.
-        return pa.int64() if self.log.time.unit == "ns" else pa.float64()
-
-    def _first(self, stamps: NDArray[Any]) -> Any:
-        valid = stamps[~np.isnan(stamps)] if stamps.dtype.kind == "f" else stamps
-        if not len(valid):
-            raise RecordingError(f"{self.path.name}: no time stamp in the first records")
-        assert self.log.time is not None
-        if self.log.time.format == "iso8601":
-            self.started = str(np.datetime64(int(valid[0]), "ns"))[:23]
-        return valid[0]
-
-    # --------------------------------------------------------------------------- faults
-
-    def _wrong_width(self, row: pacsv.InvalidRow, layout: _Layout) -> RecordingError:
+    def _wrong_width(self, row: pacsv.InvalidRow, layout: TextLayout) -> RecordingError:
         return RecordingError(
-            f"{self.path.name}, line {self._line(row.number, layout)}: found "
+            f"{self.path.name}, line {self._line(row.number, layout, blank=True)}: found "
             f"{row.actual_columns} columns, expected {row.expected_columns}: {row.text[:80]!r}; "
             f"{_ADVICE}"
         )
 
-    def _line(self, row: int, layout: _Layout) -> int:
-        """Return the line of a record in the file; blank lines are no records."""
-        records = 0
+    def _bad_cell(self, line: int, column: str, found: str, expected: str) -> RecordingError:
+        return RecordingError(
+            f"{self.path.name}, line {line}, column {column!r}: found {found[:40]!r}, expected "
+            f"{expected}; {_ADVICE}"
+        )
+
+    def _line(self, row: int, layout: TextLayout, *, blank: bool) -> int:
+        """Return the line of a record in the file; ``blank``: lines of spaces count as records."""
+        stripped = b"\r\n" if blank else b"\r\n\t "
+        one, count = layout.records(), 0
         for number, raw in enumerate(first_lines(self.path), start=1):
-            records += number > layout.lines_before and bool(raw.strip(b"\r\n"))
-            if records == row:
+            count += number > layout.lines_before and bool(one(raw).strip(stripped))
+            if count == row:
                 return number
         return row + layout.lines_before
 
     def _explained(
-        self, error: pa.ArrowInvalid, layout: _Layout, types: dict[str, pa.DataType]
+        self,
+        error: pa.ArrowException,
+        fault: _WrongWidth,
+        layout: TextLayout,
+        time: TextTime | None,
     ) -> RecordingError:
+        """Return what an error of pyarrow says, in terms of the file."""
         text = str(error)
         row, column = _ARROW_ROW.search(text), _ARROW_COLUMN.search(text)
-        where = f", line {self._line(int(row[1]), layout)}" if row else ""
-        name = layout.names[int(column[1])] if column and int(column[1]) < len(layout.names) else ""
-        expected = "a time stamp" if name in types and types[name] != pa.float64() else "a number"
-        found = re.search(
-            r"invalid value '(.*)'|expected .* zone offset in '(.*)'", text, re.DOTALL
-        )
-        if not name or not found:
-            return RecordingError(
-                f"{self.path.name}{where}: cannot be read as text columns: {text}"
-            )
-        value = (found[1] or found[2] or "")[:40]
-        return RecordingError(
-            f"{self.path.name}{where}, column {name!r}: found {value!r}, expected {expected}; "
-            f"{_ADVICE}"
-        )
+        if fault.row is not None and (row is None or fault.row.number <= int(row[1])):
+            return self._wrong_width(fault.row, layout)
+        if _OPEN_QUOTE in text:
+            text = "a quote is opened that is not closed on its line; expected one record a line"
+        value = _ARROW_VALUE.search(text)
+        if row is None or column is None or value is None:
+            return RecordingError(f"{self.path.name}: not read as columns: {text[:300]}; {_ADVICE}")
+        position = int(column[1])
+        expected = f"a number with {layout.decimal!r} before its decimals, or nothing"
+        if time is not None and position in time.types:
+            expected = time.expected
+        line = self._line(int(row[1]), layout, blank=True)
+        return self._bad_cell(line, layout.names[position], value[1] or value[2] or "", expected)
 
 
-def _delimiter(head: list[str]) -> str:
-    """Return the likeliest delimiter: the most telling one that stands as often in both lines."""
-    for sign in _DELIMITERS:
-        if 0 < head[0].count(sign) == head[-1].count(sign):
-            return sign
-    return max(_DELIMITERS, key=lambda sign: (head[-1].count(sign), -_DELIMITERS.index(sign)))
+class _WrongWidth:
+    """The first record with too many or too few columns: no fault where it is the last one.
+
+    Attributes
+    ----------
+    row : InvalidRow or None
+    record : int
+        Its number among the records without lines of spaces, counted from 1.
+    """
+
+    def __init__(self) -> None:
+        self.row: pacsv.InvalidRow | None = None
+        self.record = 0
+        self._blank = 0
+
+    def keep(self, row: pacsv.InvalidRow) -> str:
+        """Tell pyarrow to go on after the first such record, and to stop at the next."""
+        if not row.text.strip():
+            self._blank += 1
+            return "skip"
+        if self.row is not None:
+            return "error"
+        self.row, self.record = row, row.number - self._blank
+        return "skip"
 
 
-def _is_number_or_missing(text: str) -> bool:
-    if text.strip().lower() in _MISSING:
-        return True
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
-def _numbers(part: pa.RecordBatch, layout: _Layout, position: int) -> NDArray[np.float64]:
-    column = part.column(layout.names[position])
-    return np.asarray(column.to_numpy(zero_copy_only=False), dtype=np.float64)
-
-
-def _stamps(column: pa.Array) -> NDArray[Any]:
-    if pa.types.is_timestamp(column.type):
-        column = column.cast(pa.int64())
-    if pa.types.is_integer(column.type) and column.null_count:
-        # An integer column with a gap: the gap becomes NaN.
-        return np.asarray(column.to_numpy(zero_copy_only=False), dtype=np.float64)
-    return np.asarray(column.to_numpy(zero_copy_only=False))
+def _numbers(part: pa.RecordBatch, position: int) -> NDArray[np.float64]:
+    return np.asarray(part.column(str(position)).to_numpy(zero_copy_only=False), np.float64)

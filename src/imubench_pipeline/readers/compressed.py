@@ -1,0 +1,333 @@
+"""The bytes of a log that may be compressed, or a file inside an archive; told by content."""
+
+from __future__ import annotations
+
+import bz2
+import gzip
+import io
+import lzma
+import stat
+import struct
+import zipfile
+import zlib
+from collections.abc import Callable, Mapping
+from contextlib import closing
+from pathlib import Path
+from typing import IO, Any
+
+from imubench_pipeline.readers.batch import RecordingError
+
+_FED = 1 << 11
+"""Bytes of zstd data decompressed at a time: they may stand for 32768 times as many."""
+
+_LARGEST_WINDOW = 1 << 27
+_UNSUSPICIOUS = 1 << 28
+_LARGEST_RATIO = 800
+"""A log that expands further holds nothing but one character."""
+
+_SEEN = 1 << 12
+_SCANNED = 1 << 20
+_ZIP_LOCAL = b"PK\x03\x04"
+_ZIP_EMPTY = b"PK\x05\x06"
+_ZIP_HEADER = struct.Struct("<4sHHHHHIIIHH")
+_ZIP_METHODS = {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}
+_ENCRYPTED, _SIZE_FOLLOWS, _UTF_8 = 1, 8, 0x800
+_LONGEST_MEMBER_NAME = 512
+_UNKNOWN_SIZE = 1 << 62
+
+
+class Bytes:
+    """The bytes of a log as it was before it was compressed.
+
+    Attributes
+    ----------
+    name : str
+        The log's name, for messages.
+    ended_early : bool
+        The compressed data stop before their end.
+    """
+
+    def __init__(self, name: str, stream: Any, size: int, under: tuple[Any, ...] = ()) -> None:
+        self.name = name
+        self.ended_early = False
+        self._stream = stream
+        self._streams = (stream, *under)
+        self._left = max(_UNSUSPICIOUS, _LARGEST_RATIO * size)
+
+    def read(self, size: int) -> bytes:
+        """Return the next bytes, at most ``size``; none at the end.
+
+        Raises
+        ------
+        RecordingError
+            If the compressed data are corrupt, encrypted, or expand beyond all reason.
+        """
+        try:
+            # read1, for read would throw away what comes before an early end.
+            block: bytes = self._stream.read1(size)
+        except EOFError:
+            self.ended_early = True
+            return b""
+        except _CORRUPT as error:
+            raise _corrupt(self.name, error) from None
+        self._left -= len(block)
+        if self._left < 0:
+            raise RecordingError(
+                f"{self.name}: expands to more than {_LARGEST_RATIO} times its size, which no log "
+                "does; expected compressed text: unpack it and look what it is"
+            )
+        return block
+
+    def close(self) -> None:
+        """Close the file."""
+        for stream in self._streams:
+            stream.close()
+
+
+class _Zstd:
+    """The decompressed bytes of zstd frames; unlike the library's, it tells an early end."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        import zstandard  # only a log that is compressed so needs it
+
+        self._new: Callable[[], Any] = zstandard.ZstdDecompressor(
+            max_window_size=_LARGEST_WINDOW
+        ).decompressobj
+        self._error = zstandard.ZstdError
+        self._file = file
+        self._frame: Any = None
+        self._fed = b""
+        self._ready = b""
+
+    def read1(self, size: int) -> bytes:
+        while not self._ready:
+            self._fed = self._fed or self._file.read(_FED)
+            if not self._fed:
+                if self._frame is not None:
+                    raise EOFError
+                return b""
+            self._frame = self._frame or self._new()
+            try:
+                self._ready = self._frame.decompress(self._fed)
+            except self._error as error:
+                raise OSError(str(error)) from None
+            self._fed = b""
+            if self._frame.eof:
+                self._fed, self._frame = self._frame.unused_data, None
+        block, self._ready = self._ready[:size], self._ready[size:]
+        return block
+
+    def close(self) -> None:
+        self._file.close()
+
+
+_OPENED: Mapping[bytes, Callable[[IO[bytes]], Any]] = {
+    b"\x1f\x8b": lambda file: gzip.GzipFile(fileobj=file),
+    b"\x28\xb5\x2f\xfd": _Zstd,
+    b"\xfd7zXZ\0": lzma.LZMAFile,
+    b"BZh": bz2.BZ2File,
+}
+"""How a file is opened that begins so."""
+
+_NOT_READ: Mapping[bytes, str] = {
+    b"7z\xbc\xaf\x27\x1c": "7z",
+    b"Rar!\x1a\x07": "rar",
+    b"\x04\x22\x4d\x18": "lz4",
+    b"\x1f\x9d": "compress",
+    _ZIP_LOCAL: "zip in another way",
+}
+
+_CORRUPT = (
+    OSError,
+    ValueError,
+    zlib.error,
+    lzma.LZMAError,
+    zipfile.BadZipFile,
+    RuntimeError,
+    struct.error,
+    MemoryError,
+)
+"""What the libraries raise for data that are not as their format says."""
+
+
+def _corrupt(name: str, error: Exception) -> RecordingError:
+    if isinstance(error, RecordingError):
+        return error
+    return RecordingError(f"{name}: corrupt compressed data ({error}); copy it again")
+
+
+def open_bytes(path: Path) -> Bytes:
+    """Open a log for reading.
+
+    Parameters
+    ----------
+    path : Path
+        A file, compressed or not, or a member of a zip archive: the path of the archive and
+        the name in it.
+
+    Raises
+    ------
+    RecordingError
+        If it cannot be opened, or is compressed in another way.
+    """
+    archive = None if path.is_file() else _archive_of(path)
+    try:
+        file = (archive or path).open("rb")
+    except OSError as error:
+        raise RecordingError(f"{path.name}: cannot be opened ({error.strerror})") from None
+    try:
+        if archive is not None:
+            return _open_member(archive, path.relative_to(archive).as_posix(), file)
+        begin = file.read(6)
+        file.seek(0)
+        for magic, kind in _NOT_READ.items():
+            if begin.startswith(magic):
+                raise RecordingError(
+                    f"{path.name}: is compressed with {kind}; expected gzip, zstd, xz, bzip2 or "
+                    "zip: unpack it"
+                )
+        opened = next((how for magic, how in _OPENED.items() if begin.startswith(magic)), None)
+        if opened is None:
+            return Bytes(path.name, file, _UNKNOWN_SIZE)
+        return Bytes(path.name, opened(file), path.stat().st_size, (file,))
+    except BaseException:
+        file.close()
+        raise
+
+
+# ------------------------------------------------------------------------------ zip archives
+
+
+def is_archive(path: Path) -> bool:
+    """Tell whether a file is a zip archive."""
+    try:
+        with path.open("rb") as file:
+            return file.read(4) in (_ZIP_LOCAL, _ZIP_EMPTY)
+    except OSError:
+        return False
+
+
+def is_member(path: Path) -> bool:
+    """Tell whether a path names a member of an archive: its archive is a file, not a folder."""
+    return not path.exists() and _archive_of(path) is not None
+
+
+def members(archive: Path) -> list[Path]:
+    """Return the visible files of a zip archive, sorted: its path with their names appended.
+
+    Raises
+    ------
+    RecordingError
+        If the archive cannot be read.
+    """
+    return sorted(archive / name for name in _directory(archive) if visible(Path(name)))
+
+
+def visible(path: Path) -> bool:
+    """Tell a file from what systems leave beside files; the path is within its folder."""
+    return not any(part.startswith((".", "__MACOSX")) for part in path.parts)
+
+
+def _archive_of(path: Path) -> Path | None:
+    return next((parent for parent in path.parents if parent.is_file()), None)
+
+
+def holds_text(path: Path) -> bool:
+    """Tell whether a file or a member of an archive begins as text does."""
+    with closing(open_bytes(path)) as stream:
+        begin = stream.read(_SEEN)
+    return b"\0" not in begin or begin.startswith((b"\xff\xfe", b"\xfe\xff"))
+
+
+def _directory(archive: Path) -> dict[str, zipfile.ZipInfo]:
+    """Return the files of an archive by name, also of one whose end is missing."""
+    try:
+        try:
+            with zipfile.ZipFile(archive) as file:
+                found = file.infolist()
+        except zipfile.BadZipFile:
+            found = _scanned(archive)
+    except OSError as error:
+        raise RecordingError(f"{archive.name}: cannot be opened ({error.strerror})") from None
+    except _CORRUPT as error:
+        raise _corrupt(archive.name, error) from None
+    return {
+        # A name that begins with / would leave the archive.
+        Path(info.filename.lstrip("/")).as_posix(): info
+        for info in found
+        if not info.is_dir() and len(info.filename) <= _LONGEST_MEMBER_NAME
+    }
+
+
+def _scanned(archive: Path) -> list[zipfile.ZipInfo]:
+    """Return the members of an archive without a directory, which stands at its end."""
+    found: list[zipfile.ZipInfo] = []
+    with archive.open("rb") as file:
+        start, held = 0, b""
+        while block := file.read(_SCANNED):
+            held += block
+            at = held.find(_ZIP_LOCAL)
+            while at >= 0 and at + _ZIP_HEADER.size + _LONGEST_MEMBER_NAME <= len(held):
+                found += _local_header(held[at:], start + at)
+                at = held.find(_ZIP_LOCAL, at + 1)
+            keep = at if at >= 0 else len(held) - 3
+            start, held = start + keep, held[keep:]
+        at = held.find(_ZIP_LOCAL)
+        while at >= 0:
+            found += _local_header(held[at:], start + at)
+            at = held.find(_ZIP_LOCAL, at + 1)
+    return found
+
+
+def _local_header(begin: bytes, offset: int) -> list[zipfile.ZipInfo]:
+    """Return the member whose header begins so; none where it is no header."""
+    if len(begin) < _ZIP_HEADER.size:
+        return []
+    _, version, flags, method, _, _, crc, packed, size, name_size, _ = _ZIP_HEADER.unpack(
+        begin[: _ZIP_HEADER.size]
+    )
+    name = begin[_ZIP_HEADER.size :][:name_size].decode(
+        "utf-8" if flags & _UTF_8 else "cp437", "replace"
+    )
+    if (
+        (version & 0xFF) > 63
+        or method not in _ZIP_METHODS
+        or not 0 < name_size == len(begin[_ZIP_HEADER.size :][:name_size])
+        or not name.isprintable()
+    ):
+        return []
+    info = zipfile.ZipInfo(name)
+    info.header_offset, info.compress_type, info.flag_bits = offset, method, flags
+    info.orig_filename = name
+    if flags & _SIZE_FOLLOWS or 0xFFFFFFFF in (packed, size):
+        # The compressed data say themselves where they end.
+        info.compress_size = info.file_size = _UNKNOWN_SIZE
+        info.CRC = None  # type: ignore[assignment]  # not checked then
+    else:
+        info.compress_size, info.file_size, info.CRC = packed, size, crc
+    return [info]
+
+
+def _open_member(archive: Path, name: str, file: IO[bytes]) -> Bytes:
+    shown = f"{archive.name}/{name}"
+    info = _directory(archive).get(name)
+    if info is None:
+        raise RecordingError(f"{shown}: no such file in the archive; it may be cut short")
+    if info.flag_bits & _ENCRYPTED:
+        raise RecordingError(f"{shown}: is encrypted; unpack the archive with its password")
+    if info.compress_type not in _ZIP_METHODS or stat.S_ISLNK(info.external_attr >> 16):
+        raise RecordingError(
+            f"{shown}: is packed by method {info.compress_type} or is a link; unpack the archive"
+        )
+    try:
+        file.seek(info.header_offset)
+        header = _ZIP_HEADER.unpack(file.read(_ZIP_HEADER.size))
+        if header[0] != _ZIP_LOCAL:
+            raise zipfile.BadZipFile("no header where the directory says")
+        file.seek(header[9] + header[10], io.SEEK_CUR)
+        stream = zipfile.ZipExtFile(file, "r", info)
+    except _CORRUPT as error:
+        raise _corrupt(shown, error) from None
+    except NotImplementedError as error:
+        raise RecordingError(f"{shown}: {error}; unpack the archive") from None
+    return Bytes(shown, stream, min(info.compress_size, archive.stat().st_size), (file,))
