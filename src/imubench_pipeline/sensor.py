@@ -39,8 +39,8 @@ class ColumnSource(Strict):
     )
     variable: str | None = Field(
         None,
-        description="variable or dataset of a MATLAB, NumPy or HDF5 file, topic of a ROS bag; "
-        "null: the only one of the file",
+        description="variable or dataset of a MATLAB, NumPy or HDF5 file, topic of a ROS bag, "
+        "message of a UBX log; null: the only one of the file",
     )
     scale: float = Field(1.0, description="unit per count or volt")
     offset: float = Field(0.0, description="counts or volts at zero: scale * (raw - offset)")

@@ -130,9 +130,12 @@ class _Writer:
         count = len(next(iter(block.values())))
         columns: dict[str, NDArray[Any]] = {}
         if self._log.time is not None:
-            if self._log.time.format is not None:
-                raise ConfigError("simulated logs have numeric time stamps, not ISO 8601")
-            seconds = SECONDS[self._log.time.unit or "s"]
+            unit = self._log.time.unit
+            if unit is None or unit == "samples" or self._log.time.wraps is not None:
+                raise ConfigError(
+                    "simulated logs have numeric time stamps in s, ms, us or ns that never wrap"
+                )
+            seconds = SECONDS[unit] * self._log.time.scale
             stamps = np.arange(start, start + count) / rate / seconds
             columns[str(self._log.time.column)] = np.round(stamps, 9)
         for channel, source in self._sources.items():

@@ -142,11 +142,13 @@ def test_phyphox_with_one_sensor_needs_no_file_name(
 
 
 @pytest.mark.parametrize("packed", [True, False])
+@pytest.mark.parametrize("within", ["", "2024-09-29_08-53-20/"])
 @pytest.mark.parametrize("column", ["time", "seconds_elapsed"])
 def test_sensor_logger(
-    tmp_path: Path, truth: tuple[np.ndarray, np.ndarray], column: str, packed: bool
+    tmp_path: Path, truth: tuple[np.ndarray, np.ndarray], column: str, within: str, packed: bool
 ) -> None:
-    path = placed(tmp_path, sensor_logger(*truth), packed)
+    files = {within + name: text for name, text in sensor_logger(*truth).items()}
+    path = placed(tmp_path, files, packed)
     names = {"gyro": "Gyroscope.csv", "accel": "TotalAcceleration.csv"}
     time = {"column": column, "unit": "ns" if column == "time" else "s"}
     gyro, accel = read(path, log_format(channels(names, "{axis}"), time=time))

@@ -155,6 +155,8 @@ def test_thousands_of_columns(tmp_path: Path, rng: np.random.Generator) -> None:
         # The power was cut in the middle of a record.
         ("wx,ax\n1,2\n3,4.wx,ax\n5,6\n", [1, 5], 1),
         ("Logger X\nwx,ax\n1,2\n3,4.Logger X\nwx,ax\n5,6\n", [1, 5], 1),
+        ("# wx ax\n1 2\n3 4\n# wx ax\n5 6\n", [1, 3, 5], 1),
+        ("# log\n# wx,ax\n1,2\n3,4.# log\n# wx,ax\n5,6\n", [1, 5], 1),
         ("a  wx\n1  1\n2  2\na  wx\n3  3\n", [1, 2, 3], 1),
     ],
 )
@@ -181,6 +183,11 @@ def test_restarts_and_comments_in_a_long_log(tmp_path: Path) -> None:
     lines[-1] = "oops,1"
     with pytest.raises(RecordingError, match=rf"line {bad}, column 'wx': found 'oops'"):
         columns(written(tmp_path, "\n".join(lines) + "\n"), log_format())
+
+
+def test_a_short_log_with_much_after_it(tmp_path: Path) -> None:
+    found, _, _ = columns(written(tmp_path, "wx,ax\n1,2\n" + "\n" * 600_000), log_format())
+    assert found["gyro_x"].tolist() == [1]
 
 
 def test_a_first_record_without_its_beginning_is_noted(tmp_path: Path) -> None:

@@ -28,6 +28,9 @@ _CLASSES: dict[Reader, tuple[str, str]] = {
 _STREAMED: tuple[Reader, ...] = ("csv", "vectornav", "ubx")
 """The readers of logs that may be compressed, or in a zip archive."""
 
+_SEVERAL_CLOCKS: tuple[Reader, ...] = ("rosbag", "ubx")
+"""The readers of files in which each ``variable`` is recorded by itself."""
+
 __all__ = ["TEMPERATURE", "Batch", "LogFile", "RecordingError", "log_files", "read"]
 
 
@@ -53,7 +56,7 @@ def read(path: Path, log: LogFormat) -> list[LogFile]:
     Returns
     -------
     list of LogFile
-        One a file, sorted by name, each with the columns that it holds.
+        One a file, and a topic of it, sorted by name, each with the columns that it holds.
 
     Raises
     ------
@@ -65,10 +68,22 @@ def read(path: Path, log: LogFormat) -> list[LogFile]:
     if log.temperature is not None:
         sources[TEMPERATURE] = log.temperature
     present = _present(path, log)
-    by_file: dict[Path, dict[str, ColumnSource]] = {}
+    together: dict[tuple[Path, str], dict[str, ColumnSource]] = {}
     for name, source in sources.items():
-        by_file.setdefault(_file_of(path, present, source, name), {})[name] = source
-    return [_open(file, log, by_file[file]) for file in sorted(by_file)]
+        file = _file_of(path, present, source, name)
+        together.setdefault((file, _clock(file, log, source)), {})[name] = source
+    return [_open(file, log, columns) for (file, _), columns in sorted(together.items(), key=_key)]
+
+
+def _key(item: tuple[tuple[Path, str], object]) -> tuple[Path, str]:
+    return item[0]
+
+
+def _clock(file: Path, log: LogFormat, source: ColumnSource) -> str:
+    """Return what has a clock of its own in a file: a topic, or a kind of message."""
+    if source.variable is None or is_member(file):
+        return ""
+    return source.variable if (log.reader or reader_of(file)) in _SEVERAL_CLOCKS else ""
 
 
 def _present(path: Path, log: LogFormat) -> list[Path] | None:
@@ -90,12 +105,16 @@ def _file_of(path: Path, present: list[Path] | None, source: ColumnSource, name:
             f"{path.name}: is one file, but the sensor file takes {name} from {source.file!r} of "
             "a folder; put the files into a folder, or drop 'file:'"
         )
-    if path / source.file not in present:
+    if path / source.file in present:
+        return path / source.file
+    # A folder that was packed with its own name, or unpacked into another one.
+    nested = [file for file in present if file.as_posix().endswith(f"/{source.file}")]
+    if len(nested) != 1:
         raise RecordingError(
             f"{path.name}: no file {source.file!r} for {name}; the folder has "
             f"{_names(path, present)}; mend 'file' of {name} in the sensor file"
         )
-    return path / source.file
+    return nested[0]
 
 
 def _only(path: Path, present: list[Path]) -> Path:

@@ -270,7 +270,7 @@ def _scanned(archive: Path) -> list[zipfile.ZipInfo]:
             while at >= 0 and at + _ZIP_HEADER.size + _LONGEST_MEMBER_NAME <= len(held):
                 found += _local_header(held[at:], start + at)
                 at = held.find(_ZIP_LOCAL, at + 1)
-            keep = at if at >= 0 else len(held) - 3
+            keep = at if at >= 0 else max(len(held) - 3, 0)
             start, held = start + keep, held[keep:]
         at = held.find(_ZIP_LOCAL)
         while at >= 0:

@@ -51,7 +51,7 @@ class TextLayout:
     comments : tuple of str
         Beginnings of lines that are comments.
     header : bytes
-        The line of names; empty: none, or a comment.
+        The line of names; empty: none.
     preamble : tuple of bytes
         The lines before the first record, with the comments.
     cut_before : bool
@@ -197,7 +197,7 @@ class _Search:
             names=names,
             rows=rows,
             comments=self._signs(split),
-            header=b"" if header is None or cut or header in comments else header.raw,
+            header=b"" if header is None or cut else header.raw,
             preamble=tuple(
                 line.raw for line in [*comments, *lines[:first]] if line.number < record.number
             ),
@@ -223,6 +223,8 @@ class _Search:
         for number, raw in enumerate(first_lines(path), start=1):
             here, start = start, start + len(raw)
             if number > _MOST_LINES_BEFORE + self._log.skip_lines:
+                if lines:
+                    break
                 raise RecordingError(
                     f"{self._file}: no record in the first {number} lines, which are blank or "
                     "comments; expected some: mend 'comment' in the sensor file"

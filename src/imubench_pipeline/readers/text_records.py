@@ -62,12 +62,13 @@ class Records:
 
     def __call__(self, lines: bytes) -> bytes:
         """Return the records of complete lines."""
+        # Before the comments, for a header may be one.
+        if self._header and self._telling in lines and self._header in lines:
+            lines = self._without_headers(lines)
         for sign in self._comments:
             if sign[:1] in lines and (lines.startswith(sign) or b"\n" + sign in lines):
                 lines = self._comment_lines.sub(b"", b"\n" + lines)[1:]
                 break
-        if self._header and self._telling in lines and self._header in lines:
-            lines = self._without_headers(lines)
         if self._runs:
             lines = _single_spaces(lines)
         # pyarrow shows us a record of wrong width only if it is UTF-8.
