@@ -129,7 +129,10 @@ def _changes(
 ) -> Iterator[Finding]:
     """Yield what is not the same from beginning to end."""
     blocks = column.blocks()
+    moves = stationarity.steps(blocks, settings.step)
     for first, last in stationarity.motions(blocks, settings.motion):
+        if any(first - step.window <= step.sample <= last + step.window for step in moves):
+            continue  # the step itself
         detail = (
             f"{channel} is shaken from {first / rate:.5g} s to {last / rate:.5g} s; use a part "
             "without it ('use:' beside the log)"
@@ -137,7 +140,7 @@ def _changes(
         yield Finding(
             "motion", "warning", detail, (last - first) / rate, channel, first / rate, last / rate
         )
-    for step in stationarity.steps(blocks, settings.step):
+    for step in moves:
         at = step.sample / rate
         detail = (
             f"the mean of {channel} changes by {step.size:.4g} in SI at {at:.5g} s "

@@ -39,11 +39,14 @@ class Step:
         SI.
     sigmas : float
         Its size over the spread of the other steps.
+    window : int
+        Records of a window.
     """
 
     sample: int
     size: float
     sigmas: float
+    window: int
 
 
 @dataclass(frozen=True)
@@ -95,7 +98,7 @@ def steps(blocks: Blocks, sigmas: float) -> list[Step]:
         change = after - before
         if abs(change) > 0.5 * abs(float(away[peak])):
             sample = (int(peak) + 1) * size * BLOCK + size * BLOCK // 2
-            found.append(Step(sample, change, abs(float(away[peak])) / scale))
+            found.append(Step(sample, change, abs(float(away[peak])) / scale, size * BLOCK))
     return found
 
 
