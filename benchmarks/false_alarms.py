@@ -1,0 +1,82 @@
+"""Findings in clean simulated logs, where there should be none.
+
+python benchmarks/false_alarms.py [--logs 200] [--processes 2]
+
+Each log has six channels, of sensors from quiet to noisy, with and without flicker noise and
+random walk, quantised or not, and lasts from a quarter of an hour to three hours.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
+
+import numpy as np
+
+from imubench_pipeline.config import QualitySettings
+from imubench_pipeline.findings import Finding
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.quality.columns import column_findings
+from imubench_pipeline.quality.knocks import suspects
+from imubench_pipeline.quality.summary import ColumnSummary
+from imubench_pipeline.simulate import simulate
+
+GYROS = (
+    NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7),
+    NoiseModel(N=7e-4, B=1.8e-4, K=1e-5),
+    NoiseModel(N=1e-4, K=3e-6),
+    NoiseModel(N=1e-4, B=3e-4),
+)
+ACCELEROMETERS = (
+    NoiseModel(N=1.1e-3, B=7.2e-4, T_B=148.9, K=2.0e-5),
+    NoiseModel(N=4.5e-3, B=2.5e-3, K=3e-4),
+    NoiseModel(N=1e-3, B=1e-3),
+)
+GRAVITY = (0.3, -0.2, 9.8)
+
+
+def of_log(number: int) -> list[Finding]:
+    """Return the findings of one log, knocks among them."""
+    rng = np.random.default_rng([number, 17])
+    rate = float(rng.choice([20.0, 50.0, 100.0]))
+    samples = int(rng.choice([0.25, 1.0, 3.0]) * 3600.0 * rate)
+    gyro, accelerometer = rng.choice(len(GYROS)), rng.choice(len(ACCELEROMETERS))
+    coarse = float(rng.choice([0.0, 0.3]))
+    columns: dict[str, ColumnSummary] = {}
+    settings = QualitySettings()
+    found = []
+    for index, name in enumerate([f"{q}_{axis}" for q in ("gyro", "accel") for axis in "xyz"]):
+        model = GYROS[gyro] if index < 3 else ACCELEROMETERS[accelerometer]
+        log = simulate(model, rate, samples, rng)
+        log += 0.01 * rng.standard_normal() if index < 3 else GRAVITY[index - 3]
+        if coarse:
+            step = coarse * model.N * np.sqrt(rate)
+            log = np.round(log / step) * step
+        columns[name] = ColumnSummary()
+        columns[name].add(log)
+        if len(suspects(columns[name].blocks(), settings.knock)[0]):
+            found.append(Finding("knocks", "warning", f"{name}, {rate} Hz", 1, name))
+    return found + column_findings(columns, rate, settings)
+
+
+def main() -> None:
+    """Print how many logs have warnings and fatal findings, and which."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--logs", type=int, default=200)
+    parser.add_argument("--processes", type=int, default=2)
+    given = parser.parse_args()
+    with ProcessPoolExecutor(given.processes) as pool:
+        logs = list(pool.map(of_log, range(given.logs)))
+    for severity in ("fatal", "warning", "note"):
+        touched = sum(any(f.severity == severity for f in found) for found in logs)
+        names = Counter(f.finding for found in logs for f in found if f.severity == severity)
+        print(f"{severity}: in {touched} of {given.logs} clean simulated logs {dict(names)}")
+    for found in logs:
+        for finding in found:
+            if finding.severity != "note":
+                print(f"  {finding.detail}")
+
+
+if __name__ == "__main__":
+    main()
