@@ -16,7 +16,7 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.simulate import simulate
 from tests.conftest import PROJECT
 
-pytestmark = pytest.mark.workflow
+pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("workflow")]
 
 CHANNELS = {
     "gyro_x": {"column": "wx", "unit": "deg/s"},

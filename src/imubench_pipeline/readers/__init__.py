@@ -22,6 +22,9 @@ _CLASSES: dict[Reader, tuple[str, str]] = {
     "ubx": ("imubench_pipeline.readers.ubx", "UbxFile"),
     "rosbag": ("imubench_pipeline.readers.rosbag", "RosbagFile"),
     "matlab": ("imubench_pipeline.readers.matlab", "MatlabFile"),
+    "numpy": ("imubench_pipeline.readers.npy", "NumpyFile"),
+    "arrow": ("imubench_pipeline.readers.arrow", "ArrowFile"),
+    "hdf5": ("imubench_pipeline.readers.hdf5", "Hdf5File"),
 }
 """Module and class of each reader: only those that a run needs are imported."""
 

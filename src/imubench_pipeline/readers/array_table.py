@@ -1,0 +1,224 @@
+"""What an array format has in it: tables of columns, read in blocks of records."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+NUMBERS = "fiu"
+"""NumPy's letters of the kinds of data that are figures: float, signed and unsigned integer."""
+
+DATES = "M"
+
+_WORDS = {
+    "f": "numbers",
+    "i": "numbers",
+    "u": "numbers",
+    "M": "dates",
+    "m": "durations",
+    "c": "complex numbers",
+    "b": "truth values",
+    "S": "text",
+    "U": "text",
+    "T": "text",
+    "O": "objects",
+    "V": "raw bytes or arrays",
+}
+_WIDEST_FIELD = 1024
+"""Elements of a field of a record that are told apart as columns."""
+
+
+class UnusableError(Exception):
+    """What is asked of a file is not there, or cannot be read; the text leaves out the file."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a table.
+
+    Attributes
+    ----------
+    label : str
+        Its name; empty in a matrix, whose columns have none.
+    kind : str
+        NumPy's letter for the kind of data.
+    holds : str
+        The same in words.
+    """
+
+    label: str
+    kind: str
+    holds: str
+
+
+class Table(ABC):
+    """Columns of equal length that a file keeps under one name.
+
+    Attributes
+    ----------
+    name : str
+        Empty where the file holds one table, without a name.
+    rows : int or None
+        Records; None where only reading tells.
+    width : int
+        Columns.
+    labels : sequence of str
+        Names of the columns; empty where they have none.
+    fault : str or None
+        Why it cannot be used at all, as the end of a sentence.
+    """
+
+    name: str = ""
+    rows: int | None = None
+    width: int = 0
+    labels: Sequence[str] = ()
+    fault: str | None = None
+
+    @property
+    def shown(self) -> str:
+        """What messages call it."""
+        return self.name or "the table"
+
+    @abstractmethod
+    def column(self, position: int) -> Column:
+        """Return a column by its position, counted from 0."""
+
+    @abstractmethod
+    def row_bytes(self, positions: Sequence[int]) -> int:
+        """Return the memory that a record takes while these columns are read."""
+
+    @abstractmethod
+    def blocks(self, positions: Sequence[int], rows: int) -> Iterator[list[NDArray[Any]]]:
+        """Yield these columns, ``rows`` records at a time or fewer.
+
+        A column with missing values is a masked array, or has NaN or NaT there.
+        """
+
+
+class Refused(Table):
+    """What a file has under a name but no reader takes."""
+
+    def __init__(self, name: str, fault: str) -> None:
+        self.name = name
+        self.fault = fault
+
+    def column(self, position: int) -> Column:
+        """Raise: it has no column."""
+        raise UnusableError(f"{self.shown} {self.fault}")
+
+    def row_bytes(self, positions: Sequence[int]) -> int:
+        """Return 0: nothing is read."""
+        return 0
+
+    def blocks(self, positions: Sequence[int], rows: int) -> Iterator[list[NDArray[Any]]]:
+        """Yield nothing."""
+        return iter(())
+
+
+@dataclass(frozen=True)
+class _Leaf:
+    """A column of an array of records: a field, or one element of a field that is a vector."""
+
+    label: str
+    path: tuple[str | int, ...]
+    dtype: np.dtype[Any]
+
+
+class Array(Table):
+    """A vector, a matrix whose longer side is time, or a vector of records with named fields.
+
+    A field that is a vector of three is the columns ``gyro[1]``, ``gyro[2]`` and ``gyro[3]``; a
+    field of a field is ``imu.gyro``.
+
+    Parameters
+    ----------
+    name : str
+    shape : tuple of int
+    dtype : dtype
+    time_axis : int
+        The side that is time where both are equally long.
+    """
+
+    def __init__(
+        self, name: str, shape: tuple[int, ...], dtype: np.dtype[Any], time_axis: int = 0
+    ) -> None:
+        self.name = name
+        self.dtype = dtype
+        self.shape = shape
+        self.time_axis = time_axis
+        self._leaves: list[_Leaf] = []
+        if len(shape) not in (1, 2):
+            self.fault = (
+                f"has {len(shape)} dimensions ({sides_of(shape)}); expected a vector, or a "
+                "matrix with a column a channel: reshape it"
+                if shape
+                else "is a single value; expected a vector or a matrix"
+            )
+            return
+        if 0 in shape:
+            self.fault = f"is empty ({sides_of(shape)}); expected at least one record"
+            return
+        if len(shape) == 1 or shape[0] != shape[1]:
+            self.time_axis = 0 if len(shape) == 1 or shape[0] > shape[1] else 1
+        sides = (*shape, 1)[:2]
+        self.rows, self.width = sides[self.time_axis], sides[1 - self.time_axis]
+        if dtype.names:
+            self._leaves = list(_leaves(dtype))
+            if self.width != 1:
+                self.fault = "is a matrix of records; expected a vector of records"
+            self.width = len(self._leaves)
+            self.labels = [leaf.label for leaf in self._leaves]
+        elif dtype.kind not in NUMBERS + DATES:
+            self.fault = f"holds {_WORDS.get(dtype.kind, str(dtype))}; expected numbers: convert it"
+
+    def column(self, position: int) -> Column:
+        """Return a column by its position, counted from 0."""
+        if not self._leaves:
+            return Column("", self.dtype.kind, _WORDS[self.dtype.kind])
+        leaf = self._leaves[position]
+        return Column(leaf.label, leaf.dtype.kind, _WORDS.get(leaf.dtype.kind, str(leaf.dtype)))
+
+    def fields(self, positions: Sequence[int]) -> list[str]:
+        """Return the fields of a record that these columns are in; none if it has no fields."""
+        if not self._leaves:
+            return []
+        return list(dict.fromkeys(str(self._leaves[position].path[0]) for position in positions))
+
+    def taken(self, block: NDArray[Any], position: int) -> NDArray[Any]:
+        """Return one column of a block: of records, or of a matrix with time downwards."""
+        if not self._leaves:
+            return block[:, position]
+        values = block
+        for step in self._leaves[position].path:
+            values = values[step] if isinstance(step, str) else values[..., step]
+        return values
+
+
+def sides_of(shape: tuple[int, ...]) -> str:
+    """Return the sides of an array in words."""
+    return " x ".join(str(side) for side in shape) or "1"
+
+
+def _leaves(
+    dtype: np.dtype[Any], label: str = "", path: tuple[str | int, ...] = ()
+) -> Iterator[_Leaf]:
+    if dtype.names is not None:
+        for name in dtype.names:
+            below = f"{label}.{name}" if label else name
+            yield from _leaves(dtype[name], below, (*path, name))
+    elif (
+        dtype.subdtype is not None
+        and len(dtype.shape) == 1
+        and math.prod(dtype.shape) <= _WIDEST_FIELD
+        and dtype.base.names is None
+    ):
+        for element in range(dtype.shape[0]):
+            yield _Leaf(f"{label}[{element + 1}]", (*path, element), dtype.base)
+    else:
+        yield _Leaf(label, path, dtype)
