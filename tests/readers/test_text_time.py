@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from imubench_pipeline.readers import RecordingError
+from imubench_pipeline.readers import RecordingError, read
 from imubench_pipeline.sensor import LogFormat
 from imubench_pipeline.validation import ConfigError, parse
 from tests.readers.text_logs import TWO, columns, log_format, written
@@ -215,3 +215,13 @@ def test_a_bad_stamp_late_in_a_log_is_named_by_its_line(tmp_path: Path) -> None:
 def test_what_cannot_be_stated(time: dict[str, Any], message: str) -> None:
     with pytest.raises(ConfigError, match=message):
         parse(LogFormat, {"time": time, "channels": TWO}, "s.yaml")
+
+
+def test_a_stamp_beyond_every_date_is_no_date(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t,wx\n1e305,1\n1.1e305,2\n")
+    channels = {"gyro_x": {"column": "wx", "unit": "rad/s"}}
+    log = LogFormat.model_validate({"time": {"column": "t", "unit": "s"}, "channels": channels})
+    (file,) = read(path, log)
+    assert sum(len(batch) for batch in file.batches()) == 2
+    assert file.started is None

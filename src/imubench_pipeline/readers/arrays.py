@@ -79,9 +79,9 @@ class ArrayFile(LogFile):
             raise RecordingError(f"{self.path.name}: {error}") from None
         # The libraries raise nearly every kind of exception on damaged files.
         except Exception as error:
+            said = " ".join(str(error).split()) or type(error).__name__
             raise RecordingError(
-                f"{self.path.name}: corrupt data, or cut short ({error or type(error).__name__}); "
-                "copy it again"
+                f"{self.path.name}: corrupt data, or cut short ({said}); copy it again"
             ) from error
 
     # --------------------------------------------------------------------------- blocks

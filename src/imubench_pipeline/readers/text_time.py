@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from typing import Any
 
@@ -119,7 +120,8 @@ class TextTime:
         if self._source.unit == "ns" and self._source.scale == 1:
             return date_of(int(self._first))
         scale = SECONDS[self._source.unit] * self._source.scale
-        return date_of(round(float(self._first) * scale * 1e9))
+        nanoseconds = float(self._first) * scale * 1e9
+        return date_of(round(nanoseconds)) if math.isfinite(nanoseconds) else None
 
 
 def time_columns(source: TimeSource | None) -> list[str | int]:
