@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -53,9 +54,9 @@ def main() -> None:
         timed(lambda: scipy.fft.dct(log, norm="ortho"), of("DCT of the log, scipy"))
         spectrum, _ = timed(lambda: spectra([log], len(log), RATE), of("spectra"))
         whittle = whittle_of(spectrum, 0.5 * RATE)
-        best = timed(lambda w=whittle: w.maximum(PAPERS), of("fit of the papers' model"))  # type: ignore[misc]
-        timed(lambda w=whittle: compare(w, quantization=True), of("fits of all models"))  # type: ignore[misc]
-        timed(lambda w=whittle, b=best: sample(w, b, rng), of("posterior of a model"))  # type: ignore[misc]
+        best = timed(partial(whittle.maximum, PAPERS), of("fit of the papers' model"))
+        timed(partial(compare, whittle, quantization=True), of("fits of all models"))
+        timed(partial(sample, whittle, best, rng), of("posterior of a model"))
         timed(lambda: fit(log, RATE), of("everything, with lines, band and all intervals"))
     print(f"{given.samples:,} samples, median of {given.runs} runs")
     reference = float(np.median(taken["DCT of the log, scipy"]))

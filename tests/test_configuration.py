@@ -82,7 +82,7 @@ def test_faults_name_file_key_value_and_what_was_expected(
 
 
 def test_the_shipped_configuration_is_valid_and_states_the_defaults() -> None:
-    shipped = read_run(read_yaml(PROJECT / "config/config.yaml"))  # type: ignore[arg-type]  # any YAML
+    shipped = read_run(read_yaml(PROJECT / "config/config.yaml"))
     assert shipped == Run()
     sensors = read_sensors(PROJECT / "config/sensors")
     assert {"mti_7", "c102_f9r", "sirrs01_03", "adis16405", "mpu6050", "cats_tag"} <= set(sensors)

@@ -259,4 +259,4 @@ def test_wrong_arguments() -> None:
     with pytest.raises(ValueError, match="expected 4 or more"):
         fit(noiseless(MTI_7, samples=20))
     with pytest.raises(ValueError, match="'weighted' or 'paper'"):
-        fit(noiseless(MTI_7), method="best")  # type: ignore[arg-type]  # wrong on purpose
+        fit(noiseless(MTI_7), method="best")  # wrong on purpose

@@ -55,7 +55,7 @@ def estimate_of(truth: dict[str, float], method: str = "weighted") -> Estimate:
 def fits(names: str, method: str) -> list[Estimate]:
     """Fits to curves of simulated logs."""
     truth = {"SENSOR": SENSOR, "WALK": WALK}[names]
-    return [fit(curve, method=method) for curve in curves(names, **truth)]  # type: ignore[arg-type]
+    return [fit(curve, method=method) for curve in curves(names, **truth)]
 
 
 @cache
@@ -210,7 +210,7 @@ def test_half_the_degrees_of_freedom_widen_the_limits_by_the_root_of_two() -> No
 @pytest.mark.parametrize("unit", [1e-6, 57.29577951308232])
 def test_limits_have_the_unit_of_the_log(method: str, unit: float) -> None:
     (curve, *_) = curves("SENSOR", **SENSOR)
-    scaled = fit(replace(curve, variance=unit**2 * curve.variance), method=method)  # type: ignore[arg-type]
+    scaled = fit(replace(curve, variance=unit**2 * curve.variance), method=method)
     for name, parameter in fits("SENSOR", method)[0].parameters.items():
         factor = 1.0 if name == "T_B" else unit
         twin = scaled.parameters[name]

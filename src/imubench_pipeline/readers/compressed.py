@@ -302,7 +302,7 @@ def _local_header(begin: bytes, offset: int) -> list[zipfile.ZipInfo]:
     if flags & _SIZE_FOLLOWS or 0xFFFFFFFF in (packed, size):
         # The compressed data say themselves where they end.
         info.compress_size = info.file_size = _UNKNOWN_SIZE
-        info.CRC = None  # type: ignore[assignment]  # not checked then
+        info.CRC = None  # type: ignore[assignment]  # zipfile checks none then; its types know none
     else:
         info.compress_size, info.file_size, info.CRC = packed, size, crc
     return [info]

@@ -265,7 +265,7 @@ class _Inflated(io.RawIOBase):
 
     def readinto(self, buffer: object) -> int:
         """Fill a buffer; 0 at the end, where the checksum has been compared."""
-        view = memoryview(buffer)  # type: ignore[arg-type]  # any writable buffer
+        view = memoryview(buffer)  # type: ignore[arg-type]  # RawIOBase hands over any writable buffer
         while not self._inflate.eof:
             packed = self._inflate.unconsumed_tail
             if not packed:

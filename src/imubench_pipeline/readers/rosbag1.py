@@ -120,7 +120,7 @@ class Bag:
         if compression == "bz2":
             data = bz2.decompress(data)
         elif compression == "lz4":
-            import lz4.frame  # type: ignore[import-untyped]  # only such a bag needs it
+            import lz4.frame  # type: ignore[import-untyped]  # has no types
 
             data = lz4.frame.decompress(data)
         elif compression != "none":
