@@ -23,6 +23,10 @@ from tests.readers.array_files import (
 ROWS = 60
 RECORD = np.dtype([("t", "i8"), ("gyro", "f4", (3,)), ("imu", [("temp", "i2")]), ("note", "S3")])
 
+LONG_DOUBLE = pytest.mark.skipif(
+    np.dtype(np.longdouble).itemsize == 8, reason="long double is double on this machine"
+)
+
 
 def records() -> np.ndarray:
     made = np.zeros(ROWS, RECORD)
@@ -199,13 +203,11 @@ def test_a_compression_that_is_not_here(tmp_path: Path) -> None:
     "dtype",
     [
         np.dtype({"names": ["a", "b"], "formats": ["f8", "i4"], "offsets": [0, 4], "itemsize": 12}),
-        np.dtype([("a", np.longdouble)]),
-        np.dtype(np.longdouble),
+        pytest.param(np.dtype([("a", np.longdouble)]), marks=LONG_DOUBLE),
+        pytest.param(np.dtype(np.longdouble), marks=LONG_DOUBLE),
     ],
 )
-def test_types_that_harm_the_library_are_refused(tmp_path: Path, dtype: np.dtype) -> None:
-    if np.dtype(np.longdouble).itemsize <= 8:
-        pytest.skip("long double is double on this machine")
+def test_types_that_harm_the_library_are_refused(dtype: np.dtype) -> None:
     assert not hdf5._is_sound(dtype)
 
 

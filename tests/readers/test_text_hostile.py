@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gzip
 import json
-import resource
 import subprocess
 import sys
 import time
@@ -80,7 +79,9 @@ def main(folder: str) -> None:
             except RecordingError as error:
                 outcome = [str(error)]
             results.setdefault(path.name, []).append([outcome, time.monotonic() - begin])
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    # Not ru_maxrss, which begins with the size of the process that started this one.
+    status = Path("/proc/self/status").read_text()
+    peak = int(status.partition("VmHWM:")[2].split()[0]) / 1024
     print(json.dumps({"peak": peak, "results": results}))
 
 
