@@ -13,7 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.whittle import Maximum, Whittle
-from imubench_pipeline.estimators.whittle_kernels import cost_of, shape_at
+from imubench_pipeline.estimators.whittle_kernels import Bins, ShapeTable, cost_of, shape_at
 
 Array = NDArray[np.float64]
 
@@ -75,7 +75,6 @@ def sample(
     linear = len(terms.linear)
     p, g = linear + terms.gauss_markov, terms.gauss_markov
     fixed = np.column_stack([whittle.column(letter) for letter in terms.linear])
-    first, step = whittle.grid
     ramp_unit = float(np.sqrt(1.0 / max(_ramp_information(whittle, start), 1e-300)))
     at = [*np.log(np.sqrt(start.powers)), *np.log(start.times)]
     if terms.ramp:
@@ -90,15 +89,10 @@ def sample(
         rng.standard_normal((_BURN_IN + draws, len(at))),
         np.log(rng.random(_BURN_IN + draws)),
         fixed / whittle.scale,
-        whittle.spectrum.ordinates,
-        whittle.spectrum.density / whittle.scale,
-        whittle.spectrum.cross / whittle.scale * ramp_unit,
-        whittle.spectrum.ramp / whittle.scale * ramp_unit**2,
+        whittle.bins(ramp_unit),
         g,
         terms.ramp,
-        first,
-        step,
-        whittle.table - np.log(whittle.scale),
+        whittle.shape_table(whittle.scale),
     )
     times = np.exp(kept[:, p : p + g])
     order = np.argsort(times, axis=1)
@@ -138,22 +132,18 @@ def _first_spread(information: Array) -> Array:
 def _log_posterior(
     x: Array,
     fixed: Array,
-    nu: Array,
-    density: Array,
-    cross: Array,
-    ramp: Array,
+    bins: Bins,
     processes: int,
     with_ramp: bool,
-    first: float,
-    step: float,
-    table: Array,
+    table: ShapeTable,
     model: Array,
     data: Array,
     shape: Array,
 ) -> float:
+    nu, density, cross, ramp = bins
     linear = fixed.shape[1]
     p = linear + processes
-    last = first + step * (table.shape[0] - 1)
+    last = table.first + table.step * (table.logarithms.shape[0] - 1)
     prior = 0.0
     for j in range(p):
         prior += x[j]  # flat in the amplitude a is e^x in x = log a
@@ -164,9 +154,9 @@ def _log_posterior(
         model[i] = total
     for g in range(processes):
         where = x[p + g]
-        if where < first or where > last:
+        if where < table.first or where > last:
             return -np.inf
-        shape_at(where, first, step, table, shape)
+        shape_at(where, table, shape)
         power = np.exp(2.0 * x[linear + g])
         for i in range(nu.size):
             model[i] += power * shape[i]
@@ -185,33 +175,15 @@ def _metropolis(
     normals: Array,
     log_uniforms: Array,
     fixed: Array,
-    nu: Array,
-    density: Array,
-    cross: Array,
-    ramp: Array,
+    bins: Bins,
     processes: int,
     with_ramp: bool,
-    first: float,
-    step: float,
-    table: Array,
+    table: ShapeTable,
 ) -> tuple[Array, float]:
     n, d = normals.shape
-    model, data, shape = np.empty(nu.size), np.empty(nu.size), np.empty(nu.size)
-    arguments = (
-        fixed,
-        nu,
-        density,
-        cross,
-        ramp,
-        processes,
-        with_ramp,
-        first,
-        step,
-        table,
-        model,
-        data,
-        shape,
-    )
+    b = fixed.shape[0]
+    model, data, shape = np.empty(b), np.empty(b), np.empty(b)
+    arguments = (fixed, bins, processes, with_ramp, table, model, data, shape)
     x = start.copy()
     here = _log_posterior(x, *arguments)
     mean, covariance = x.copy(), root @ root.T * d / 5.76
@@ -234,8 +206,8 @@ def _metropolis(
         change = x - mean
         mean = mean + gain * change
         for a in range(d):
-            for b in range(d):
-                covariance[a, b] += gain * (change[a] * change[b] - covariance[a, b])
+            for c in range(d):
+                covariance[a, c] += gain * (change[a] * change[c] - covariance[a, c])
         if k % _ADAPT_EVERY == _ADAPT_EVERY - 1:
             rate = recent / _ADAPT_EVERY
             scale *= min(2.0, max(0.5, np.exp(2.0 * (rate - 0.27))))

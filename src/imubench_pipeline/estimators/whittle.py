@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.whittle_kernels import (
+    Bins,
+    ShapeTable,
     best_powers,
     one_process,
     shape_at,
@@ -123,11 +125,6 @@ class Whittle:
         self.times = np.geomspace(self.shortest, self.longest, self.shapes)
         self.table = np.log(np.array([self.shape_of.gauss_markov(time) for time in self.times]))
         self._nu = self.spectrum.ordinates
-        self._data = (
-            self.spectrum.density / self.scale,
-            self.spectrum.cross / self.scale,
-            self.spectrum.ramp / self.scale,
-        )
 
     def column(self, letter: str) -> Array:
         """Return the density of a unit linear term (Q, N, F or K) in each bin."""
@@ -144,14 +141,24 @@ class Whittle:
     def gauss_markov(self, time: float) -> Array:
         """Return the density of a Gauss-Markov process of B = 1 in each bin."""
         shape = np.empty(len(self._nu))
-        shape_at(np.log(time), *self.grid, self.table, shape)
+        shape_at(np.log(time), self.shape_table(), shape)
         return shape
 
-    @property
-    def grid(self) -> tuple[float, float]:
-        """First of the logarithms of the tabulated correlation times, and their step."""
+    def shape_table(self, unit: float = 1.0) -> ShapeTable:
+        """Return the table of shapes in units of a density."""
         first = float(np.log(self.times[0]))
-        return first, (float(np.log(self.times[-1])) - first) / (self.shapes - 1)
+        step = (float(np.log(self.times[-1])) - first) / (self.shapes - 1)
+        return ShapeTable(first, step, self.table - np.log(unit) if unit != 1.0 else self.table)
+
+    def bins(self, ramp_unit: float = 1.0) -> Bins:
+        """Return the bins in units of `scale`, and of a ramp."""
+        spectrum = self.spectrum
+        return Bins(
+            spectrum.ordinates,
+            spectrum.density / self.scale,
+            spectrum.cross / self.scale * ramp_unit,
+            spectrum.ramp / self.scale * ramp_unit**2,
+        )
 
     def matrix(self, terms: Terms, times: Array) -> Array:
         """Return the densities of unit terms, shape (b, p)."""
@@ -173,16 +180,16 @@ class Whittle:
         fixed = np.column_stack([self.column(letter) for letter in terms.linear])
         size = fixed.mean(axis=0)
         fixed = np.ascontiguousarray(fixed / size)
-        arguments = (fixed, self._nu, *self._data, terms.ramp)
+        bins = self.bins()
         where = np.empty(0)
         if terms.gauss_markov:
             search = one_process if terms.gauss_markov == 1 else two_processes
-            where = search(*arguments, *self.grid, self.table)
+            where = search(fixed, bins, terms.ramp, self.shape_table())
         times = np.sort(np.exp(where))
         processes = [self.gauss_markov(float(time)) for time in times]
         columns = np.ascontiguousarray(np.column_stack([fixed, *processes]))
         norm = columns.mean(axis=0)
-        powers, ramp, cost = best_powers(columns / norm, *arguments[1:])
+        powers, ramp, cost = best_powers(columns / norm, bins, terms.ramp)
         powers = powers / norm * self.scale
         powers[: len(size)] /= size
         return Maximum(terms, powers, times, ramp, cost)

@@ -1,11 +1,12 @@
 """The compiled inner loops of the Whittle likelihood.
 
 Data and densities are in units in which they are near 1. ``fixed`` holds the densities of the
-linear terms, shape (b, p), and ``table`` the logarithms of those of a Gauss-Markov process at
-correlation times whose logarithms begin at ``first`` and are ``step`` apart.
+linear terms, shape (b, p).
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -23,14 +24,35 @@ _MOST_STEPS = 60
 _GOLDEN = 0.6180339887498949
 
 
+class Bins(NamedTuple):
+    """The bins of a spectrum, each of shape (b,): nu, mean density, and the ramp's products."""
+
+    nu: Array
+    density: Array
+    cross: Array
+    ramp: Array
+
+
+class ShapeTable(NamedTuple):
+    """Logarithms of the density of a Gauss-Markov process, shape (t, b).
+
+    The logarithms of the correlation times (s) begin at ``first`` and are ``step`` apart.
+    """
+
+    first: float
+    step: float
+    logarithms: Array
+
+
 @njit(cache=True)
-def shape_at(where: float, first: float, step: float, table: Array, shape: Array) -> None:
+def shape_at(where: float, table: ShapeTable, shape: Array) -> None:
     """Interpolate the logarithm of a tabulated shape linearly in log T_B."""
-    place = min(max((where - first) / step, 0.0), table.shape[0] - 1.000001)
+    logarithms = table.logarithms
+    place = min(max((where - table.first) / table.step, 0.0), logarithms.shape[0] - 1.000001)
     i = int(place)
     part = place - i
     for j in range(shape.size):
-        shape[j] = np.exp(table[i, j] + part * (table[i + 1, j] - table[i, j]))
+        shape[j] = np.exp(logarithms[i, j] + part * (logarithms[i + 1, j] - logarithms[i, j]))
 
 
 @njit(cache=True)
@@ -89,10 +111,9 @@ def _non_negative(gram: Array, target: Array) -> Array:
 
 
 @njit(cache=True)
-def best_powers(
-    columns: Array, nu: Array, density: Array, cross: Array, ramp: Array, with_ramp: bool
-) -> tuple[Array, float, float]:
+def best_powers(columns: Array, bins: Bins, with_ramp: bool) -> tuple[Array, float, float]:
     """Return the squared parameters, R and the cost that fit best."""
+    nu, density, cross, ramp = bins
     b, p = columns.shape
     R = 0.0
     data = density.copy()
@@ -156,14 +177,9 @@ def best_powers(
 def _cost_at(
     places: Array,
     fixed: Array,
-    nu: Array,
-    density: Array,
-    cross: Array,
-    ramp: Array,
+    bins: Bins,
     with_ramp: bool,
-    first: float,
-    step: float,
-    table: Array,
+    table: ShapeTable,
 ) -> float:
     """Return the cost at logarithms of correlation times, profiled over everything else."""
     b, p = fixed.shape
@@ -171,9 +187,9 @@ def _cost_at(
     columns[:, :p] = fixed
     shape = np.empty(b)
     for g in range(places.size):
-        shape_at(places[g], first, step, table, shape)
+        shape_at(places[g], table, shape)
         columns[:, p + g] = shape / shape.mean()
-    return best_powers(columns, nu, density, cross, ramp, with_ramp)[2]
+    return best_powers(columns, bins, with_ramp)[2]
 
 
 @njit(cache=True)
@@ -183,56 +199,47 @@ def _polished(
     low: float,
     high: float,
     fixed: Array,
-    nu: Array,
-    density: Array,
-    cross: Array,
-    ramp: Array,
+    bins: Bins,
     with_ramp: bool,
-    first: float,
-    step: float,
-    table: Array,
+    table: ShapeTable,
 ) -> tuple[float, float]:
     """Minimise the cost over one correlation time by golden section."""
     here = places.copy()
     a, d = low, high
     b, c = d - _GOLDEN * (d - a), a + _GOLDEN * (d - a)
     here[which] = b
-    cost_b = _cost_at(here, fixed, nu, density, cross, ramp, with_ramp, first, step, table)
+    cost_b = _cost_at(here, fixed, bins, with_ramp, table)
     here[which] = c
-    cost_c = _cost_at(here, fixed, nu, density, cross, ramp, with_ramp, first, step, table)
+    cost_c = _cost_at(here, fixed, bins, with_ramp, table)
     while d - a > 2e-4:
         if cost_b <= cost_c:
             d, c, cost_c = c, b, cost_b
             b = d - _GOLDEN * (d - a)
             here[which] = b
-            cost_b = _cost_at(here, fixed, nu, density, cross, ramp, with_ramp, first, step, table)
+            cost_b = _cost_at(here, fixed, bins, with_ramp, table)
         else:
             a, b, cost_b = b, c, cost_c
             c = a + _GOLDEN * (d - a)
             here[which] = c
-            cost_c = _cost_at(here, fixed, nu, density, cross, ramp, with_ramp, first, step, table)
+            cost_c = _cost_at(here, fixed, bins, with_ramp, table)
     return (b, cost_b) if cost_b <= cost_c else (c, cost_c)
 
 
 @njit(cache=True)
 def one_process(
     fixed: Array,
-    nu: Array,
-    density: Array,
-    cross: Array,
-    ramp: Array,
+    bins: Bins,
     with_ramp: bool,
-    first: float,
-    step: float,
-    table: Array,
+    table: ShapeTable,
 ) -> Array:
     """Scan the correlation time, then polish the best."""
-    last = first + step * (table.shape[0] - 1)
+    first, step, logarithms = table
+    last = first + step * (logarithms.shape[0] - 1)
     best, lowest = first, np.inf
     place = np.empty(1)
-    for i in range(0, table.shape[0], _SCAN_STEP):
+    for i in range(0, logarithms.shape[0], _SCAN_STEP):
         place[0] = first + i * step
-        cost = _cost_at(place, fixed, nu, density, cross, ramp, with_ramp, first, step, table)
+        cost = _cost_at(place, fixed, bins, with_ramp, table)
         if cost < lowest:
             best, lowest = place[0], cost
     reach = _SCAN_STEP * step
@@ -243,13 +250,8 @@ def one_process(
         max(first, best - reach),
         min(last, best + reach),
         fixed,
-        nu,
-        density,
-        cross,
-        ramp,
+        bins,
         with_ramp,
-        first,
-        step,
         table,
     )
     place[0] = found if cost < lowest else best
@@ -259,27 +261,23 @@ def one_process(
 @njit(cache=True)
 def two_processes(
     fixed: Array,
-    nu: Array,
-    density: Array,
-    cross: Array,
-    ramp: Array,
+    bins: Bins,
     with_ramp: bool,
-    first: float,
-    step: float,
-    table: Array,
+    table: ShapeTable,
 ) -> Array:
     """Scan pairs of correlation times, then polish each in turn."""
-    last = first + step * (table.shape[0] - 1)
+    first, step, logarithms = table
+    last = first + step * (logarithms.shape[0] - 1)
     apart = np.log(_CLOSEST_PAIR)
     lowest = np.inf
     best = np.array([first, last])
     places = np.empty(2)
-    for i in range(0, table.shape[0], _PAIR_STEP):
-        for j in range(i + _PAIR_STEP, table.shape[0], _PAIR_STEP):
+    for i in range(0, logarithms.shape[0], _PAIR_STEP):
+        for j in range(i + _PAIR_STEP, logarithms.shape[0], _PAIR_STEP):
             places[0], places[1] = first + i * step, first + j * step
             if places[1] - places[0] < apart:
                 continue
-            cost = _cost_at(places, fixed, nu, density, cross, ramp, with_ramp, first, step, table)
+            cost = _cost_at(places, fixed, bins, with_ramp, table)
             if cost < lowest:
                 lowest = cost
                 best = places.copy()
@@ -300,13 +298,8 @@ def two_processes(
                 low,
                 high,
                 fixed,
-                nu,
-                density,
-                cross,
-                ramp,
+                bins,
                 with_ramp,
-                first,
-                step,
                 table,
             )
             if cost < lowest:
