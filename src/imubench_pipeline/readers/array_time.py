@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.readers.array_table import DATES, UnusableError
-from imubench_pipeline.readers.batch import SECONDS, LogFile
-from imubench_pipeline.readers.started import date_of
+from imubench_pipeline.readers.batch import LogFile
+from imubench_pipeline.readers.started import date_of_stamp
 from imubench_pipeline.readers.wrapping import WrapState, unwrapped
 
 _NANOSECONDS = {
@@ -75,12 +75,7 @@ class ArrayTime:
         if dated:
             return str(np.datetime64(int(self._first), "ns"))[:23]
         source = self._file.log.time
-        if source is None or source.unit not in SECONDS:
-            return None
-        if source.unit == "ns" and source.scale == 1:
-            return date_of(int(self._first))
-        nanoseconds = float(self._first) * SECONDS[source.unit] * source.scale * 1e9
-        return date_of(round(nanoseconds)) if np.isfinite(nanoseconds) else None
+        return None if source is None else date_of_stamp(self._first, source)
 
 
 def _nanoseconds(dates: NDArray[Any], missing: NDArray[np.bool_]) -> NDArray[np.int64]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from typing import Any
 
@@ -11,8 +10,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from imubench_pipeline.readers.batch import SECONDS, LogFile, RecordingError
-from imubench_pipeline.readers.started import date_of
+from imubench_pipeline.readers.batch import LogFile, RecordingError
+from imubench_pipeline.readers.started import date_of_stamp
 from imubench_pipeline.readers.text_cells import is_missing
 from imubench_pipeline.readers.text_layout import TextLayout
 from imubench_pipeline.readers.text_stamps import DAY, TextStamps, arrow_type
@@ -115,13 +114,7 @@ class TextTime:
         if self._source.format is not None:
             dated = self._text is None or self._text.dated
             return str(np.datetime64(int(self._first), "ns"))[:23] if dated else None
-        if self._source.unit not in SECONDS:
-            return None
-        if self._source.unit == "ns" and self._source.scale == 1:
-            return date_of(int(self._first))
-        scale = SECONDS[self._source.unit] * self._source.scale
-        nanoseconds = float(self._first) * scale * 1e9
-        return date_of(round(nanoseconds)) if math.isfinite(nanoseconds) else None
+        return date_of_stamp(self._first, self._source)
 
 
 def time_columns(source: TimeSource | None) -> list[str | int]:
