@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag1 import Writer as Writer1
@@ -21,6 +21,7 @@ from imubench_pipeline.readers.batch import LogFile
 from imubench_pipeline.readers.rosbag import RosbagFile
 from imubench_pipeline.readers.rosbag1 import Bag
 from imubench_pipeline.sensor import LogFormat
+from tests.readers.damage import examples
 
 IMU, TEMPERATURE = "sensor_msgs/msg/Imu", "sensor_msgs/msg/Temperature"
 COLUMNS = {
@@ -421,11 +422,7 @@ def bytes_of(kind: str) -> bytes:
     st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.integers(1, 255)), max_size=5),
     st.booleans(),
 )
-@settings(
-    max_examples=200,
-    deadline=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
+@examples(200)
 def test_no_damage_gives_another_error(
     tmp_path: Path,
     kind: str,
@@ -450,11 +447,7 @@ def test_no_damage_gives_another_error(
 
 
 @given(st.binary(max_size=300), st.sampled_from(["", "#ROSBAG V2.0\n", "whole"]))
-@settings(
-    max_examples=100,
-    deadline=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
+@examples(100)
 def test_any_bytes_give_no_other_error(tmp_path: Path, data: bytes, begin: str) -> None:
     path = tmp_path / "a"
     before = bytes_of("ros1") if begin == "whole" else begin.encode()
@@ -466,11 +459,7 @@ def test_any_bytes_give_no_other_error(tmp_path: Path, data: bytes, begin: str) 
 
 
 @given(st.text(max_size=300))
-@settings(
-    max_examples=60,
-    deadline=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
+@examples(60)
 def test_any_metadata_gives_no_other_error(tmp_path: Path, text: str) -> None:
     folder = tmp_path / "a"
     folder.mkdir(exist_ok=True)

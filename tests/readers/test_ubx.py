@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pyubx2 import GET, UBXMessage, UBXReader
 
 from imubench_pipeline.readers import RecordingError, read
 from imubench_pipeline.readers.batch import LogFile
 from imubench_pipeline.sensor import LogFormat
+from tests.readers.damage import Damage, damaged, damages, examples
 
 DEG = np.pi / 180
 TYPES = {"gyro_x": 14, "gyro_y": 13, "gyro_z": 5, "accel_x": 16, "accel_y": 17, "accel_z": 18}
@@ -370,37 +371,20 @@ LOGS = [
 ]
 
 
-@given(
-    st.integers(0, len(WHOLE)),
-    st.lists(st.tuples(st.integers(0, len(WHOLE) - 1), st.integers(1, 255)), max_size=20),
-    st.sampled_from(LOGS),
-)
-@settings(
-    max_examples=150,
-    deadline=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
-def test_no_damage_gives_another_error(
-    tmp_path: Path, cut: int, flips: list[tuple[int, int]], log: LogFormat
-) -> None:
-    damaged = bytearray(WHOLE)
-    for place, bits in flips:
-        damaged[place] ^= bits
+@given(damages(len(WHOLE), 20), st.sampled_from(LOGS))
+@examples(150)
+def test_no_damage_gives_another_error(tmp_path: Path, damage: Damage, log: LogFormat) -> None:
     try:
-        found, _, _ = columns(written(tmp_path, bytes(damaged[:cut])), log)
+        found, _, _ = columns(written(tmp_path, damaged(WHOLE, damage)), log)
     except RecordingError as error:
         assert "a.ubx" in str(error)
         return
-    if "accel_x" in found and len(flips) <= 1:
+    if "accel_x" in found and len(damage[1]) <= 1:
         assert set(found["accel_x"]) <= set(expected("accel_x", truth(20)))
 
 
 @given(st.binary(max_size=300))
-@settings(
-    max_examples=100,
-    deadline=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
+@examples(100)
 def test_any_payload_gives_no_other_error(tmp_path: Path, payload: bytes) -> None:
     for key in ("ESF-MEAS", "ESF-RAW"):
         size = struct.pack("<H", len(payload))

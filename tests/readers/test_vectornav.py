@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from imubench_pipeline.readers import RecordingError, read
@@ -18,6 +18,7 @@ from imubench_pipeline.readers.batch import LogFile
 from imubench_pipeline.readers.vectornav import VectorNavFile
 from imubench_pipeline.readers.vectornav_sentences import FIELDS, right_checksums
 from imubench_pipeline.sensor import LogFormat
+from tests.readers.damage import Damage, damaged, damages, examples
 
 UNITS = {"gyro": "rad/s", "accel": "m/s^2"}
 ALL = [f"{quantity}_{axis}" for quantity in UNITS for axis in "xyz"]
@@ -358,40 +359,25 @@ LOGS = [log_format(), log_format(time={"column": "host_time", "unit": "s"})]
 WHOLE = logged([b"%d.25 " % i + sentence("VNYMR", [i / 8] * 12) for i in range(40)])
 
 
-@given(
-    st.integers(0, len(WHOLE)),
-    st.lists(st.tuples(st.integers(0, len(WHOLE) - 1), st.integers(1, 255)), max_size=30),
-    st.sampled_from(LOGS),
-)
-@settings(
-    max_examples=150,
-    deadline=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
+@given(damages(len(WHOLE), 30), st.sampled_from(LOGS))
+@examples(150)
 def test_no_damage_gives_a_wrong_figure_or_another_error(
-    tmp_path: Path, cut: int, flips: list[tuple[int, int]], log: LogFormat
+    tmp_path: Path, damage: Damage, log: LogFormat
 ) -> None:
-    damaged = bytearray(WHOLE)
-    for place, bits in flips:
-        damaged[place] ^= bits
     try:
-        found, _, _ = columns(written(tmp_path, bytes(damaged[:cut])), log)
+        found, _, _ = columns(written(tmp_path, damaged(WHOLE, damage)), log)
     except RecordingError as error:
         assert "a.txt" in str(error)
         return
     present = found["gyro_x"][~np.isnan(found["gyro_x"])]
     # Two flips of the same bit in one sentence pass a checksum of 8 bits.
-    if len(flips) <= 1:
+    if len(damage[1]) <= 1:
         assert set(present * 8) <= set(range(40))
         assert list(present) == sorted(present)
 
 
 @given(st.binary(max_size=400))
-@settings(
-    max_examples=100,
-    deadline=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
+@examples(100)
 def test_any_bytes_give_no_other_error(tmp_path: Path, text: bytes) -> None:
     for prefix in (b"", YMR + b"\n", b"$VNYMR,"):
         try:
