@@ -124,6 +124,31 @@ def test_warnings_stand_at_the_top_and_notes_at_the_end() -> None:
     assert page.index("a long gap") < page.index('id="comparison"') < page.index("a short end")
 
 
+def test_findings_stand_beside_the_results_that_they_touch() -> None:
+    of_r = {"sensor": "s", "recording": "r", "value": 1.0, "severity": "warning"}
+    rows = [
+        of_r | {"finding": "missing_samples", "detail": "of all channels"},
+        of_r
+        | {
+            "finding": "step",
+            "detail": "it was moved",
+            "channel": "gyro_x",
+            "start": 60.0,
+            "end": 61.0,
+        },
+        of_r | {"finding": "lines", "severity": "note", "detail": "1 Hz", "channel": "gyro_x"},
+        of_r | {"finding": "motion", "detail": "elsewhere", "channel": "gyro_y"},
+        of_r | {"finding": "knocks", "detail": "elsewhere", "recording": "q"},
+    ]
+    page = render(tables(recordings=[recording("r")], findings=rows, **channel("r")), SETTINGS)
+    parameters = page[page.index('id="parameters"') : page.index('id="scores"')]
+    doubts = re.findall(r'href="#(s-r-gyro_x-findings)">see: ([^<]*)</a>', parameters)
+    assert doubts == [("s-r-gyro_x-findings", "missing samples, step")]
+    section = page[page.index('id="s-r-gyro_x-findings"') : page.index('id="recordings"')]
+    assert "of all channels" in section and "1 Hz" in section and "elsewhere" not in section
+    assert "60 s to 61 s: (warning, step): it was moved" in section
+
+
 def test_a_simulated_log_is_called_so_wherever_it_appears() -> None:
     truth = {"sensor": "s", "recording": "r", "channel": "gyro_x", "parameter": "N"}
     truth |= {"value": np.pi / 180 / 60, "unit": "x", "assumed": True, "source": "x"}

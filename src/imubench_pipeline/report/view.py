@@ -45,6 +45,13 @@ class ChannelView:
     models: list[Row] = field(default_factory=list)
     lines: list[Row] = field(default_factory=list)
     spectrum: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    findings: list[Row] = field(default_factory=list)
+
+    @property
+    def warnings(self) -> list[str]:
+        """Names of the findings that put the results of the channel in doubt, each once."""
+        serious = [row["finding"] for row in self.findings if row["severity"] != "note"]
+        return [name.replace("_", " ") for name in dict.fromkeys(serious)]
 
     @property
     def quantity(self) -> str:
@@ -114,6 +121,11 @@ def channel_views(tables: Mapping[str, pa.Table]) -> list[ChannelView]:
     for row in tables["simulated_truth"].to_pylist():
         if _name(row) in views:
             views[_name(row)].truth[row["parameter"]] = row
+    for row in tables["findings"].to_pylist():
+        for (sensor, recording, channel), view in views.items():
+            here = (sensor, recording) == (row["sensor"], row["recording"])
+            if here and row["channel"] in (None, channel):
+                view.findings.append(row)
     return list(views.values())
 
 
