@@ -4,6 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import settings
+
+# The first example may have to wait for a compiler; how fast the code is, benchmarks/ tells.
+settings.register_profile("imubench", deadline=None)
+settings.load_profile("imubench")
 
 PROJECT = Path(__file__).parents[1]
 SHARED = PROJECT.parent / "shared"

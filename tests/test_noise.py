@@ -31,7 +31,6 @@ def exact_gauss_markov(tau: float, T_B: float) -> mpmath.mpf:
         return c**2 / t * bracket
 
 
-@settings(deadline=None)
 @given(st.floats(-6, 6), st.floats(-3, 5))
 def test_gauss_markov_to_ten_digits_at_every_tau(log_ratio: float, log_time: float) -> None:
     T_B = 10.0**log_time

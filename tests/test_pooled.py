@@ -130,7 +130,6 @@ recordings = st.lists(
 )
 
 
-@settings(deadline=None)
 @given(recordings, st.randoms(use_true_random=False), st.floats(1e-8, 1e8))
 def test_order_and_unit_do_not_matter(drawn, random, scale: float) -> None:
     def pooled(entries, unit: float) -> Pool:

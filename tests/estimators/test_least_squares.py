@@ -51,7 +51,7 @@ def test_a_noiseless_curve_gives_its_parameters_back(method) -> None:
     assert estimate.model.name == "N+GM+K"
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.floats(0.5, 3), st.floats(0.5, 1.4), st.floats(20, 500), st.floats(0.3, 3))
 def test_noiseless_curves_of_many_sensors(N: float, B: float, T_B: float, K: float) -> None:
     model = NoiseModel(N=N * 1e-4, B=B * 7e-5, T_B=T_B, K=K * 1e-6)

@@ -10,7 +10,6 @@ def examples(number: int) -> settings:
     """So many examples; a test may write each over the last one in its folder."""
     return settings(
         max_examples=number,
-        deadline=None,
         suppress_health_check=[HealthCheck.function_scoped_fixture],
     )
 

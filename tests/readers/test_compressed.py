@@ -240,7 +240,7 @@ def test_bombs_are_stopped(tmp_path: Path, way: str, monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.parametrize("way", PACKED)
-@settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=40, suppress_health_check=list(HealthCheck))
 @given(data=st.data())
 def test_nothing_but_a_recording_error_comes_of_damage(
     tmp_path: Path, way: str, data: st.DataObject

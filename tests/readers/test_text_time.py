@@ -59,7 +59,7 @@ def test_stamps_in_text(tmp_path: Path, form: str, stamps: str, started: str) ->
     assert file.started == f"2021-09-20T{started}"
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=40, suppress_health_check=list(HealthCheck))
 @given(
     st.lists(st.datetimes(datetime(1971, 1, 1), datetime(2199, 12, 31)), min_size=1, max_size=8),
     st.sampled_from(
