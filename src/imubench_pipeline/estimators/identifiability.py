@@ -20,7 +20,7 @@ NOT_IDENTIFIED = 0.5
 NOT_IDENTIFIED_TIME = 0.4
 """That of T_B: of weak processes those whose T_B seems known have it wrong."""
 
-NOT_IDENTIFIED_LEVEL = 0.75
+NOT_IDENTIFIED_LEVEL = 0.9
 """That of the other parameters: their bound at the fitted value scatters with the value."""
 
 WANTED = 0.1
