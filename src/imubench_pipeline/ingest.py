@@ -225,9 +225,11 @@ def _base(part: Part, log: LogFormat, settings: QualitySettings) -> timebase.Tim
 
 def _shared_bases(parts: list[Part], bases: list[timebase.TimeBase]) -> list[list[int]]:
     """Group the files that have the same clock: the same stamps, or as many samples and none."""
+    if len(parts) == 1:
+        return [[0]]
     groups: dict[tuple[object, ...], list[int]] = {}
     for index, (part, base) in enumerate(zip(parts, bases, strict=True)):
-        groups.setdefault((part.digest, part.rows, base.rate), []).append(index)
+        groups.setdefault((part.digest(), part.rows, base.rate), []).append(index)
     return list(groups.values())
 
 

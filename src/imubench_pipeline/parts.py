@@ -41,8 +41,6 @@ class Part:
         Samples left out of each column, as part of a knock.
     stamped : bool
         Records have stamps.
-    digest : str
-        Of the stamps: files with the same ones share a clock.
     """
 
     source: LogFile
@@ -54,12 +52,18 @@ class Part:
     columns: dict[str, ColumnSummary] = field(default_factory=dict)
     knocks: dict[str, int] = field(default_factory=dict)
     stamped: bool = False
-    digest: str = ""
 
     def stamps(self) -> Iterator[NDArray[np.float64]]:
         """Yield the stamps in s, from the disk."""
         for start in range(0, self.rows, _STAMP_BLOCK):
             yield np.fromfile(self.stamps_path, np.float64, _STAMP_BLOCK, offset=8 * start)
+
+    def digest(self) -> str:
+        """Return a digest of the stamps: files with the same ones share a clock."""
+        digest = hashlib.blake2b()
+        for block in self.stamps():
+            digest.update(block.data)
+        return digest.hexdigest()
 
 
 def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
@@ -86,7 +90,6 @@ def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
         file, data, stamps_path, writer, columns={name: ColumnSummary() for name in columns}
     )
     rate = file.log.rate_hz
-    digest = hashlib.blake2b()
     read_rows = 0
     with stamps_path.open("wb") as stamps:
         for batch in file.batches():
@@ -105,9 +108,7 @@ def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
             whole = bool(keep.all())
             part.not_used += len(batch) - int(keep.sum())
             if time is not None:
-                kept_time = np.ascontiguousarray(time if whole else time[keep])
-                kept_time.tofile(stamps)
-                digest.update(kept_time.tobytes())
+                np.ascontiguousarray(time if whole else time[keep]).tofile(stamps)
             kept = {
                 name: part.columns[name].add(values if whole else values[keep])
                 for name, values in batch.columns.items()
@@ -128,7 +129,6 @@ def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
                 part.not_used,
             )
         )
-    part.digest = digest.hexdigest() if part.stamped else ""
     return part
 
 

@@ -45,7 +45,7 @@ class LogWriter:
             use_byte_stream_split=floats,
             column_encoding={name: "DELTA_BINARY_PACKED" for name in integers} or None,
         )
-        self._waiting: list[dict[str, NDArray[Any]]] = []
+        self._waiting: list[pa.RecordBatch] = []
         self._rows = 0
 
     def __enter__(self) -> LogWriter:
@@ -64,7 +64,7 @@ class LogWriter:
         rows = len(next(iter(columns.values())))
         if rows == 0:
             return
-        self._waiting.append(dict(columns))
+        self._waiting.append(self._batch(columns))
         self._rows += rows
         while self._rows >= ROW_GROUP:
             self._flush(ROW_GROUP)
@@ -76,19 +76,21 @@ class LogWriter:
         self._writer.add_key_value_metadata({_METADATA: json.dumps(metadata)})
 
     def _flush(self, rows: int) -> None:
-        joined = {
-            name: np.concatenate([part[name] for part in self._waiting])
-            for name in self._schema.names
-        }
-        arrays = [
-            pa.array(joined[name][:rows], type=self._schema.field(name).type, from_pandas=True)
-            for name in self._schema.names
-        ]
-        self._writer.write_table(
-            pa.Table.from_arrays(arrays, schema=self._schema), row_group_size=ROW_GROUP
-        )
-        self._waiting = [{name: column[rows:].copy() for name, column in joined.items()}]
+        """Write the first rows of what is waiting, which is not copied for it."""
+        waiting = pa.Table.from_batches(self._waiting, schema=self._schema)
+        self._writer.write_table(waiting.slice(0, rows), row_group_size=ROW_GROUP)
+        self._waiting = waiting.slice(rows).to_batches()
         self._rows -= rows
+
+    def _batch(self, columns: Mapping[str, NDArray[Any]]) -> pa.RecordBatch:
+        arrays = [_to_arrow(columns[field.name], field.type) for field in self._schema]
+        return pa.RecordBatch.from_arrays(arrays, schema=self._schema)
+
+
+def _to_arrow(values: NDArray[Any], kind: pa.DataType) -> pa.Array:
+    """Return numbers as Arrow keeps them, null for NaN; not copied where there is none."""
+    holes = values.dtype.kind == "f" and np.isnan(values.sum())
+    return pa.array(values, type=kind, from_pandas=bool(holes))
 
 
 def _to_numpy(column: pa.ChunkedArray) -> NDArray[Any]:

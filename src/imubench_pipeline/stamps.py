@@ -19,6 +19,9 @@ _TRACKING = 0.02
 """Gain with which the grid follows the stamps; its interval, with a quarter of
 the square."""
 
+_ENOUGH = 1 << 17
+"""Stamps of a block whose median interval is that of the block."""
+
 
 def typical_interval(stamps: Stamps) -> float | None:
     """Return the mean of the intervals between which no sample is missing, in s.
@@ -27,7 +30,9 @@ def typical_interval(stamps: Stamps) -> float | None:
     """
     medians, rounded = [], []
     for block in stamps():
-        steps = _advances(block)
+        steps = _advances(block[:_ENOUGH])
+        if not len(steps):
+            steps = _advances(block)
         if len(steps):
             medians.append(float(np.median(steps)))
             rounded.append(_long_steps_are_regular(steps, medians[-1]))

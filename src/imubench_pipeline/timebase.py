@@ -23,6 +23,9 @@ from imubench_pipeline.stamps import Stamps, Track, tracked, typical_interval
 _SHARED = 0.2
 """Part of the records that repeat a stamp beyond which a stamp belongs to a group of samples."""
 
+_SAME = 1e-5
+"""Relative difference of two intervals at which stamps are put on the same grid points."""
+
 
 @dataclass(frozen=True)
 class TimeBase:
@@ -101,9 +104,11 @@ def from_stamps(stamps: Stamps, stated: float | None, settings: QualitySettings)
     interval = typical_interval(stamps)
     if interval is None:
         raise RecordingError("the time stamps do not advance; is the right column named?")
-    first = tracked(stamps, interval, settings.longest_hole)
-    # The mean over the recording is far better known than the typical interval: once more.
-    found = tracked(stamps, first.mean_interval or interval, settings.longest_hole)
+    found = tracked(stamps, interval, settings.longest_hole)
+    mean = found.mean_interval or interval
+    if abs(mean / interval - 1.0) > _SAME:
+        # The mean over the recording is far better known than the typical interval: once more.
+        found = tracked(stamps, mean, settings.longest_hole)
     # Many holes that are together longer than the log are pauses of the host, not losses.
     bursts = found.grid > 2 * found.rows and found.holes > 0.05 * found.rows
     shared = found.duplicates > _SHARED * found.rows

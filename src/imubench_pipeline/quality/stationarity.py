@@ -180,6 +180,8 @@ def _means(blocks: Blocks, size: int) -> Array:
     """Return medians of the means of ``size`` blocks: one knock does not move them."""
     whole = len(blocks.mean) // size
     grouped = blocks.mean[: whole * size].reshape(whole, size)
+    if np.isfinite(grouped).all():
+        return np.median(grouped, axis=1)
     return np.array([_median(group) for group in grouped])
 
 

@@ -159,51 +159,121 @@ def _close(state: Array, row: Array) -> None:
 def _take(values: Array, state: Array, rows: Array) -> tuple[int, bool]:
     """Count samples; return the number of blocks that were completed, and if one is infinite."""
     number = 0
-    infinite = False
-    last, run, step = state[_LAST], state[_RUN], state[_STEP]
-    low, high, at_low, at_high = state[_LOW], state[_HIGH], state[_AT_LOW], state[_AT_HIGH]
-    for i in range(values.size):
-        x = values[i]
-        if np.isfinite(x):
-            state[_PRESENT] += 1
-            if np.isnan(state[_SHIFT]):
-                state[_SHIFT] = x
-            state[_COUNT] += 1
-            y = x - state[_SHIFT]
-            state[_SUM] += y
-            state[_SQUARES] += y * y
-            if x < state[_LEAST]:
-                state[_LEAST] = x
-            if x > state[_MOST]:
-                state[_MOST] = x
-            if x <= low:
-                at_low = at_low + 1 if x == low else 1.0
-                low = x
-            if x >= high:
-                at_high = at_high + 1 if x == high else 1.0
-                high = x
-            if x == last:
-                run += 1
-                state[_REPEATS] += 1
-            else:
-                away = abs(x - last)
-                if away < step:
-                    step = away
-                run = 1.0
-                last = x
-            if run > state[_LONGEST]:
-                state[_LONGEST] = run
-                state[_LONGEST_END] = state[_TAKEN] + i + 1
-        elif np.isnan(x):
-            state[_MISSING] += 1
-        else:
-            state[_INFINITE] += 1
-            infinite = True
-        state[_FILLED] += 1
+    before = state[_INFINITE]
+    start = 0
+    while start < values.size:
+        stop = min(values.size, start + BLOCK - int(state[_FILLED]))
+        piece = values[start:stop]
+        begun = state[_PRESENT] > 0.0 and not np.isnan(state[_SHIFT])
+        if not (begun and _nothing(piece) == 0.0 and _take_plain(piece, state)):
+            _take_each(piece, state)
+        state[_TAKEN] += stop - start
+        state[_FILLED] += stop - start
         if state[_FILLED] == BLOCK:
             _close(state, rows[number])
             number += 1
-    state[_TAKEN] += values.size
+        start = stop
+    return number, state[_INFINITE] > before
+
+
+@njit(cache=True, nogil=True)
+def _take_plain(piece: Array, state: Array) -> bool:
+    """Count finite samples that are no new extremes and repeat nothing; else tell so."""
+    least, most, step = _extremes(piece, state[_LAST])
+    if step == 0.0 or least <= state[_LOW] or most >= state[_HIGH]:
+        return False
+    total, squares = _sums(piece, state[_SHIFT])
+    state[_PRESENT] += piece.size
+    state[_COUNT] += piece.size
+    state[_SUM] += total
+    state[_SQUARES] += squares
+    state[_LEAST] = min(state[_LEAST], least)
+    state[_MOST] = max(state[_MOST], most)
+    state[_STEP] = min(state[_STEP], step)
+    state[_LAST], state[_RUN] = piece[-1], 1.0
+    return True
+
+
+# The order of sums is free here, which makes wide instructions of them; comparisons need no care
+# for NaN in `_extremes` alone, where there is none.
+
+
+@njit(cache=True, nogil=True, fastmath={"reassoc"})
+def _nothing(piece: Array) -> float:
+    """Return 0, or NaN where a sample is not finite."""
+    total = 0.0
+    for i in range(piece.size):
+        total += 0.0 * piece[i]
+    return total
+
+
+@njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
+def _sums(piece: Array, shift: float) -> tuple[float, float]:
+    """Return the sum, and that of the squares, about a value."""
+    total, squares = 0.0, 0.0
+    for i in range(piece.size):
+        away = piece[i] - shift
+        total += away
+        squares += away * away
+    return total, squares
+
+
+@njit(cache=True, nogil=True, fastmath={"reassoc", "nnan", "nsz"})
+def _extremes(piece: Array, last: float) -> tuple[float, float, float]:
+    """Return the lowest and the highest sample, and the smallest step between neighbours."""
+    least, most, step = piece[0], piece[0], abs(piece[0] - last)
+    for i in range(1, piece.size):
+        least = min(least, piece[i])
+        most = max(most, piece[i])
+        step = min(step, abs(piece[i] - piece[i - 1]))
+    return least, most, step
+
+
+@njit(cache=True, nogil=True)
+def _take_each(piece: Array, state: Array) -> None:
+    """Count samples one by one."""
+    last, run, step = state[_LAST], state[_RUN], state[_STEP]
+    low, high, at_low, at_high = state[_LOW], state[_HIGH], state[_AT_LOW], state[_AT_HIGH]
+    shift, total, squares = state[_SHIFT], state[_SUM], state[_SQUARES]
+    least, most = state[_LEAST], state[_MOST]
+    count, repeats = 0, 0
+    for i in range(piece.size):
+        x = piece[i]
+        if not np.isfinite(x):
+            state[_MISSING if np.isnan(x) else _INFINITE] += 1
+            continue
+        count += 1
+        if np.isnan(shift):
+            shift = x
+        y = x - shift
+        total += y
+        squares += y * y
+        if x < least:
+            least = x
+        if x > most:
+            most = x
+        if x <= low:
+            at_low = at_low + 1 if x == low else 1.0
+            low = x
+        if x >= high:
+            at_high = at_high + 1 if x == high else 1.0
+            high = x
+        if x == last:
+            run += 1
+            repeats += 1
+        else:
+            away = abs(x - last)
+            if away < step:
+                step = away
+            run = 1.0
+            last = x
+        if run > state[_LONGEST]:
+            state[_LONGEST] = run
+            state[_LONGEST_END] = state[_TAKEN] + i + 1
+    state[_PRESENT] += count
+    state[_COUNT] += count
+    state[_REPEATS] += repeats
     state[_LAST], state[_RUN], state[_STEP] = last, run, step
     state[_LOW], state[_HIGH], state[_AT_LOW], state[_AT_HIGH] = low, high, at_low, at_high
-    return number, infinite
+    state[_SHIFT], state[_SUM], state[_SQUARES] = shift, total, squares
+    state[_LEAST], state[_MOST] = least, most

@@ -97,4 +97,5 @@ class LogFile(ABC):
         factor, zero = conversion(source.unit, dimension)
         if source.offset:
             raw = raw - source.offset
-        return raw * (source.scale * factor) + zero
+        figures = raw * (source.scale * factor)
+        return figures + zero if zero else figures

@@ -85,6 +85,7 @@ class TextTime:
         if self._text is not None and not self._text.dated:
             wraps = DAY
         if wraps is not None:
+            stamps = stamps.copy()
             stamps[present] = unwrapped(stamps[present], wraps, self._wrap)
         if self._first is None:
             if not present.any():
@@ -94,7 +95,8 @@ class TextTime:
                 )
             self._first = stamps[present.argmax()]
             self._file.started = self._started() or self._file.started
-        return np.where(present, self._file.seconds(stamps, self._first), np.nan)
+        seconds = self._file.seconds(stamps, self._first)
+        return seconds if present.all() else np.where(present, seconds, np.nan)
 
     def _stamps(self, columns: list[pa.Array]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
         """Return the stamps as numbers, and which of them are there."""
@@ -105,7 +107,7 @@ class TextTime:
         present = np.asarray(column.is_valid())
         if pa.types.is_timestamp(column.type):
             column = column.cast(pa.int64())
-        stamps = np.array(column.fill_null(0))
+        stamps = np.asarray(column.fill_null(0) if column.null_count else column)
         if stamps.dtype.kind == "f":
             present &= np.isfinite(stamps)
         return stamps, present
