@@ -9,7 +9,6 @@ groups of a million rows, and run each in a process of its own, one after the ot
 from __future__ import annotations
 
 import argparse
-import os
 import subprocess
 import sys
 import tempfile
@@ -25,6 +24,7 @@ from imubench_pipeline.config import QualitySettings
 from imubench_pipeline.ingest import ingest
 from imubench_pipeline.recording import ROW_GROUP
 from imubench_pipeline.sensor import LogFormat, RecordingNotes
+from resident import peak_memory
 
 RATE = 100.0
 COLUMNS = ("t", "wx", "wy", "wz", "ax", "ay", "az")
@@ -91,17 +91,12 @@ WAYS = {"ours": ours, "bare": bare}
 
 
 def measured(way: str, source: Path) -> tuple[float, float]:
-    """Run one way in a process of its own; return seconds of work, and peak resident MiB."""
+    """Run one way in a process of its own; return seconds of work, and peak resident MB."""
     with tempfile.TemporaryDirectory(dir=source.parent) as folder:
         command = [sys.executable, __file__, "--way", way, "--log", str(source), "--to", folder]
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-        assert process.stdout is not None
-        seconds = float(process.stdout.read())
-        _, status, usage = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
-        if process.returncode:
-            raise SystemExit(f"{way}: exit status {process.returncode}")
-    return seconds, usage.ru_maxrss / 1024
+        done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True)
+    seconds, memory = map(float, done.stdout.split())
+    return seconds, memory
 
 
 def main() -> None:
@@ -121,7 +116,7 @@ def main() -> None:
         WAYS[given.way](small, given.to / "small")
         start = time.perf_counter()
         WAYS[given.way](given.log, given.to)
-        print(time.perf_counter() - start)
+        print(time.perf_counter() - start, peak_memory())
         return
     for rows in given.rows:
         with tempfile.TemporaryDirectory() as name:
@@ -132,7 +127,7 @@ def main() -> None:
         for way, results in zip(WAYS, zip(*pairs, strict=True), strict=True):
             seconds = np.median([result[0] for result in results])
             memory = max(result[1] for result in results)
-            print(f"{rows:,} rows x 7, {way}: {seconds:.2f} s, peak resident {memory:.0f} MiB")
+            print(f"{rows:,} rows x 7, {way}: {seconds:.2f} s, peak resident {memory:.0f} MB")
         print(
             f"speed of ours over the bare conversion, median: {np.median(ratios):.2f}", flush=True
         )

@@ -21,6 +21,7 @@ import yaml
 
 from imubench_pipeline.allan import of_blocks
 from imubench_pipeline.recording import ROW_GROUP, ChannelLog, LogWriter
+from resident import peak_memory
 
 PROJECT = Path(__file__).parents[1]
 SENSOR = {
@@ -91,12 +92,9 @@ def analyse(path: Path, samples: int, threads: int) -> None:
         log.blocks(), log.grid, log.rate, holes=log.holes, segments=log.segments, threads=threads
     )
     taken = time.perf_counter() - start
-    # What `getrusage` gives would count the process that started this one, too.
-    lines = Path("/proc/self/status").read_text().splitlines()
-    peak = next(int(line.split()[1]) for line in lines if line.startswith("VmHWM:"))
     print(
         f"{threads} thread{'s' if threads > 1 else ' '}  {len(curve.tau)} tau  {taken:6.1f} s  "
-        f"peak resident {peak * 1024 / 1e6:5.0f} MB"
+        f"peak resident {peak_memory():5.0f} MB"
     )
 
 
