@@ -6,6 +6,7 @@ import hashlib
 import json
 import shutil
 import tempfile
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -82,17 +83,21 @@ def ingest(
     folder.mkdir(parents=True, exist_ok=True)
     remove_kept(folder)
     scratch = Path(tempfile.mkdtemp(prefix=".ingest.", suffix=".part", dir=folder))
+    # The files are identified while they are read.
+    beside = ThreadPoolExecutor(1)
+    sources = beside.submit(_identified, source)
     try:
-        found = _ingest(source, log, notes, settings, folder, scratch, provenance)
+        found = _ingest(source, log, notes, settings, folder, scratch, provenance, sources)
         end = max((f.end or 0.0 for f in found.findings if f.finding == "warm_up"), default=0.0)
         if not (settings.trim_warm_up and end):
             return found
         later = notes.model_copy(update={"use": UsedPart(start=end, end=notes.use.end)})
-        trimmed = _ingest(source, log, later, settings, folder, scratch, provenance)
+        trimmed = _ingest(source, log, later, settings, folder, scratch, provenance, sources)
         detail = f"the first {end:.5g} s, a warm-up, are left out (quality.trim_warm_up)"
         note = Finding("warm_up_trimmed", "note", detail, end, start=0.0, end=end)
         return replace(trimmed, findings=[note, *trimmed.findings])
     finally:
+        beside.shutdown()
         shutil.rmtree(scratch)
 
 
@@ -112,6 +117,7 @@ def _ingest(
     folder: Path,
     scratch: Path,
     provenance: dict[str, Any],
+    sources: Future[list[dict[str, Any]]],
 ) -> Ingested:
     parts = [
         read_part(file, notes.use, scratch, number) for number, file in enumerate(read(source, log))
@@ -137,10 +143,7 @@ def _ingest(
         )
     names = names_of(parts, groups)
     metadata = provenance | {
-        "sources": [
-            {"name": path.name, "size": path.stat().st_size, "sha256": _sha256(path)}
-            for path in log_files(source)
-        ],
+        "sources": sources.result(),
         "reader": log.reader,
         "started": notes.started
         or next((p.source.started for p in parts if p.source.started), None),
@@ -256,9 +259,14 @@ def _summary(
     }
 
 
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+def _identified(source: Path) -> list[dict[str, Any]]:
+    """Return name, size and digest of each file of a recording."""
+    found = []
+    for path in log_files(source):
+        with path.open("rb") as file:
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+        found.append({"name": path.name, "size": path.stat().st_size, "sha256": digest})
+    return found
 
 
 def ingest_as_planned(

@@ -4,7 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from imubench_pipeline.quality.summary import BLOCK, ColumnSummary
+from imubench_pipeline.quality import blocks as of_blocks
+from imubench_pipeline.quality.blocks import FIRST_SIZE
+from imubench_pipeline.quality.summary import ColumnSummary
 
 VALUES = st.sampled_from([-1.0, 0.0, 0.5, 2.0, np.nan, np.inf, -np.inf])
 
@@ -31,17 +33,23 @@ def test_counts_are_those_of_the_whole_column(log: np.ndarray, pieces: int) -> N
     assert column.mean == pytest.approx(finite.mean(), abs=1e-12)
 
 
-def test_blocks_are_those_of_the_records(rng: np.random.Generator) -> None:
-    log = 9.81 + 1e-6 * rng.standard_normal(10 * BLOCK + 17)
+@pytest.mark.parametrize(("many", "size"), [(1 << 15, 1), (8, 1), (4, 2), (3, 2), (2, 4)])
+def test_blocks_are_those_of_the_records(
+    rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch, many: int, size: int
+) -> None:
+    """However many there are: then blocks are made of several."""
+    monkeypatch.setattr(of_blocks, "_MANY", many)
+    log = 9.81 + 1e-6 * rng.standard_normal(10 * FIRST_SIZE + 17)
     log[rng.random(len(log)) < 0.2] = np.nan
-    log[3 * BLOCK : 4 * BLOCK] = np.nan
+    log[3 * FIRST_SIZE : 4 * FIRST_SIZE] = np.nan
     column = ColumnSummary()
     for piece in np.array_split(log, 13):
         column.add(piece)
     blocks = column.blocks()
-    assert len(blocks.mean) == 11
-    for k in range(11):
-        part = log[k * BLOCK : (k + 1) * BLOCK]
+    assert blocks.size == size * FIRST_SIZE
+    assert len(blocks.mean) == -(-len(log) // blocks.size) <= max(2 * many, 2)
+    for k in range(len(blocks.mean)):
+        part = log[k * blocks.size : (k + 1) * blocks.size]
         part = part[np.isfinite(part)]
         assert blocks.count[k] == len(part)
         if len(part) == 0:

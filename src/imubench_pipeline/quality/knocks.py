@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.quality.summary import BLOCK, Blocks
+from imubench_pipeline.quality.blocks import Blocks
 
 Array = NDArray[np.float64]
 
@@ -97,7 +97,7 @@ def knocks(pieces: Iterable[Array], blocks: Blocks, sigmas: float, longest: int)
         return
     wanted = {int(k): i for i, k in enumerate(number)}
     reached = 0
-    for k, values in enumerate(_blocks_of(pieces)):
+    for k, values in enumerate(_cut(pieces, blocks.size)):
         if k in wanted:
             i = wanted[k]
             away = np.abs(values - level[i]) / noise[i]
@@ -108,13 +108,13 @@ def knocks(pieces: Iterable[Array], blocks: Blocks, sigmas: float, longest: int)
         reached += len(values)
 
 
-def _blocks_of(pieces: Iterable[Array]) -> Iterator[Array]:
-    """Cut a column into blocks of `BLOCK` records."""
+def _cut(pieces: Iterable[Array], size: int) -> Iterator[Array]:
+    """Cut a column into blocks of so many records."""
     rest = np.empty(0)
     for piece in pieces:
         joined = np.concatenate((rest, piece)) if len(rest) else piece
-        whole = len(joined) // BLOCK * BLOCK
-        yield from joined[:whole].reshape(-1, BLOCK)
+        whole = len(joined) // size * size
+        yield from joined[:whole].reshape(-1, size)
         rest = joined[whole:]
     if len(rest):
         yield rest

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.quality.summary import BLOCK, Blocks
+from imubench_pipeline.quality.blocks import Blocks
 
 Array = NDArray[np.float64]
 
@@ -97,8 +97,8 @@ def steps(blocks: Blocks, sigmas: float) -> list[Step]:
         after = _median(means[group[-1] + 2 : group[-1] + 7])
         change = after - before
         if abs(change) > 0.5 * abs(float(away[peak])):
-            sample = (int(peak) + 1) * size * BLOCK + size * BLOCK // 2
-            found.append(Step(sample, change, abs(float(away[peak])) / scale, size * BLOCK))
+            sample = (int(peak) + 1) * size * blocks.size + size * blocks.size // 2
+            found.append(Step(sample, change, abs(float(away[peak])) / scale, size * blocks.size))
     return found
 
 
@@ -127,7 +127,7 @@ def warm_up(blocks: Blocks, times: float) -> WarmUp | None:
     calm = np.flatnonzero(np.abs(drifts) < 3.0 * usual)
     end = int(calm[0]) if len(calm) else _PARTS
     drift = float(np.nansum(drifts[:end]))
-    return WarmUp(end * size * BLOCK, drift, usual)
+    return WarmUp(end * size * blocks.size, drift, usual)
 
 
 def variance_change(blocks: Blocks) -> tuple[float, int, int] | None:
@@ -148,7 +148,11 @@ def variance_change(blocks: Blocks) -> tuple[float, int, int] | None:
     noisy = int(np.argmax(np.nan_to_num(spreads)))
     if not np.isfinite(calm):
         return None
-    return float(spreads[noisy]) / calm, noisy * size * BLOCK, (noisy + 1) * size * BLOCK
+    return (
+        float(spreads[noisy]) / calm,
+        noisy * size * blocks.size,
+        (noisy + 1) * size * blocks.size,
+    )
 
 
 def motions(blocks: Blocks, times: float) -> list[tuple[int, int]]:
@@ -173,7 +177,7 @@ def motions(blocks: Blocks, times: float) -> list[tuple[int, int]]:
     if len(shaken) == 0:
         return []
     groups = np.split(shaken, np.flatnonzero(np.diff(shaken) > 2) + 1)
-    return [(int(group[0]) * BLOCK, (int(group[-1]) + 1) * BLOCK) for group in groups]
+    return [(int(group[0]) * blocks.size, (int(group[-1]) + 1) * blocks.size) for group in groups]
 
 
 def _means(blocks: Blocks, size: int) -> Array:

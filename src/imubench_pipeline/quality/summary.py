@@ -12,34 +12,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from imubench_pipeline.quality.blocks import FIRST_SIZE, Blocks, Gathering
 
-BLOCK = 256
-"""Samples of a block."""
+Array = NDArray[np.float64]
 
 _PRESENT, _MISSING, _INFINITE, _LOW, _HIGH, _AT_LOW, _AT_HIGH = range(7)
 _LAST, _RUN, _LONGEST, _LONGEST_END, _REPEATS, _STEP, _TAKEN = range(7, 14)
 _FILLED, _COUNT, _SUM, _SQUARES, _LEAST, _MOST, _SHIFT = range(14, 21)
 _SIZE = 21
-
-
-@dataclass(frozen=True)
-class Blocks:
-    """Statistics of consecutive blocks of `BLOCK` records.
-
-    Attributes
-    ----------
-    count : ndarray, shape (b,)
-        Samples present.
-    mean, spread, low, high : ndarray, shape (b,)
-        Mean, standard deviation and extremes of the samples present, SI; NaN where there are none.
-    """
-
-    count: Array
-    mean: Array
-    spread: Array
-    low: Array
-    high: Array
 
 
 def _start() -> Array:
@@ -55,14 +35,14 @@ class ColumnSummary:
     """A column as it streams past; NaN is a missing sample."""
 
     _state: Array = field(default_factory=_start)
-    _parts: list[Array] = field(default_factory=list)
+    _blocks: Gathering = field(default_factory=Gathering)
 
     def add(self, values: Array) -> Array:
         """Count a piece of the column and return it with infinities made missing."""
-        rows = np.empty((len(values) // BLOCK + 2, 5))
+        rows = np.empty((len(values) // FIRST_SIZE + 2, 5))
         number, infinite = _take(np.ascontiguousarray(values), self._state, rows)
         if number:
-            self._parts.append(rows[:number].copy())
+            self._blocks.add(rows[:number])
         return np.where(np.isfinite(values), values, np.nan) if infinite else values
 
     @property
@@ -119,17 +99,15 @@ class ColumnSummary:
 
     def blocks(self) -> Blocks:
         """Return the statistics of the blocks, the last one as far as it goes."""
-        rows = (
-            [*self._parts, _closed(self._state)[None, :]] if self._state[_FILLED] else self._parts
-        )
-        joined = np.concatenate(rows) if rows else np.empty((0, 5))
-        return Blocks(*(np.ascontiguousarray(column) for column in joined.T))
+        return self._blocks.blocks(_closed(self._state))
 
 
 def _closed(state: Array) -> Array:
-    row = np.empty(5)
-    _close(state.copy(), row)
-    return row
+    """Return the block that is being filled as a row, or no row, shape (n, 5)."""
+    rows = np.empty((int(state[_FILLED] > 0), 5))
+    for row in rows:
+        _close(state.copy(), row)
+    return rows
 
 
 @njit(cache=True, nogil=True)
@@ -162,14 +140,14 @@ def _take(values: Array, state: Array, rows: Array) -> tuple[int, bool]:
     before = state[_INFINITE]
     start = 0
     while start < values.size:
-        stop = min(values.size, start + BLOCK - int(state[_FILLED]))
+        stop = min(values.size, start + FIRST_SIZE - int(state[_FILLED]))
         piece = values[start:stop]
         begun = state[_PRESENT] > 0.0 and not np.isnan(state[_SHIFT])
         if not (begun and _nothing(piece) == 0.0 and _take_plain(piece, state)):
             _take_each(piece, state)
         state[_TAKEN] += stop - start
         state[_FILLED] += stop - start
-        if state[_FILLED] == BLOCK:
+        if state[_FILLED] == FIRST_SIZE:
             _close(state, rows[number])
             number += 1
         start = stop

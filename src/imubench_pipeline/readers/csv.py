@@ -20,7 +20,7 @@ from imubench_pipeline.readers.text_records import Records
 from imubench_pipeline.readers.text_stamps import StampError
 from imubench_pipeline.readers.text_time import TextTime, time_columns
 
-_BLOCK_BYTES = 4 << 20
+_BLOCK_BYTES = 1 << 20  # pyarrow reads 32 of them ahead
 _ADVICE = (
     "either the file is corrupt there (copy it again, or cut it before that line), or the sensor "
     "file does not describe it (delimiter, decimal, header, skip_lines, comment, column)"
