@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.quality.knocks import Knock, knocks, suspects
 from imubench_pipeline.quality.summary import ColumnSummary
-from imubench_pipeline.readers import LogFile, RecordingError
+from imubench_pipeline.readers import Batch, LogFile, RecordingError
 from imubench_pipeline.recording import LogWriter
 from imubench_pipeline.sensor import UsedPart
 
@@ -94,26 +94,17 @@ def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
     with stamps_path.open("wb") as stamps:
         for batch in file.batches():
             time = batch.time
-            if time is None:
-                assert rate is not None  # checked with the sensor file
-                clock = np.arange(read_rows, read_rows + len(batch)) / rate
-            else:
-                clock = time
-                part.stamped = True
+            part.stamped = time is not None
+            keep = _used(batch, use, read_rows, rate)
             read_rows += len(batch)
-            # A record without a stamp is not known to lie outside.
-            keep = ~(clock < use.start)
-            if use.end is not None:
-                keep &= ~(clock > use.end)
-            whole = bool(keep.all())
-            part.not_used += len(batch) - int(keep.sum())
             if time is not None:
-                np.ascontiguousarray(time if whole else time[keep]).tofile(stamps)
+                np.ascontiguousarray(time[keep]).tofile(stamps)
             kept = {
-                name: part.columns[name].add(values if whole else values[keep])
-                for name, values in batch.columns.items()
+                name: part.columns[name].add(values[keep]) for name, values in batch.columns.items()
             }
-            part.rows += int(keep.sum())
+            rows = len(next(iter(kept.values())))
+            part.not_used += len(batch) - rows
+            part.rows += rows
             writer.write(kept)
     if part.rows == 0:
         raise RecordingError(
@@ -130,6 +121,33 @@ def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
             )
         )
     return part
+
+
+def _used(
+    batch: Batch, use: UsedPart, before: int, rate: float | None
+) -> slice | NDArray[np.bool_]:
+    """Return which records of a batch lie in the part to use.
+
+    Parameters
+    ----------
+    batch : Batch
+    use : UsedPart
+    before : int
+        Records before the batch.
+    rate : float or None
+        The stated one, Hz; needed where there are no stamps.
+    """
+    if use.start == 0.0 and use.end is None:
+        return slice(None)
+    clock = batch.time
+    if clock is None:
+        assert rate is not None  # checked with the sensor file
+        clock = np.arange(before, before + len(batch)) / rate
+    # A record without a stamp is not known to lie outside.
+    keep = ~(clock < use.start)
+    if use.end is not None:
+        keep &= ~(clock > use.end)
+    return keep
 
 
 def leave_out_knocks(

@@ -20,7 +20,7 @@ _TRACKING = 0.02
 the square."""
 
 _ENOUGH = 1 << 17
-"""Stamps of a block whose median interval is that of the block."""
+"""Stamps of a block that tell its typical interval; all are then followed."""
 
 
 def typical_interval(stamps: Stamps) -> float | None:
@@ -30,9 +30,7 @@ def typical_interval(stamps: Stamps) -> float | None:
     """
     medians, rounded = [], []
     for block in stamps():
-        steps = _advances(block[:_ENOUGH])
-        if not len(steps):
-            steps = _advances(block)
+        steps = _advances(block)
         if len(steps):
             medians.append(float(np.median(steps)))
             rounded.append(_long_steps_are_regular(steps, medians[-1]))
@@ -50,8 +48,13 @@ def typical_interval(stamps: Stamps) -> float | None:
 
 
 def _advances(block: NDArray[np.float64]) -> NDArray[np.float64]:
-    steps = np.diff(block)
-    return steps[steps > 0]
+    """Return the steps forward in a block, from its first stamps if they have any."""
+    for part in (block[:_ENOUGH], block):
+        steps = np.diff(part)
+        steps = steps[steps > 0]
+        if len(steps):
+            break
+    return steps
 
 
 def _long_steps_are_regular(steps: NDArray[np.float64], median: float) -> bool:
