@@ -10,7 +10,11 @@ from imubench_pipeline.findings import Finding
 from imubench_pipeline.quality import levels, plausibility, stationarity
 from imubench_pipeline.quality.summary import ColumnSummary
 from imubench_pipeline.readers.batch import TEMPERATURE
-from imubench_pipeline.sensor import quantity_of
+from imubench_pipeline.sensor import QUANTITIES, quantity_of
+from imubench_pipeline.units import SI_UNITS, from_si
+
+_USUAL = {"gyro": ("deg/s", "°/s"), "accel": ("mg", "mg")}
+"""Unit in which a reader knows the figures of each quantity, and its sign."""
 
 
 def column_findings(
@@ -45,6 +49,15 @@ def column_findings(
     return findings
 
 
+def _figure(channel: str, value: float) -> str:
+    """Return a figure of a channel in SI, and as it is usually written."""
+    quantity = quantity_of(channel)
+    usual, sign = _USUAL[quantity]
+    dimension = QUANTITIES[quantity]
+    written = from_si(value, usual, dimension)
+    return f"{value:.4g} {SI_UNITS[dimension]} ({written:.4g} {sign})"
+
+
 def _unusable(channel: str, column: ColumnSummary, settings: QualitySettings) -> Finding | None:
     if column.present == 0:
         return Finding("no_samples", "fatal", f"{channel} holds no number", 0, channel)
@@ -56,8 +69,8 @@ def _unusable(channel: str, column: ColumnSummary, settings: QualitySettings) ->
         return Finding("too_short", "fatal", detail, column.present, channel)
     if column.low == column.high:
         detail = (
-            f"{channel} never changes (it stays at {column.low:.6g} in SI); the axis is dead or "
-            "the column is not the one meant"
+            f"{channel} never changes (it stays at {_figure(channel, column.low)}); the axis is "
+            "dead or the column is not the one meant"
         )
         return Finding("stuck", "fatal", detail, column.low, channel)
     return None
@@ -90,15 +103,15 @@ def _values(
     steps = levels.quantisation(column)
     if steps is not None and steps.levels < settings.fewest_levels:
         detail = (
-            f"{channel} has {steps.levels:.0f} levels of {steps.step:.4g} in SI, fewer than "
-            f"{settings.fewest_levels}: its noise is that of the rounding; record in more digits "
-            "or in a finer range"
+            f"{channel} has {steps.levels:.0f} levels of {_figure(channel, steps.step)}, fewer "
+            f"than {settings.fewest_levels}: its noise is that of the rounding; record "
+            "in more digits or in a finer range"
         )
         yield Finding("coarse", "warning", detail, steps.levels, channel)
     elif steps is not None and steps.over_noise > settings.step_over_noise:
         detail = (
-            f"{channel} is quantised in steps of {steps.step:.4g} in SI, {steps.over_noise:.2g} "
-            "of its noise"
+            f"{channel} is quantised in steps of {_figure(channel, steps.step)}, "
+            f"{steps.over_noise:.2g} of its noise"
         )
         yield Finding("quantised", "note", detail, steps.step, channel)
     length, end = column.longest_run
@@ -118,7 +131,7 @@ def _values(
         side, number = piled
         value = column.low if side == "lowest" else column.high
         detail = (
-            f"{channel} has {number} samples at its {side} value, {value:.5g} in SI: it is "
+            f"{channel} has {number} samples at its {side} value, {_figure(channel, value)}: it is "
             "saturated; use a wider range"
         )
         yield Finding("saturated", "warning", detail, number, channel)
@@ -143,7 +156,7 @@ def _changes(
     for step in moves:
         at = step.sample / rate
         detail = (
-            f"the mean of {channel} changes by {step.size:.4g} in SI at {at:.5g} s "
+            f"the mean of {channel} changes by {_figure(channel, step.size)} at {at:.5g} s "
             f"({step.sigmas:.0f} times its usual changes): the sensor was moved, or its range "
             "or its temperature jumped"
         )
@@ -151,9 +164,9 @@ def _changes(
     warm = stationarity.warm_up(blocks, settings.warm_up)
     if warm is not None:
         detail = (
-            f"{channel} drifts by {warm.drift:.4g} in SI in its first {warm.end / rate:.5g} s, "
-            f"{abs(warm.drift) / warm.usual:.0f} times as much as in a later part; leave it out "
-            "with 'use: {start: "
+            f"{channel} drifts by {_figure(channel, warm.drift)} in its first "
+            f"{warm.end / rate:.5g} s, {abs(warm.drift) / warm.usual:.0f} times as much as in a "
+            "later part; leave it out with 'use: {start: "
             f"{math.ceil(warm.end / rate)}"
             "}' beside the log, or quality.trim_warm_up"
         )
