@@ -1,6 +1,6 @@
 """Which model the likelihood chooses on simulated logs, and how well it then knows it.
 
-python benchmarks/model_choice.py [--logs 200] [--processes 2]
+python benchmarks/model_choice.py [--logs 200] [--processes 2] [--case white ...]
 
 The flicker noise of the logs comes from Kasdin's fractional integration, not from the project's
 bank of Gauss-Markov processes, whose ripple is printed first.
@@ -140,6 +140,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--logs", type=int, default=200)
     parser.add_argument("--processes", type=int, default=2)
+    names = [case.name for case in CASES]
+    parser.add_argument("--case", action="append", choices=names, help="default: all")
     given = parser.parse_args()
     for rate, hours in ((100.0, 10.0), (20.0, 10.0), (500.0, 5.0), (32.0, 168.0)):
         variance, density = ripple(1.0 / rate, hours * 3600.0)
@@ -150,6 +152,8 @@ def main() -> None:
         )
     with ProcessPoolExecutor(given.processes) as pool:
         for case in CASES:
+            if given.case and case.name not in given.case:
+                continue
             found = []
             work: Callable[[int], tuple[str, dict[str, Parameter], bool, str]]
             work = partial(of_log, case)
