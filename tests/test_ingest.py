@@ -32,7 +32,7 @@ def kept(
     notes = RecordingNotes.model_validate({"use": keys.pop("use", {})})
     rate = {} if "time" in keys else {"rate": "100 Hz"}
     log = LogFormat.model_validate({"channels": channels or XY} | rate | keys)
-    result = ingest(source, log, notes, QualitySettings(), folder, {"simulated": False})
+    result = ingest(source, log, notes, QualitySettings(short=0), folder, {"simulated": False})
     values = {
         name: np.concatenate(list(found.blocks())) for name, found in channel_logs(folder).items()
     }
@@ -238,3 +238,13 @@ def test_temperature_is_kept_beside_the_channels(tmp_path: Path, rng: np.random.
     assert result.summary["temperature_min"] == pytest.approx(16.85)
     assert result.summary["temperature_max"] == pytest.approx(26.85)
     assert "temperature" in pq.read_schema(tmp_path / "out/log.parquet").names
+
+
+@pytest.mark.parametrize(("seconds", "noted"), [(600, ["short_recording"]), (1000, [])])
+def test_a_short_recording_gets_a_note(
+    tmp_path: Path, rng: np.random.Generator, seconds: int, noted: list[str]
+) -> None:
+    log = write_csv(tmp_path / "log.csv", wx=1e-3 * rng.standard_normal(10 * seconds))
+    layout = LogFormat.model_validate({"rate": "10 Hz", "channels": {"gyro_x": XY["gyro_x"]}})
+    found = ingest(log, layout, RecordingNotes(), QualitySettings(), tmp_path / "out", {})
+    assert [finding.finding for finding in found.findings] == noted

@@ -138,6 +138,9 @@ class QualitySettings(Strict):
     """Thresholds of the findings about a recording."""
 
     shortest: int = Field(100, ge=10, description="samples; a shorter recording is rejected")
+    short: float = Field(
+        900.0, ge=0, description="s; a shorter recording gets a note that it shows white noise alone"
+    )
     longest_hole: float = Field(
         3600.0, gt=0, description="s; a longer gap begins a new segment instead of a hole"
     )

@@ -141,6 +141,13 @@ def _ingest(
                 max(rows) - min(rows),
             )
         )
+    duration = max(base.grid / base.rate for base in bases)
+    if duration < settings.short:
+        detail = (
+            f"the recording lasts {duration:.5g} s: it shows white noise, but bias instability and "
+            "random walk take hours"
+        )
+        findings.append(Finding("short_recording", "note", detail, duration))
     names = names_of(parts, groups)
     metadata = provenance | {
         "sources": sources.result(),

@@ -56,7 +56,7 @@ def kept(tmp_path: Path, log: np.ndarray) -> tuple[list[str], np.ndarray]:
     path.write_text("ax\n" + "\n".join(f"{value:.9g}" for value in log) + "\n")
     channels = {"accel_x": {"column": "ax", "unit": "m/s^2"}}
     layout = LogFormat.model_validate({"rate": "50 Hz", "channels": channels})
-    out = ingest(path, layout, RecordingNotes(), QualitySettings(), tmp_path / "out", {})
+    out = ingest(path, layout, RecordingNotes(), QualitySettings(short=0), tmp_path / "out", {})
     values = np.concatenate(list(channel_logs(tmp_path / "out")["accel_x"].blocks()))
     assert channel_logs(tmp_path / "out")["accel_x"].holes
     counts = out.channels["accel_x"]
