@@ -1,0 +1,180 @@
+"""Error budgets against simulated runs of dead reckoning."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.signal import fftconvolve
+
+from imubench_pipeline.error_budget import (
+    EARTH_RATE,
+    Calibrated,
+    Gyrocompass,
+    Levelled,
+    Quantity,
+    Start,
+    Uncalibrated,
+    budget,
+)
+from imubench_pipeline.error_budget.growth import SensorStart, variance
+from imubench_pipeline.noise import (
+    Flicker,
+    GaussMarkov,
+    NoiseModel,
+    Quantization,
+    Ramp,
+    RandomWalk,
+    Sinusoid,
+    Term,
+    WhiteNoise,
+)
+from imubench_pipeline.simulate import simulate
+
+Array = NDArray[np.float64]
+
+G = 9.80665
+RATE = 20.0
+BEFORE = 20.0
+TIMES = (4.0, 30.0)
+RUNS = 2000
+TERMS: tuple[Term, ...] = (
+    Quantization(0.3),
+    WhiteNoise(0.5),
+    Flicker(0.4),
+    GaussMarkov(0.7, 1.5),
+    GaussMarkov(0.7, 200.0),
+    RandomWalk(0.2),
+    Ramp(-0.01),
+    Sinusoid(0.5, 0.21),
+)
+
+
+def fractional_noise(shape: tuple[int, int], rng: np.random.Generator, earlier: int) -> Array:
+    """Return flicker noise of B = 1 that began so many samples earlier (N. J. Kasdin, 1995)."""
+    runs, samples = shape
+    k = np.arange(1, samples + earlier, dtype=np.float64)
+    weights = np.concatenate(([1.0], np.cumprod((k - 0.5) / k)))
+    white = rng.standard_normal((runs, samples + earlier))
+    return np.asarray(fftconvolve(white, weights[None, :], axes=1)[:, earlier : samples + earlier])
+
+
+def logs(model: NoiseModel, begun: bool, rng: np.random.Generator) -> Array:
+    """Return simulated logs; flicker noise has a long past, or it begins with the log."""
+    samples = round((BEFORE + max(TIMES)) * RATE)
+    flicker = model.B if model.T_B is None else 0.0
+    rest = NoiseModel(
+        Q=model.Q,
+        N=model.N,
+        B=0.0 if flicker else model.B,
+        T_B=model.T_B,
+        K=model.K,
+        R=model.R,
+        further=model.further,
+        sinusoids=model.sinusoids,
+    )
+    found = np.array([simulate(rest, RATE, samples, one) for one in rng.spawn(RUNS)])
+    if flicker:
+        earlier = 0 if begun else 8 * samples
+        found += flicker * fractional_noise(found.shape, rng, earlier)
+    return found
+
+
+def integrated(rate: Array) -> Array:
+    """Return the integrals of samples that hold for an interval: once, twice and three times."""
+    T = 1.0 / RATE
+    first = np.cumsum(rate, axis=1) * T
+    before = first - rate * T
+    second = np.cumsum(before * T + rate * T**2 / 2.0, axis=1)
+    start = second - before * T - rate * T**2 / 2.0
+    third = np.cumsum(start * T + before * T**2 / 2.0 + rate * T**3 / 6.0, axis=1)
+    return np.stack([first, second, third])
+
+
+def spread(errors: Array) -> tuple[float, float]:
+    """Return the root mean square of errors, and its standard error."""
+    squares = errors**2
+    sigma = math.sqrt(float(squares.mean()))
+    return sigma, float(squares.std()) / math.sqrt(len(errors)) / (2.0 * sigma)
+
+
+def model_of(term: Term) -> NoiseModel:
+    match term:
+        case GaussMarkov(B, T_B):
+            return NoiseModel(B=B, T_B=T_B)
+        case Sinusoid():
+            return NoiseModel(sinusoids=(term,))
+    name = "B" if isinstance(term, Flicker) else term.symbol
+    values: dict[str, Any] = {name: getattr(term, name)}
+    return NoiseModel(**values)
+
+
+@pytest.mark.parametrize("calibrated", [True, False])
+@pytest.mark.parametrize("term", TERMS, ids=lambda t: repr(t))
+def test_each_term_grows_as_in_simulated_runs(term: Term, calibrated: bool) -> None:
+    rng = np.random.default_rng([7, TERMS.index(term), calibrated])
+    log = logs(model_of(term), not calibrated, rng)
+    rest = round(BEFORE * RATE)
+    # A sample stands for the middle of its interval: a walk begins half an interval later.
+    start: SensorStart = Uncalibrated(bias=0.0, on_time=BEFORE - 0.5 / RATE)
+    moving = log[:, rest:]
+    if calibrated:
+        start = Calibrated(BEFORE)
+        moving = moving - log[:, :rest].mean(axis=1)[:, None]
+    errors = integrated(moving)
+    for time in TIMES:
+        for order in range(3):
+            found, error = spread(errors[order, :, round(time * RATE) - 1])
+            expected = math.sqrt(variance(term, order, time, start))
+            assert abs(found - expected) < 4.0 * error + 2e-3 * expected, (time, order)
+
+
+@pytest.mark.parametrize("levelled", [True, False])
+def test_dead_reckoning_of_simulated_runs(levelled: bool) -> None:
+    rng = np.random.default_rng([8, levelled])
+    gyro = NoiseModel(N=1e-3, B=4e-4, K=1e-4, further=(GaussMarkov(1e-3, 8.0),))
+    accel = NoiseModel(N=1e-2, B=1e-2, T_B=5.0, K=2e-3, sinusoids=(Sinusoid(0.02, 0.05),))
+    # Flicker with a long past has no place in an uncalibrated start, nor in an absolute tilt.
+    rates, forces = (logs(model, not levelled, rng) for model in (gyro, accel))
+    rest = round(BEFORE * RATE)
+    normal = rng.standard_normal((3, RUNS))
+    if levelled:
+        start = Start.calibrated(BEFORE, tilt=Levelled(bias=0.05, on_time=0.0))
+        forces += 0.05 * normal[0][:, None]
+        # The accelerometer at rest reads its error, and the tilt is set as if it were gravity.
+        tilt = -forces[:, :rest].mean(axis=1) / G
+        rates = rates - rates[:, :rest].mean(axis=1)[:, None]
+    else:
+        start = Start.uncalibrated(
+            gyro_bias=2e-3, accel_bias=0.05, on_time=BEFORE - 0.5 / RATE, tilt=3e-3
+        )
+        tilt = 3e-3 * normal[0]
+        rates += 2e-3 * normal[1][:, None]
+        forces += 0.05 * normal[2][:, None]
+    turned = integrated(rates[:, rest:])
+    moved = integrated(forces[:, rest:])
+    t = np.arange(1, turned.shape[2] + 1) / RATE
+    errors: dict[Quantity, Array] = {
+        "attitude": tilt[:, None] + turned[0],
+        "velocity": moved[0] + G * (tilt[:, None] * t + turned[1]),
+        "position": moved[1] + G * (tilt[:, None] * t**2 / 2.0 + turned[2]),
+    }
+    for time in TIMES:
+        for quantity, runs in errors.items():
+            found, error = spread(runs[:, round(time * RATE) - 1])
+            expected = budget(quantity, time, gyro=gyro, accel=accel, start=start).total
+            assert abs(found - expected) < 4.0 * error + 2e-3 * expected, (time, quantity)
+
+
+def test_gyrocompassing_on_simulated_windows(rng: np.random.Generator) -> None:
+    gyro = NoiseModel(N=1e-3, B=4e-4, K=1e-4, further=(GaussMarkov(1e-3, 8.0),))
+    log = logs(gyro, True, rng)
+    time = log.shape[1] / RATE
+    found, error = spread(log.mean(axis=1) / EARTH_RATE)
+    compass = Gyrocompass(gyro=gyro, latitude=0.0, bias=0.0)
+    assert abs(found - compass.heading(time).total) < 4.0 * error
+    first, second = np.split(log, 2, axis=1)
+    found, error = spread((first.mean(axis=1) - second.mean(axis=1)) / 2.0 / EARTH_RATE)
+    compass = Gyrocompass(gyro=gyro, latitude=0.0, positions=2)
+    assert abs(found - compass.heading(time).total) < 4.0 * error
