@@ -19,6 +19,10 @@ ESTIMATED = ("parameters", "models", "lines", "spectrum", "fixed_bias")
 FOLDERS = [FOLDER.format(sensor=s, recording=r) for s, r in plan.recordings]
 
 
+def as_files(table):
+    return [f"{RESULTS}/tables/{table}.{kind}" for kind in ("parquet", "csv")]
+
+
 wildcard_constraints:
     sensor="[^/]+",
     recording="[^/]+",
@@ -110,6 +114,18 @@ rule datasheet:
         "workflow/scripts/datasheet.py"
 
 
+rule error_budget:
+    input:
+        parameters=FOLDER + "/parameters.parquet",
+    output:
+        FOLDER + "/error_budget.parquet",
+    params:
+        settings=plan.error_budget_settings(),
+        code=plan.code("error_budget"),
+    script:
+        "workflow/scripts/error_budget.py"
+
+
 rule tables:
     input:
         **{
@@ -121,17 +137,26 @@ rule tables:
         reconstruction=[f"{folder}/reconstruction.parquet" for folder in FOLDERS],
         scores=[f"{folder}/scores.parquet" for folder in FOLDERS],
         datasheet=[f"{folder}/datasheet.parquet" for folder in FOLDERS],
+        error_budget=[f"{folder}/error_budget.parquet" for folder in FOLDERS],
     output:
-        [
-            f"{RESULTS}/tables/{table}.{kind}"
-            for table in TABLES
-            for kind in ("parquet", "csv")
-        ],
+        [path for table in TABLES if table != "ranking" for path in as_files(table)],
     params:
         truths=plan.truths(),
         code=plan.code("tables"),
     script:
         "workflow/scripts/tables.py"
+
+
+rule ranking:
+    input:
+        RESULTS + "/tables/error_budget.parquet",
+    output:
+        as_files("ranking"),
+    params:
+        settings=plan.ranking_settings(),
+        code=plan.code("ranking"),
+    script:
+        "workflow/scripts/ranking.py"
 
 
 rule report:

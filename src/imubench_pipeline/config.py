@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
+from imubench_pipeline.requirements import Axis, Latitude, Time
 from imubench_pipeline.sensor import QUANTITIES, Channel, Sensor, quantity_of
 from imubench_pipeline.units import UnitError, quantity_to_si
 from imubench_pipeline.validation import (
@@ -139,7 +140,9 @@ class QualitySettings(Strict):
 
     shortest: int = Field(100, ge=10, description="samples; a shorter recording is rejected")
     short: float = Field(
-        900.0, ge=0, description="s; a shorter recording gets a note that it shows white noise alone"
+        900.0,
+        ge=0,
+        description="s; a shorter recording gets a note that it shows white noise alone",
     )
     longest_hole: float = Field(
         3600.0, gt=0, description="s; a longer gap begins a new segment instead of a hole"
@@ -191,6 +194,21 @@ class DatasheetSettings(Strict):
     )
 
 
+class ErrorBudgetSettings(Strict):
+    """What the noise means for dead reckoning, for every recording."""
+
+    times: tuple[Time, ...] = Field(
+        ("1 s", "10 s", "60 s", "600 s"), min_length=1, description="of dead reckoning, and of rest"
+    )
+    static_window: Time = Field(
+        "60 s", description="at rest right before, from which biases and tilt are taken"
+    )
+    latitude: Latitude = Field("45 deg", description="where gyros look for north")
+    axes: tuple[Axis, ...] = Field(("worst", "median"), min_length=1)
+    draws: int = Field(100, ge=20, description="noise models that give the interval of an error")
+    seed: int = Field(20260101, ge=0)
+
+
 class ReportSettings(Strict):
     """The report."""
 
@@ -213,11 +231,17 @@ class Run(Strict):
     simulated: Annotated[
         Path | None, BeforeValidator(_path_or_none, json_schema_input_type=str | bool | None)
     ] = Field(Path("config/simulated.yaml"), description="simulated recordings; false: none")
+    requirements: Annotated[
+        Path | None, BeforeValidator(_path_or_none, json_schema_input_type=str | bool | None)
+    ] = Field(
+        Path("config/requirements"), description="what applications need, a file each; false: none"
+    )
     allan: AllanSettings = AllanSettings()
     estimate: EstimateSettings = EstimateSettings()
     reconstruction: ReconstructionSettings = ReconstructionSettings()
     quality: QualitySettings = QualitySettings()
     datasheet: DatasheetSettings = DatasheetSettings()
+    error_budget: ErrorBudgetSettings = ErrorBudgetSettings()
     report: ReportSettings = ReportSettings()
 
 

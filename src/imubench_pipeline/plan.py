@@ -17,6 +17,7 @@ from pydantic import BaseModel
 from imubench_pipeline.config import Run, read_run, read_simulated
 from imubench_pipeline.provenance import source_digest
 from imubench_pipeline.readers import log_files
+from imubench_pipeline.requirements import Requirement, read_requirements
 from imubench_pipeline.sensor import RecordingNotes, Sensor, merged_log, read_sensors
 from imubench_pipeline.tables import read
 from imubench_pipeline.units import quantity_to_si
@@ -34,6 +35,8 @@ STEPS: Mapping[str, tuple[str, ...]] = {
     "estimate": ("estimation",),
     "reconstruct": ("reconstruction",),
     "datasheet": ("datasheet", "results"),
+    "error_budget": ("expected_errors", "results"),
+    "ranking": ("selection", "results"),
     "tables": ("results",),
     "report": ("report.page",),
 }
@@ -85,6 +88,7 @@ class Plan:
     def __init__(self, config: Mapping[str, object]) -> None:
         self.run: Run = read_run(config)
         self.sensors: dict[str, Sensor] = read_sensors(self.run.sensors)
+        self.requirements: dict[str, Requirement] = read_requirements(self.run.requirements)
         self._simulated = {
             (entry.sensor, entry.recording): entry
             for entry in read_simulated(self.run.simulated, self.sensors)
@@ -207,21 +211,54 @@ class Plan:
             }
         )
 
+    def error_budget_settings(self) -> str:
+        """Return the errors that are asked of every recording."""
+        return _text(
+            {
+                "error_budget": self.run.error_budget.model_dump(mode="json"),
+                "requirements": self._requirements(),
+            }
+        )
+
+    def ranking_settings(self) -> str:
+        """Return what the ranking depends on: requirements, and what is said of the sensors."""
+        return _text(
+            {
+                "requirements": self._requirements(),
+                "sensors": self._described("vendor", "model", "price_class"),
+            }
+        )
+
+    def _requirements(self) -> dict[str, object]:
+        return {name: one.model_dump(mode="json") for name, one in self.requirements.items()}
+
+    def _described(self, *keys: str) -> dict[str, object]:
+        """Return what the files of the sensors that have recordings say."""
+        used = {sensor for sensor, _ in self.recordings}
+        return {
+            name: sensor.model_dump(mode="json", include=set(keys))
+            for name, sensor in self.sensors.items()
+            if name in used
+        }
+
     def report_settings(self) -> str:
         """Return what the report shows beside the tables."""
-        used = {sensor for sensor, _ in self.recordings}
         return _text(
             {
                 "report": self.run.report.model_dump(mode="json"),
                 "settings": {
                     section: getattr(self.run, section).model_dump(mode="json")
-                    for section in ("allan", "estimate", "reconstruction", "quality", "datasheet")
+                    for section in (
+                        "allan",
+                        "estimate",
+                        "reconstruction",
+                        "quality",
+                        "datasheet",
+                        "error_budget",
+                    )
                 },
-                "sensors": {
-                    name: sensor.model_dump(mode="json", include={"vendor", "model", "datasheet"})
-                    for name, sensor in self.sensors.items()
-                    if name in used
-                },
+                "sensors": self._described("vendor", "model", "price_class"),
+                "requirements": self._requirements(),
             }
         )
 

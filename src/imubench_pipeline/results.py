@@ -101,6 +101,16 @@ def estimates(path: Path) -> dict[str, list[Estimate]]:
     return found
 
 
+def recommended_estimates(path: Path) -> dict[str, Estimate]:
+    """Read the recommended estimate of each channel from the table ``parameters``."""
+    table = read("parameters", [path])
+    by_channel = _by(table.filter(table["recommended"]), "channel", "method")
+    return {
+        channel: estimate_of(method, rows.to_pylist())
+        for (channel, method), rows in by_channel.items()
+    }
+
+
 def estimate_of(method: str, rows: Iterable[Row]) -> Estimate:
     """Return the estimate that rows of the table ``parameters`` stand for."""
     components: dict[int, dict[str, Parameter]] = {}

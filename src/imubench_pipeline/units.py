@@ -1,7 +1,7 @@
 """Every unit that a log, a setting or a datasheet writes, converted to SI and back.
 
 The registry is ours: angles have a dimension of their own, so that °/s and Hz, or rad/s and
-1/s, cannot be mixed up, and ``g`` is standard gravity, not gram.
+1/s, cannot be mixed up, ``g`` is standard gravity, not gram, and ``LSB`` is a count.
 """
 
 from __future__ import annotations
@@ -22,8 +22,13 @@ SI_UNITS: dict[str, str] = {
     "temperature": "degC",
     "frequency": "Hz",
     "time": "s",
+    "angle": "rad",
+    "velocity": "m/s",
+    "length": "m",
     "gyro_density": "rad/s/sqrt(Hz)",
     "accel_density": "m/s^2/sqrt(Hz)",
+    "gyro_power_density": "(rad/s)^2/Hz",
+    "accel_power_density": "(m/s^2)^2/Hz",
     "gyro_random_walk": "rad/s/sqrt(s)",
     "accel_random_walk": "m/s^2/sqrt(s)",
     "gyro_quantization": "rad",
@@ -32,6 +37,11 @@ SI_UNITS: dict[str, str] = {
     "accel_ramp": "m/s^3",
     "gyro_temperature_coefficient": "rad/s/K",
     "accel_temperature_coefficient": "m/s^2/K",
+    "gyro_acceleration_coefficient": "rad/s/(m/s^2)",
+    "gyro_step": "rad/s/LSB",
+    "accel_step": "m/s^2/LSB",
+    "gyro_sensitivity": "LSB/(rad/s)",
+    "accel_sensitivity": "LSB/(m/s^2)",
 }
 """The dimensions that the project knows, each with the SI unit that it is kept in."""
 
@@ -41,8 +51,13 @@ _EXAMPLES: dict[str, str] = {
     "temperature": "degC or K",
     "frequency": "Hz or kHz",
     "time": "s, ms, us or ns",
+    "angle": "deg, mrad or rad",
+    "velocity": "m/s or km/h",
+    "length": "m, km or cm",
     "gyro_density": "deg/s/sqrt(Hz), mdps/sqrt(Hz) or deg/sqrt(h)",
     "accel_density": "ug/sqrt(Hz) or m/s/sqrt(h)",
+    "gyro_power_density": "(deg/s)^2/Hz or (deg/h)^2/Hz",
+    "accel_power_density": "g^2/Hz or (m/s^2)^2/Hz",
     "gyro_random_walk": "deg/h/sqrt(h) or deg/s^(3/2)",
     "accel_random_walk": "ug/sqrt(h) or m/s^(5/2)",
     "gyro_quantization": "deg or arcsec",
@@ -51,23 +66,31 @@ _EXAMPLES: dict[str, str] = {
     "accel_ramp": "ug/h or m/s^3",
     "gyro_temperature_coefficient": "deg/s/K",
     "accel_temperature_coefficient": "mg/K",
+    "gyro_acceleration_coefficient": "deg/s/g or deg/h/g",
+    "gyro_step": "mdps/LSB or deg/s/LSB",
+    "accel_step": "mg/LSB or m/s^2/LSB",
+    "gyro_sensitivity": "LSB/(deg/s)",
+    "accel_sensitivity": "LSB/g or LSB/mg",
 }
 
 _DEFINITIONS = """
 nano- = 1e-9 = n-
 micro- = 1e-6 = u- = µ- = μ-
 milli- = 1e-3 = m-
+centi- = 1e-2 = c-
 kilo- = 1e3 = k-
 second = [time] = s = sec
 meter = [length] = m = metre
 radian = [angle] = rad
 kelvin = [temperature] = K
+least_significant_bit = [count] = LSB = lsb
 degree_Celsius = kelvin; offset: 273.15 = degC
 minute = 60 * second = min
 hour = 3600 * second = h = hr
 day = 86400 * second = d
 hertz = 1 / second = Hz
 degree = 0.017453292519943295 * radian = deg
+arcsecond = 4.84813681109536e-06 * radian = arcsec
 degree_per_second = degree / second = dps
 standard_gravity = 9.80665 * meter / second ** 2 = g = g0
 gal = 0.01 * meter / second ** 2 = Gal
@@ -90,55 +113,124 @@ def _registry() -> pint.UnitRegistry[float]:
     return registry
 
 
+_MEANT: tuple[tuple[str, str], ...] = (
+    # what stands behind a unit: a condition, a remark, what kind of figure it is
+    (r"(?:,|\bover\b).*$", ""),
+    (r"\s*\((?:OCR|total|typ|max|min)\.?\)\s*$", ""),
+    (r"[\s-]*(?:\(?\brms\b\)?|1\s*[σs]igma|1\s*σ)\s*$", ""),
+    # signs
+    (r"²", "^2"),
+    (r"³", "^3"),
+    (r"−", "-"),
+    (r"[·×]", "*"),
+    (r"\bper\b", "/"),
+    (r"(?:\bx|\*)\s*Hz\s*\^?\(?-1/2\)?", "/√Hz"),
+    (r"\bm/s2\b", "m/s^2"),
+    (r"\bmilli-(?=rad|deg|g)", "m"),
+    # the degree sign: of temperature, or of an angle
+    (r"[°º]\s*C\b|\bdeg\s*C\b|\bcelsius\b", "degC"),
+    (r"[°º]", "deg"),
+    # roots: √Hz, rt-Hz, root hour, sqrt(Hz), and V where text recognition saw no √
+    (r"/\s*V\s*(?=(?:Hz|hr?)\b)", "/√"),
+    (r"\b(?:rt|root)[\s-]*(?=[A-Za-z])", "√"),
+    (r"\bsqrt\s*(?=\()", "√"),
+    (r"√\s*\(\s*([A-Za-z]+)\s*\)", r"√\1"),
+    (r"√\s*([A-Za-z]+)", r"(\1)**0.5"),
+    (r"\bhour\b", "h"),
+    (r"\bhr\b", "h"),
+)
+"""What vendors write, and what it means, in the order in which it is put right."""
+
+_REWRITTEN = tuple((re.compile(written, re.IGNORECASE), meant) for written, meant in _MEANT)
+_LOST_SIGN = re.compile(r"\(.*\blost\b.*\)")
+_LEVEL = re.compile(r"\bdB\b")
+_POWER_OF_TWO = re.compile(r"\*\s*2\s*\^\s*(-?\d+)\s*$")
+_RATIO_POWER = re.compile(r"\^\s*\(\s*(\d+)\s*/\s*(\d+)\s*\)")
+_NO_ROOT = re.compile(r"/\s*(Hz|hr?)\s*$", re.IGNORECASE)
+
+
 def _normalise(text: str) -> str:
     """Rewrite a vendor's spelling (°/√h, dps/rtHz, m/s²) as an expression for the registry."""
-    unit = re.sub(
-        r"[\s-]*(\(?\brms\b\)?|1\s*[σs]igma|1\s*σ)\s*$", "", text.strip(), flags=re.IGNORECASE
-    )
-    unit = re.sub(r"\bx\s*Hz\s*\^?-1/2", "/sqrt(Hz)", unit)
-    unit = re.sub(r"\bm/s2\b", "m/s^2", unit)
-    for written, meant in (("²", "^2"), ("³", "^3"), ("−", "-"), ("·", "*"), ("×", "*")):
-        unit = unit.replace(written, meant)
-    unit = re.sub(r"[°º]\s*C\b|\bdeg\s*C\b|\bcelsius\b", "degC", unit, flags=re.IGNORECASE)
-    unit = re.sub(r"[°º]", "deg", unit)
-    unit = re.sub(r"√\s*\(?\s*([A-Za-z]+)\s*\)?", r"sqrt(\1)", unit)
-    unit = re.sub(r"\b(?:rt|root)[\s-]*([A-Za-z]+)", r"sqrt(\1)", unit)
-    unit = re.sub(r"sqrt\s*\(\s*([A-Za-z]+)\s*\)", r"(\1)**0.5", unit, flags=re.IGNORECASE)
-    unit = re.sub(r"\^\s*\(\s*(\d+)\s*/\s*(\d+)\s*\)", _power, unit)
-    unit = unit.replace("^", "**")
-    unit = re.sub(r"\b(hour|Hr)\b", "h", unit)
+    unit = text.strip()
+    for written, meant in _REWRITTEN:
+        unit = written.sub(meant, unit)
+    unit = _RATIO_POWER.sub(lambda found: f"**{int(found[1]) / int(found[2])}", unit)
+    unit = unit.replace("^", "**").strip()
     # A difference of temperatures is meant wherever degC is not alone.
     return unit if unit == "degC" else re.sub(r"\bdegC\b", "K", unit)
 
 
-def _power(match: re.Match[str]) -> str:
-    return f"**{int(match[1]) / int(match[2])}"
+def _said(dimension: str) -> str:
+    return dimension.replace("_", " ")
 
 
 def _expected(dimension: str) -> str:
-    return f"expected a unit of {dimension.replace('_', ' ')} such as {_EXAMPLES[dimension]}"
+    return f"expected a unit of {_said(dimension)} such as {_EXAMPLES[dimension]}"
+
+
+def _parsed(unit: str) -> tuple[float, pint.Unit]:
+    """Return a unit of the registry and the power of two that stands with it.
+
+    Raises
+    ------
+    UnitError
+        If it cannot be read; the text says why, and does not yet say what is expected.
+    """
+    import pint
+
+    if _LEVEL.search(unit):
+        raise UnitError(
+            f"{unit!r} is a level in decibels, not a unit: the figure is 10^(level/20) times the "
+            "reference for an amplitude, 10^(level/10) for a power; state it in the unit of the "
+            "reference"
+        )
+    if _LOST_SIGN.search(unit):
+        raise UnitError(f"{unit!r} says that a sign was lost; state the unit that was meant")
+    power = _POWER_OF_TWO.search(unit)
+    text = unit[: power.start()] if power else unit
+    try:
+        if "//" in text:
+            raise pint.UndefinedUnitError(text)
+        found = _registry().parse_units(_normalise(text))
+    except pint.UndefinedUnitError:
+        raise UnitError(f"unknown unit {unit!r}") from None
+    except Exception as error:  # the registry raises many kinds on text that is no unit
+        raise UnitError(f"cannot read {unit!r} as a unit") from error
+    return 2.0 ** int(power[1]) if power else 1.0, found
+
+
+@lru_cache(maxsize=1)
+def _targets() -> dict[str, pint.Unit]:
+    return {name: _registry().parse_units(_normalise(unit)) for name, unit in SI_UNITS.items()}
 
 
 @lru_cache(maxsize=1024)
 def _converter(unit: str, dimension: str) -> tuple[float, float]:
-    import pint
-
-    registry = _registry()
-    target = registry.Quantity(1.0, _normalise(SI_UNITS[dimension])).units
+    target = _targets()[dimension]
     try:
-        if "//" in unit:
-            raise pint.UndefinedUnitError(unit)
-        source = registry.parse_units(_normalise(unit))
-        zero, one = (registry.Quantity(value, source).to(target).magnitude for value in (0.0, 1.0))
-    except pint.UndefinedUnitError as error:
-        raise UnitError(f"unknown unit {unit!r}; {_expected(dimension)}") from error
-    except pint.DimensionalityError as error:
-        raise UnitError(
-            f"{unit!r} is no unit of {dimension.replace('_', ' ')}; {_expected(dimension)}"
-        ) from error
-    except Exception as error:  # the registry raises many kinds on text that is no unit
-        raise UnitError(f"cannot read {unit!r} as a unit; {_expected(dimension)}") from error
+        power, source = _parsed(unit)
+    except UnitError as error:
+        raise UnitError(f"{error}; {_expected(dimension)}") from error
+    if source.dimensionality != target.dimensionality:
+        raise UnitError(f"{_mismatch(unit, source, dimension)}; {_expected(dimension)}")
+    zero, one = (_registry().Quantity(value, source).to(target).magnitude for value in (0.0, power))
     return float(one - zero), float(zero)
+
+
+def _mismatch(unit: str, source: pint.Unit, dimension: str) -> str:
+    """Return what a unit of another dimension is, and what may be the matter."""
+    others = [
+        name
+        for name, target in _targets().items()
+        if target.dimensionality == source.dimensionality
+    ]
+    but = f" but of {_said(others[0])}" if others else f" (it has {source.dimensionality})"
+    said = f"{unit!r} is no unit of {_said(dimension)}{but}"
+    if _NO_ROOT.search(unit):
+        rooted = _NO_ROOT.sub(r"/sqrt(\1)", unit)
+        if _parsed(rooted)[1].dimensionality == _targets()[dimension].dimensionality:
+            said += f"; is the sign of a root lost, and {rooted!r} meant?"
+    return said
 
 
 def conversion(unit: str, dimension: str) -> tuple[float, float]:
@@ -147,16 +239,42 @@ def conversion(unit: str, dimension: str) -> tuple[float, float]:
     Parameters
     ----------
     unit : str
-        As a vendor writes it, for instance ``°/√h``, ``dps/√Hz`` or ``µg``.
+        As a vendor writes it, for instance ``°/√h``, ``dps/√Hz`` or ``µg``. What stands behind
+        it (``rms``, ``1σ``, ``over -40..85``) is passed over.
     dimension : str
         A key of `SI_UNITS`.
 
     Raises
     ------
     UnitError
-        If the unit is unknown or of another dimension; the text names what was expected.
+        If the unit is unknown, of another dimension, a level in decibels, or spelled without a
+        sign that was lost; the text names both dimensions and what was expected.
     """
     return _converter(unit, dimension)
+
+
+def dimension_of(unit: str, expected: tuple[str, ...]) -> str:
+    """Return which of some dimensions a unit has.
+
+    Parameters
+    ----------
+    unit : str
+    expected : tuple of str
+        Keys of `SI_UNITS`, the usual one first.
+
+    Raises
+    ------
+    UnitError
+        If it has none of them; the text is that of the first.
+    """
+    for dimension in expected[1:]:
+        try:
+            _converter(unit, dimension)
+        except UnitError:
+            continue
+        return dimension
+    _converter(unit, expected[0])
+    return expected[0]
 
 
 def to_si(value: float, unit: str, dimension: str) -> float:

@@ -13,7 +13,11 @@ from imubench_pipeline.tables import TABLES, build
 SETTINGS = {
     "report": {"title": "A <title>", "units": "practical"},
     "sensors": {"s": {"vendor": "V", "model": "M"}},
-    "settings": {"allan": {"overlap": "octave"}},
+    "settings": {
+        "allan": {"overlap": "octave"},
+        "error_budget": {"static_window": "60 s", "latitude": "45 deg"},
+    },
+    "requirements": {},
 }
 
 

@@ -17,7 +17,8 @@ from imubench_pipeline.report.figures import (
     datasheet_figure,
     spectrum_figure,
 )
-from imubench_pipeline.report.practical import PageUnit, System, page_unit
+from imubench_pipeline.report.meaning import budget_tables, rankings
+from imubench_pipeline.report.practical import PageUnit, System, duration_text, page_unit
 from imubench_pipeline.report.view import METHOD_NAMES, ChannelView, channel_views
 
 _LIBRARIES = ("imubench_pipeline", "numpy", "scipy", "numba", "pyarrow", "snakemake")
@@ -39,11 +40,13 @@ def render(tables: Mapping[str, pa.Table], settings: Mapping[str, Any]) -> str:
     tables : mapping of str to pyarrow.Table
         All tables of `imubench_pipeline.tables.TABLES`.
     settings : mapping
-        ``report``: title and units; ``sensors``: vendor and model of each.
+        ``report``: title and units; ``settings``: those of the steps; ``sensors``: vendor and
+        model of each; ``requirements``: what was asked.
     """
     system: System = settings["report"]["units"]
     views = channel_views(tables)
     recordings = tables["recordings"].to_pylist()
+    simulated = {(row["sensor"], row["recording"]): row["simulated"] for row in recordings}
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("imubench_pipeline.report"),
         autoescape=True,
@@ -73,6 +76,10 @@ def render(tables: Mapping[str, pa.Table], settings: Mapping[str, Any]) -> str:
             for view in views
         ],
         deltas=list(_deltas(views, system)),
+        rankings=list(
+            rankings(tables["ranking"].to_pylist(), settings["requirements"], simulated, system)
+        ),
+        budgets=list(budget_tables(tables["error_budget"].to_pylist(), simulated, system)),
         settings={
             f"{section}.{key}": value
             for section, values in settings["settings"].items()
@@ -159,17 +166,9 @@ def _cell(rows: list[Mapping[str, Any]], unit: PageUnit) -> dict[str, Any]:
     notes = [row["reason"] for row in rows if row["reason"]]
     needed = rows[0]["duration_needed"]
     if needed is not None and rows[0]["status"] != "absent":
-        notes.append(f"a log of {_duration(needed)} tells it to 10 %")
+        notes.append(f"a log of {duration_text(needed)} tells it to 10 %")
     empty = all(row["value"] is None for row in rows)
     return {"lines": lines, "note": "; ".join(notes), "class": "none" if empty else "number"}
-
-
-def _duration(seconds: float) -> str:
-    """Return a time in the unit in which it is easily read."""
-    for size, name in ((86400.0, "days"), (3600.0, "h"), (60.0, "min")):
-        if seconds >= 2.0 * size:
-            return f"{seconds / size:.3g} {name}"
-    return f"{seconds:.3g} s"
 
 
 def _truth_cell(

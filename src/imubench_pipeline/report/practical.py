@@ -71,6 +71,27 @@ _SI: dict[str, dict[str, str]] = {
 }
 
 
+_OF_DIMENSION: dict[System, dict[str, str]] = {
+    "practical": {"angle": "°", "velocity": "m/s", "length": "m"},
+    "si": {"angle": "rad", "velocity": "m/s", "length": "m"},
+}
+
+
+def unit_of(dimension: str, system: System) -> PageUnit:
+    """Return the unit in which a page shows an angle, a velocity or a length."""
+    sign = _OF_DIMENSION[system][dimension]
+    factor, _ = conversion(sign, dimension)
+    return PageUnit(sign, 1.0 / factor)
+
+
+def duration_text(seconds: float) -> str:
+    """Return a time in the unit in which it is easily read."""
+    for size, name in ((86400.0, "days"), (3600.0, "h"), (60.0, "min")):
+        if seconds >= 2.0 * size:
+            return f"{seconds / size:.3g} {name}"
+    return f"{seconds:.3g} s"
+
+
 def page_unit(quantity: str, symbol: str, system: System) -> PageUnit:
     """Return the unit in which a page shows a parameter, or ``adev``, of a quantity."""
     sign = (_PRACTICAL if system == "practical" else _SI)[quantity][symbol]

@@ -1,0 +1,157 @@
+"""What the page says of use: which sensor fulfils which requirement, and what errors come of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from imubench_pipeline.report.practical import PageUnit, System, duration_text, unit_of
+from imubench_pipeline.requirements import DIMENSIONS, Requirement
+
+Row = Mapping[str, Any]
+Simulated = Mapping[tuple[str, str], bool]
+
+_NAMES = {
+    "attitude": "attitude (tilt)",
+    "heading": "heading",
+    "velocity": "velocity, one axis",
+    "position": "position, one axis",
+    "north": "north, found at rest",
+}
+_HALF_TURN = 3.141592653589793
+_SHOWN_SOURCES = 3
+
+
+def rankings(
+    rows: Sequence[Row], requirements: Mapping[str, Any], simulated: Simulated, system: System
+) -> Iterator[dict[str, Any]]:
+    """Yield each requirement with the sensors in their order, and how they stand to its limits.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        The table ``ranking``.
+    requirements : mapping
+        By name, as the plan wrote them.
+    simulated : mapping
+        Which recordings are.
+    system : str
+        Units of the page.
+    """
+    for name, given in requirements.items():
+        requirement = Requirement.model_validate(given)
+        own = [row for row in rows if row["requirement"] == name]
+        groups = []
+        for sensor in sorted(dict.fromkeys(row["sensor"] for row in own), key=_order(own)):
+            limits = [row for row in own if row["sensor"] == sensor]
+            recordings = {row["recording"] for row in limits}
+            groups.append(
+                {
+                    "sensor": sensor,
+                    "simulated": all(simulated.get((sensor, one), False) for one in recordings),
+                    "rank": limits[0]["rank"] or "–",
+                    "tied_with": limits[0]["tied_with"],
+                    "verdict": limits[0]["verdict"],
+                    "limits": [_limit(row, system) for row in limits],
+                }
+            )
+        yield {"name": name, "requirement": requirement, "groups": groups}
+
+
+def _order(rows: Sequence[Row]) -> Any:
+    """Return a key that puts the ranked sensors first, by their margin."""
+    margins: dict[str, tuple[int, float]] = {}
+    for row in rows:
+        if row["decides"]:
+            rank, margin = row["rank"], row["margin"]
+            margins[row["sensor"]] = (rank or 10**6, -(margin or 0.0))
+    return margins.__getitem__
+
+
+def _limit(row: Row, system: System) -> dict[str, Any]:
+    unit = unit_of(DIMENSIONS[row["error"]], system)
+    known = row["sigma"] is not None
+    reached = row["reached_after"]
+    return {
+        "limit": f"{_NAMES[row['error']]}, {duration_text(row['time'])}",
+        "allowed": unit.text(row["limit"], 3),
+        "sigma": _shown(row["error"], row["sigma"], unit) if known else "–",
+        "interval": _interval(row, unit),
+        "unit": unit.sign,
+        "margin": f"{row['margin']:.3g}" if known else "–",
+        "chance": _percent(row["chance"]) if known else "–",
+        "source": f"{row['source']} ({_percent(row['share'])})" if row["source"] else "–",
+        "reached": duration_text(reached) if reached is not None else "–",
+        "decides": row["decides"],
+        "reason": row["reason"] or "",
+    }
+
+
+def budget_tables(
+    rows: Sequence[Row], simulated: Simulated, system: System
+) -> Iterator[dict[str, Any]]:
+    """Yield the error budget of each recording: a line an error and axis, a column a time.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        The table ``error_budget``; what requirements ask for is left out.
+    simulated : mapping
+        Which recordings are.
+    system : str
+        Units of the page.
+    """
+    own = [row for row in rows if row["requirement"] is None]
+    for key in dict.fromkeys((row["sensor"], row["recording"]) for row in own):
+        parts = [row for row in own if (row["sensor"], row["recording"]) == key]
+        times = list(dict.fromkeys(row["time"] for row in parts))
+        lines = []
+        for error, axis in dict.fromkeys((row["error"], row["axis"]) for row in parts):
+            unit = unit_of(DIMENSIONS[error], system)
+            chosen = [row for row in parts if (row["error"], row["axis"]) == (error, axis)]
+            lines.append(
+                {
+                    "error": f"{_NAMES[error]} ({unit.sign})",
+                    "axis": axis,
+                    "cells": [
+                        _cell([row for row in chosen if row["time"] == time], unit)
+                        for time in times
+                    ],
+                }
+            )
+        yield {
+            "sensor": key[0],
+            "recording": key[1],
+            "simulated": simulated.get(key, False),
+            "times": [duration_text(time) for time in times],
+            "lines": lines,
+        }
+
+
+def _cell(rows: Sequence[Row], unit: PageUnit) -> dict[str, Any]:
+    """Return an error with its interval, and what it comes of."""
+    (total,) = (row for row in rows if row["source"] == "total")
+    if total["sigma"] is None:
+        return {"lines": ["–"], "note": total["reason"] or "", "class": "none"}
+    lines = [_shown(total["error"], total["sigma"], unit), _interval(total, unit)]
+    if total["sigma"] > 0.0:
+        parts = [row for row in rows if row["source"] != "total"][:_SHOWN_SOURCES]
+        shares = ((row["source"], (row["sigma"] / total["sigma"]) ** 2) for row in parts)
+        lines += [f"{source} {_percent(share)}" for source, share in shares if share >= 0.01]
+    return {"lines": lines, "note": total["reason"] or "", "class": "number"}
+
+
+def _shown(error: str, sigma: float, unit: PageUnit) -> str:
+    if DIMENSIONS[error] == "angle" and sigma > 0.5 * _HALF_TURN:  # type: ignore[index]
+        return "none" if error == "north" else f"over {unit.text(0.5 * _HALF_TURN, 3)}"
+    return unit.text(sigma, 3)
+
+
+def _interval(row: Row, unit: PageUnit) -> str:
+    if row["lower"] is None or row["upper"] is None:
+        return "–"
+    return f"{unit.text(row['lower'], 3)} to {unit.text(row['upper'], 3)}"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %"

@@ -1,0 +1,202 @@
+"""Which sensor fulfils which requirement: rows of the table ``ranking``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from statistics import NormalDist
+from typing import Any
+
+from imubench_pipeline.requirements import Requirement
+
+Row = Mapping[str, Any]
+
+_SURE = 0.975
+"""Chance from which a verdict is sure."""
+
+_VAGUE = 4.0
+"""Upper over lower limit of an error beyond which the logs say too little."""
+
+_WIDTH = 3.92
+"""Standard deviations of a 95 % interval."""
+
+
+@dataclass(frozen=True)
+class Standing:
+    """What a sensor makes of one limit of a requirement.
+
+    Attributes
+    ----------
+    total : mapping
+        Row ``total`` of the table ``error_budget`` of the recording that answers.
+    source : str or None
+        The largest contribution.
+    share : float or None
+        Its part of the variance.
+    """
+
+    total: Row
+    source: str | None = None
+    share: float | None = None
+
+    @property
+    def known(self) -> bool:
+        """Whether there is a figure."""
+        return self.total["sigma"] is not None
+
+    @property
+    def margin(self) -> float:
+        """How many times the error fits into the limit."""
+        return _over(self.total["limit"], self.total["sigma"])
+
+    @property
+    def margins(self) -> tuple[float, float]:
+        """95 % limits of the margin."""
+        limit = self.total["limit"]
+        return _over(limit, self.total["upper"]), _over(limit, self.total["lower"])
+
+    @property
+    def chance(self) -> float:
+        """Chance that the error is within its limit: its logarithm is taken as normal."""
+        low, high = self.margins
+        if low >= 1.0 and math.isinf(high):
+            return 1.0
+        spread = math.log(high / low) / _WIDTH if low > 0 and high < math.inf else math.inf
+        if spread == 0.0:
+            return float(self.margin >= 1.0)
+        return NormalDist().cdf(math.log(self.margin) / spread)
+
+    @property
+    def verdict(self) -> str:
+        """The chance in words."""
+        if not self.known:
+            return "not enough data"
+        low, high = self.margins
+        vague = low <= 0.0 or high / low > _VAGUE
+        if vague and 1.0 - _SURE < self.chance < _SURE:
+            return "not enough data"
+        for least, words in ((_SURE, "passes"), (0.5, "probably passes")):
+            if self.chance >= least:
+                return words
+        return "probably fails" if self.chance > 1.0 - _SURE else "surely fails"
+
+
+def ranking_rows(
+    errors: Iterable[Row],
+    requirements: Mapping[str, Requirement],
+    sensors: Mapping[str, Mapping[str, Any]],
+) -> Iterator[Row]:
+    """Rank the sensors for each requirement.
+
+    A sensor stands where its limit with the least margin stands. Its rank is one more than the
+    number of sensors that are surely better, whose interval lies wholly above its own: sensors
+    with overlapping intervals are tied.
+
+    Parameters
+    ----------
+    errors : iterable of mapping
+        Rows of the table ``error_budget``.
+    requirements : mapping of str to Requirement
+    sensors : mapping of str to mapping
+        ``price_class`` of each sensor.
+
+    Yields
+    ------
+    mapping
+        One a requirement, sensor and limit.
+    """
+    asked = [row for row in errors if row["requirement"] is not None]
+    for name, requirement in requirements.items():
+        standings = _standings([row for row in asked if row["requirement"] == name], requirement)
+        deciding = {sensor: _deciding(found) for sensor, found in standings.items()}
+        ranked = {
+            sensor: one
+            for sensor, one in deciding.items()
+            if one.known and requirement.admits(sensors[sensor]["price_class"])
+        }
+        for sensor, found in standings.items():
+            one = deciding[sensor]
+            rank, tied = _rank(sensor, ranked) if sensor in ranked else (None, [])
+            outside = not requirement.admits(sensors[sensor]["price_class"])
+            for standing in found:
+                yield {
+                    "requirement": name,
+                    "sensor": sensor,
+                    "rank": rank,
+                    "tied_with": ", ".join(tied) or None,
+                    "verdict": "outside the price class" if outside else one.verdict,
+                    "decides": standing is one,
+                    **_limit_row(standing),
+                }
+
+
+def _limit_row(standing: Standing) -> Row:
+    total = standing.total
+    known = standing.known
+    return {
+        **{
+            key: total[key]
+            for key in ("recording", "error", "time", "limit", "sigma", "lower", "upper", "unit")
+        },
+        "margin": standing.margin if known else None,
+        "chance": standing.chance if known else None,
+        "limit_verdict": standing.verdict,
+        "source": standing.source,
+        "share": standing.share,
+        "reached_after": total["reached_after"],
+        "reason": total["reason"],
+    }
+
+
+def _standings(rows: list[Row], requirement: Requirement) -> dict[str, list[Standing]]:
+    """Return how each sensor stands to each limit, by the recording that answers."""
+    found: dict[str, list[Standing]] = {}
+    for sensor in dict.fromkeys(row["sensor"] for row in rows):
+        own = [row for row in rows if row["sensor"] == sensor]
+        standings = []
+        for key in dict.fromkeys((row["error"], row["time"], row["limit"]) for row in own):
+            parts = [row for row in own if (row["error"], row["time"], row["limit"]) == key]
+            totals = [row for row in parts if row["source"] == "total"]
+            known = sorted(
+                (row for row in totals if row["sigma"] is not None), key=lambda row: row["sigma"]
+            )
+            if not known:
+                standings.append(Standing(totals[0]))
+                continue
+            total = known[-1] if requirement.axis == "worst" else known[len(known) // 2]
+            sources = [
+                row
+                for row in parts
+                if row["source"] != "total" and row["recording"] == total["recording"]
+            ]
+            largest = max(sources, key=lambda row: row["sigma"], default=None)
+            if largest is None or total["sigma"] == 0.0:
+                standings.append(Standing(total))
+            else:
+                share = (largest["sigma"] / total["sigma"]) ** 2
+                standings.append(Standing(total, largest["source"], share))
+        found[sensor] = standings
+    return found
+
+
+def _deciding(standings: list[Standing]) -> Standing:
+    unknown = [one for one in standings if not one.known]
+    return unknown[0] if unknown else min(standings, key=lambda one: one.margin)
+
+
+def _rank(sensor: str, ranked: Mapping[str, Standing]) -> tuple[int, list[str]]:
+    """Return the rank of a sensor, and the sensors that it is tied with."""
+    low, high = ranked[sensor].margins
+    better, tied = 0, []
+    for other, standing in ranked.items():
+        other_low, other_high = standing.margins
+        if other_low > high:
+            better += 1
+        elif other != sensor and other_high >= low:
+            tied.append(other)
+    return 1 + better, tied
+
+
+def _over(limit: float, error: float) -> float:
+    return limit / error if error > 0.0 else math.inf

@@ -1,0 +1,28 @@
+"""Rank the sensors for each requirement."""
+
+import json
+from pathlib import Path
+
+from imubench_pipeline.requirements import Requirement
+from imubench_pipeline.selection import ranking_rows
+from imubench_pipeline.tables import build, read, write_arrow
+
+
+def main(errors: Path, settings: str, outputs: list[Path]) -> None:
+    """Write the table ``ranking``, as Parquet and CSV."""
+    given = json.loads(settings)
+    requirements = {
+        name: Requirement.model_validate(one) for name, one in given["requirements"].items()
+    }
+    rows = read("error_budget", [errors]).to_pylist()
+    table = build("ranking", ranking_rows(rows, requirements, given["sensors"]))
+    for output in outputs:
+        write_arrow(table, output)
+
+
+if __name__ == "__main__":
+    main(
+        Path(snakemake.input[0]),
+        snakemake.params.settings,
+        [Path(path) for path in snakemake.output],
+    )
