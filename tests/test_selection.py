@@ -144,6 +144,17 @@ def test_the_limit_with_the_least_margin_decides_and_the_source_is_named() -> No
     assert rows[0]["source"] == "gyro N" and rows[0]["share"] == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.parametrize(
+    ("N", "verdict", "rank"), [(1e-3, "surely fails", 1), (1e-6, "not enough data", None)]
+)
+def test_what_surely_fails_fails_whatever_else_is_not_known(
+    N: float, verdict: str, rank: int | None
+) -> None:
+    asked = requirement(("heading", "100 s", "0.1 deg"), ("position", "100 s", "1 m"))
+    found = ranking({"s": {"gyro_x": white(N)}}, asked)
+    assert (found["s"]["verdict"], found["s"]["rank"]) == (verdict, rank)
+
+
 def test_a_sensor_outside_the_price_class_is_not_ranked() -> None:
     asked = requirement(("heading", "100 s", "0.1 deg"), price_class=["chip"])
     found = ranking({"s": {"gyro_x": white(5e-5)}}, asked, "tactical")

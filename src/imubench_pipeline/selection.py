@@ -181,8 +181,11 @@ def _standings(rows: list[Row], requirement: Requirement) -> dict[str, list[Stan
 
 
 def _deciding(standings: list[Standing]) -> Standing:
+    """Return the limit that decides: one that surely fails, whatever is not known of others."""
+    known = [one for one in standings if one.known]
+    worst = min(known, key=lambda one: one.margin, default=standings[0])
     unknown = [one for one in standings if not one.known]
-    return unknown[0] if unknown else min(standings, key=lambda one: one.margin)
+    return worst if not unknown or worst.verdict == "surely fails" else unknown[0]
 
 
 def _rank(sensor: str, ranked: Mapping[str, Standing]) -> tuple[int, list[str]]:
