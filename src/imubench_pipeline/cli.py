@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import io
 import json
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,7 +14,7 @@ from pydantic import BaseModel
 
 from imubench_pipeline.config import Run, Simulated
 from imubench_pipeline.sensor import RecordingNotes, Sensor
-from imubench_pipeline.tables import write_json
+from imubench_pipeline.tables import replacing, write_json
 from imubench_pipeline.validation import ConfigError, read_yaml
 
 SCHEMAS: dict[str, type[BaseModel]] = {
@@ -22,6 +24,9 @@ SCHEMAS: dict[str, type[BaseModel]] = {
     "simulated": Simulated,
 }
 """The configuration files: config.yaml, a sensor's, the notes beside a log, simulated.yaml."""
+
+_CLOSED_PIPE = 141
+"""Exit status that shells give a command whose reader has gone."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -43,8 +48,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
     checking.add_argument(
         "--config", type=Path, default=Path("config/config.yaml"), help="settings of the findings"
     )
+    inspecting = commands.add_parser(
+        "inspect",
+        help="show what a log holds, and draft a sensor file for it",
+        description="Exit status: 0 the sensor file is complete, 1 something is left to fill in, "
+        "2 the log cannot be read.",
+    )
+    inspecting.add_argument("log", type=Path, help="log file, or folder or archive of a recording")
+    inspecting.add_argument(
+        "--block", action="store_true", help="print the sensor file alone, and no listing"
+    )
+    inspecting.add_argument(
+        "--output", type=Path, help="where to write the sensor file; default: the terminal"
+    )
     given = parser.parse_args(arguments)
-    return _schema(given) if given.command == "schema" else _check(given)
+    try:
+        status = {"schema": _schema, "check": _check, "inspect": _inspect}[given.command](given)
+        sys.stdout.flush()
+        return status
+    except BrokenPipeError:
+        # Who reads has seen enough, as `head` has; what is left must not be written at the exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return _CLOSED_PIPE
 
 
 def _schema(given: argparse.Namespace) -> int:
@@ -84,3 +109,30 @@ def _check(given: argparse.Namespace) -> int:
             print(f"  {finding['severity']:8} {finding['finding']}: {finding['detail']}")
         sys.stdout.flush()
     return worst
+
+
+def _inspect(given: argparse.Namespace) -> int:
+    from imubench_pipeline.inspection import inspect
+    from imubench_pipeline.readers import RecordingError
+
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        # Names in a log may be in any script, and sensor files are UTF-8.
+        sys.stdout.reconfigure(encoding="utf-8", errors="backslashreplace")
+    output: Path | None = given.output
+    if output is not None and output.exists():
+        print(f"{output}: exists already; expected a new name", file=sys.stderr)
+        return 2
+    try:
+        found = inspect(given.log, output.stem if output is not None else None)
+        if output is not None:
+            with replacing(output) as temporary:
+                temporary.write_text(found.block, encoding="utf-8")
+    except (RecordingError, OSError) as error:
+        print(error, file=sys.stderr)
+        return 2
+    if not given.block:
+        print(found.listing)
+    if output is None:
+        sys.stdout.write(found.block)
+    print(found.proof.said, file=sys.stderr if given.block else sys.stdout)
+    return 0 if found.complete else 1

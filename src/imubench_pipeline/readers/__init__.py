@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from importlib import import_module
 from pathlib import Path
 
@@ -31,19 +32,41 @@ _CLASSES: dict[Reader, tuple[str, str]] = {
 _STREAMED: tuple[Reader, ...] = ("csv", "vectornav", "ubx")
 """The readers of logs that may be compressed, or in a zip archive."""
 
-_SEVERAL_CLOCKS: tuple[Reader, ...] = ("rosbag", "ubx")
+SEVERAL_CLOCKS: tuple[Reader, ...] = ("rosbag", "ubx")
 """The readers of files in which each ``variable`` is recorded by itself."""
 
-__all__ = ["TEMPERATURE", "Batch", "LogFile", "RecordingError", "log_files", "read"]
+__all__ = [
+    "SEVERAL_CLOCKS",
+    "TEMPERATURE",
+    "Batch",
+    "LogFile",
+    "RecordingError",
+    "class_of",
+    "log_files",
+    "only_log",
+    "read",
+]
 
 
 def log_files(path: Path) -> list[Path]:
-    """Return the files of a recording: the file itself, or the visible files of its folder."""
+    """Return the files of a recording: the file itself, or the visible files of its folder.
+
+    Raises
+    ------
+    OSError
+        If it is a device or a named pipe, which may never end.
+    """
     if path.is_dir():
         return sorted(
             file for file in path.rglob("*") if file.is_file() and visible(file.relative_to(path))
         )
+    if _is_endless(path):
+        raise OSError(errno.EINVAL, "it is neither a file nor a folder")
     return [path]
+
+
+def _is_endless(path: Path) -> bool:
+    return path.exists() and not path.is_file() and not path.is_dir()
 
 
 def read(path: Path, log: LogFormat) -> list[LogFile]:
@@ -67,6 +90,8 @@ def read(path: Path, log: LogFormat) -> list[LogFile]:
         If a file that the format names is not there, or the recording is a folder and the
         format does not say which file a channel is in.
     """
+    if _is_endless(path):
+        raise RecordingError(f"{path.name}: is neither a file nor a folder; expected a log")
     sources = {str(name): source for name, source in log.channels.items()}
     if log.temperature is not None:
         sources[TEMPERATURE] = log.temperature
@@ -86,7 +111,7 @@ def _clock(file: Path, log: LogFormat, source: ColumnSource) -> str:
     """Return what has a clock of its own in a file: a topic, or a kind of message."""
     if source.variable is None or is_member(file):
         return ""
-    return source.variable if (log.reader or reader_of(file)) in _SEVERAL_CLOCKS else ""
+    return source.variable if (log.reader or reader_of(file)) in SEVERAL_CLOCKS else ""
 
 
 def _present(path: Path, log: LogFormat) -> list[Path] | None:
@@ -102,7 +127,7 @@ def _present(path: Path, log: LogFormat) -> list[Path] | None:
 
 def _file_of(path: Path, present: list[Path] | None, source: ColumnSource, name: str) -> Path:
     if source.file is None:
-        return path if present is None else _only(path, present)
+        return path if present is None else only_log(path, present)
     if present is None:
         raise RecordingError(
             f"{path.name}: is one file, but the sensor file takes {name} from {source.file!r} of "
@@ -120,8 +145,20 @@ def _file_of(path: Path, present: list[Path] | None, source: ColumnSource, name:
     return nested[0]
 
 
-def _only(path: Path, present: list[Path]) -> Path:
-    """Return the one log of a folder or archive; what is in its sub-folders describes it."""
+def only_log(path: Path, present: list[Path]) -> Path:
+    """Return the one log of a folder or archive; what is in its sub-folders describes it.
+
+    Parameters
+    ----------
+    path : Path
+    present : list of Path
+        Its files.
+
+    Raises
+    ------
+    RecordingError
+        If there is another number of logs.
+    """
     found = [file for file in present if file.parent == path] or present
     if len(found) > 1 and not path.is_dir():
         found = [file for file in found if holds_text(file)]
@@ -140,8 +177,12 @@ def _names(path: Path, files: list[Path]) -> str:
 def _open(file: Path, log: LogFormat, sources: dict[str, ColumnSource]) -> LogFile:
     inside = None if is_member(file) else _present(file, log)
     if inside is not None:
-        file = _only(file, inside)  # a log that is packed alone, among others
-    reader = log.reader or ("csv" if is_member(file) else reader_of(file))
+        file = only_log(file, inside)  # a log that is packed alone, among others
+    return class_of(log.reader or reader_of(file))(file, log, sources)
+
+
+def class_of(reader: Reader) -> type[LogFile]:
+    """Return the class that reads the files of a reader; only its module is imported."""
     module, name = _CLASSES[reader]
     kind: type[LogFile] = getattr(import_module(module), name)
-    return kind(file, log, sources)
+    return kind

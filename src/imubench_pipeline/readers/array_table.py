@@ -89,6 +89,10 @@ class Table(ABC):
     def column(self, position: int) -> Column:
         """Return a column by its position, counted from 0."""
 
+    def unit(self, position: int) -> str | None:
+        """Return the unit of a column, where the file states it."""
+        return None
+
     @abstractmethod
     def row_bytes(self, positions: Sequence[int]) -> int:
         """Return the memory that a record takes while these columns are read."""

@@ -17,8 +17,9 @@ from __future__ import annotations
 import re
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from itertools import islice
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -47,15 +48,7 @@ class ArrayFile(LogFile):
 
     def batches(self) -> Iterator[Batch]:
         """Yield the records in the order of the file (see `LogFile.batches`)."""
-        try:
-            with self.path.open("rb") as file:
-                empty = not file.read(1)
-        except OSError as error:
-            raise RecordingError(
-                f"{self.path.name}: cannot be opened ({error.strerror}); expected a file"
-            ) from None
-        if empty:
-            raise RecordingError(f"{self.path.name}: the file is empty; copy it again")
+        check_not_empty(self.path)
         time = ArrayTime(self)
         for block in self._guarded():
             stamps = block.pop(_TIME, None)
@@ -65,24 +58,15 @@ class ArrayFile(LogFile):
                     seconds = None if stamps is None else time.seconds(stamps)
                 except UnusableError as error:
                     raise RecordingError(f"{self.path.name}: {error}") from None
-                columns = {name: self.to_si(name, _numbers(raw)) for name, raw in block.items()}
+                columns = {name: self.to_si(name, numbers(raw)) for name, raw in block.items()}
             yield Batch(seconds, columns)
 
     def _guarded(self) -> Iterator[dict[str, NDArray[Any]]]:
         """Yield the blocks as written; whatever a library raises becomes a `RecordingError`."""
-        try:
-            with ExitStack() as stack:
-                yield from self._blocks(
-                    self._places(list(islice(self.tables(stack), _MOST_TABLES + 1)))
-                )
-        except UnusableError as error:
-            raise RecordingError(f"{self.path.name}: {error}") from None
-        # The libraries raise nearly every kind of exception on damaged files.
-        except Exception as error:
-            said = " ".join(str(error).split()) or type(error).__name__
-            raise RecordingError(
-                f"{self.path.name}: corrupt data, or cut short ({said}); copy it again"
-            ) from error
+        with explained(self.path), ExitStack() as stack:
+            yield from self._blocks(
+                self._places(list(islice(self.tables(stack), _MOST_TABLES + 1)))
+            )
 
     # --------------------------------------------------------------------------- blocks
 
@@ -161,7 +145,35 @@ class ArrayFile(LogFile):
         return place
 
 
-def _numbers(raw: NDArray[Any]) -> NDArray[np.float64]:
+def check_not_empty(path: Path) -> None:
+    """Raise `RecordingError` if a file cannot be opened or has no byte."""
+    try:
+        with path.open("rb") as file:
+            empty = not file.read(1)
+    except OSError as error:
+        raise RecordingError(
+            f"{path.name}: cannot be opened ({error.strerror}); expected a file"
+        ) from None
+    if empty:
+        raise RecordingError(f"{path.name}: the file is empty; copy it again")
+
+
+@contextmanager
+def explained(path: Path) -> Iterator[None]:
+    """Make a `RecordingError` of whatever a library raises on a file."""
+    try:
+        yield
+    except UnusableError as error:
+        raise RecordingError(f"{path.name}: {error}") from None
+    # The libraries raise nearly every kind of exception on damaged files.
+    except Exception as error:
+        said = " ".join(str(error).split()) or type(error).__name__
+        raise RecordingError(
+            f"{path.name}: corrupt data, or cut short ({said}); copy it again"
+        ) from error
+
+
+def numbers(raw: NDArray[Any]) -> NDArray[np.float64]:
     """Return a column as float64, with NaN where a value is missing."""
     return np.ma.filled(np.ma.asanyarray(raw, np.float64), np.nan)
 

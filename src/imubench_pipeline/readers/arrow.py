@@ -66,6 +66,12 @@ class _ArrowTable(Table):
         kind = self.schema.field(position).type
         return Column(self.labels[position], _kind(kind), str(kind))
 
+    def unit(self, position: int) -> str | None:
+        """Return the unit of a column, where its metadata state it."""
+        stated = self.schema.field(position).metadata or {}
+        found = next((stated[key] for key in (b"unit", b"units") if key in stated), b"")
+        return found.decode("utf-8", "replace") or None
+
     def row_bytes(self, positions: Sequence[int]) -> int:
         """Return the memory that a record takes while these columns are read."""
         return 8 * len(positions)

@@ -22,6 +22,10 @@ TEMPERATURE = "temperature"
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Seconds in a unit of time stamps."""
 
+_BEYOND = 2.0**684
+"""What this factor makes infinite, beyond 2e102 in SI, was never measured, and stays infinite:
+sums of its squares would be. A power of two loses no digit of what was."""
+
 
 class RecordingError(ValueError):
     """A recording that cannot be used; the text is the reason, with what to mend."""
@@ -91,11 +95,16 @@ class LogFile(ABC):
         return np.asarray((stamps - first) * (SECONDS[unit] * scale), np.float64)
 
     def to_si(self, name: str, raw: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Convert the figures of a column as written to SI: scale * (raw - offset), then unit."""
+        """Convert the figures of a column as written to SI: scale * (raw - offset), then unit.
+
+        What is absurdly large becomes infinite.
+        """
         source = self.sources[name]
         dimension = TEMPERATURE if name == TEMPERATURE else QUANTITIES[quantity_of(name)]
         factor, zero = conversion(source.unit, dimension)
         if source.offset:
             raw = raw - source.offset
-        figures = raw * (source.scale * factor)
+        with np.errstate(over="ignore"):
+            figures = raw * (source.scale * factor * _BEYOND)
+        figures *= 1.0 / _BEYOND
         return figures + zero if zero else figures

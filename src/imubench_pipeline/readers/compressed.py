@@ -20,6 +20,7 @@ from imubench_pipeline.readers.batch import RecordingError
 _FED = 1 << 11
 """Bytes of zstd data decompressed at a time: they may stand for 32768 times as many."""
 
+_READ = 1 << 16
 _LARGEST_WINDOW = 1 << 27
 _UNSUSPICIOUS = 1 << 28
 _LARGEST_RATIO = 800
@@ -31,6 +32,7 @@ _ZIP_LOCAL = b"PK\x03\x04"
 _ZIP_EMPTY = b"PK\x05\x06"
 _ZIP_HEADER = struct.Struct("<4sHHHHHIIIHH")
 _ZIP_METHODS = {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}
+_OTHER_METHODS = {9: "deflate64", 12: "bzip2", 14: "LZMA", 93: "zstd", 95: "xz", 98: "PPMd"}
 _ENCRYPTED, _SIZE_FOLLOWS, _UTF_8 = 1, 8, 0x800
 _LONGEST_MEMBER_NAME = 512
 _UNKNOWN_SIZE = 1 << 62
@@ -97,7 +99,7 @@ class _Zstd:
         self._file = file
         self._frame: Any = None
         self._fed = b""
-        self._ready = b""
+        self._ready = memoryview(b"")
 
     def read1(self, size: int) -> bytes:
         while not self._ready:
@@ -108,17 +110,63 @@ class _Zstd:
                 return b""
             self._frame = self._frame or self._new()
             try:
-                self._ready = self._frame.decompress(self._fed)
+                self._ready = memoryview(self._frame.decompress(self._fed))
             except self._error as error:
                 raise OSError(str(error)) from None
             self._fed = b""
             if self._frame.eof:
                 self._fed, self._frame = self._frame.unused_data, None
+        # Views, for to copy the rest each time would take the square of its size.
         block, self._ready = self._ready[:size], self._ready[size:]
-        return block
+        return bytes(block)
 
     def close(self) -> None:
         self._file.close()
+
+
+class _Deflated:
+    """A deflated file in an archive; unlike the library's, it gives all that is there of a cut one.
+
+    Parameters
+    ----------
+    file : file
+        At the first byte of the data.
+    info : ZipInfo
+        Its checksum is None where it is not known.
+    """
+
+    def __init__(self, file: IO[bytes], info: zipfile.ZipInfo) -> None:
+        self._file = file
+        self._left = info.compress_size
+        self._size = info.file_size
+        self._expected: int | None = info.CRC
+        self._crc = zlib.crc32(b"")
+        self._inflate = zlib.decompressobj(-zlib.MAX_WBITS)
+
+    def read1(self, size: int) -> bytes:
+        while not self._inflate.eof:
+            packed = self._inflate.unconsumed_tail
+            if not packed:
+                packed = self._file.read(min(_READ, self._left))
+                self._left -= len(packed)
+            block = self._inflate.decompress(packed, size)
+            if block:
+                self._count(block)
+                return block
+            if not packed and not self._inflate.eof:
+                raise EOFError
+        if self._expected not in (None, self._crc):
+            raise zipfile.BadZipFile("wrong checksum")
+        return b""
+
+    def close(self) -> None:
+        self._file.close()
+
+    def _count(self, block: bytes) -> None:
+        self._crc = zlib.crc32(block, self._crc)
+        self._size -= len(block)
+        if self._size < 0:
+            raise zipfile.BadZipFile("more data than the directory says")
 
 
 _OPENED: Mapping[bytes, Callable[[IO[bytes]], Any]] = {
@@ -315,9 +363,13 @@ def _open_member(archive: Path, name: str, file: IO[bytes]) -> Bytes:
         raise RecordingError(f"{shown}: no such file in the archive; it may be cut short")
     if info.flag_bits & _ENCRYPTED:
         raise RecordingError(f"{shown}: is encrypted; unpack the archive with its password")
-    if info.compress_type not in _ZIP_METHODS or stat.S_ISLNK(info.external_attr >> 16):
+    if stat.S_ISLNK(info.external_attr >> 16):
+        raise RecordingError(f"{shown}: is a link; expected the log itself: pack it anew")
+    if info.compress_type not in _ZIP_METHODS:
+        method = _OTHER_METHODS.get(info.compress_type, "unknown")
         raise RecordingError(
-            f"{shown}: is packed by method {info.compress_type} or is a link; unpack the archive"
+            f"{shown}: is packed by method {info.compress_type} ({method}); expected deflate, or "
+            "none: unpack the archive"
         )
     try:
         file.seek(info.header_offset)
@@ -325,7 +377,8 @@ def _open_member(archive: Path, name: str, file: IO[bytes]) -> Bytes:
         if header[0] != _ZIP_LOCAL:
             raise zipfile.BadZipFile("no header where the directory says")
         file.seek(header[9] + header[10], io.SEEK_CUR)
-        stream = zipfile.ZipExtFile(file, "r", info)
+        deflated = info.compress_type == zipfile.ZIP_DEFLATED
+        stream = _Deflated(file, info) if deflated else zipfile.ZipExtFile(file, "r", info)
     except _CORRUPT as error:
         raise _corrupt(shown, error) from None
     except NotImplementedError as error:

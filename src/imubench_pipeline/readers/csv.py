@@ -124,11 +124,14 @@ class CsvFile(LogFile):
         self.findings.append(Finding(finding, "note", f"{self.path.name}: {detail}", value))
 
     def _note(self, layout: TextLayout, records: Records) -> None:
-        if layout.cut_before:
+        if layout.passed_over:
+            count, (number, text) = len(layout.passed_over), layout.passed_over[0]
+            if layout.header:
+                name, what = "not_records", "stand under the names and are no units"
+            else:
+                name, what = "incomplete_first_record", "lack a part of their record"
             self._found(
-                "incomplete_first_record",
-                f"line {layout.lines_before} lacks the beginning of its record; left out",
-                1,
+                name, f"{count} lines from line {number} {what}; left out: {text[:60]!r}", count
             )
         if records.restarts:
             cut = f" after a record cut short in {records.cut} places" if records.cut else ""

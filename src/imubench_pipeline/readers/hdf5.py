@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.readers.array_table import Array, Table, UnusableError
 from imubench_pipeline.readers.arrays import ArrayFile
+from imubench_pipeline.readers.hdf5_units import stated_unit
 
 _LARGEST_CHUNK = 1 << 28
 
@@ -87,6 +88,10 @@ class DataSet(Array):
         self.data = data
         if self.fault is None and not _is_sound(dtype):
             self.fault = "has a damaged or unusual type; expected standard numbers: copy it again"
+
+    def unit(self, position: int) -> str | None:
+        """Return the unit of its columns, where an attribute states it."""
+        return stated_unit(self.data)
 
     def row_bytes(self, positions: Sequence[int]) -> int:
         """Return the memory that a record takes while these columns are read."""

@@ -10,6 +10,7 @@ hold the column. Time columns, with ``unit: ns``: ``header.stamp``, what the dri
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Protocol
 
@@ -29,20 +30,27 @@ from imubench_pipeline.readers.wrapping import WrapState, unwrapped
 
 _BATCH = 1 << 14
 _SQLITE = b"SQLite format 3"
-_STAMP, _LOG_TIME = "header.stamp", "log_time"
+STAMP, LOG_TIME = "header.stamp", "log_time"
+"""The columns of time."""
 
 
-class _Source(Protocol):
+class Source(Protocol):
     """A bag of either kind."""
 
     ros_1: bool
     unclosed: bool
 
-    def topics(self) -> dict[str, str]: ...
+    def topics(self) -> dict[str, str]:
+        """Return the topics, and the type of message of each."""
 
-    def messages(self, topic: str) -> Iterator[tuple[int, bytes]]: ...
+    def counts(self) -> dict[str, int]:
+        """Return how many messages a topic has, where that is cheap to know."""
 
-    def close(self) -> None: ...
+    def messages(self, topic: str) -> Iterator[tuple[int, bytes]]:
+        """Yield time of recording (ns) and bytes of the messages of a topic."""
+
+    def close(self) -> None:
+        """Close the bag."""
 
 
 class RosbagFile(LogFile):
@@ -51,14 +59,14 @@ class RosbagFile(LogFile):
     def batches(self) -> Iterator[Batch]:
         """Yield the records in the order of the bag (see `LogFile.batches`)."""
         self._check_time()
-        source = self._guarded_open()
+        source = opened(self.path)
         try:
             topic, kind = self._topic(source)
             yield from self._read(source, topic, LAYOUTS[kind])
         finally:
             source.close()
 
-    def _read(self, source: _Source, topic: str, layout: Layout) -> Iterator[Batch]:
+    def _read(self, source: Source, topic: str, layout: Layout) -> Iterator[Batch]:
         sound = damaged = 0
         absent = dict.fromkeys(layout.covariances, 0)
         first: np.int64 | None = None
@@ -70,7 +78,7 @@ class RosbagFile(LogFile):
             self._blank(figures, layout, absent)
             time = None
             if self.log.time is not None:
-                chosen = stamps if self.log.time.column == _STAMP else times
+                chosen = stamps if self.log.time.column == STAMP else times
                 figures, chosen = figures[good], chosen[good]
                 if not len(chosen):
                     continue
@@ -112,48 +120,24 @@ class RosbagFile(LogFile):
 
     # ---------------------------------------------------------------------------- the bag
 
-    def _guarded_open(self) -> _Source:
-        try:
-            return _opened(self.path)
-        except RecordingError:
-            raise
-        except OSError as error:
-            raise RecordingError(
-                f"{self.path.name}: cannot be opened ({error.strerror or error})"
-            ) from None
-        except Exception as error:
-            raise self._corrupt(error) from None
-
     def _blocks(
-        self, source: _Source, topic: str
+        self, source: Source, topic: str
     ) -> Iterator[tuple[NDArray[np.int64], list[bytes]]]:
         """Yield the messages of a topic in blocks, with the times of their recording."""
         incoming = source.messages(topic)
         while True:
             times: list[int] = []
             messages: list[bytes] = []
-            try:
+            with explained(self.path):
                 for time, message in incoming:
                     times.append(time)
                     messages.append(message)
                     if len(times) == _BATCH:
                         break
                 written = np.array(times, np.int64)
-            except RecordingError:
-                raise
-            # The libraries raise whatever their parsing meets: struct.error, KeyError, ...
-            except Exception as error:
-                raise self._corrupt(error) from None
             if not times:
                 return
             yield written, messages
-
-    def _corrupt(self, error: Exception) -> RecordingError:
-        return RecordingError(
-            f"{self.path.name}: corrupt, or cut short ({str(error) or type(error).__name__}); "
-            "expected a ROS bag; copy it again, or mend it ('ros2 bag reindex', 'mcap recover', "
-            "'.recover' of sqlite3)"
-        )
 
     # -------------------------------------------------------------- what the sensor file says
 
@@ -161,10 +145,10 @@ class RosbagFile(LogFile):
         time = self.log.time
         if time is None:
             return
-        if time.column not in (_STAMP, _LOG_TIME):
+        if time.column not in (STAMP, LOG_TIME):
             raise RecordingError(
-                f"{self.path.name}: no time column {time.column!r}; a ROS bag has {_STAMP!r} and "
-                f"{_LOG_TIME!r}; mend 'column' of 'time' in the sensor file"
+                f"{self.path.name}: no time column {time.column!r}; a ROS bag has {STAMP!r} and "
+                f"{LOG_TIME!r}; mend 'column' of 'time' in the sensor file"
             )
         if time.unit != "ns":
             raise RecordingError(
@@ -172,14 +156,10 @@ class RosbagFile(LogFile):
                 "file; a ROS bag gives ns; expected 'unit: ns' of 'time'"
             )
 
-    def _topic(self, source: _Source) -> tuple[str, str]:
+    def _topic(self, source: Source) -> tuple[str, str]:
         """Return the topic that the columns are taken from, and its type."""
-        try:
+        with explained(self.path):
             topics = source.topics()
-        except RecordingError:
-            raise
-        except Exception as error:
-            raise self._corrupt(error) from None
         stated = {source.variable for source in self.sources.values() if source.variable}
         if len(stated) > 1:
             raise RecordingError(
@@ -246,8 +226,48 @@ class RosbagFile(LogFile):
         self.findings.append(Finding(name, "warning", f"{self.path.name}: {text}", value))
 
 
-def _opened(path: Path) -> _Source:
-    """Open a bag; its content tells which kind it is."""
+@contextmanager
+def explained(path: Path) -> Iterator[None]:
+    """Make a `RecordingError` of whatever the libraries raise on a bag."""
+    try:
+        yield
+    except RecordingError:
+        raise
+    # They raise whatever their parsing meets: struct.error, KeyError, ...
+    except Exception as error:
+        said = " ".join(str(error).replace(f"{path.parent}/", "").split())[:300]
+        if isinstance(error, MemoryError):
+            said = "a record promises more bytes than memory can hold"
+        raise RecordingError(
+            f"{path.name}: corrupt, or cut short ({said or type(error).__name__}); "
+            "expected a ROS bag; copy it again, or mend it ('ros2 bag reindex', 'mcap recover', "
+            "'.recover' of sqlite3)"
+        ) from None
+
+
+def opened(path: Path) -> Source:
+    """Open a bag; its content tells which kind it is.
+
+    Parameters
+    ----------
+    path : Path
+        A file, or the folder of a ROS 2 bag.
+
+    Raises
+    ------
+    RecordingError
+        If it cannot be opened, or is no bag.
+    """
+    with explained(path):
+        try:
+            return _opened(path)
+        except OSError as error:
+            raise RecordingError(
+                f"{path.name}: cannot be opened ({error.strerror or error})"
+            ) from None
+
+
+def _opened(path: Path) -> Source:
     if path.is_dir():
         for database in sorted(path.glob("*.db3")):
             _check_whole(database)
@@ -291,6 +311,12 @@ class _Bag2:
 
     def topics(self) -> dict[str, str]:
         return {str(held.topic): str(held.msgtype) for held in self._connections}
+
+    def counts(self) -> dict[str, int]:
+        found: dict[str, int] = {}
+        for held in self._connections:
+            found[str(held.topic)] = found.get(str(held.topic), 0) + held.msgcount
+        return found
 
     def messages(self, topic: str) -> Iterator[tuple[int, bytes]]:
         wanted = [connection for connection in self._connections if connection.topic == topic]

@@ -17,6 +17,7 @@ from imubench_pipeline.readers.batch import RecordingError
 
 _MAGIC = b"#ROSBAG V2.0\n"
 _MESSAGE, _BAG, _CHUNK, _CONNECTION = b"\x02", b"\x03", b"\x05", b"\x07"
+_LARGEST_CHUNK = 1 << 28
 _U4 = struct.Struct("<I")
 _TIME = struct.Struct("<II")
 
@@ -51,6 +52,10 @@ class Bag:
         for _ in self._listed():
             pass
         return dict(self._connections.values())
+
+    def counts(self) -> dict[str, int]:
+        """Return nothing: only the whole bag tells how many messages a topic has."""
+        return {}
 
     def _listed(self) -> Iterator[None]:
         """Read connections where the index says they are, or from all of the bag."""
@@ -116,20 +121,23 @@ class Bag:
     def _chunk(
         self, header: dict[bytes, bytes], data: bytes, topic: str
     ) -> Iterator[tuple[int, bytes]]:
+        (size,) = _U4.unpack(header[b"size"])
+        if size > _LARGEST_CHUNK:
+            raise ValueError(f"a chunk of {size} bytes")
         compression = header[b"compression"].decode("ascii", "replace")
         if compression == "bz2":
-            data = bz2.decompress(data)
+            data = bz2.BZ2Decompressor().decompress(data, size + 1)
         elif compression == "lz4":
             import lz4.frame  # type: ignore[import-untyped]  # has no types
 
-            data = lz4.frame.decompress(data)
+            data = lz4.frame.LZ4FrameDecompressor().decompress(data, size + 1)
         elif compression != "none":
             raise RecordingError(
                 f"{self._path.name}: a chunk is compressed with {compression!r}; expected bz2 or "
                 "lz4; write the bag anew with 'rosbag compress'"
             )
-        if len(data) != _U4.unpack(header[b"size"])[0]:
-            raise ValueError(f"a chunk of {len(data)} bytes is not as long as it says")
+        if len(data) != size:
+            raise ValueError(f"a chunk is not as long as the {size} bytes that it says")
         at = 0
         while at < len(data):
             fields, body, at = _record_in(data, at)

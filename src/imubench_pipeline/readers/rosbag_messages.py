@@ -30,12 +30,15 @@ class Layout:
         How many there are.
     columns : dict of str to int
         Place of each that can be a column.
+    units : dict of str to str
+        Unit of each, which ROS fixes.
     covariances : dict of str to int
         Place of the first covariance of a quantity; it is -1 where the quantity is not there.
     """
 
     figures: int
     columns: dict[str, int]
+    units: dict[str, str]
     covariances: dict[str, int]
 
 
@@ -44,9 +47,11 @@ LAYOUTS: dict[str, Layout] = {
     "sensor_msgs/msg/Imu": Layout(
         37,
         _xyz("angular_velocity", 13) | _xyz("linear_acceleration", 25),
+        dict.fromkeys(_xyz("angular_velocity", 0), "rad/s")
+        | dict.fromkeys(_xyz("linear_acceleration", 0), "m/s^2"),
         {"angular_velocity": 16, "linear_acceleration": 28},
     ),
-    "sensor_msgs/msg/Temperature": Layout(2, {"temperature": 0}, {}),
+    "sensor_msgs/msg/Temperature": Layout(2, {"temperature": 0}, {"temperature": "degC"}, {}),
 }
 """The messages that are read, by type."""
 

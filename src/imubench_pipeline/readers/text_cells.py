@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import Literal
 
 Decimal = Literal[".", ","]
@@ -53,6 +54,11 @@ def is_number(cell: str, decimal: Decimal | None = None) -> bool:
     except ValueError:
         return False
     return "_" not in text
+
+
+def are_figures(cells: Sequence[str]) -> bool:
+    """Tell whether cells are numbers, or stand for some."""
+    return all(is_number(cell) or is_missing(cell) for cell in cells)
 
 
 def is_datum(cell: str) -> bool:

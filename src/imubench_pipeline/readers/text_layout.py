@@ -5,7 +5,6 @@ All is found from the first lines; what the sensor file states is taken as state
 
 from __future__ import annotations
 
-import re
 from collections import Counter, deque
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,8 +12,14 @@ from pathlib import Path
 
 from imubench_pipeline.readers.batch import RecordingError
 from imubench_pipeline.readers.complete_lines import first_lines
-from imubench_pipeline.readers.text_cells import Decimal, is_datum, is_missing, is_number
+from imubench_pipeline.readers.text_cells import Decimal, are_figures, is_datum, is_number
+from imubench_pipeline.readers.text_header import are_units, completed, is_heading, likely_header
 from imubench_pipeline.readers.text_records import Records
+from imubench_pipeline.readers.text_refusals import (
+    refuse_binary,
+    refuse_decimals_apart,
+    refuse_other_formats,
+)
 from imubench_pipeline.readers.text_split import MOST_COLUMNS, Split
 from imubench_pipeline.sensor import LogFormat
 
@@ -27,8 +32,7 @@ _COMMENT_LINES = 1000
 _MOST_LINES_BEFORE = 500_000
 _SCORED_LINES, _SCORED_CELLS = 50, 50
 _UNIT_LINES = 3
-_RULED = re.compile(r"[-=_+]{2,}")
-_SHOWN = 20
+_SHOWN, _LONGEST_SHOWN = 20, 40
 
 
 @dataclass(frozen=True)
@@ -54,8 +58,8 @@ class TextLayout:
         The line of names; empty: none.
     preamble : tuple of bytes
         The lines before the first record, with the comments.
-    cut_before : bool
-        The line before the first record is one that lacks its beginning.
+    passed_over : tuple of (int, str)
+        Number and text of the lines before the first record that are neither names nor units.
     """
 
     file: str
@@ -69,7 +73,7 @@ class TextLayout:
     comments: tuple[str, ...]
     header: bytes
     preamble: tuple[bytes, ...]
-    cut_before: bool
+    passed_over: tuple[tuple[int, str], ...]
 
     def position(self, column: Column, key: str) -> int:
         """Return the position, counted from 0, of a column that the sensor file names.
@@ -79,7 +83,8 @@ class TextLayout:
         RecordingError
             If the file has no such column, or two of that name.
         """
-        found = ", ".join(self.names[:_SHOWN]) + (", ..." if len(self.names) > _SHOWN else "")
+        shown = [name[:_LONGEST_SHOWN] for name in self.names[:_SHOWN]]
+        found = ", ".join(shown) + (", ..." if len(self.names) > _SHOWN else "")
         if isinstance(column, int):
             if column > len(self.names):
                 raise RecordingError(
@@ -131,7 +136,8 @@ def find_layout(
     log : LogFormat
         What is stated.
     figures, times : sequence of str or int
-        The columns of figures and those of time stamps that are wanted, by name or position.
+        The columns of figures and those of time stamps that are wanted, by name or position. Where
+        none is, the likeliest layout is found.
 
     Raises
     ------
@@ -150,9 +156,9 @@ class _Search:
         self._file = path.name
         self._log = log
         self._figures = figures
-        wanted = [*figures, *times]
-        self._names = [column for column in wanted if isinstance(column, str)]
-        self._last = max((column for column in wanted if isinstance(column, int)), default=1)
+        self._wanted = [*figures, *times]
+        self._names = [column for column in self._wanted if isinstance(column, str)]
+        self._last = max((place for place in self._wanted if isinstance(place, int)), default=1)
         self._comments, self._lines = self._head(path)
         if not self._comments and not self._lines:
             raise RecordingError(
@@ -162,19 +168,19 @@ class _Search:
 
     def layout(self) -> TextLayout:
         """Return the likeliest layout."""
-        splits: Sequence[Split] = _SPLITS
-        if self._log.delimiter is not None:
-            splits = [s for s in _SPLITS if s.delimiter == self._log.delimiter] or [
-                Split(self._log.delimiter)
-            ]
-        split = max(splits, key=self._likelihood)
+        if self._lines:
+            refuse_other_formats(self._file, self._lines[0].raw)
+        split = max(self._splits(), key=self._likelihood)
         comments, lines = self._parted(split)
         if not lines:
             raise RecordingError(f"{self._file}: no record after the comments; expected some")
         header, first = self._header_and_first(split, comments, lines)
-        self._check_text(lines[: first + 1])
+        for line in lines[: first + 1]:
+            refuse_binary(self._file, line.number, line.raw)
         record = lines[first]
         rows = [split.cells(line.text) for line in lines[first:]]
+        if split.delimiter == "," and not (self._names or self._log.delimiter or self._log.decimal):
+            refuse_decimals_apart(self._file, record.number, record.text, rows)
         names = self._column_names(split, header, rows[0])
         if len(names) > MOST_COLUMNS:
             raise RecordingError(
@@ -182,11 +188,7 @@ class _Search:
                 f"delimiter {split}; expected one record a line: write the log so, or mend "
                 "'delimiter' in the sensor file"
             )
-        cut = (
-            header is not None
-            and not (self._names or self._log.header)
-            and _are_figures(split.cells(header.text))
-        )
+        passed_over = self._passed_over(split, header, lines[:first])
         return TextLayout(
             file=self._file,
             lines_before=record.number - 1,
@@ -197,11 +199,11 @@ class _Search:
             names=names,
             rows=rows,
             comments=self._signs(split),
-            header=b"" if header is None or cut else header.raw,
+            header=b"" if header is None or (passed_over and not self._names) else header.raw,
             preamble=tuple(
                 line.raw for line in [*comments, *lines[:first]] if line.number < record.number
             ),
-            cut_before=cut,
+            passed_over=tuple((line.number, line.text) for line in passed_over),
         )
 
     # --------------------------------------------------------------------- the first lines
@@ -249,15 +251,20 @@ class _Search:
         lines = [line for line in self._lines if not line.text.startswith(";")]
         return self._comments + comments, lines
 
-    def _check_text(self, lines: list[_Line]) -> None:
-        for line in lines:
-            if b"\0" in line.raw:
-                raise RecordingError(
-                    f"{self._file}, line {line.number}: holds binary data, expected text; state "
-                    "the 'reader' of the file, or cut the file before that line"
-                )
-
     # ------------------------------------------------------------------------- delimiter
+
+    def _splits(self) -> Sequence[Split]:
+        """Return the ways to divide a line that come into question."""
+        stated = self._log.delimiter
+        if stated is not None:
+            return [split for split in _SPLITS if split.delimiter == stated] or [Split(stated)]
+        if self._log.decimal != ",":
+            return _SPLITS
+        return [
+            split
+            for split in _SPLITS
+            if split.delimiter != "," or any(split.quotes(line.text) for line in self._lines)
+        ]
 
     def _likelihood(self, split: Split) -> tuple[float, ...]:
         """Return how likely a delimiter is; the first of equals is taken.
@@ -276,7 +283,7 @@ class _Search:
             names = self._names_in(split, line, width)
             held = sum(name in names for name in self._names)
             if held > shown:
-                shown, fits = held, any(_completed(names, row) for row in even)
+                shown, fits = held, any(completed(names, row) for row in even)
             if held == len(self._names):
                 break
         cells = [cell for row in even for cell in row[:_SCORED_CELLS]]
@@ -297,9 +304,9 @@ class _Search:
         """Return the names of all columns; positions, where none are wanted and none fit."""
         if header is not None:
             names = self._names_in(split, header, len(record))
-            completed = _completed(names, record)
-            if completed or self._names:
-                return completed or names
+            whole = completed(names, record)
+            if whole or self._names:
+                return whole or names
         return [str(number) for number in range(1, len(record) + 1)]
 
     def _header_and_first(
@@ -313,6 +320,8 @@ class _Search:
         widths = Counter(len(rows[index]) for index in alike[-_SCORED_LINES:])
         width = widths.most_common(1)[0][0] if widths else 0
         first = next((index for index in alike if len(rows[index]) == width), 1)
+        if not self._wanted:
+            return self._likely_header(split, comments, lines[: first + 1] if alike else []), first
         if self._names:
             header = self._named(split, [*lines, *reversed(comments)], width)
             if header is not None and header in comments:
@@ -334,6 +343,18 @@ class _Search:
             header = lines[max(first - 1, 0)]
         return header, first
 
+    def _likely_header(
+        self, split: Split, comments: list[_Line], lines: list[_Line]
+    ) -> _Line | None:
+        """Return the line of names before the first record, the last of the lines."""
+        if not lines:
+            raise RecordingError(f"{self._file}: no line of figures; expected the text of a log")
+        record = split.cells(lines[-1].text)
+        near = [line for line in comments if line.number < lines[-1].number] + lines[:-1]
+        named = [completed(self._names_in(split, line, len(record)), record) for line in near]
+        found = likely_header(named)
+        return None if found is None else near[found]
+
     def _named(self, split: Split, lines: list[_Line], width: int) -> _Line | None:
         """Return the line that has all names that are wanted."""
         return next(
@@ -342,19 +363,30 @@ class _Search:
 
     def _is_record(self, row: list[str]) -> bool:
         """Tell whether the figures that are wanted are in a line of which no names are known."""
-        if self._names:
+        if self._names or not self._wanted:
             return 2 * sum(map(is_datum, row)) >= len(row)
         cells = [row[int(column) - 1] for column in self._figures if int(column) <= len(row)]
-        return len(row) >= self._last and _are_figures(cells)
+        return len(row) >= self._last and are_figures(cells)
 
     def _after_units(self, split: Split, header: _Line, rows: list[list[str]], index: int) -> int:
         """Return the index of the first line that is no line of units under the header."""
         if index < len(rows):
             places = self._places(self._names_in(split, header, len(rows[index])))
             end = index + _UNIT_LINES
-            while index < min(end, len(rows)) and _are_units(rows[index], places):
+            while index < min(end, len(rows)) and are_units(rows[index], places):
                 index += 1
         return index
+
+    def _passed_over(self, split: Split, header: _Line | None, before: list[_Line]) -> list[_Line]:
+        """Return the lines right before the first record that are neither names nor units."""
+        rows = [split.cells(line.text) for line in before]
+        if self._names and header in before:
+            first = before.index(header) + 1
+            return [before[n] for n in range(first, len(rows)) if not is_heading(rows[n])]
+        if self._names or self._log.header:
+            return []
+        others = [number for number, row in enumerate(rows) if not are_figures(row)]
+        return before[max(others, default=-1) + 1 :]
 
     def _places(self, names: list[str]) -> set[int]:
         """Return the positions of the figures that are wanted, as far as they are there."""
@@ -383,28 +415,3 @@ def _decoded(raw: bytes) -> str:
         return raw.decode()
     except UnicodeDecodeError:
         return raw.decode("latin-1")
-
-
-def _completed(names: list[str], record: list[str]) -> list[str]:
-    """Return a name for each cell of a record; none where there are more or fewer names.
-
-    Either line may end with a delimiter, and the other may not.
-    """
-    if len(names) == len(record) + 1 and not names[-1]:
-        return names[:-1]
-    if len(names) + 1 == len(record) and not record[-1].strip():
-        return [*names, ""]
-    return names if len(names) == len(record) else []
-
-
-def _are_figures(cells: list[str]) -> bool:
-    return all(is_number(cell) or is_missing(cell) for cell in cells)
-
-
-def _are_units(row: list[str], places: set[int]) -> bool:
-    """Tell whether a line under the header says units, or is ruled: it has no figure."""
-    if all(_RULED.fullmatch(cell.strip()) for cell in row):
-        return True
-    cells = [row[place].strip() for place in places if place < len(row)]
-    texts = [cell for cell in cells if not is_missing(cell)]
-    return bool(texts) and not any(is_number(text) or text[0].isdigit() for text in texts)

@@ -49,8 +49,11 @@ class Split:
         """Tell whether a cell of a line stands in quotes, both of them at its ends."""
         if '"' not in text:
             return False
-        edge = rf"\s*{re.escape(self.delimiter)}\s*"
-        return re.search(rf'(?:^\s*|{edge})"[^"]*"(?:\s*$|{edge})', text) is not None
+        sign = re.escape(self.delimiter)
+        # Spaces are never given back, or a line of spaces would take the cube of its length.
+        spaces = rf"[^\S{sign}]*+"
+        cell = rf'(?:^|{sign}){spaces}"[^"]*+"(?={spaces}(?:$|{sign}))'
+        return re.search(cell, text) is not None
 
     def __str__(self) -> str:
         return "runs of spaces" if self.runs else repr(self.delimiter)

@@ -30,9 +30,11 @@ from imubench_pipeline.readers.batch import Batch, LogFile, RecordingError
 from imubench_pipeline.readers.ubx_frames import Frames
 from imubench_pipeline.readers.wrapping import WrapState, unwrapped
 
-_MEAS, _RAW, _NAV_PVT = b"\x10\x02", b"\x10\x03", b"\x01\x07"
-_KINDS = {_MEAS: "ESF-MEAS", _RAW: "ESF-RAW"}
-_COLUMNS: dict[str, tuple[int, float]] = {
+_MEAS, RAW, _NAV_PVT = b"\x10\x02", b"\x10\x03", b"\x01\x07"
+KINDS = {_MEAS: "ESF-MEAS", RAW: "ESF-RAW"}
+"""The messages that are read, by class and id."""
+
+COLUMNS: dict[str, tuple[int, float]] = {
     "gyro_x": (14, 2.0**-12),
     "gyro_y": (13, 2.0**-12),
     "gyro_z": (5, 2.0**-12),
@@ -41,9 +43,12 @@ _COLUMNS: dict[str, tuple[int, float]] = {
     "accel_z": (18, 2.0**-10),
     "temperature": (12, 1e-2),
 }
-"""Data type of each column, and what one count is in deg/s, m/s^2 or degC."""
+"""Data type of each column, and what one count is in its unit."""
 
-_TICK_MS = 5 / 128
+UNITS = {"gyro": "deg/s", "accel": "m/s^2", "temperature": "degC"}
+"""Unit of each quantity."""
+
+TICK_MS = 5 / 128
 """1/25.6, which float64 holds exactly."""
 
 _BATCH_WORDS = 1 << 17
@@ -62,7 +67,7 @@ class UbxFile(LogFile):
         kind = self._kind()
         self._check_time(kind)
         frames = Frames(self.path, self.findings)
-        words = _Words(kind, self._columns())
+        words = Words(kind, self._columns())
         clock = _Clock(self, kind)
         records = _Records(len(self._columns()))
         rows = 0
@@ -81,7 +86,7 @@ class UbxFile(LogFile):
         self._report(kind, words, frames, rows)
 
     def _batch(
-        self, words: _Words, clock: _Clock, records: _Records, ended: bool
+        self, words: Words, clock: _Clock, records: _Records, ended: bool
     ) -> Iterator[Batch]:
         columns, values, tags, places = words.taken()
         table, stamps = records.grouped(columns, values, clock.stamps(tags, places), ended)
@@ -103,33 +108,33 @@ class UbxFile(LogFile):
 
     def _check_columns(self) -> None:
         for name, source in self.sources.items():
-            if source.column not in _COLUMNS:
+            if source.column not in COLUMNS:
                 raise RecordingError(
                     f"{self.path.name}: no column {source.column!r} for {name}; a UBX log has "
-                    f"{', '.join(_COLUMNS)}; mend 'column' of {name} in the sensor file"
+                    f"{', '.join(COLUMNS)}; mend 'column' of {name} in the sensor file"
                 )
 
     def _check_time(self, kind: bytes) -> None:
         time = self.log.time
         if time is None:
             return
-        known = ("time_tag", "sTtag") if kind == _RAW else ("time_tag",)
+        known = ("time_tag", "sTtag") if kind == RAW else ("time_tag",)
         if time.column not in known:
             raise RecordingError(
-                f"{self.path.name}: no time column {time.column!r}; {_KINDS[kind]} has "
+                f"{self.path.name}: no time column {time.column!r}; {KINDS[kind]} has "
                 f"{' and '.join(known)}; mend 'column' of 'time' in the sensor file"
             )
-        in_ms = kind == _RAW and time.column == "time_tag"
+        in_ms = kind == RAW and time.column == "time_tag"
         if time.format is not None or (in_ms and time.unit != "ms"):
             raise RecordingError(
-                f"{self.path.name}: {time.column} of {_KINDS[kind]} is "
+                f"{self.path.name}: {time.column} of {KINDS[kind]} is "
                 f"{time.format or time.unit} in the sensor file; expected 'unit: ms' of 'time'"
             )
 
     def _kind(self) -> bytes:
         """Return class and id of the one message that the columns are taken from."""
         stated = {source.variable for source in self.sources.values()} - {None}
-        kinds = [key for key, name in _KINDS.items() if name in stated]
+        kinds = [key for key, name in KINDS.items() if name in stated]
         if len(stated) > 1 or len(kinds) != len(stated):
             raise RecordingError(
                 f"{self.path.name}: 'variable' is {', '.join(sorted(map(str, stated)))}; expected "
@@ -137,7 +142,7 @@ class UbxFile(LogFile):
             )
         if kinds:
             return kinds[0]
-        words = {key: _Words(key, self._columns()) for key in _KINDS}
+        words = {key: Words(key, self._columns()) for key in KINDS}
         frames = Frames(self.path, [])
         for number, (key, payload) in enumerate(frames):
             if key in words:
@@ -145,7 +150,7 @@ class UbxFile(LogFile):
             if number % 1000 == 0 and self._told(frames, words):
                 break
         self._told(frames, words)
-        held = [key for key in _KINDS if words[key].present]
+        held = [key for key in KINDS if words[key].present]
         if len(held) == 1:
             return held[0]
         if held:
@@ -157,7 +162,7 @@ class UbxFile(LogFile):
             f"{key.hex(' ')} ({count})" for key, count in frames.right.most_common(10)
         )
         types = ", ".join(
-            f"{_KINDS[key]} with data types {found.types()}"
+            f"{KINDS[key]} with data types {found.types()}"
             for key, found in words.items()
             if found.types()
         )
@@ -169,7 +174,7 @@ class UbxFile(LogFile):
             "mend 'column' in the sensor file"
         )
 
-    def _told(self, frames: Frames, words: dict[bytes, _Words]) -> bool:
+    def _told(self, frames: Frames, words: dict[bytes, Words]) -> bool:
         """Tell whether the log so far says where the columns are."""
         for found in words.values():
             found.taken()
@@ -177,9 +182,9 @@ class UbxFile(LogFile):
 
     # ----------------------------------------------------------------------------- findings
 
-    def _report(self, kind: bytes, words: _Words, frames: Frames, rows: int) -> None:
-        name = _KINDS[kind]
-        absent = [column for column in self._columns() if not words.seen[_COLUMNS[column][0]]]
+    def _report(self, kind: bytes, words: Words, frames: Frames, rows: int) -> None:
+        name = KINDS[kind]
+        absent = [column for column in self._columns() if not words.seen[COLUMNS[column][0]]]
         if rows == 0 or absent:
             raise RecordingError(
                 f"{self.path.name}: found {frames.right[kind]} {name} messages with data types "
@@ -214,26 +219,30 @@ class UbxFile(LogFile):
 
 
 def _types_of(columns: list[str]) -> str:
-    return ", ".join(f"{_COLUMNS[column][0]} ({column})" for column in columns)
+    return ", ".join(f"{COLUMNS[column][0]} ({column})" for column in columns)
 
 
-class _Words:
+class Words:
     """The measurements of the messages read so far that are not yet in a batch.
+
+    Parameters
+    ----------
+    kind : bytes
+        Class and id of the messages.
+    columns : list of str
 
     Attributes
     ----------
     seen : ndarray of int64
         How often each data type was there.
-    present : bool
-        A data type that is wanted was there.
     """
 
     def __init__(self, kind: bytes, columns: list[str]) -> None:
-        self._raw = kind == _RAW
+        self._raw = kind == RAW
         self._place = np.full(256, -1, np.int64)
-        self._scale = np.array([_COLUMNS[column][1] for column in columns])
+        self._scale = np.array([COLUMNS[column][1] for column in columns])
         for place, column in enumerate(columns):
-            self._place[_COLUMNS[column][0]] = place
+            self._place[COLUMNS[column][0]] = place
         self._parts: list[bytes] = []
         self._counts: list[int] = []
         self._tags: list[int] = []
@@ -245,12 +254,15 @@ class _Words:
 
     @property
     def present(self) -> bool:
+        """Whether a data type that is wanted was there."""
         return bool(self.seen[self._place >= 0].any())
 
     def types(self) -> str:
+        """Say which data types were there."""
         return ", ".join(map(str, np.flatnonzero(self.seen)))
 
     def add(self, payload: bytes) -> None:
+        """Take in the measurements of a message."""
         if self._raw:
             count = max(len(payload) - 4, 0) // 8
             self._parts.append(payload[4 : 4 + 8 * count])
@@ -290,7 +302,7 @@ class _Clock:
     def __init__(self, file: UbxFile, kind: bytes) -> None:
         self._file = file
         self._time = file.log.time
-        self._tick = _TICK_MS if kind == _RAW and self._column() == "time_tag" else 1
+        self._tick = TICK_MS if kind == RAW and self._column() == "time_tag" else 1
         self._wraps: float | None = 2.0**32 if kind == _MEAS else None
         if self._time is not None and self._time.wraps is not None:
             self._wraps = self._time.wraps / self._tick

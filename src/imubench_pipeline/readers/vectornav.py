@@ -29,7 +29,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -51,9 +51,11 @@ from imubench_pipeline.readers.vectornav_sentences import (
 from imubench_pipeline.readers.wrapping import WrapState, unwrapped
 
 _LOOKED_AT = 1000
+_NAMES, _LONGEST_NAME = 10, 12
 _ZONE = re.compile(rb"(Z|[+-]\d\d:?\d\d)$")
-_AROUND_STAMP = b" \t,;:|[]()\"'\r\0"
-_HOST, _COUNTER = "host_time", "counter"
+AROUND_STAMP = b" \t,;:|[]()\"'\r\0"
+HOST, COUNTER = "host_time", "counter"
+"""The columns of time."""
 
 
 class VectorNavFile(LogFile):
@@ -109,7 +111,7 @@ class VectorNavFile(LogFile):
         held = [kind for kind in able if kind in present]
         if len(held) == 1:
             return held[0]
-        found = ", ".join(sorted(present)) or "no sentence with a right checksum"
+        found = _listed(present) or "no sentence with a right checksum"
         if not held:
             raise RecordingError(
                 f"{self.path.name}: found {found}; expected one of {', '.join(able)}, each with "
@@ -140,23 +142,23 @@ class VectorNavFile(LogFile):
 
     def _check_time(self) -> None:
         time = self.log.time
-        if time is not None and time.column not in (_HOST, _COUNTER):
+        if time is not None and time.column not in (HOST, COUNTER):
             raise RecordingError(
                 f"{self.path.name}: no time column {time.column!r}; a VectorNav log has "
-                f"{_HOST!r}, a stamp before the '$', and {_COUNTER!r}, the figure after 'T' at "
+                f"{HOST!r}, a stamp before the '$', and {COUNTER!r}, the figure after 'T' at "
                 "the end; mend 'column' of 'time', or drop 'time' and state 'rate'"
             )
 
     def _stamps(self, rows: list[Row]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
         """Return the stamps of some records, and which of them are missing."""
         assert self.log.time is not None
-        if self.log.time.column == _COUNTER:
+        if self.log.time.column == COUNTER:
             texts = [row.counter for row in rows]
         else:
-            texts = [row.before.strip(_AROUND_STAMP) for row in rows]
+            texts = [row.before.strip(AROUND_STAMP) for row in rows]
         if self.log.time.format == "iso8601":
             return _dates(texts)
-        whole = self.log.time.unit == "ns" or self.log.time.column == _COUNTER
+        whole = self.log.time.unit == "ns" or self.log.time.column == COUNTER
         # Nanoseconds since 1970 do not fit into the 53 bits of a float64.
         stamps = np.zeros(len(texts), np.int64 if whole else np.float64)
         missing = np.zeros(len(texts), bool)
@@ -174,7 +176,7 @@ class VectorNavFile(LogFile):
         present = stamps[~missing]
         if not len(present):
             where = (
-                "before the '$'" if self.log.time.column == _HOST else "'T' and a count at the end"
+                "before the '$'" if self.log.time.column == HOST else "'T' and a count at the end"
             )
             raise RecordingError(
                 f"{self.path.name}: no stamp that can be read in the first {len(rows)} sentences; "
@@ -182,7 +184,7 @@ class VectorNavFile(LogFile):
                 f"before {rows[0].body[-40:].decode('ascii', 'replace')!r}; mend 'time' in the "
                 "sensor file, or drop it and state 'rate'"
             )
-        if self.log.time.column == _HOST and self.log.time.unit != "samples":
+        if self.log.time.column == HOST and self.log.time.unit != "samples":
             scale = SECONDS[self.log.time.unit or "ns"] * 1e9
             first = present[0].item()
             self.started = date_of(first if isinstance(first, int) else round(first * scale))
@@ -198,7 +200,7 @@ class VectorNavFile(LogFile):
                 "sensor file right, and the checksum on (register 30)?"
             )
         fate = "left out" if self.log.time is not None else "missing samples"
-        others = ", ".join(sorted(records.others)[:10])
+        others = _listed(records.others)
         self._count(
             records.wrong,
             "wrong_checksum",
@@ -228,6 +230,10 @@ class VectorNavFile(LogFile):
             self.findings.append(
                 Finding(name, severity, f"{self.path.name}: {count} {text}", count)
             )
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(name[:_LONGEST_NAME] for name in sorted(names)[:_NAMES])
 
 
 def _dates(texts: Sequence[bytes]) -> tuple[NDArray[Any], NDArray[np.bool_]]:

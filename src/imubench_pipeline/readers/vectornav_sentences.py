@@ -43,6 +43,16 @@ FIELDS: dict[str, tuple[str, ...]] = {
 }
 """The fields of each sentence that holds angular rate or acceleration."""
 
+UNITS = {
+    **dict.fromkeys(_axes("gyro"), "rad/s"),
+    **dict.fromkeys(_axes("accel", "linear_accel", "inertial_accel"), "m/s^2"),
+    **dict.fromkeys(_ATTITUDE, "deg"),
+    **dict.fromkeys(_axes("mag"), "gauss"),
+    "temperature": "degC",
+    "pressure": "kPa",
+}
+"""The unit that the format fixes for each field that has one."""
+
 
 @dataclass(slots=True)
 class Row:
