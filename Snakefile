@@ -19,8 +19,8 @@ ESTIMATED = ("parameters", "models", "lines", "spectrum", "fixed_bias")
 FOLDERS = [FOLDER.format(sensor=s, recording=r) for s, r in plan.recordings]
 
 
-def as_files(table):
-    return [f"{RESULTS}/tables/{table}.{kind}" for kind in ("parquet", "csv")]
+def as_files(*tables):
+    return [f"{RESULTS}/tables/{t}.{kind}" for t in tables for kind in ("parquet", "csv")]
 
 
 wildcard_constraints:
@@ -105,6 +105,7 @@ rule datasheet:
         quality=FOLDER + "/quality.json",
         allan=FOLDER + "/allan.parquet",
         parameters=FOLDER + "/parameters.parquet",
+        fixed_bias=FOLDER + "/fixed_bias.parquet",
     output:
         FOLDER + "/datasheet.parquet",
     params:
@@ -139,9 +140,10 @@ rule tables:
         datasheet=[f"{folder}/datasheet.parquet" for folder in FOLDERS],
         error_budget=[f"{folder}/error_budget.parquet" for folder in FOLDERS],
     output:
-        [path for table in TABLES if table != "ranking" for path in as_files(table)],
+        as_files(*sorted(set(TABLES) - {"ranking", "coverage", "coverage_by_vendor"})),
     params:
         truths=plan.truths(),
+        catalogue=plan.catalogue(),
         code=plan.code("tables"),
     script:
         "workflow/scripts/tables.py"
@@ -157,6 +159,16 @@ rule ranking:
         code=plan.code("ranking"),
     script:
         "workflow/scripts/ranking.py"
+
+
+rule coverage:
+    output:
+        as_files("coverage", "coverage_by_vendor"),
+    params:
+        catalogue=plan.catalogue(),
+        code=plan.code("coverage"),
+    script:
+        "workflow/scripts/coverage.py"
 
 
 rule report:

@@ -1,15 +1,23 @@
 import math
+from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
-from imubench_pipeline.datasheet import deltas
+from imubench_pipeline.comparable import comparables
+from imubench_pipeline.datasheet import VERDICTS, Delta, bias_deltas, curve_rms, deltas
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.measured import fixed_bias
 from imubench_pipeline.noise import FLOOR, NoiseModel
-from imubench_pipeline.sensor import Datasheet
+from imubench_pipeline.printed import Datasheet
+from imubench_pipeline.sensor import read_sensors
+from tests.conftest import PROJECT
 
 DEG = math.pi / 180
+G = 9.80665
 TAU = np.geomspace(0.01, 1e4, 61)
 
 
@@ -124,3 +132,363 @@ def test_what_is_not_measured_has_its_reason() -> None:
 def test_verdicts(kind: str, measured: float, verdict: str) -> None:
     walk = {"value": 60, "unit": "deg/sqrt(h)", "kind": kind}
     assert rows(sheet(random_walk=walk), estimate(N=measured * DEG))["N", None].verdict == verdict
+
+
+def paper_tables(shared: Path, paper: str) -> dict[str, Any]:
+    papers = yaml.safe_load((shared / "facts/paper_tables.yaml").read_text())["papers"]
+    return next(entry for entry in papers if entry["id"] == paper)
+
+
+def test_table_4_of_the_first_paper_as_printed_and_with_the_root_of_two(shared: Path) -> None:
+    """The manufacturer's column is the density taken for N; one-sided it is √2 too large."""
+    sensor = read_sensors(PROJECT / "config/sensors")["mti_7"]
+    table = paper_tables(shared, "000")["table_4"]["rows"]
+    expected = {"gyro": (-0.30, -0.03), "acc": (-0.20, 0.15)}
+    for row in (row for row in table if row["quantity"] == "N"):
+        channel = {"gyro": "gyro_x", "acc": "accel_x"}[row["sensor"]]
+        found = rows(sensor.datasheet, estimate(N=row["optimised"]), channel)
+        assert found["N", "two-sided"].comparable == pytest.approx(row["manufacturer"], rel=0.02)
+        two_sided, one_sided = expected[row["sensor"]]
+        assert row["optimised"] / row["manufacturer"] - 1 == pytest.approx(two_sided, abs=0.005)
+        assert found["N", "two-sided"].delta == pytest.approx(two_sided, abs=0.02)
+        assert found["N", "one-sided"].delta == pytest.approx(one_sided, abs=0.005)
+    for row in (row for row in table if row["quantity"] == "B"):
+        channel = {"gyro": "gyro_x", "acc": "accel_x"}[row["sensor"]]
+        found = rows(sensor.datasheet, estimate(B=row["optimised"], T_B=90.0), channel)
+        # the paper sets B itself beside the printed minimum; what compares is 0.664 B
+        assert found["plateau", None].comparable == pytest.approx(row["manufacturer"], rel=0.025)
+        assert found["plateau", None].measured == pytest.approx(0.664 * row["optimised"], rel=1e-3)
+
+
+# sensor, table of the means, statistic of the printed offset, and per axis |mean| / printed - 1
+OFFSETS = [
+    ("scc2130", "table_2", "max", {"x": (-0.9019, "as printed")}),
+    (
+        "mpu9250",
+        "table_3",
+        "typ",
+        {
+            "x": (0.0348, "as printed"),
+            "y": (-0.33208, "better than typ"),
+            "z": (0.21868, "worse than typ"),
+        },
+    ),
+    (
+        "bno055",
+        "table_4",
+        "max",
+        {
+            "x": (0.790867, "worse than max"),
+            "y": (0.694100, "worse than max"),
+            "z": (1.121333, "worse than max"),
+        },
+    ),
+]
+
+
+@pytest.mark.parametrize(("name", "table", "kind", "expected"), OFFSETS)
+def test_offsets_of_the_second_paper(
+    shared: Path, name: str, table: str, kind: str, expected: dict[str, tuple[float, str]]
+) -> None:
+    sensor = read_sensors(PROJECT / "config/sensors")[name]
+    printed = paper_tables(shared, "001")[table]["rows"]
+    means = {f"gyro_{row['axis']}": row["fixed_drift"] * DEG for row in printed}
+    assert len(means) == len(expected)
+    for axis, (delta, verdict) in expected.items():
+        listed = list(bias_deltas(sensor.datasheet, f"gyro_{axis}", means, 0.1))
+        row = next(row for row in listed if row.quantity == "offset" and row.kind == kind)
+        assert (row.delta, row.verdict) == (pytest.approx(delta, abs=1e-6), verdict)
+
+
+def test_every_verdict_is_explained() -> None:
+    assert all(VERDICTS.values())
+
+
+@pytest.mark.parametrize(
+    ("kind", "lower", "upper", "verdict"),
+    [
+        ("typ", 1.11, 1.3, "worse than typ"),
+        ("typ", 1.09, 1.3, "not sure"),
+        ("typ", 0.95, 1.05, "as printed"),
+        ("typ", 0.5, 0.89, "better than typ"),
+        ("typ", 0.5, 0.91, "not sure"),
+        ("max", 1.01, 1.2, "worse than max"),
+        ("max", 0.99, 1.2, "not sure"),
+        ("max", 0.1, 0.99, "as printed"),
+    ],
+)
+def test_a_verdict_takes_the_whole_interval(
+    kind: str, lower: float, upper: float, verdict: str
+) -> None:
+    value = (lower + upper) / 2 * DEG
+    found = Estimate(
+        "likelihood",
+        estimate().parameters | {"N": Parameter(value, lower=lower * DEG, upper=upper * DEG)},
+    )
+    walk = {"value": 60, "unit": "deg/sqrt(h)", "kind": kind}
+    row = rows(sheet(random_walk=walk), found)["N", None]
+    assert row.verdict == verdict and row.verdict in VERDICTS
+    assert row.delta_lower == pytest.approx(lower - 1) and row.delta_upper == pytest.approx(
+        upper - 1
+    )
+    assert ("the 95 % interval reaches from" in (row.reason or "")) == (verdict == "not sure")
+
+
+def test_limits_decide_where_there_is_no_value() -> None:
+    printed = {"value": 60, "unit": "deg/sqrt(h)"}
+    for upper, verdict in ((0.5, "better than typ"), (1.0, "not measured"), (2.0, "not measured")):
+        absent = Parameter(None, "absent", "too small to see", 0.0, upper * DEG)
+        found = Estimate("likelihood", estimate().parameters | {"N": absent})
+        row = rows(sheet(random_walk=printed), found)["N", None]
+        assert row.verdict == verdict
+        assert (row.reason or "").startswith("absent: too small to see")
+
+
+def all_rows(datasheet: Datasheet, found: Estimate, channel: str = "gyro_x") -> list[Delta]:
+    return list(deltas(datasheet, channel, found, TAU, 0.1))
+
+
+def test_typical_and_maximum_are_two_rows_with_the_printed_interval() -> None:
+    printed = [
+        {"value": 60, "unit": "deg/sqrt(h)", "kind": "typ"},
+        {"value": 90, "unit": "deg/sqrt(h)", "kind": "max"},
+    ]
+    sensor = Datasheet.model_validate({"gyro": {"random_walk": printed}})
+    found = Estimate(
+        "likelihood",
+        estimate().parameters | {"N": Parameter(1.2 * DEG, lower=1.15 * DEG, upper=1.25 * DEG)},
+    )
+    typical, largest = (row for row in all_rows(sensor, found) if row.statistic == "N")
+    assert (typical.verdict, largest.verdict) == ("worse than typ", "as printed")
+    for row in (typical, largest):
+        assert row.comparable_lower == pytest.approx(DEG)
+        assert row.comparable_upper == pytest.approx(1.5 * DEG)
+        assert row.delta_lower == pytest.approx(1.15 / 1.5 - 1)
+        assert row.delta_upper == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize(
+    ("measured", "verdict"),
+    [(0.5, "better than typ"), (1.2, "as printed"), (1.6, "worse than max")],
+)
+def test_a_printed_range(measured: float, verdict: str) -> None:
+    printed = {"value": [60, 90], "unit": "deg/sqrt(h)", "kind": "range"}
+    row = rows(sheet(random_walk=printed), estimate(N=measured * DEG))["N", None]
+    assert row.verdict == verdict
+    assert (row.printed, row.comparable) == (90.0, pytest.approx(1.5 * DEG))
+    assert row.delta == pytest.approx(measured / 1.5 - 1)
+
+
+def test_figures_of_an_option_are_compared_where_the_logs_have_it() -> None:
+    figures = [
+        {"value": v, "unit": "deg/sqrt(h)", "option": grade} for grade, v in (("A", 60), ("B", 30))
+    ]
+    given = {"gyro": {"random_walk": figures}}
+
+    def noise(*options: str) -> list[Delta]:
+        sensor = Datasheet.model_validate(given | {"options": options})
+        return [row for row in all_rows(sensor, estimate(N=1.0 * DEG)) if row.statistic == "N"]
+
+    (of_grade,) = noise("A")
+    assert (of_grade.printed, of_grade.verdict) == (60.0, "as printed")
+    for options, said in (((), "file does not say what it has"), (("C",), "that is logged has: C")):
+        for row, grade in zip(noise(*options), "AB", strict=True):
+            assert row.verdict == "not comparable (condition)"
+            assert row.comparable is None and row.delta is None
+            assert f"printed for the option {grade}; the sensor {said}" in (row.reason or "")
+            assert row.measured == pytest.approx(DEG)
+
+
+@pytest.mark.parametrize(
+    ("name", "figure", "reason"),
+    [
+        ("random_walk", {"value": 60, "unit": "deg/sqrt(h)", "kind": "min"}, "a least value"),
+        ("rms_noise", {"value": 0.1, "unit": "deg/s rms"}, "without its bandwidth"),
+        ("allan_deviation", {"value": 1, "unit": "deg/h"}, "without its averaging time"),
+    ],
+)
+def test_what_no_static_log_can_be_compared_with(
+    name: str, figure: dict[str, Any], reason: str
+) -> None:
+    row = next(r for r in all_rows(sheet(**{name: figure}), estimate(N=1.0)) if r.printed)
+    assert row.verdict == "not comparable (condition)"
+    assert reason in (row.reason or "")
+
+
+def test_a_figure_by_axis_holds_for_its_axis() -> None:
+    printed = {"value": {"x": 60, "yz": 90}, "unit": "deg/sqrt(h)"}
+    found = estimate(N=1.0 * DEG)
+    for channel, comparable in (("gyro_x", 1.0), ("gyro_y", 1.5), ("gyro_z", 1.5)):
+        row = rows(sheet(random_walk=printed), found, channel)["N", None]
+        assert row.comparable == pytest.approx(comparable * DEG)
+    alone = {"value": {"x": 60}, "unit": "deg/sqrt(h)"}
+    assert rows(sheet(random_walk=alone), found, "gyro_z")["N", None].verdict == "not published"
+
+
+def test_an_rms_over_a_bandwidth_is_compared_as_density() -> None:
+    # 0.1 / √(2 * 47) = 0.010314 °/s/√Hz; with a filter of first order 0.1 / √(2 * 73.827)
+    stated = {"value": 0.1, "unit": "deg/s rms", "bandwidth": "47 Hz"}
+    for figure, N in ((stated, 0.010314212), (stated | {"filter": "first-order"}, 0.00822955)):
+        row = rows(sheet(rms_noise=figure), estimate(N=N * DEG))["N", "one-sided"]
+        assert row.comparable == pytest.approx(N * DEG, rel=1e-6)
+        assert (row.verdict, row.unit) == ("as printed", "deg/s rms")
+
+
+def test_a_power_density_is_compared_by_its_root() -> None:
+    figure = {"value": 4e-6, "unit": "(deg/s)^2/Hz", "sidedness": "two-sided"}
+    row = rows(sheet(noise_density=figure), estimate(N=2e-3 * DEG))["N", "two-sided"]
+    assert row.delta == pytest.approx(0.0, abs=1e-12)
+
+
+def test_an_allan_deviation_is_compared_at_its_averaging_time() -> None:
+    printed = {"value": 0.5, "unit": "deg/h", "tau": "600 s"}
+    value = math.sqrt(600.0) * 0.5 / 3600 * DEG  # N / √600 = 0.5 °/h
+    row = next(r for r in all_rows(sheet(allan_deviation=printed), estimate(N=value)) if r.printed)
+    assert (row.statistic, row.verdict) == ("adev", "as printed")
+    assert row.delta == pytest.approx(0.0, abs=1e-9)
+    beyond = printed | {"tau": "20000 s"}
+    row = next(r for r in all_rows(sheet(allan_deviation=beyond), estimate(N=value)) if r.printed)
+    assert row.verdict == "not measured"
+
+
+def test_the_minimum_has_limits_where_its_parameters_have() -> None:
+    printed = {"value": 10, "unit": "deg/h"}
+    values = {"N": 1e-4, "B": 7e-5, "T_B": 100.0, "K": 3e-6}
+    sure = Estimate(
+        "likelihood",
+        {k: Parameter(v, lower=v / 1.1, upper=v * 1.1) for k, v in values.items()},
+    )
+    row = rows(sheet(bias_instability=printed), sure)["adev_minimum", None]
+    assert row.lower is not None and row.measured is not None and row.upper is not None
+    assert row.lower < row.measured < row.upper
+    # amplitudes 10 % larger make a curve 10 % larger; the correlation time only moves it
+    assert row.upper == pytest.approx(1.1 * row.measured, rel=0.03)
+    unsure = rows(sheet(bias_instability=printed), estimate(**values))["adev_minimum", None]
+    assert (unsure.measured, unsure.lower) == (row.measured, None)
+
+
+def bias_rows(sensor: Datasheet, channel: str, means: dict[str, float]) -> dict[str, Delta]:
+    return {row.quantity: row for row in bias_deltas(sensor, channel, means, 0.1)}
+
+
+def test_the_rotation_of_the_earth_is_not_an_offset() -> None:
+    # 20 °/h measured against 10 °/h at most: up to 15 °/h of it may be the Earth's
+    sensor = sheet(offset={"value": 10, "unit": "deg/h", "kind": "max"})
+    row = bias_rows(sensor, "gyro_x", {"gyro_x": -20 / 3600 * DEG})["offset"]
+    assert row.measured == pytest.approx(20 / 3600 * DEG)
+    assert row.lower == pytest.approx((20 - 15.0411) / 3600 * DEG, rel=1e-4)
+    assert row.verdict == "not sure"
+    row = bias_rows(sensor, "gyro_x", {"gyro_x": 26 / 3600 * DEG})["offset"]
+    assert row.verdict == "worse than max"
+
+
+def test_a_range_of_offsets_is_a_size() -> None:
+    sensor = sheet(offset={"value": [-250, 250], "unit": "deg/h", "kind": "range"})
+    for mean, verdict in ((-200, "as printed"), (0, "as printed"), (-300, "worse than max")):
+        row = bias_rows(sensor, "gyro_x", {"gyro_x": mean / 3600 * DEG})["offset"]
+        assert row.verdict == verdict
+        assert (row.printed, row.delta) == (250.0, pytest.approx(abs(mean) / 250 - 1))
+
+
+def test_what_changes_with_temperature_is_not_compared_with_a_static_log() -> None:
+    sensor = sheet(
+        temperature_total={"value": 30, "unit": "deg/s"},
+        temperature_coefficient={"value": 0.05, "unit": "deg/s/K"},
+        bias_repeatability={"value": 4, "unit": "deg/h"},
+    )
+    found = bias_rows(sensor, "gyro_x", {"gyro_x": 0.1 * DEG})
+    assert found["offset"].verdict == "not published"
+    for name in ("temperature_total", "temperature_coefficient", "bias_repeatability"):
+        assert found[name].verdict == "not comparable (condition)"
+        assert found[name].measured is None and found[name].printed is not None
+
+
+ACCEL = Datasheet.model_validate({"accel": {"offset": {"value": 20, "unit": "mg"}}})
+
+
+def test_gravity_tells_the_offset_of_a_vertical_axis_alone() -> None:
+    means = {"accel_x": 0.05 * G, "accel_y": -0.02 * G, "accel_z": -1.03 * G}
+    norm = G * math.sqrt(0.05**2 + 0.02**2 + 1.03**2)
+    row = bias_rows(ACCEL, "accel_z", means)["offset"]
+    assert row.measured == pytest.approx(norm - G)
+    assert row.lower == pytest.approx(norm - G - 0.027)
+    assert row.verdict == "worse than typ"  # 31.4 mg, of which 2.8 may be local gravity
+    for channel in ("accel_x", "accel_y"):
+        row = bias_rows(ACCEL, channel, means)["offset"]
+        assert row.verdict == "not comparable (condition)"
+        assert "cannot be told from a tilt" in (row.reason or "")
+        assert row.measured is None and row.printed == 20.0
+
+
+@pytest.mark.parametrize(
+    ("means", "reason"),
+    [
+        ({"accel_z": G}, "three axes are needed"),
+        ({"accel_x": 0.1, "accel_y": 0.1, "accel_z": 0.1}, "and not gravity"),
+        ({"accel_x": 6.0, "accel_y": 5.0, "accel_z": 5.9}, "not vertical"),
+    ],
+)
+def test_where_gravity_does_not_tell_the_offset(means: dict[str, float], reason: str) -> None:
+    found = fixed_bias("accel_z", means)
+    assert found.value is None and reason in (found.reason or "")
+
+
+def test_the_distance_of_a_curve_from_the_lines_of_a_datasheet() -> None:
+    density = {"value": 0.01, "unit": "deg/s/sqrt(Hz)", "sidedness": "two-sided"}
+    sensor = sheet(noise_density=density, bias_instability={"value": 36, "unit": "deg/h"})
+    tau = np.array([1.0, 4.0])
+    line = np.array([math.sqrt(1e-4 + 1e-4), math.sqrt(0.25e-4 + 1e-4)]) * DEG
+    (found,) = curve_rms(list(comparables(sensor, "gyro_x")), tau, 10.0 * line)
+    assert found.rms_log10 == pytest.approx(1.0)
+    # 9 times the line: 9 * √((2e-4 + 1.25e-4) / 2) = 0.114728 °/s
+    assert found.rms == pytest.approx(0.114728 * DEG, rel=1e-5)
+    (same,) = curve_rms(list(comparables(sensor, "gyro_x")), tau, line)
+    assert same.rms == pytest.approx(0.0, abs=1e-15)
+
+
+def test_lines_that_a_datasheet_does_not_have() -> None:
+    tau, adev = np.array([1.0, 100.0]), np.array([1.0, 1.0]) * DEG
+    floor = sheet(bias_instability={"value": 3600, "unit": "deg/h"})
+    (found,) = curve_rms(list(comparables(floor, "gyro_x")), tau, adev)
+    assert found.noise is None and found.rms == pytest.approx(0.0, abs=1e-15)
+    both_sides = sheet(noise_density={"value": math.sqrt(2), "unit": "deg/s/sqrt(Hz)"})
+    one, two = curve_rms(list(comparables(both_sides, "gyro_x")), tau[:1], adev[:1])
+    assert (one.noise.sidedness, two.noise.sidedness) == ("one-sided", "two-sided")  # type: ignore[union-attr]
+    assert one.rms == pytest.approx(0.0, abs=1e-15)
+    assert two.rms_log10 == pytest.approx(math.log10(2) / 2)
+    assert curve_rms(list(comparables(sheet(), "gyro_x")), tau, adev) == []
+    for wrong in (adev[:1], 0 * adev):
+        with pytest.raises(ValueError, match="expected as many, and deviations above 0"):
+            curve_rms(list(comparables(floor, "gyro_x")), tau, wrong)
+
+
+def test_typical_figures_make_the_lines() -> None:
+    walk = [
+        {"value": 90, "unit": "deg/sqrt(h)", "kind": "max"},
+        {"value": 60, "unit": "deg/sqrt(h)", "kind": "typ"},
+    ]
+    sensor = Datasheet.model_validate({"gyro": {"random_walk": walk}})
+    (found,) = curve_rms(list(comparables(sensor, "gyro_x")), np.array([1.0]), np.array([DEG]))
+    assert found.noise is not None and found.noise.printed == 60.0
+    largest = Datasheet.model_validate({"gyro": {"random_walk": walk[:1]}})
+    (found,) = curve_rms(list(comparables(largest, "gyro_x")), np.array([1.0]), np.array([DEG]))
+    assert found.noise is not None and found.noise.printed == 90.0
+
+
+def test_every_shipped_datasheet_gives_rows() -> None:
+    means = {f"gyro_{a}": 1e-3 for a in "xyz"} | {"accel_x": 0.1, "accel_y": 0.1, "accel_z": G}
+    found = estimate(N=1e-4, B=1e-4, T_B=10.0, K=1e-6)
+    for sensor in read_sensors(PROJECT / "config/sensors").values():
+        for channel in means:
+            listed = [*all_rows(sensor.datasheet, found, channel)]
+            listed += bias_deltas(sensor.datasheet, channel, means, 0.1)
+            assert {row.verdict for row in listed} <= set(VERDICTS)
+            assert {row.quantity for row in listed} >= {
+                "N",
+                "bias_instability",
+                "K",
+                "T_B",
+                "offset",
+            }
+            for row in listed:
+                assert all(v == v for v in asdict(row).values())  # no NaN

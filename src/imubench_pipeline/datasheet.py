@@ -1,32 +1,37 @@
-"""Figures as printed -> comparable values, and the deltas of what was measured.
+"""The deltas between what is measured and what vendors print.
 
-Two conventions ruin such a comparison. A printed noise density is mostly one-sided, and N is
-that density over sqrt(2); where the datasheet does not say, both readings are given. A printed
-bias instability is the minimum of the curve of Allan deviation, and is compared with the minimum of
-the model's curve. Beside it stands the plateau 0.664 B: the two agree where the curve has a
-plateau, and differ where N and K add to B at the minimum, or the curve dips beside the peak of a
-Gauss-Markov process.
+A verdict needs the whole 95 % interval of what is measured: ``worse than typ`` says that all of
+it lies beyond the printed figure and the tolerance. Where it reaches over a border the verdict is
+``not sure``, and the reason says what the interval leaves open.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
+from imubench_pipeline.comparable import Comparable, bias_comparables, comparables
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.noise import FLOOR
-from imubench_pipeline.sensor import FIGURE_DIMENSIONS, Datasheet, PrintedFigure, quantity_of
-from imubench_pipeline.units import to_si
+from imubench_pipeline.measured import fixed_bias, measured
+from imubench_pipeline.printed import Datasheet
 
-_SIDEDNESS: dict[str, tuple[str, ...]] = {
-    "one-sided": ("one-sided",),
-    "two-sided": ("two-sided",),
-    "unknown": ("one-sided", "two-sided"),
+VERDICTS: dict[str, str] = {
+    "better than typ": "below a typical figure and the tolerance, or below a printed range",
+    "as printed": "at a typical figure, within the tolerance; within a maximum or a range",
+    "worse than typ": "above a typical figure and the tolerance",
+    "worse than max": "above a maximum, or above a range",
+    "not sure": "the 95 % interval reaches over a border between these",
+    "not published": "there is no printed figure",
+    "not measured": "the log does not tell the value",
+    "not comparable (condition)": "the figure holds for what this log does not have",
 }
+"""What a verdict says."""
+
+_TYPICAL = ("typ", "1sigma", "derived")
 
 
 @dataclass(frozen=True)
@@ -38,72 +43,19 @@ class Delta:
     printed: float | None
     unit: str | None
     kind: str | None
+    condition: str | None
     sidedness: str | None
     comparable: float | None
+    comparable_lower: float | None
+    comparable_upper: float | None
     measured: float | None
     lower: float | None
     upper: float | None
     delta: float | None
+    delta_lower: float | None
+    delta_upper: float | None
     verdict: str
     reason: str | None
-
-
-@dataclass(frozen=True)
-class Comparable:
-    """A printed figure in SI, in the convention of the estimate that it is compared with."""
-
-    quantity: str
-    statistic: str
-    figure: PrintedFigure | None
-    sidedness: str | None = None
-    value: float | None = None
-    reason: str | None = None
-
-
-def comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
-    """Yield what a datasheet says of N, bias instability, K and T_B of a channel's quantity.
-
-    Yields
-    ------
-    Comparable
-        In SI; without a figure where the vendor does not publish the quantity.
-    """
-    quantity = quantity_of(channel)
-    figures = getattr(datasheet, quantity)
-    dimensions = FIGURE_DIMENSIONS[quantity]
-
-    def printed(name: str) -> tuple[PrintedFigure | None, float | None]:
-        figure: PrintedFigure | None = getattr(figures, name, None)
-        if figure is None or figure.value is None:
-            return None, None
-        return figure, to_si(figure.value, figure.unit, dimensions[name])
-
-    density, value = printed("noise_density")
-    walk, walk_value = printed("random_walk")
-    if density is not None and value is not None:
-        for sidedness in _SIDEDNESS[density.sidedness]:
-            one_sided = sidedness == "one-sided"
-            assumed = ", assumed: the datasheet does not say" * (density.sidedness == "unknown")
-            yield Comparable(
-                "N",
-                "N",
-                density,
-                sidedness,
-                value / math.sqrt(2.0) if one_sided else value,
-                f"{sidedness} density{assumed}; N is the density{' / sqrt(2)' * one_sided}",
-            )
-    if walk is not None:
-        yield Comparable("N", "N", walk, None, walk_value, "random walk as printed is N")
-    if density is None and walk is None:
-        yield Comparable("N", "N", None)
-    for name, quantity_name, statistic, reason in (
-        ("bias_instability", "bias_instability", "adev_minimum", "minimum of the curve"),
-        ("bias_instability", "bias_instability", "plateau", "the plateau alone: 0.664 B"),
-        ("rate_random_walk", "K", "K", None),
-        ("correlation_time", "T_B", "T_B", None),
-    ):
-        figure, value = printed(name)
-        yield Comparable(quantity_name, statistic, figure, None, value, reason)
 
 
 def deltas(
@@ -132,63 +84,201 @@ def deltas(
         One a printed figure and reading of it; K and T_B are mostly not published.
     """
     for entry in comparables(datasheet, channel):
-        parameter, factor = _measured(entry.statistic, estimate, tau)
-        measured, lower, upper = (
-            None if value is None else value * factor
-            for value in (parameter.value, parameter.lower, parameter.upper)
-        )
-        delta = None
-        if entry.figure is None or entry.value is None:
-            verdict, reason = "not published", "the datasheet does not give it"
-        elif measured is None:
-            verdict = "not measured"
-            reason = f"{parameter.status.replace('_', ' ')}: {parameter.reason}"
+        yield compare(entry, measured(entry, estimate, tau), tolerance)
+
+
+def bias_deltas(
+    datasheet: Datasheet, channel: str, means: Mapping[str, float], tolerance: float
+) -> Iterator[Delta]:
+    """Compare the fixed bias of a recording with the offset that a datasheet prints.
+
+    Parameters
+    ----------
+    datasheet : Datasheet
+    channel : str
+    means : mapping of str to float
+        Mean of every channel of the recording, rad/s or m/s².
+    tolerance : float
+        Relative difference that still counts as printed.
+
+    Yields
+    ------
+    Delta
+        The offset; and what is printed of repeatability and temperature, which one static log
+        cannot be compared with.
+    """
+    bias = fixed_bias(channel, means)
+    for entry in bias_comparables(datasheet, channel):
+        if entry.quantity != "offset":
+            yield compare(entry, Parameter(None), tolerance)
+        elif bias.value is None and entry.figure:
+            hidden = replace(entry, value=None, lower=None, upper=None, obstacle=bias.reason)
+            yield compare(hidden, bias, tolerance)
         else:
-            delta = measured / entry.value - 1.0
-            verdict, reason = _verdict(entry.figure.kind, delta, tolerance), entry.reason or ""
-            if parameter.reason:
-                reason = f"{reason}; {parameter.reason}".lstrip("; ")
-        figure = entry.figure
-        yield Delta(
-            entry.quantity,
-            entry.statistic,
-            figure.value if figure else None,
-            figure.unit if figure else None,
-            figure.kind if figure else None,
-            entry.sidedness,
-            entry.value,
-            measured,
-            lower,
-            upper,
-            delta,
-            verdict,
-            reason or None,
-        )
+            yield compare(entry, bias, tolerance)
 
 
-def _measured(
-    statistic: str, estimate: Estimate, tau: NDArray[np.float64]
-) -> tuple[Parameter, float]:
-    bias = estimate.parameters["B"]
-    if statistic == "plateau" or (statistic == "adev_minimum" and estimate.method == "curve"):
-        return bias, FLOOR  # what is read from the curve is its minimum over 0.664
-    if statistic == "adev_minimum":
-        return _minimum(estimate, tau), 1.0
-    return estimate.parameters[statistic], 1.0
+def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
+    """Compare a printed figure with what was measured.
+
+    Parameters
+    ----------
+    entry : Comparable
+    parameter : Parameter
+        What was measured of it, SI; without limits, its value alone decides.
+    tolerance : float
+        Relative difference from a typical figure that still counts as printed.
+
+    Returns
+    -------
+    Delta
+        ``delta`` is measured / comparable - 1; ``delta_lower`` and ``delta_upper`` are the least
+        and the largest that the interval of the measurement and that of the printed figures
+        allow.
+    """
+    figure = entry.figure
+    value, lower, upper = parameter.value, parameter.lower, parameter.upper
+    row = Delta(
+        quantity=entry.quantity,
+        statistic=entry.statistic,
+        printed=entry.printed,
+        unit=figure.unit if figure else None,
+        kind=figure.kind if figure else None,
+        condition=figure.condition if figure else None,
+        sidedness=entry.sidedness,
+        comparable=entry.value,
+        comparable_lower=entry.lower,
+        comparable_upper=entry.upper,
+        measured=value,
+        lower=lower,
+        upper=upper,
+        delta=None,
+        delta_lower=None,
+        delta_upper=None,
+        verdict="not published",
+        reason=entry.reason,
+    )
+    if figure is None:
+        return row
+    if entry.value is None:
+        return replace(row, verdict="not comparable (condition)", reason=entry.obstacle)
+    if value is None:
+        verdict, reason = _without_a_value(entry, parameter, tolerance)
+        return replace(row, verdict=verdict, reason=reason)
+    row = replace(
+        row,
+        delta=_relative(value, entry.value),
+        delta_lower=_relative(lower, entry.upper),
+        delta_upper=_relative(upper, entry.lower),
+    )
+    low, high = (value, value) if lower is None or upper is None else (lower, upper)
+    least, largest = (_place(entry, end, tolerance) for end in (low, high))
+    reasons = [entry.reason, parameter.reason]
+    if least != largest:
+        reasons.append(f"the 95 % interval reaches from {least!r} to {largest!r}")
+    said = "; ".join(reason for reason in reasons if reason)
+    return replace(row, verdict=least if least == largest else "not sure", reason=said or None)
 
 
-def _minimum(estimate: Estimate, tau: NDArray[np.float64]) -> Parameter:
-    """Return the minimum of the model's curve, if it lies inside the tau of the log."""
-    deviation = np.sqrt(estimate.model.allan_variance(tau))
-    lowest = int(np.argmin(deviation)) if len(tau) else 0
-    if not 0 < lowest < len(tau) - 1:
-        return Parameter(None, "not_shown", "the curve has no minimum inside the log's tau")
-    return Parameter(float(deviation[lowest]))
+def _without_a_value(entry: Comparable, parameter: Parameter, tolerance: float) -> tuple[str, str]:
+    """Return verdict and reason where the log gives limits alone, or nothing."""
+    reason = f"{parameter.status.replace('_', ' ')}: {parameter.reason}"
+    if parameter.upper is not None:
+        least = _place(entry, parameter.lower or 0.0, tolerance)
+        if least == _place(entry, parameter.upper, tolerance) != "as printed":
+            return least, f"{reason}; the limits alone decide"
+    return "not measured", reason
 
 
-def _verdict(kind: str, delta: float, tolerance: float) -> str:
-    if kind == "max":
-        return "worse than max" if delta > 0 else "as printed"
-    if delta > tolerance:
+def _place(entry: Comparable, value: float, tolerance: float) -> str:
+    """Return where one value lies beside a printed figure."""
+    assert entry.figure is not None and entry.value is not None
+    if entry.figure.kind in ("max", "range"):
+        if value > entry.value:
+            return "worse than max"
+        return "better than typ" if value < (entry.least or 0.0) else "as printed"
+    if value > entry.value * (1.0 + tolerance):
         return "worse than typ"
-    return "better than typ" if delta < -tolerance else "as printed"
+    return "better than typ" if value < entry.value * (1.0 - tolerance) else "as printed"
+
+
+def _relative(value: float | None, printed: float | None) -> float | None:
+    """Return the relative difference, where both are there and the printed figure is a size."""
+    if value is None or printed is None or printed <= 0:
+        return None
+    return value / printed - 1.0
+
+
+@dataclass(frozen=True)
+class CurveRms:
+    """How far a measured curve is from the lines of a datasheet.
+
+    Attributes
+    ----------
+    noise, floor : Comparable or None
+        The printed figures that the lines are of.
+    rms : float
+        Root mean square over tau of measured minus printed Allan deviation, rad/s or m/s².
+    rms_log10 : float
+        The same of the difference of log10, decades.
+    """
+
+    noise: Comparable | None
+    floor: Comparable | None
+    rms: float
+    rms_log10: float
+
+
+def curve_rms(
+    printed: Sequence[Comparable], tau: NDArray[np.float64], adev: NDArray[np.float64]
+) -> list[CurveRms]:
+    """Compare a measured curve with the lines N/√τ and bias instability of a datasheet.
+
+    The two add as variances: σ²(τ) = N²/τ + floor². A datasheet that prints one of them gives
+    that line alone, and one that does not say the side of its density gives two curves.
+
+    Parameters
+    ----------
+    printed : sequence of Comparable
+        What `comparable.comparables` gives of a channel. Typical figures are taken where there
+        are any, else the others.
+    tau : ndarray, shape (m,)
+        s.
+    adev : ndarray, shape (m,)
+        Measured Allan deviation, rad/s or m/s².
+
+    Returns
+    -------
+    list of CurveRms
+        One a reading of the noise; empty if the datasheet has no line.
+
+    Raises
+    ------
+    ValueError
+        If the two arrays do not go together, or a deviation is not above 0.
+    """
+    if tau.shape != adev.shape or not tau.size or np.any(adev <= 0):
+        raise ValueError(
+            f"tau of shape {tau.shape} and Allan deviations of shape {adev.shape}; expected as "
+            "many, and deviations above 0"
+        )
+    noises: list[Comparable | None] = [*_lines(printed, "N")]
+    floors: list[Comparable | None] = [*_lines(printed, "adev_minimum")]
+    found = []
+    for noise, floor in product(noises or [None], floors[:1] or [None]):
+        if noise is None and floor is None:
+            continue
+        white = noise.value if noise and noise.value else 0.0
+        bottom = floor.value if floor and floor.value else 0.0
+        line = np.sqrt(white**2 / tau + bottom**2)
+        absolute, relative = adev - line, np.log10(adev / line)
+        rms, rms_log10 = (float(np.sqrt(np.mean(each**2))) for each in (absolute, relative))
+        found.append(CurveRms(noise, floor, rms, rms_log10))
+    return found
+
+
+def _lines(printed: Sequence[Comparable], statistic: str) -> list[Comparable]:
+    """Return the typical figures of a statistic; the others where there are none."""
+    known = [row for row in printed if row.statistic == statistic and row.value is not None]
+    typical = [row for row in known if row.figure and row.figure.kind in _TYPICAL]
+    return typical or known

@@ -37,6 +37,7 @@ STEPS: Mapping[str, tuple[str, ...]] = {
     "datasheet": ("datasheet", "results"),
     "error_budget": ("expected_errors", "results"),
     "ranking": ("selection", "results"),
+    "coverage": ("coverage", "results"),
     "tables": ("results",),
     "report": ("report.page",),
 }
@@ -260,6 +261,12 @@ class Plan:
                 "sensors": self._described("vendor", "model", "price_class"),
                 "requirements": self._requirements(),
             }
+        )
+
+    def catalogue(self) -> str:
+        """Return all sensor files."""
+        return _text(
+            {name: sensor.model_dump(mode="json") for name, sensor in self.sensors.items()}
         )
 
     def truths(self) -> str:

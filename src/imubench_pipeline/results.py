@@ -14,9 +14,12 @@ import pyarrow as pa
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.config import SimulatedRecording
 from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate, Parameter, Status
+from imubench_pipeline.findings import Finding
+from imubench_pipeline.noise import FLOOR
 from imubench_pipeline.pooled import pooled_rows
 from imubench_pipeline.quality.spectral import band_finding, line_findings
-from imubench_pipeline.sensor import quantity_of
+from imubench_pipeline.sensor import Sensor, quantity_of
+from imubench_pipeline.suspicion import suspicious, usual_figures
 from imubench_pipeline.tables import build, read
 
 Row = Mapping[str, Any]
@@ -140,7 +143,9 @@ def _by(table: pa.Table, *names: str) -> dict[tuple[str, ...], pa.Table]:
     return {key: table.filter(pa.array(which == label)) for key, label in labels.items()}
 
 
-def joined_tables(parts: Mapping[str, list[Path]], truths: str) -> dict[str, pa.Table]:
+def joined_tables(
+    parts: Mapping[str, list[Path]], truths: str, catalogue: str
+) -> dict[str, pa.Table]:
     """Join the results of all recordings.
 
     Parameters
@@ -149,11 +154,13 @@ def joined_tables(parts: Mapping[str, list[Path]], truths: str) -> dict[str, pa.
         Files of each table, in the order of the recordings; ``quality`` for the JSON files.
     truths : str
         The simulated recordings, as the plan wrote them.
+    catalogue : str
+        The sensor files, likewise.
 
     Returns
     -------
     dict
-        Every table of `imubench_pipeline.tables.TABLES`.
+        Every table of recordings.
     """
     qualities = [Quality.read(path) for path in parts["quality"]]
     joined = {name: read(name, paths) for name, paths in parts.items() if name != "quality"}
@@ -165,8 +172,9 @@ def joined_tables(parts: Mapping[str, list[Path]], truths: str) -> dict[str, pa.
         pooled_rows(recommended.to_pylist(), joined["fixed_bias"].to_pylist(), devices),
     )
     joined["recordings"] = build("recordings", about)
-    rows = [row for q in qualities for row in q.findings]
-    joined["findings"] = build("findings", [*rows, *spectral_rows(joined)])
+    of_logs = (row for quality in qualities for row in quality.findings)
+    unusual = unusual_rows(recommended.to_pylist(), catalogue)
+    joined["findings"] = build("findings", [*of_logs, *spectral_rows(joined), *unusual])
     joined["simulated_truth"] = build("simulated_truth", truth_rows(truths))
     return joined
 
@@ -181,6 +189,24 @@ def spectral_rows(tables: Mapping[str, pa.Table]) -> Iterator[Row]:
         if row["band"] is not None:
             for finding in band_finding(row["channel"], row["band"], row["band_source"] or ""):
                 yield finding.row(row["sensor"], row["recording"])
+
+
+def unusual_rows(parameters: Iterable[Row], catalogue: str) -> Iterator[Row]:
+    """Yield the rows of the table ``findings`` about estimates far from what vendors print."""
+    usual = usual_figures(sensors_of(catalogue))
+    for row in parameters:
+        if row["parameter"] not in ("N", "B") or row["component"] != 1 or row["value"] is None:
+            continue
+        # What vendors print of B is the minimum of the curve.
+        value = row["value"] * (FLOOR if row["parameter"] == "B" else 1.0)
+        for sentence in suspicious(quantity_of(row["channel"]), {row["parameter"]: value}, usual):
+            finding = Finding("unusual_figure", "warning", sentence, value, row["channel"])
+            yield finding.row(row["sensor"], row["recording"])
+
+
+def sensors_of(catalogue: str) -> dict[str, Sensor]:
+    """Return the sensors as the plan wrote them."""
+    return {name: Sensor.model_validate(one) for name, one in json.loads(catalogue).items()}
 
 
 def truth_rows(truths: str) -> Iterator[Row]:

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
+from imubench_pipeline.printed import Datasheet
 from imubench_pipeline.units import UnitError, conversion, quantity_to_si
 from imubench_pipeline.validation import ConfigError, Frequency, Strict, Text, parse, read_yaml
 
@@ -182,72 +183,6 @@ def _check_unit(unit: str, dimension: str, key: str) -> None:
         conversion(unit, dimension)
     except UnitError as error:
         raise ValueError(f"{key}: {error}") from error
-
-
-class PrintedFigure(Strict):
-    """One figure of a datasheet, as printed."""
-
-    value: float | None = Field(description="null: the document does not give it")
-    unit: str
-    kind: Literal["typ", "max", "min", "1sigma", "derived"] = "typ"
-    sidedness: Literal["one-sided", "two-sided", "unknown"] = Field(
-        "unknown", description="of a noise density: N is the one-sided density over sqrt(2)"
-    )
-    condition: str | None = None
-    evidence: str | None = Field(None, description="where the figure or its sidedness is from")
-
-
-class QuantityDatasheet(Strict):
-    """What a datasheet says of one quantity."""
-
-    noise_density: PrintedFigure | None = Field(None, description="amplitude density, .../sqrt(Hz)")
-    random_walk: PrintedFigure | None = Field(
-        None, description="angle or velocity random walk, deg/sqrt(h) or m/s/sqrt(h): N itself"
-    )
-    bias_instability: PrintedFigure | None = Field(
-        None, description="in-run bias: the minimum of the curve of Allan deviation"
-    )
-    rate_random_walk: PrintedFigure | None = Field(None, description="K")
-    correlation_time: PrintedFigure | None = Field(None, description="T_B")
-    offset: PrintedFigure | None = Field(None, description="zero-rate or zero-g offset")
-    temperature_coefficient: PrintedFigure | None = Field(None, description="offset per kelvin")
-
-
-FIGURE_DIMENSIONS: dict[str, dict[str, str]] = {
-    quantity: {
-        "noise_density": f"{quantity}_density",
-        "random_walk": f"{quantity}_density",
-        "bias_instability": dimension,
-        "rate_random_walk": f"{quantity}_random_walk",
-        "correlation_time": "time",
-        "offset": dimension,
-        "temperature_coefficient": f"{quantity}_temperature_coefficient",
-    }
-    for quantity, dimension in QUANTITIES.items()
-}
-"""Dimension of each datasheet figure, by quantity."""
-
-
-class Datasheet(Strict):
-    """What a vendor prints of a sensor."""
-
-    document: str | None = None
-    gyro: QuantityDatasheet | None = Field(
-        default=QuantityDatasheet(), description="null: the sensor has no gyro"
-    )
-    accel: QuantityDatasheet | None = Field(
-        default=QuantityDatasheet(), description="null: the sensor has no accelerometer"
-    )
-
-    @model_validator(mode="after")
-    def _units(self) -> Datasheet:
-        for quantity, dimensions in FIGURE_DIMENSIONS.items():
-            figures = getattr(self, quantity)
-            for name, dimension in dimensions.items():
-                figure = getattr(figures, name, None)
-                if figure is not None:
-                    _check_unit(figure.unit, dimension, f"{quantity}.{name}.unit")
-        return self
 
 
 class Sensor(Strict):

@@ -1,27 +1,31 @@
-"""Compare the estimates of a recording with its sensor's datasheet."""
+"""Compare the estimates of a recording, and its fixed bias, with its sensor's datasheet."""
 
 import json
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 
-from imubench_pipeline.datasheet import deltas
+from imubench_pipeline.datasheet import bias_deltas, deltas
+from imubench_pipeline.printed import Datasheet
 from imubench_pipeline.results import Quality, Row, curves, estimates
-from imubench_pipeline.sensor import Datasheet
-from imubench_pipeline.tables import write
+from imubench_pipeline.tables import read, write
 
 
 def rows(folder: Path, sensor: str, recording: str, settings: str) -> Iterator[Row]:
     """Yield the rows of the table ``datasheet``; none of a rejected recording."""
     measured = curves(folder / "allan.parquet", Quality.read(folder / "quality.json"))
+    biases = read("fixed_bias", [folder / "fixed_bias.parquet"]).to_pylist()
+    means = {row["channel"]: row["value"] for row in biases}
     given = json.loads(settings)
-    datasheet = Datasheet.model_validate(given["datasheet"])
+    datasheet, tolerance = Datasheet.model_validate(given["datasheet"]), given["tolerance"]
     for channel, by_method in estimates(folder / "parameters.parquet").items():
         tau = measured[channel].up_to(given["longest"])
         names = {"sensor": sensor, "recording": recording, "channel": channel}
         for estimate in by_method:
-            for delta in deltas(datasheet, channel, estimate, tau, given["tolerance"]):
+            for delta in deltas(datasheet, channel, estimate, tau, tolerance):
                 yield names | {"method": estimate.method} | asdict(delta)
+        for delta in bias_deltas(datasheet, channel, means, tolerance):
+            yield names | {"method": "mean"} | asdict(delta)
 
 
 if __name__ == "__main__":

@@ -7,6 +7,6 @@ from imubench_pipeline.tables import write_arrow
 
 if __name__ == "__main__":
     parts = {name: [Path(path) for path in paths] for name, paths in snakemake.input.items()}
-    tables = joined_tables(parts, snakemake.params.truths)
+    tables = joined_tables(parts, snakemake.params.truths, snakemake.params.catalogue)
     for output in map(Path, snakemake.output):
         write_arrow(tables[output.stem], output)

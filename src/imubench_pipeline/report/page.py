@@ -11,6 +11,7 @@ import jinja2
 import pyarrow as pa
 
 from imubench_pipeline.estimators.estimate import FAMILY, PARAMETERS
+from imubench_pipeline.report.coverage import coverage_tables
 from imubench_pipeline.report.figures import (
     channel_figure,
     comparison_figure,
@@ -76,6 +77,7 @@ def render(tables: Mapping[str, pa.Table], settings: Mapping[str, Any]) -> str:
             for view in views
         ],
         deltas=list(_deltas(views, system)),
+        coverage=list(coverage_tables(tables["coverage"].to_pylist())),
         rankings=list(
             rankings(tables["ranking"].to_pylist(), settings["requirements"], simulated, system)
         ),
@@ -205,29 +207,44 @@ def _score_tables(views: list[ChannelView], system: System) -> Iterator[dict[str
 
 
 def _deltas(views: list[ChannelView], system: System) -> Iterator[dict[str, Any]]:
-    symbols = {"N": "N", "bias_instability": "B", "K": "K", "T_B": "T_B"}
+    symbols = {"N": "N", "K": "K", "T_B": "T_B"}
     for view in views:
         rows = []
         for row in view.datasheet:
-            if row["method"] != view.recommended:
+            if row["method"] not in (view.recommended, "mean"):
                 continue
-            unit = page_unit(view.quantity, symbols[row["quantity"]], system)
+            unit = page_unit(view.quantity, symbols.get(row["quantity"], "B"), system)
             published = row["printed"] is not None
+            plain = row["quantity"].replace("_", " ")
             rows.append(
                 {
-                    "quantity": _STATISTIC_NAMES[row["statistic"]],
+                    "quantity": _STATISTIC_NAMES.get(row["statistic"], plain),
                     "printed": f"{row['printed']:g} {row['unit']}" if published else "–",
                     "kind": row["kind"] or "",
+                    "condition": row["condition"] or "",
                     "comparable": unit.text(row["comparable"]),
-                    "measured": unit.text(row["measured"]),
-                    "unit": unit.sign,
-                    "delta": "–" if row["delta"] is None else f"{round(100 * row['delta']):+d} %",
+                    "measured": _with_limits(row, unit.text),
+                    "unit": "" if row["comparable"] is None and not row["measured"] else unit.sign,
+                    "delta": _with_limits(row, _percent, "delta"),
                     "verdict": row["verdict"],
                     "reason": (row["reason"] or "") if published else "",
                 }
             )
         if rows:
             yield {"view": view, "rows": rows}
+
+
+def _percent(share: float | None) -> str:
+    return "–" if share is None else f"{round(100 * share):+d} %"
+
+
+def _with_limits(row: Mapping[str, Any], text: Callable[[float | None], str], of: str = "") -> str:
+    """Return a figure, and its 95 % limits behind it."""
+    value, ends = (of, f"{of}_") if of else ("measured", "")
+    lower, upper = row[f"{ends}lower"], row[f"{ends}upper"]
+    if lower is None or upper is None:
+        return text(row[value])
+    return f"{text(row[value])} ({text(lower)} to {text(upper)})"
 
 
 def _models(views: list[ChannelView]) -> Iterator[dict[str, Any]]:

@@ -1,0 +1,147 @@
+"""What a recording says of the statistics that vendors print figures of."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.comparable import Comparable
+from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.noise import FLOOR
+from imubench_pipeline.units import STANDARD_GRAVITY
+
+_EARTH_RATE = 7.292115e-5
+"""rad/s; its part in the mean of a gyro depends on how the axis stands."""
+
+_LOCAL_GRAVITY = 0.027
+"""m/s²; gravity on the ground differs by less from its standard value."""
+
+_VERTICAL = math.cos(math.radians(15.0))
+_AT_REST = 0.15
+
+
+def measured(entry: Comparable, estimate: Estimate, tau: NDArray[np.float64]) -> Parameter:
+    """Return what an estimate says of the statistic that a printed figure is compared with.
+
+    Parameters
+    ----------
+    entry : Comparable
+    estimate : Estimate
+        In SI.
+    tau : ndarray, shape (m,)
+        Where the log shows the curve well enough for its minimum, s.
+
+    Returns
+    -------
+    Parameter
+        SI. The limits of a point of the curve are at least as wide as 95 %: all amplitudes are
+        taken at the same end of their intervals, each correlation time at either end.
+    """
+    statistic = entry.statistic
+    if statistic == "plateau" or (statistic == "adev_minimum" and estimate.method == "curve"):
+        return _scaled(estimate.parameters["B"], FLOOR)  # what is read there is the minimum/0.664
+    if statistic == "adev_minimum":
+        return _minimum(estimate, tau)
+    if statistic == "adev":
+        return _ordinate(estimate, tau, entry.tau or math.nan)
+    return estimate.parameters[statistic]
+
+
+def _scaled(parameter: Parameter, factor: float) -> Parameter:
+    value, lower, upper = (
+        None if each is None else each * factor
+        for each in (parameter.value, parameter.lower, parameter.upper)
+    )
+    return replace(parameter, value=value, lower=lower, upper=upper)
+
+
+def _minimum(estimate: Estimate, tau: NDArray[np.float64]) -> Parameter:
+    """Return the minimum of the model's curve, if it lies inside the tau of the log."""
+    deviation = np.sqrt(estimate.model.allan_variance(tau))
+    lowest = int(np.argmin(deviation)) if len(tau) else 0
+    if not 0 < lowest < len(tau) - 1:
+        return Parameter(None, "not_shown", "the curve has no minimum inside the log's tau")
+    return _within(float(deviation[lowest]), estimate, tau)
+
+
+def _ordinate(estimate: Estimate, tau: NDArray[np.float64], at: float) -> Parameter:
+    if not len(tau) or not tau[0] <= at <= tau[-1]:
+        return Parameter(None, "not_shown", f"the log does not show the curve at {at:g} s")
+    where = np.array([at])
+    return _within(math.sqrt(float(estimate.model.allan_variance(where)[0])), estimate, where)
+
+
+def _within(value: float, estimate: Estimate, tau: NDArray[np.float64]) -> Parameter:
+    """Give the least of a model's curve the limits that those of its parameters allow."""
+    curves = [np.sqrt(end.model.allan_variance(tau)) for end in _ends(estimate)]
+    if not curves:
+        return Parameter(value)
+    least = [float(curve.min()) for curve in curves]
+    return Parameter(value, lower=min(value, *least), upper=max(value, *least))
+
+
+def _ends(estimate: Estimate) -> Iterator[Estimate]:
+    """Yield the estimate at the ends of its intervals; nothing if one has no interval."""
+    groups = [estimate.parameters, *estimate.further]
+    known = [p for group in groups for p in group.values() if p.in_model]
+    if any(p.lower is None or p.upper is None for p in known):
+        return
+
+    def at(group: Mapping[str, Parameter], amplitudes: str, times: str) -> dict[str, Parameter]:
+        return {
+            name: Parameter(getattr(p, times if name == "T_B" else amplitudes)) if p.in_model else p
+            for name, p in group.items()
+        }
+
+    for ends in product(("lower", "upper"), repeat=2):
+        first, *further = (at(group, *ends) for group in groups)
+        yield replace(estimate, parameters=first, further=further)
+
+
+def fixed_bias(channel: str, means: Mapping[str, float]) -> Parameter:
+    """Return the size of the fixed bias of a channel, as far as a recording at rest shows it.
+
+    That of a gyro is its mean; the rotation of the Earth is in it, up to 15.04 °/h either way.
+    That of an accelerometer is hidden in gravity: on a vertical axis it is the norm of the three
+    axes less that of gravity, with the error of the scale factor in it; on any other axis it
+    cannot be told from a tilt.
+
+    Parameters
+    ----------
+    channel : str
+    means : mapping of str to float
+        Mean of every channel of the recording, rad/s or m/s².
+
+    Returns
+    -------
+    Parameter
+        Without sign, rad/s or m/s²; the limits are those of what is not known of the Earth.
+    """
+    if channel.startswith("gyro"):
+        reason = "mean of the recording; the Earth's rotation is in it, 15 °/h either way at most"
+        return _size(means[channel], _EARTH_RATE, reason)
+    axes = [means.get(f"accel_{axis}") for axis in "xyz"]
+    if any(value is None for value in axes):
+        return Parameter(None, "not_shown", "gravity cannot be taken off: three axes are needed")
+    norm = math.hypot(*(value or 0.0 for value in axes))
+    if abs(norm / STANDARD_GRAVITY - 1.0) > _AT_REST:
+        reason = f"the mean acceleration is {norm:.4g} m/s², and not gravity"
+        return Parameter(None, "not_shown", reason)
+    if abs(means[channel]) < _VERTICAL * norm:
+        reason = "the axis is not vertical: its offset cannot be told from a tilt"
+        return Parameter(None, "not_shown", reason)
+    reason = (
+        "norm of the three axes less standard gravity, with the scale factor error; local gravity "
+        "differs by 0.027 m/s² at most"
+    )
+    return _size(norm - STANDARD_GRAVITY, _LOCAL_GRAVITY, reason)
+
+
+def _size(value: float, unknown: float, reason: str) -> Parameter:
+    size = abs(value)
+    return Parameter(size, "ok", reason, max(size - unknown, 0.0), size + unknown)

@@ -1,0 +1,77 @@
+import math
+from pathlib import Path
+
+import pytest
+import yaml
+
+from imubench_pipeline.sensor import Sensor, read_sensors
+from imubench_pipeline.suspicion import (
+    Usual,
+    printed_figures,
+    suspicious,
+    suspicious_datasheets,
+    usual_figures,
+)
+from imubench_pipeline.validation import parse
+from tests.conftest import PROJECT
+from tests.test_configuration import SENSOR
+
+CATALOGUE = read_sensors(PROJECT / "config/sensors")
+DEG = math.pi / 180
+
+
+def test_the_c102_f9r_as_published_is_probably_in_degrees(shared: Path) -> None:
+    papers = yaml.safe_load((shared / "facts/paper_tables.yaml").read_text())["papers"]
+    published = papers[0]["table_2"]["rows"][1]
+    figures = {"N": published["gyro_N"], "B": published["gyro_B"]}
+    noise, bias = suspicious("gyro", figures, usual_figures(CATALOGUE))
+    assert noise.startswith("gyro N = 0.327 °/s/√Hz is ") and "times the median" in noise
+    assert noise.endswith("is it in degrees, and not rad? It would be 0.0057 °/s/√Hz then")
+    assert bias.startswith("gyro B = 701 °/h is ")
+    assert bias.endswith("is it in degrees, and not rad? It would be 12.2 °/h then")
+    in_degrees = {figure: value * DEG for figure, value in figures.items()}
+    assert suspicious("gyro", in_degrees, usual_figures(CATALOGUE)) == []
+    accel = {"N": published["acc_N"], "B": published["acc_B"]}
+    assert suspicious("accel", accel, usual_figures(CATALOGUE)) == []
+
+
+def test_every_other_sensor_of_the_papers_is_usual() -> None:
+    # MTi-7, SiRRS01-03, and Engers' three read as N = 60 x the printed figure
+    for N in (8.4e-5, 0.0122 * DEG, 0.0045 * DEG, 0.0516 * DEG):
+        assert suspicious("gyro", {"N": N}, usual_figures(CATALOGUE)) == []
+
+
+USUAL = {
+    ("gyro", "N"): Usual(0.005 * DEG, 0.001 * DEG, 9),
+    ("accel", "N"): Usual(1e-3, 4e-4, 9),
+}
+
+
+@pytest.mark.parametrize(
+    ("quantity", "N", "said"),
+    [
+        ("gyro", 0.11 * DEG, "22 times the median of 9 sensors, 0.005 °/s/√Hz: is it in degrees"),
+        ("gyro", 0.099 * DEG, None),
+        ("gyro", 6e-5 * DEG, None),  # below a twentieth of the median, not of the least
+        ("gyro", 4e-5 * DEG, "25 times below the least of 9 sensors, 0.001 °/s/√Hz: is it in rad"),
+        ("accel", 0.98, "is its unit right?"),
+        ("accel", 1.9e-2, None),
+    ],
+)
+def test_twenty_times_off(quantity: str, N: float, said: str | None) -> None:
+    found = suspicious(quantity, {"N": N, "B": 1.0}, USUAL)
+    assert len(found) == (said is not None)
+    assert (said or "") in "".join(found)
+
+
+def with_walk(value: float) -> Sensor:
+    walk = {"value": value, "unit": "deg/sqrt(h)"}
+    return parse(Sensor, SENSOR | {"datasheet": {"gyro": {"random_walk": walk}}}, "s.yaml")
+
+
+def test_a_printed_figure_is_held_against_the_others() -> None:
+    sensors = {f"s{i}": with_walk(0.3) for i in range(5)} | {"odd": with_walk(19.6)}
+    assert printed_figures(sensors["odd"], "gyro") == {"N": pytest.approx(19.6 / 60 * DEG)}
+    assert list(suspicious_datasheets(sensors)) == ["odd"]
+    few = {name: sensors[name] for name in ("s0", "s1", "odd")}
+    assert suspicious_datasheets(few) == {}
