@@ -20,7 +20,9 @@ FOLDERS = [FOLDER.format(sensor=s, recording=r) for s, r in plan.recordings]
 
 
 def as_files(*tables):
-    return [f"{RESULTS}/tables/{t}.{kind}" for t in tables for kind in ("parquet", "csv")]
+    return [
+        f"{RESULTS}/tables/{t}.{kind}" for t in tables for kind in ("parquet", "csv")
+    ]
 
 
 wildcard_constraints:

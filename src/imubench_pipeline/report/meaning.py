@@ -105,35 +105,36 @@ def budget_tables(
     for key in dict.fromkeys((row["sensor"], row["recording"]) for row in own):
         parts = [row for row in own if (row["sensor"], row["recording"]) == key]
         times = list(dict.fromkeys(row["time"] for row in parts))
-        lines = []
+        lines: dict[tuple[str, tuple[float | None, ...]], dict[str, Any]] = {}
+        missing: dict[str, None] = {}
         for error, axis in dict.fromkeys((row["error"], row["axis"]) for row in parts):
             unit = unit_of(DIMENSIONS[error], system)
             chosen = [row for row in parts if (row["error"], row["axis"]) == (error, axis)]
-            lines.append(
-                {
-                    "error": f"{_NAMES[error]} ({unit.sign})",
-                    "axis": axis,
-                    "cells": [
-                        _cell([row for row in chosen if row["time"] == time], unit)
-                        for time in times
-                    ],
-                }
-            )
+            sigmas = tuple(row["sigma"] for row in chosen if row["source"] == "total")
+            if not any(sigmas):
+                missing[f"{_NAMES[error]}: {chosen[0]['reason']}"] = None
+            elif (error, sigmas) in lines:
+                # One channel is the worst and the median.
+                lines[error, sigmas]["axis"] += f", {axis}"
+            else:
+                cells = [_cell([row for row in chosen if row["time"] == t], unit) for t in times]
+                name = f"{_NAMES[error]} ({unit.sign})"
+                lines[error, sigmas] = {"error": name, "axis": axis, "cells": cells}
         yield {
             "sensor": key[0],
             "recording": key[1],
             "simulated": simulated.get(key, False),
             "times": [duration_text(time) for time in times],
-            "lines": lines,
+            "lines": list(lines.values()),
+            "missing": "; ".join(missing),
         }
 
 
 def _cell(rows: Sequence[Row], unit: PageUnit) -> dict[str, Any]:
     """Return an error with its interval, and what it comes of."""
     (total,) = (row for row in rows if row["source"] == "total")
-    if total["sigma"] is None:
-        return {"lines": ["–"], "note": total["reason"] or "", "class": "none"}
-    lines = [_shown(total["error"], total["sigma"], unit), _interval(total, unit)]
+    shown = _shown(total["error"], total["sigma"], unit)
+    lines = [shown, _interval(total, unit)] if shown[0].isdigit() else [shown]
     if total["sigma"] > 0.0:
         parts = [row for row in rows if row["source"] != "total"][:_SHOWN_SOURCES]
         shares = ((row["source"], (row["sigma"] / total["sigma"]) ** 2) for row in parts)
