@@ -37,6 +37,7 @@ localrules:
 rule all:
     input:
         RESULTS + "/report/index.html",
+        RESULTS + "/exports",
 
 
 rule simulate:
@@ -171,6 +172,21 @@ rule coverage:
         code=plan.code("coverage"),
     script:
         "workflow/scripts/coverage.py"
+
+
+rule exports:
+    input:
+        [
+            RESULTS + f"/tables/{t}.parquet"
+            for t in ("recordings", "parameters", "allan")
+        ],
+    output:
+        directory(RESULTS + "/exports"),
+    params:
+        settings=plan.settings("exports"),
+        code=plan.code("exports"),
+    script:
+        "workflow/scripts/exports.py"
 
 
 rule report:

@@ -14,7 +14,7 @@ from pydantic import BaseModel
 
 from imubench_pipeline.config import Run, Simulated
 from imubench_pipeline.sensor import RecordingNotes, Sensor
-from imubench_pipeline.tables import replacing, write_json
+from imubench_pipeline.tables import replacing, write_content, write_json
 from imubench_pipeline.validation import ConfigError, read_yaml
 
 SCHEMAS: dict[str, type[BaseModel]] = {
@@ -61,15 +61,78 @@ def main(arguments: Sequence[str] | None = None) -> int:
     inspecting.add_argument(
         "--output", type=Path, help="where to write the sensor file; default: the terminal"
     )
+    _add_export(commands.add_parser("export", help="write what a filter or simulator loads"))
     given = parser.parse_args(arguments)
     try:
-        status = {"schema": _schema, "check": _check, "inspect": _inspect}[given.command](given)
+        status = _COMMANDS[given.command](given)
         sys.stdout.flush()
         return status
     except BrokenPipeError:
         # Who reads has seen enough, as `head` has; what is left must not be written at the exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return _CLOSED_PIPE
+
+
+def _add_export(exporting: argparse.ArgumentParser) -> None:
+    exporting.add_argument("results", type=Path, help="folder of the results of a run")
+    exporting.add_argument("--sensor", required=True, help="name of the sensor file")
+    exporting.add_argument(
+        "--target", required=True, help="program, such as kalibr; a wrong name lists them all"
+    )
+    exporting.add_argument(
+        "--axis", default="worst", help="worst, median, a device or a recording; default: worst"
+    )
+    exporting.add_argument(
+        "--horizon",
+        type=float,
+        default=60.0,
+        metavar="S",
+        help="time of coasting for which terms that the program lacks are mapped; default: 60",
+    )
+    exporting.add_argument(
+        "--inflate", type=float, default=1.0, metavar="FACTOR", help="multiplies every deviation"
+    )
+    exporting.add_argument("--because", help="reason of --inflate, for the file")
+    exporting.add_argument(
+        "--overbound",
+        action="store_true",
+        help="the smallest model above the upper 95 %% limit of the measured curve",
+    )
+    exporting.add_argument("--method", help="of the estimates; default: the recommended one")
+    exporting.add_argument("--latitude", type=float, metavar="DEG", help="for gravity")
+    exporting.add_argument("--rate", type=float, metavar="HZ", help="default: the recording's")
+    exporting.add_argument("--output", type=Path, help="where to write; default: the terminal")
+
+
+def _export(given: argparse.Namespace) -> int:
+    from imubench_pipeline.export.imu import ExportError
+    from imubench_pipeline.export.request import Request, load, made
+
+    asked = Request(
+        sensor=given.sensor,
+        target=given.target,
+        axis=given.axis,
+        horizon=given.horizon,
+        inflation=given.inflate,
+        because=given.because,
+        overbound=given.overbound,
+        method=given.method,
+        latitude=given.latitude,
+        rate=given.rate,
+    )
+    try:
+        content = made(load(given.results), asked)
+    except ExportError as error:
+        print(error, file=sys.stderr)
+        return 2
+    if given.output is not None:
+        write_content(content, given.output)
+    elif isinstance(content, bytes):
+        print(f"{given.target} is no text; expected --output FILE", file=sys.stderr)
+        return 2
+    else:
+        print(content, end="")
+    return 0
 
 
 def _schema(given: argparse.Namespace) -> int:
@@ -136,3 +199,6 @@ def _inspect(given: argparse.Namespace) -> int:
         sys.stdout.write(found.block)
     print(found.proof.said, file=sys.stderr if given.block else sys.stdout)
     return 0 if found.complete else 1
+
+
+_COMMANDS = {"schema": _schema, "check": _check, "inspect": _inspect, "export": _export}

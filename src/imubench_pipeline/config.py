@@ -16,6 +16,7 @@ from imubench_pipeline.validation import (
     FractionOfLog,
     Frequency,
     Strict,
+    Text,
     parse,
     read_yaml,
 )
@@ -209,6 +210,23 @@ class ErrorBudgetSettings(Strict):
     seed: int = Field(20260101, ge=0)
 
 
+class ExportSettings(Strict):
+    """The files that filters and simulators load, of every sensor."""
+
+    targets: tuple[Text, ...] = Field(
+        ("kalibr", "json"), description="programs; `imubench export` knows their names"
+    )
+    axis: Text = Field("worst", description="worst or median axis, a device or a recording")
+    horizon: Time = Field(
+        "60 s", description="of coasting, for which terms that a program lacks are mapped"
+    )
+    inflation: float = Field(1.0, ge=1, description="multiplies every deviation")
+    because: Text | None = Field(None, description="reason of the inflation, for the files")
+    overbound: bool = Field(
+        False, description="the smallest model above the upper limit of the curve instead"
+    )
+
+
 class ReportSettings(Strict):
     """The report."""
 
@@ -242,6 +260,7 @@ class Run(Strict):
     quality: QualitySettings = QualitySettings()
     datasheet: DatasheetSettings = DatasheetSettings()
     error_budget: ErrorBudgetSettings = ErrorBudgetSettings()
+    exports: ExportSettings = ExportSettings()
     report: ReportSettings = ReportSettings()
 
 

@@ -27,6 +27,7 @@ from imubench_pipeline.units import SI_UNITS, quantity_to_si
 Row = Mapping[str, Any]
 
 _NOTHING = NoiseModel()
+_NAMES = {"gyro": "gyro", "accel": "accelerometer"}
 
 
 @dataclass(frozen=True)
@@ -175,7 +176,7 @@ def error_rows(
             if not any(quantity_of(channel) == quantity for channel in estimates)
         ]
         if missing:
-            reason = f"no {' and no '.join(missing)} in the recording"
+            reason = f"no {' and no '.join(_NAMES[one] for one in missing)} in the recording"
             yield asked | {"source": "total", "reason": reason}
             continue
         chosen = {

@@ -38,6 +38,7 @@ STEPS: Mapping[str, tuple[str, ...]] = {
     "error_budget": ("expected_errors", "results"),
     "ranking": ("selection", "results"),
     "coverage": ("coverage", "results"),
+    "exports": ("export.of_run",),
     "tables": ("results",),
     "report": ("report.page",),
 }

@@ -374,6 +374,12 @@ def read(table: str, paths: Sequence[Path]) -> pa.Table:
     return pa.concat_tables([part.cast(expected) for part in parts] or [expected.empty_table()])
 
 
+def write_content(content: str | bytes, path: Path) -> None:
+    """Write a text or bytes, atomically."""
+    with replacing(path) as temporary:
+        temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
 def write_json(data: object, path: Path) -> None:
     """Write JSON, atomically."""
     with replacing(path) as temporary:

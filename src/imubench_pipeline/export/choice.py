@@ -1,0 +1,160 @@
+"""Which axis stands for a sensor: the worst, the median one, or the worst of a device."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.export.imu import AxisNoise, ExportError
+from imubench_pipeline.results import estimate_of
+
+Row = Mapping[str, Any]
+Key = tuple[str, str]  # recording, channel
+
+WORST, MEDIAN = "worst", "median"
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The axis that was chosen.
+
+    Attributes
+    ----------
+    recording, channel, method : str
+    axis : AxisNoise
+    deviation : float
+        Allan deviation of its model at the horizon, SI.
+    of : int
+        Number of axes it was chosen from.
+    """
+
+    recording: str
+    channel: str
+    method: str
+    axis: AxisNoise
+    deviation: float
+    of: int
+
+
+def choose(
+    rows: Iterable[Row],
+    quantity: str,
+    *,
+    axis: str = WORST,
+    horizon: float = 60.0,
+    devices: Mapping[str, str] | None = None,
+    method: str | None = None,
+) -> Choice:
+    """Choose the axis whose noise stands for a quantity of a sensor.
+
+    Axes are ordered by the Allan deviation of their model at the horizon h: sqrt(2) h times it is
+    the deviation of the angle or velocity after h without a measurement, with a bias averaged over
+    h before. All parameters are those of one axis, never a mix.
+
+    Parameters
+    ----------
+    rows : iterable of mapping
+        Of the table ``parameters``, of one sensor.
+    quantity : {"gyro", "accel"}
+    axis : str
+        ``worst``, ``median`` (of an even number the larger of the two in the middle), or a device
+        or recording, of which the worst.
+    horizon : float
+        s.
+    devices : mapping of str to str, optional
+        The device of each recording.
+    method : str, optional
+        Estimation method; the recommended one by default.
+
+    Returns
+    -------
+    Choice
+
+    Raises
+    ------
+    ExportError
+        If there is no estimate of the quantity, or of the device.
+    """
+    found: dict[tuple[str, str, str], list[Row]] = {}
+    for row in rows:
+        wanted = row["recommended"] if method is None else row["method"] == method
+        if wanted and row["channel"].startswith(f"{quantity}_"):
+            key = (row["recording"], row["channel"], row["method"])
+            found.setdefault(key, []).append(row)
+    named = devices or {}
+    if axis not in (WORST, MEDIAN):
+        devices_there = sorted({named.get(recording, recording) for recording, _, _ in found})
+        found = {
+            key: part for key, part in found.items() if axis in (key[0], named.get(key[0], key[0]))
+        }
+        if not found and devices_there:
+            raise ExportError(
+                f"no {quantity} of device {axis!r}; there are: {', '.join(devices_there)}"
+            )
+    ranked = []
+    for key, part in found.items():
+        estimate = estimate_of(key[2], part)
+        if estimate.model.N > 0.0:
+            deviation = float(np.sqrt(estimate.model.allan_variance(np.array([horizon]))[0]))
+            ranked.append((deviation, key, estimate))
+    if not ranked:
+        raise ExportError(f"no estimate of a {quantity} with white noise")
+    ranked.sort(key=lambda one: one[0])
+    place = len(ranked) // 2 if axis == MEDIAN else len(ranked) - 1
+    deviation, (recording, channel, used), estimate = ranked[place]
+    which = f"the {MEDIAN if axis == MEDIAN else WORST} of {len(ranked)} axes"
+    if len(ranked) == 1:
+        which = "the only axis"
+    whose = "" if axis in (WORST, MEDIAN) else f" of {axis}"
+    unit = {"gyro": "rad", "accel": "m/s"}[quantity]
+    error = math.sqrt(2.0) * horizon * deviation
+    origin = (
+        f"{channel} of recording {recording} by method {used}, {which}{whose} at {horizon:g} s "
+        f"({error:.3g} {unit} there, with a bias averaged as long before)"
+    )
+    noise = AxisNoise(estimate.model, origin, parameter_notes(estimate), _least_walk(estimate))
+    return Choice(recording, channel, used, noise, deviation, len(ranked))
+
+
+def parameter_notes(estimate: Estimate) -> list[str]:
+    """Say what was done with the parameters that have no plain value."""
+    said = []
+    for number, name, parameter in estimate.components():
+        label = name if number == 1 else f"{name} of component {number}"
+        note = _note(parameter)
+        if note:
+            said.append(f"{label} {note}")
+    return said
+
+
+def _note(parameter: Parameter) -> str | None:
+    reason = f" ({parameter.reason})" if parameter.reason else ""
+    status = parameter.status.replace("_", " ")
+    between = ""
+    if parameter.lower is not None and parameter.upper is not None:
+        between = f", 95 % limits {parameter.lower:.3e} to {parameter.upper:.3e}"
+    if parameter.status == "at_bound":
+        return f"is at the end of its search{reason}: {parameter.value:.4e} is used{between}"
+    if parameter.value is not None:
+        return None
+    if parameter.fitted is not None:
+        return f"is {status}{reason}: the fitted {parameter.fitted:.3e} is used{between}"
+    if parameter.upper is not None:
+        return f"is {status}{reason}: 0 in the model; its upper limit is {parameter.upper:.3e}"
+    return None
+
+
+def _least_walk(estimate: Estimate) -> float | None:
+    """Return the upper limit of a K that the model does not have."""
+    K = estimate.parameters.get("K")
+    return K.upper if K is not None and K.in_model is None else None
+
+
+def devices_of(recordings: Sequence[Row]) -> dict[str, str]:
+    """Return the device of each recording, of rows of the table ``recordings`` of one sensor."""
+    return {row["recording"]: row["device"] for row in recordings}

@@ -1,0 +1,78 @@
+"""What stands at the head of every file: where its numbers come from, and their convention."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping, Sequence
+
+from imubench_pipeline.export.imu import Imu
+from imubench_pipeline.export.mapping import Mapped, named
+
+_WIDTH = 96
+
+
+def heading(imu: Imu, program: str, convention: str) -> list[str]:
+    """Return what is to be said of every file.
+
+    Parameters
+    ----------
+    imu : Imu
+    program : str
+        What loads the file.
+    convention : str
+        Of its numbers, in words.
+
+    Returns
+    -------
+    list of str
+        One statement each.
+    """
+    said = [f"Noise of the {imu.sensor} for {program}, by imubench."]
+    if imu.simulated:
+        said.append("The recordings are SIMULATED, not measured.")
+    said.append(convention)
+    units = {"gyro": "rad, s", "accel": "m, s"}
+    estimated = {"gyro": imu.gyro, "accel": imu.accel}
+    for name, axis in imu.axes.items():
+        said.append(f"{name}: {axis.origin}.")
+        terms = named((estimated[name] or axis).model.terms)
+        said.append(f"{name} model ({units[name]}; N two-sided): {terms}.")
+        said += [f"{name}: {note}." for note in axis.notes]
+    if imu.inflation != 1.0:
+        said.append(
+            f"INFLATED: from here on all densities and amplitudes are {imu.inflation:g} times "
+            f"those above, because: {imu.because}."
+        )
+    return said
+
+
+def mapping_words(mapped: Mapping[str, Mapped]) -> list[str]:
+    """Return what was replaced in the models, one statement each."""
+    return [f"{name}: {words}." for name, one in mapped.items() for words in one.words]
+
+
+def commented(statements: Sequence[str], mark: str = "#") -> str:
+    """Return statements as comment lines, each beginning with a mark."""
+    lines = []
+    for statement in statements:
+        wrapped = textwrap.wrap(
+            statement, _WIDTH - len(mark) - 1, subsequent_indent="  ", break_long_words=False
+        )
+        lines += [f"{mark} {line}" for line in wrapped]
+    return "\n".join(lines) + "\n"
+
+
+def setting(key: str, value: str, comment: str, indent: str = "") -> str:
+    """Return a line of YAML with its comment."""
+    return f"{indent}{key}: {value}  # {comment}\n"
+
+
+def number(value: float) -> str:
+    """Return a number as every YAML reader takes it for one: with a point, the exponent signed."""
+    return f"{value:.6e}"
+
+
+def plain(value: float) -> str:
+    """Return a number without an exponent, and with a point."""
+    text = f"{value:.9f}".rstrip("0")
+    return text + "0" if text.endswith(".") else text

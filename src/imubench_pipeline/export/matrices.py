@@ -1,0 +1,193 @@
+"""The matrices of a Kalman filter, as JSON and as ``.npz``.
+
+Every term of a model has its states: none for white noise, one for a Gauss-Markov process and a
+random walk, two for a ramp, a line and quantization noise; flicker noise is a bank of Gauss-Markov
+processes followed up to four times the horizon. Continuous in time
+
+    x' = F x + w, E[w w'] = Q delta, z = H x + v, E[v v'] = R delta,
+
+and in discrete time, exact for the rate,
+
+    x_(k+1) = Phi x_k + w_k, E[w_k w_k'] = Q_d, z_k = H x_k + v_k, E[v_k^2] = R_d,
+
+with mean x0 and covariance P0 of the first x. Quantization noise has no continuous form.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from imubench_pipeline.export.comments import heading
+from imubench_pipeline.export.imu import Imu
+from imubench_pipeline.export.mapping import named
+from imubench_pipeline.noise import (
+    GaussMarkov,
+    NoiseModel,
+    Quantization,
+    Ramp,
+    RandomWalk,
+    Sinusoid,
+    Term,
+    WhiteNoise,
+)
+from imubench_pipeline.noise_terms import Array
+
+FOLLOWED = 4.0
+"""Tau over the horizon up to which flicker noise is followed."""
+
+_CONVENTION = (
+    "SI; densities are two-sided. Continuous: x' = F x + w, z = H x + v with densities Q and R of "
+    "w and v. Discrete at {rate:g} Hz: Phi, Q_d, H, R_d, exact; x0 and P0: mean and covariance of "
+    "the first x."
+)
+
+
+@dataclass(frozen=True)
+class Matrices:
+    """A noise model in continuous and discrete time; m states.
+
+    Attributes
+    ----------
+    F, Q : ndarray, shape (m, m)
+        Continuous in time, without the states of quantization noise.
+    H_continuous : ndarray, shape (m,)
+    R : float
+        Density of the white noise, N^2.
+    Phi, Q_d, P0 : ndarray, shape (m, m)
+    H, x0 : ndarray, shape (m,)
+    R_d : float
+    states : sequence of str
+        What each state of the discrete model belongs to.
+    """
+
+    F: Array
+    Q: Array
+    H_continuous: Array
+    R: float
+    Phi: Array
+    Q_d: Array
+    H: Array
+    R_d: float
+    x0: Array
+    P0: Array
+    states: Sequence[str]
+
+
+def matrices(model: NoiseModel, rate: float, horizon: float) -> Matrices:
+    """Return the matrices of a model.
+
+    Parameters
+    ----------
+    model : NoiseModel
+    rate : float
+        Hz.
+    horizon : float
+        s; flicker noise is followed up to four times this.
+    """
+    longest = max(FOLLOWED * horizon, 4.0 / rate)
+    terms = model.realised(1.0 / rate, longest)
+    discrete = model.state_space(rate, longest)
+    continuous = [_continuous(term) for term in terms if not isinstance(term, Quantization)]
+    nothing = np.zeros((0, 0))
+    return Matrices(
+        F=block_diag(nothing, *(F for F, _, _ in continuous)),
+        Q=block_diag(nothing, *(Q for _, Q, _ in continuous)),
+        H_continuous=np.concatenate([np.zeros(0), *(H for _, _, H in continuous)]),
+        R=sum(term.N**2 for term in terms if isinstance(term, WhiteNoise)),
+        Phi=discrete.transition,
+        Q_d=discrete.process_noise,
+        H=discrete.output,
+        R_d=discrete.measurement_noise,
+        x0=discrete.initial_mean,
+        P0=discrete.initial_variance,
+        states=[named([t]) for t in terms for _ in t.state_space(1.0 / rate).output],
+    )
+
+
+def _continuous(term: Term) -> tuple[Array, Array, Array]:
+    """Return F, Q and H of a term."""
+    if isinstance(term, GaussMarkov):
+        return np.array([[-1.0 / term.T_B]]), np.array([[term.density]]), np.ones(1)
+    if isinstance(term, RandomWalk):
+        return np.zeros((1, 1)), np.array([[term.K**2]]), np.ones(1)
+    if isinstance(term, Ramp):
+        return np.array([[0.0, 1.0], [0.0, 0.0]]), np.zeros((2, 2)), np.array([1.0, 0.0])
+    if isinstance(term, Sinusoid):
+        speed = 2.0 * math.pi * term.frequency
+        return np.array([[0.0, speed], [-speed, 0.0]]), np.zeros((2, 2)), np.array([1.0, 0.0])
+    return np.zeros((0, 0)), np.zeros((0, 0)), np.zeros(0)
+
+
+def write_json(imu: Imu) -> str:
+    """Return all matrices of gyro and accelerometer, as far as there are estimates, as JSON.
+
+    Parameters
+    ----------
+    imu : Imu
+    """
+    content: dict[str, object] = {
+        "about": heading(imu, "any Kalman filter", _CONVENTION.format(rate=imu.rate)),
+        "sensor": imu.sensor,
+        "rate": imu.rate,
+        "horizon": imu.horizon,
+        "gravity": imu.gravity,
+        "inflation": imu.inflation,
+    }
+    for name, axis in imu.axes.items():
+        found = matrices(axis.model, imu.rate, imu.horizon)
+        content[name] = {
+            "model": axis.model.name,
+            "unit": {"gyro": "rad/s", "accel": "m/s^2"}[name],
+            "parameters": _parameters(axis.model),
+            "states": list(found.states),
+            "continuous": {
+                "F": found.F.tolist(),
+                "Q": found.Q.tolist(),
+                "H": found.H_continuous.tolist(),
+                "R": found.R,
+            },
+            "discrete": {
+                "Phi": found.Phi.tolist(),
+                "Q_d": found.Q_d.tolist(),
+                "H": found.H.tolist(),
+                "R_d": found.R_d,
+                "x0": found.x0.tolist(),
+                "P0": found.P0.tolist(),
+            },
+        }
+    return json.dumps(content, indent=1, allow_nan=False) + "\n"
+
+
+def _parameters(model: NoiseModel) -> dict[str, object]:
+    found: dict[str, object] = {name: getattr(model, name) for name in ("Q", "N", "B", "K", "R")}
+    found["T_B"] = model.T_B
+    found["further"] = [{"B": part.B, "T_B": part.T_B} for part in model.further]
+    found["sinusoids"] = [
+        {"amplitude": part.amplitude, "frequency": part.frequency} for part in model.sinusoids
+    ]
+    return found
+
+
+def write_npz(imu: Imu) -> bytes:
+    """Return the same matrices as NumPy arrays, such as ``gyro_Phi``, and ``about``.
+
+    Parameters
+    ----------
+    imu : Imu
+    """
+    arrays: dict[str, Array] = {"rate": np.array(imu.rate), "horizon": np.array(imu.horizon)}
+    for name, axis in imu.axes.items():
+        found = matrices(axis.model, imu.rate, imu.horizon)
+        for key in ("F", "Q", "H_continuous", "R", "Phi", "Q_d", "H", "R_d", "x0", "P0"):
+            arrays[f"{name}_{key}"] = np.asarray(getattr(found, key))
+    about = np.array(heading(imu, "any Kalman filter", _CONVENTION.format(rate=imu.rate)))
+    stream = io.BytesIO()
+    np.savez(stream, about=about, **arrays)  # type: ignore[arg-type]
+    return stream.getvalue()

@@ -1,0 +1,66 @@
+"""OpenVINS: ``kalibr_imu_chain.yaml``.
+
+The densities are Kalibr's: continuous in time, two-sided. The propagation takes sigma^2 / dt for
+the white noise and sigma^2 dt for the biases. Extrinsics and intrinsics of the sensor, which the
+file also holds, are the identity here.
+
+Sources: rpng/open_vins, config/euroc_mav/kalibr_imu_chain.yaml (form and names),
+ov_msckf/src/utils/NoiseManager.h (units), ov_msckf/src/state/Propagator.cpp (discretisation).
+"""
+
+from __future__ import annotations
+
+from imubench_pipeline.export.comments import (
+    commented,
+    heading,
+    mapping_words,
+    plain,
+    setting,
+)
+from imubench_pipeline.export.imu import Imu
+from imubench_pipeline.export.kalibr import CONVENTION, densities, positive, walks
+
+
+def write(imu: Imu, topic: str = "/imu0") -> str:
+    """Return ``kalibr_imu_chain.yaml``.
+
+    Parameters
+    ----------
+    imu : Imu
+    topic : str
+        ROS topic of the samples.
+
+    Raises
+    ------
+    ExportError
+        If gyro or accelerometer has no estimate, or a density is 0.
+    """
+    mapped = walks(imu)
+    positive(mapped, "OpenVINS")
+    about = [
+        *heading(imu, "OpenVINS", CONVENTION),
+        *mapping_words(mapped),
+        "Extrinsics and intrinsics (T_i_b, Tw, Ta, Tg, R_*) are those of an ideal sensor.",
+    ]
+    indent = "  "
+    return (
+        "%YAML:1.0\n\n"
+        + commented(about)
+        + "imu0:\n"
+        + _matrix("T_i_b", 4)
+        + densities(mapped, indent)
+        + setting("rostopic", topic, "of sensor_msgs/Imu", indent)
+        + setting("time_offset", plain(0.0), "s", indent)
+        + setting("update_rate", plain(imu.rate), "Hz", indent)
+        + setting("model", '"kalibr"', "of the intrinsics", indent)
+        + "".join(_matrix(name, 3) for name in ("Tw", "R_IMUtoGYRO", "Ta", "R_IMUtoACC"))
+        + _matrix("Tg", 3, one="0.0")
+    )
+
+
+def _matrix(name: str, size: int, one: str = "1.0") -> str:
+    rows = [
+        "    - [" + ", ".join(one if i == j else "0.0" for j in range(size)) + "]\n"
+        for i in range(size)
+    ]
+    return f"  {name}:\n" + "".join(rows)

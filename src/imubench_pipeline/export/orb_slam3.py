@@ -1,0 +1,59 @@
+"""ORB-SLAM3: the lines ``IMU.*`` of its settings.
+
+``IMU.NoiseGyro`` and ``IMU.NoiseAcc`` are N, ``IMU.GyroWalk`` and ``IMU.AccWalk`` K: continuous in
+time; the tracking multiplies the first by sqrt(IMU.Frequency) and divides the second by it. Each
+must be written as a real number, the frequency too, or the program ends.
+
+Sources: UZ-SLAMLab/ORB_SLAM3, src/Settings.cc (readIMU, readParameter<float>), src/Tracking.cc
+(``IMU::Calib(Tbc, Ng*sf, Na*sf, Ngw/sf, Naw/sf)`` and the units it prints), src/ImuTypes.cc
+(the propagation).
+"""
+
+from __future__ import annotations
+
+from imubench_pipeline.export.comments import (
+    commented,
+    heading,
+    mapping_words,
+    number,
+    plain,
+    setting,
+)
+from imubench_pipeline.export.imu import Imu
+from imubench_pipeline.export.kalibr import positive, walks
+
+_CONVENTION = (
+    "N as IMU.Noise* and K as IMU.*Walk: continuous in time, two-sided, SI; the program itself "
+    "multiplies by the root of IMU.Frequency, or divides by it."
+)
+
+
+def write(imu: Imu) -> str:
+    """Return the lines of the settings that concern the noise of the sensor.
+
+    Parameters
+    ----------
+    imu : Imu
+
+    Raises
+    ------
+    ExportError
+        If gyro or accelerometer has no estimate, or a density is 0: the walks are inverted.
+    """
+    mapped = walks(imu)
+    positive(mapped, "ORB-SLAM3")
+    gyro, accel = mapped["gyro"].model, mapped["accel"].model
+    about = [
+        *heading(imu, "ORB-SLAM3", _CONVENTION),
+        *mapping_words(mapped),
+        "These lines go into the settings of the camera, beside IMU.T_b_c1.",
+    ]
+    return (
+        "%YAML:1.0\n\n"
+        + commented(about)
+        + setting("IMU.NoiseGyro", number(gyro.N), "N, rad/s/sqrt(Hz)")
+        + setting("IMU.NoiseAcc", number(accel.N), "N, m/s^2/sqrt(Hz)")
+        + setting("IMU.GyroWalk", number(gyro.K), "K, rad/s^2/sqrt(Hz)")
+        + setting("IMU.AccWalk", number(accel.K), "K, m/s^3/sqrt(Hz)")
+        + setting("IMU.Frequency", plain(imu.rate), "Hz")
+    )

@@ -1,0 +1,85 @@
+"""PX4: parameters of its estimator EKF2, as a file that QGroundControl loads.
+
+``EKF2_GYR_NOISE`` and ``EKF2_ACC_NOISE`` are deviations a step of the filter, not densities: a step
+of dt adds (dt noise)^2 to the variance of the angle or velocity increment, and (dt noise)^2 with
+``EKF2_GYR_B_NOISE`` and ``EKF2_ACC_B_NOISE`` to that of the bias. With N^2 dt and K^2 dt
+
+    EKF2_GYR_NOISE = N / sqrt(dt),   EKF2_GYR_B_NOISE = K / sqrt(dt),
+
+where dt is EKF2_PREDICT_US, 10 ms by default and whatever the rate of the sensor. The parameters
+have ranges; values outside are set to their end, and said.
+
+Sources: PX4/PX4-Autopilot, src/modules/ekf2/EKF/covariance.cpp (predictCovariance),
+src/modules/ekf2/EKF/python/ekf_derivation/derivation.py (predict_covariance),
+src/modules/ekf2/module.yaml, params_gyro_bias.yaml and params_accel_bias.yaml (units, ranges,
+EKF2_PREDICT_US); QGroundControl developer guide, "Parameters File Format".
+"""
+
+from __future__ import annotations
+
+import math
+
+from imubench_pipeline.export.comments import commented, heading, mapping_words
+from imubench_pipeline.export.imu import ExportError, Imu
+from imubench_pipeline.export.kalibr import walks
+
+PERIOD = 10_000
+"""EKF2_PREDICT_US by default, us."""
+
+_PERIODS = (1_000, 20_000)
+_RANGES = {
+    "EKF2_ACC_NOISE": (0.01, 1.0),
+    "EKF2_GYR_NOISE": (1e-4, 0.1),
+    "EKF2_ACC_B_NOISE": (0.0, 0.01),
+    "EKF2_GYR_B_NOISE": (0.0, 0.01),
+}
+_REAL, _INTEGER = 9, 6  # MAV_PARAM_TYPE
+
+_CONVENTION = (
+    "Noise a step of the filter of {step:g} ms: N / sqrt(dt) and K / sqrt(dt), dt = "
+    "EKF2_PREDICT_US; N and K are two-sided densities, SI. They hold for this EKF2_PREDICT_US "
+    "only. They are what the sensor alone makes, at rest: vibration in flight adds to it, and the "
+    "defaults of PX4 allow for that."
+)
+
+
+def write(imu: Imu, period: int = PERIOD) -> str:
+    """Return a parameter file.
+
+    Parameters
+    ----------
+    imu : Imu
+    period : int
+        EKF2_PREDICT_US, us.
+
+    Raises
+    ------
+    ExportError
+        If gyro or accelerometer has no estimate, or the period is outside its range.
+    """
+    if not _PERIODS[0] <= period <= _PERIODS[1]:
+        raise ExportError(f"EKF2_PREDICT_US is {period}, expected {_PERIODS[0]} to {_PERIODS[1]}")
+    mapped = walks(imu)
+    gyro, accel = mapped["gyro"].model, mapped["accel"].model
+    step = math.sqrt(period * 1e-6)
+    values = {
+        "EKF2_ACC_B_NOISE": (accel.K / step, "m/s^3, from K"),
+        "EKF2_ACC_NOISE": (accel.N / step, "m/s^2, from N"),
+        "EKF2_GYR_B_NOISE": (gyro.K / step, "rad/s^2, from K"),
+        "EKF2_GYR_NOISE": (gyro.N / step, "rad/s, from N"),
+    }
+    about = heading(imu, "PX4 EKF2", _CONVENTION.format(step=period / 1000.0))
+    about += mapping_words(mapped)
+    rows = []
+    for name, (value, comment) in values.items():
+        low, high = _RANGES[name]
+        kept = min(max(value, low), high)
+        if kept != value:
+            about.append(
+                f"{name}: {value:.4g} is outside the range of {low:g} to {high:g}; {kept:g} is set."
+            )
+        about.append(f"{name} = {kept:.6g} {comment}.")
+        rows.append(f"1\t1\t{name}\t{kept:.9g}\t{_REAL}\n")
+    rows.append(f"1\t1\tEKF2_PREDICT_US\t{period}\t{_INTEGER}\n")
+    columns = "# Vehicle-Id Component-Id Name Value Type\n"
+    return commented(["Onboard parameters for Vehicle 1", *about]) + columns + "".join(rows)

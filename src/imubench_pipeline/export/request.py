@@ -1,0 +1,189 @@
+"""From the tables of a run to the file of a program."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from imubench_pipeline.allan import AllanCurve
+from imubench_pipeline.export.choice import WORST, Choice, choose, devices_of
+from imubench_pipeline.export.imu import AxisNoise, ExportError, Imu, normal_gravity
+from imubench_pipeline.export.mapping import named
+from imubench_pipeline.export.targets import TARGETS
+from imubench_pipeline.overbound import Family, overbound
+from imubench_pipeline.tables import read
+from imubench_pipeline.units import STANDARD_GRAVITY
+
+Tables = Mapping[str, pa.Table]
+
+NEEDED = ("recordings", "parameters", "allan")
+"""The tables that a request reads."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """What a file is to be made of.
+
+    Attributes
+    ----------
+    sensor, target : str
+    axis : str
+        ``worst``, ``median``, a device or a recording (`imubench_pipeline.export.choice`).
+    horizon : float
+        s.
+    inflation : float
+    because : str or None
+        Reason of the inflation.
+    overbound : bool
+        The smallest model that lies above the measured curve, in place of the fitted one.
+    method : str or None
+        Estimation method; None: the recommended one.
+    latitude : float or None
+        Degrees: for gravity; None: standard gravity.
+    rate : float or None
+        Of the samples that the program will get, Hz; None: that of the recording.
+    """
+
+    sensor: str
+    target: str
+    axis: str = WORST
+    horizon: float = 60.0
+    inflation: float = 1.0
+    because: str | None = None
+    overbound: bool = False
+    method: str | None = None
+    latitude: float | None = None
+    rate: float | None = None
+
+
+def load(path: Path) -> dict[str, pa.Table]:
+    """Read the tables of a run.
+
+    Parameters
+    ----------
+    path : Path
+        Folder of the results, or the folder ``tables`` in it.
+
+    Raises
+    ------
+    ExportError
+        If a table is missing or of another form.
+    """
+    folder = path / "tables" if (path / "tables").is_dir() else path
+    try:
+        return {name: read(name, [folder / f"{name}.parquet"]) for name in NEEDED}
+    except (OSError, ValueError) as error:
+        raise ExportError(f"{folder}: {error}") from error
+
+
+def made(tables: Tables, request: Request) -> str | bytes:
+    """Return the content of the file.
+
+    Parameters
+    ----------
+    tables : mapping of str to pyarrow.Table
+        ``recordings``, ``parameters`` and ``allan`` of a run.
+    request : Request
+
+    Raises
+    ------
+    ExportError
+        If the sensor or target is not known, or the target cannot hold what there is.
+    """
+    if request.target not in TARGETS:
+        raise ExportError(
+            f"target {request.target!r} is not known; there are: {', '.join(TARGETS)}"
+        )
+    return TARGETS[request.target].write(imu_of(tables, request))
+
+
+def imu_of(tables: Tables, request: Request) -> Imu:
+    """Return the sensor's noise as a request asks for it (see `made`)."""
+    recordings = _rows(tables["recordings"], sensor=request.sensor)
+    if not recordings:
+        there = sorted(set(tables["recordings"]["sensor"].to_pylist()))
+        raise ExportError(f"no sensor {request.sensor!r}; there are: {', '.join(there)}")
+    by_name = {row["recording"]: row for row in recordings}
+    rows = _rows(tables["parameters"], sensor=request.sensor)
+    axes: dict[str, AxisNoise] = {}
+    rates: list[float] = []
+    simulated = False
+    for quantity in ("gyro", "accel"):
+        if not any(row["channel"].startswith(f"{quantity}_") for row in rows):
+            continue
+        choice = choose(
+            rows,
+            quantity,
+            axis=request.axis,
+            horizon=request.horizon,
+            devices=devices_of(recordings),
+            method=request.method,
+        )
+        about = by_name[choice.recording]
+        simulated = simulated or bool(about["simulated"])
+        rates.append(float(about["rate"]))
+        axes[quantity] = choice.axis
+        if request.overbound:
+            family = TARGETS[request.target].family
+            axes[quantity] = _bounded(
+                tables["allan"], choice, request, float(about["rate"]), family
+            )
+    if not axes:
+        raise ExportError(f"{request.sensor}: no estimate")
+    gravity = STANDARD_GRAVITY if request.latitude is None else normal_gravity(request.latitude)
+    return Imu(
+        sensor=request.sensor,
+        rate=request.rate or max(rates),
+        gyro=axes.get("gyro"),
+        accel=axes.get("accel"),
+        horizon=request.horizon,
+        gravity=gravity,
+        inflation=request.inflation,
+        because=request.because,
+        simulated=simulated,
+    )
+
+
+def _bounded(
+    allan: pa.Table, choice: Choice, request: Request, rate: float, family: Family
+) -> AxisNoise:
+    """Return the smallest model above the measured curve of the axis that was chosen."""
+    curve = curve_of(
+        _rows(allan, sensor=request.sensor, recording=choice.recording, channel=choice.channel)
+    )
+    try:
+        found = overbound(curve, choice.axis.model, rate, family=family, horizon=request.horizon)
+    except ValueError as error:
+        raise ExportError(f"{choice.channel} of {choice.recording}: {error}") from error
+    fitted = f"the fitted model was: {named(choice.axis.model.terms)}"
+    return replace(choice.axis, model=found.model, notes=[found.words, fitted, *choice.axis.notes])
+
+
+def curve_of(rows: list[dict[str, Any]]) -> AllanCurve:
+    """Return the curve of rows of the table ``allan`` of one channel.
+
+    Raises
+    ------
+    ExportError
+        If there is none.
+    """
+    if not rows:
+        raise ExportError("the channel has no Allan variance")
+    return AllanCurve(
+        tau=np.array([row["tau"] for row in rows]),
+        cluster_size=np.array([row["cluster_size"] for row in rows], dtype=np.int64),
+        variance=np.array([row["adev"] for row in rows]) ** 2,
+        edf=np.array([row["edf"] for row in rows]),
+    )
+
+
+def _rows(table: pa.Table, **wanted: str) -> list[dict[str, Any]]:
+    for name, value in wanted.items():
+        table = table.filter(pc.equal(table[name], value))
+    return list(table.to_pylist())

@@ -1,0 +1,98 @@
+"""Python that needs NumPy alone: the matrices of the noise at any rate, and a prediction.
+
+Held are white noise, Gauss-Markov processes, a random walk, and flicker noise as a bank of
+Gauss-Markov processes (`imubench_pipeline.flicker`) from the period of the samples to four times
+the horizon. Ramps, lines and quantization noise are not.
+"""
+
+from __future__ import annotations
+
+from imubench_pipeline.export.comments import commented, heading, mapping_words
+from imubench_pipeline.export.imu import Imu
+from imubench_pipeline.export.mapping import Mapped, named
+from imubench_pipeline.export.matrices import FOLLOWED
+from imubench_pipeline.noise import GaussMarkov, NoiseModel, RandomWalk, WhiteNoise
+
+_CONVENTION = (
+    "White noise and random walk by their two-sided densities N^2 and K^2, Gauss-Markov processes "
+    "by the density S_B of their drive and T_B: SI, continuous in time; the matrices are exact at "
+    "any rate."
+)
+
+_PROGRAM = '''
+import numpy as np
+
+RATE = {rate!r}  # Hz
+HORIZON = {horizon!r}  # s
+NOISE = {{
+{noise}}}
+
+
+def matrices(noise, rate):
+    """Return Phi, Q_d, H, R_d, x0 and P0: x' = Phi x + w, z = H x + v."""
+    dt = 1.0 / rate
+    density, time = np.array(noise["gauss_markov"]).reshape(-1, 2).T
+    stationary = density * time / 2.0
+    phi = np.append(np.exp(-dt / time), 1.0)
+    drive = np.append(-stationary * np.expm1(-2.0 * dt / time), noise["walk"] * dt)
+    start = np.append(stationary, 0.0)
+    one = np.ones(len(phi))
+    return np.diag(phi), np.diag(drive), one, noise["white"] / dt, 0.0 * one, np.diag(start)
+
+
+def propagate(x, P, noise, rate, steps):
+    """Return mean and covariance of (integral, states) after steps without a measurement.
+
+    ``x`` and ``P`` begin with the integral of the noise: angle, or velocity.
+    """
+    Phi, Q_d, H, R_d, _, _ = matrices(noise, rate)
+    m = len(H)
+    A = np.eye(1 + m)
+    A[0, 1:], A[1:, 1:] = H / rate, Phi
+    Q = np.zeros((1 + m, 1 + m))
+    Q[0, 0], Q[1:, 1:] = R_d / rate**2, Q_d
+    for _ in range(steps):
+        x, P = A @ x, A @ P @ A.T + Q
+    return x, P
+
+
+if __name__ == "__main__":
+    for name, noise in NOISE.items():
+        size = 1 + len(matrices(noise, RATE)[2])
+        _, P = propagate(
+            np.zeros(size), np.zeros((size, size)), noise, RATE, round(HORIZON * RATE)
+        )
+        print(name, repr(float(np.sqrt(P[0, 0]))), noise["integral"], "after", HORIZON, "s")
+'''
+
+
+def write(imu: Imu) -> str:
+    """Return the program.
+
+    Parameters
+    ----------
+    imu : Imu
+    """
+    entries = ""
+    left_out: dict[str, Mapped] = {}
+    for name, axis in imu.axes.items():
+        model = axis.model
+        held = NoiseModel(N=model.N, B=model.B, T_B=model.T_B, K=model.K, further=model.further)
+        others = [term for term in model.terms if term not in held.terms]
+        if others:
+            left_out[name] = Mapped(held, [f"not held: {named(others)}"])
+        terms = held.realised(1.0 / imu.rate, max(FOLLOWED * imu.horizon, 4.0 / imu.rate))
+        white = float(sum(t.N**2 for t in terms if isinstance(t, WhiteNoise)))
+        walk = float(sum(t.K**2 for t in terms if isinstance(t, RandomWalk)))
+        processes = [(float(t.density), float(t.T_B)) for t in terms if isinstance(t, GaussMarkov)]
+        unit = {"gyro": ("rad/s", "rad"), "accel": ("m/s^2", "m/s")}[name]
+        entries += f'    "{name}": {{\n'
+        entries += f'        "white": {white!r},  # N^2, ({unit[0]})^2/Hz\n'
+        entries += f'        "walk": {walk!r},  # K^2, ({unit[0]})^2/s\n'
+        entries += f'        "gauss_markov": [  # S_B in ({unit[0]})^2/s, T_B in s\n'
+        entries += "".join(f"            ({S!r}, {T!r}),\n" for S, T in processes)
+        entries += f'        ],\n        "integral": "{unit[1]}",\n    }},\n'
+    about = [*heading(imu, "Python", _CONVENTION), *mapping_words(left_out)]
+    return commented(about) + _PROGRAM.format(
+        rate=float(imu.rate), horizon=float(imu.horizon), noise=entries
+    )

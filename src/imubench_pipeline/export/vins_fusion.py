@@ -1,0 +1,73 @@
+"""VINS-Fusion and VINS-Mono: the lines ``acc_n``, ``gyr_n``, ``acc_w``, ``gyr_w`` and ``g_norm``.
+
+The configuration calls them standard deviations and gives no unit. The propagation takes them per
+sample, discrete in time: a step of dt adds (dt / 2)^2 (n_k^2 + n_(k+1)^2) to the variance of
+angle and velocity, with both samples' noises independent and of ``*_n``, and (dt ``*_w``)^2 to
+that of the bias. The error is N^2 dt and K^2 dt, so
+
+    acc_n = N sqrt(2 rate),   acc_w = K sqrt(rate).
+
+A sample has the deviation N sqrt(rate). The further sqrt(2) undoes what the midpoint rule takes
+away: each sample enters two steps, and the propagation takes it for two independent ones of half
+the weight. With N sqrt(rate) the covariance would be half of the true one.
+
+Sources: HKUST-Aerial-Robotics/VINS-Fusion, vins_estimator/src/factor/integration_base.h
+(``noise``, ``V`` of the midpoint integration), vins_estimator/src/estimator/parameters.cpp and
+config/euroc/euroc_mono_imu_config.yaml (names).
+"""
+
+from __future__ import annotations
+
+import math
+
+from imubench_pipeline.export.comments import (
+    commented,
+    heading,
+    mapping_words,
+    number,
+    plain,
+    setting,
+)
+from imubench_pipeline.export.imu import Imu
+from imubench_pipeline.export.kalibr import walks
+
+_CONVENTION = (
+    "acc_n, gyr_n = N sqrt(2 rate) and acc_w, gyr_w = K sqrt(rate): discrete in time, for samples "
+    "at {rate:g} Hz only. What the midpoint propagation makes of them is N^2 and K^2 times the "
+    "time; N and K are two-sided densities."
+)
+
+
+def write(imu: Imu, topic: str = "/imu0") -> str:
+    """Return the lines of the configuration that concern the sensor.
+
+    Parameters
+    ----------
+    imu : Imu
+    topic : str
+        ROS topic of the samples.
+
+    Raises
+    ------
+    ExportError
+        If gyro or accelerometer has no estimate.
+    """
+    mapped = walks(imu)
+    gyro, accel = mapped["gyro"].model, mapped["accel"].model
+    per_sample, per_step = math.sqrt(2.0 * imu.rate), math.sqrt(imu.rate)
+    about = [
+        *heading(imu, "VINS-Fusion", _CONVENTION.format(rate=imu.rate)),
+        *mapping_words(mapped),
+        "These lines replace those of the same name in the configuration.",
+    ]
+    return (
+        "%YAML:1.0\n\n"
+        + commented(about)
+        + setting("imu", "1", "use it")
+        + setting("imu_topic", f'"{topic}"', "of sensor_msgs/Imu")
+        + setting("acc_n", number(accel.N * per_sample), f"m/s^2 a sample, N = {accel.N:.4e}")
+        + setting("gyr_n", number(gyro.N * per_sample), f"rad/s a sample, N = {gyro.N:.4e}")
+        + setting("acc_w", number(accel.K * per_step), f"m/s^3, K = {accel.K:.4e}")
+        + setting("gyr_w", number(gyro.K * per_step), f"rad/s^2, K = {gyro.K:.4e}")
+        + setting("g_norm", plain(imu.gravity), "gravity, m/s^2")
+    )

@@ -1,0 +1,38 @@
+"""The sensors of these tests, and the recursions of the programs that load their noise."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.export.imu import AxisNoise, Imu
+from imubench_pipeline.noise import NoiseModel
+
+GYRO = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7)
+ACCEL = NoiseModel(N=1.1e-3, B=7.2e-4, T_B=148.9, K=2.0e-5)
+RATE = 50.0
+
+Array = NDArray[np.float64]
+
+
+def imu(gyro: NoiseModel = GYRO, accel: NoiseModel = ACCEL, **more: object) -> Imu:
+    return Imu(
+        sensor="mti_7",
+        rate=float(more.pop("rate", RATE)),  # type: ignore[arg-type]
+        gyro=AxisNoise(gyro, "gyro_z of recording a"),
+        accel=AxisNoise(accel, "accel_x of recording a"),
+        **more,  # type: ignore[arg-type]
+    )
+
+
+def white_and_walk(per_sample: float, per_step: float, samples: int, seed: int) -> Array:
+    """Return white noise of a deviation a sample on a walk of a deviation a step."""
+    rng = np.random.default_rng(seed)
+    walk = np.cumsum(per_step * rng.standard_normal(samples))
+    return per_sample * rng.standard_normal(samples) + walk
+
+
+def midpoint(per_sample: float, per_step: float, samples: int, seed: int) -> Array:
+    """Return what a midpoint rule integrates that takes the two ends of each step for new."""
+    rng = np.random.default_rng(seed)
+    ends = per_sample * rng.standard_normal((2, samples))
+    walk = np.cumsum(per_step * rng.standard_normal(samples))
+    return ends.mean(axis=0) + walk

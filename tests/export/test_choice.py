@@ -1,0 +1,103 @@
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.export.choice import choose, parameter_notes
+from imubench_pipeline.export.imu import ExportError
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.results import Key, parameter_rows
+
+
+def estimate(method: str = "likelihood", **values: float | Parameter | None) -> Estimate:
+    parameters = {
+        name: value if isinstance(value, Parameter) else Parameter(value)
+        for name, value in values.items()
+    }
+    return Estimate(method, parameters)
+
+
+def rows(
+    channel: str, found: Estimate, recording: str = "a", *, recommended: bool = True
+) -> Sequence[dict[str, Any]]:
+    key = Key("mti_7", recording, channel)
+    return [dict(row) for row in parameter_rows(key, found, recommended=recommended)]
+
+
+# At 60 s x is the best, y the worst; at 1 s y is the best and x the worst.
+AXES = [
+    *rows("gyro_x", estimate(N=3e-4, K=1e-7)),
+    *rows("gyro_y", estimate(N=1e-4, K=5e-5)),
+    *rows("gyro_z", estimate(N=2e-4, K=2e-5)),
+    *rows("accel_x", estimate(N=1e-3, K=1e-5)),
+]
+
+
+def test_the_worst_axis_is_that_of_the_largest_error_at_the_horizon_and_no_mix() -> None:
+    found = choose(AXES, "gyro", horizon=60.0)
+    assert found.channel == "gyro_y"
+    assert (found.axis.model.N, found.axis.model.K) == (1e-4, 5e-5)
+    assert found.of == 3
+    assert "gyro_y of recording a by method likelihood, the worst of 3 axes" in found.axis.origin
+    assert choose(AXES, "gyro", horizon=1.0).channel == "gyro_x"
+
+
+def test_the_median_axis_is_one_axis() -> None:
+    assert choose(AXES, "gyro", axis="median", horizon=60.0).channel == "gyro_z"
+    even = [*AXES, *rows("gyro_x", estimate(N=1e-5, K=1e-8), "b")]
+    # of four the larger of the two in the middle
+    assert choose(even, "gyro", axis="median", horizon=60.0).channel == "gyro_z"
+
+
+def test_a_device_or_a_recording_gives_its_worst_axis() -> None:
+    both = [*AXES, *rows("gyro_x", estimate(N=1e-5, K=1e-6), "b")]
+    devices = {"a": "serial 1", "b": "serial 2"}
+    found = choose(both, "gyro", axis="serial 2", devices=devices)
+    assert (found.recording, found.channel) == ("b", "gyro_x")
+    assert "the only axis of serial 2" in found.axis.origin
+    assert choose(both, "gyro", axis="a", devices=devices).channel == "gyro_y"
+    with pytest.raises(ExportError, match="there are: serial 1, serial 2"):
+        choose(both, "gyro", axis="serial 3", devices=devices)
+
+
+def test_the_recommended_method_is_taken_unless_another_is_asked_for() -> None:
+    both = [*AXES, *rows("gyro_x", estimate("weighted", N=9.0), recommended=False)]
+    assert choose(both, "gyro").method == "likelihood"
+    assert choose(both, "gyro", method="weighted").axis.model.N == 9.0
+    with pytest.raises(ExportError, match="no estimate of a gyro"):
+        choose(AXES, "gyro", method="curve")
+
+
+def test_the_error_in_words_is_that_of_coasting_over_the_horizon() -> None:
+    found = choose(AXES, "accel", horizon=60.0)
+    variance = NoiseModel(N=1e-3, K=1e-5).allan_variance(np.array([60.0]))[0]
+    assert f"({np.sqrt(2.0 * 60.0**2 * variance):.3g} m/s there" in found.axis.origin
+    assert found.deviation == pytest.approx(np.sqrt(variance))
+
+
+def test_what_has_no_plain_value_is_said() -> None:
+    found = estimate(
+        N=1e-4,
+        B=Parameter(None, "not_identified", "a short log", 1e-6, 9e-6, None, 5e-6),
+        T_B=Parameter(7200.0, "at_bound", "the longest", 100.0, 7200.0),
+        K=Parameter(None, "absent", "the data do not ask for it", 0.0, 2e-6),
+        R=Parameter(None, "absent", "the data do not ask for it"),
+    )
+    notes = parameter_notes(found)
+    assert notes == [
+        "B is not identified (a short log): the fitted 5.000e-06 is used, 95 % limits 1.000e-06 "
+        "to 9.000e-06",
+        "T_B is at the end of its search (the longest): 7.2000e+03 is used, 95 % limits 1.000e+02 "
+        "to 7.200e+03",
+        "K is absent (the data do not ask for it): 0 in the model; its upper limit is 2.000e-06",
+    ]
+    chosen = choose(rows("gyro_x", found), "gyro").axis
+    assert chosen.least_walk == 2e-6
+    assert chosen.model.B == 5e-6
+    assert list(chosen.notes) == notes
+
+
+def test_a_walk_that_is_there_has_no_other_limit() -> None:
+    assert choose(AXES, "gyro").axis.least_walk is None

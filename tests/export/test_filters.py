@@ -1,0 +1,210 @@
+"""Files of filters with white noise and random walk: loaded as they load, simulated as they do."""
+
+import json
+import re
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from imubench_pipeline.allan import allan_variance
+from imubench_pipeline.export import basalt, kalibr, openvins, orb_slam3, px4, vins_fusion
+from imubench_pipeline.export.imu import ExportError, Imu
+from imubench_pipeline.export.targets import TARGETS
+from imubench_pipeline.noise import NoiseModel
+from tests.export.sensors import ACCEL, GYRO, RATE, Array, imu, midpoint, white_and_walk
+
+Recursion = tuple[Callable[[float, float, int, int], Array], float, float, float]
+"""Maker of a log, its deviation a sample and a step, and its rate."""
+
+
+def opencv(text: str) -> dict[str, Any]:
+    """Read YAML as OpenCV's FileStorage does: its own first line, and its grammar of numbers."""
+    first, rest = text.split("\n", 1)
+    assert first == "%YAML:1.0"
+    found = yaml.safe_load(rest)
+    for line in rest.splitlines():
+        match = re.match(r"\s*[\w.]+: ([-+]?[\d.][^ #]*)", line)
+        if match:
+            # digits, then a point or an exponent makes it real (persistence_yml.cpp)
+            assert re.fullmatch(r"[-+]?\d+(\.\d*)?([eE][-+]?\d+)?", match[1]), line
+    return found
+
+
+def from_kalibr(sensor: Imu) -> dict[str, Recursion]:
+    found = yaml.safe_load(kalibr.write(sensor))
+    rate = found["update_rate"]
+    assert found["rostopic"] == "/imu0"
+    return densities(found, rate)
+
+
+def from_openvins(sensor: Imu) -> dict[str, Recursion]:
+    found = opencv(openvins.write(sensor))["imu0"]
+    assert set(found) >= {"T_i_b", "Tw", "Ta", "Tg", "R_IMUtoGYRO", "R_IMUtoACC", "time_offset"}
+    assert np.array_equal(found["T_i_b"], np.eye(4))
+    assert not np.any(found["Tg"])
+    assert found["model"] == "kalibr"
+    return densities(found, found["update_rate"])
+
+
+def densities(found: dict[str, float], rate: float) -> dict[str, Recursion]:
+    return {
+        name: (
+            white_and_walk,
+            found[f"{word}_noise_density"] * np.sqrt(rate),
+            found[f"{word}_random_walk"] / np.sqrt(rate),
+            rate,
+        )
+        for name, word in (("gyro", "gyroscope"), ("accel", "accelerometer"))
+    }
+
+
+def from_vins(sensor: Imu) -> dict[str, Recursion]:
+    found = opencv(vins_fusion.write(sensor))
+    assert found["g_norm"] == sensor.gravity
+    return {
+        name: (midpoint, found[f"{word}_n"], found[f"{word}_w"] / sensor.rate, sensor.rate)
+        for name, word in (("gyro", "gyr"), ("accel", "acc"))
+    }
+
+
+def from_orb(sensor: Imu) -> dict[str, Recursion]:
+    text = orb_slam3.write(sensor)
+    found = opencv(text)
+    # the program ends at a number without a point
+    assert all(isinstance(value, float) for value in found.values())
+    root = np.sqrt(found["IMU.Frequency"])
+    return {
+        name: (
+            white_and_walk,
+            found[f"IMU.Noise{word}"] * root,
+            found[f"IMU.{word}Walk"] / root,
+            found["IMU.Frequency"],
+        )
+        for name, word in (("gyro", "Gyro"), ("accel", "Acc"))
+    }
+
+
+def from_basalt(sensor: Imu) -> dict[str, Recursion]:
+    found = json.loads(basalt.write(sensor))["value0"]
+    rate = found["imu_update_rate"]
+    for key, value in found.items():
+        assert key == "imu_update_rate" or len(value) == 3
+    return {
+        name: (
+            white_and_walk,
+            found[f"{name}_noise_std"][0] * np.sqrt(rate),
+            found[f"{name}_bias_std"][0] / np.sqrt(rate),
+            rate,
+        )
+        for name in ("gyro", "accel")
+    }
+
+
+def from_px4(sensor: Imu) -> dict[str, Recursion]:
+    found = ekf2(px4.write(sensor))
+    step = found["EKF2_PREDICT_US"] * 1e-6
+    return {
+        name: (
+            white_and_walk,
+            found[f"EKF2_{word}_NOISE"],
+            step * found[f"EKF2_{word}_B_NOISE"],
+            1.0 / step,
+        )
+        for name, word in (("gyro", "GYR"), ("accel", "ACC"))
+    }
+
+
+def ekf2(text: str) -> dict[str, float]:
+    found = {}
+    for line in text.splitlines():
+        if not line.startswith("#"):
+            vehicle, component, name, value, kind = line.split("\t")
+            assert (vehicle, component) == ("1", "1")
+            found[name] = float(value) if kind == "9" else int(value)
+    return found
+
+
+PROGRAMS = {
+    "kalibr": from_kalibr,
+    "openvins": from_openvins,
+    "vins-fusion": from_vins,
+    "orb-slam3": from_orb,
+    "basalt": from_basalt,
+    "px4": from_px4,
+}
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_the_file_means_the_model_in_white_noise_and_at_the_horizon(name: str) -> None:
+    for quantity, (maker, sample, step, rate) in PROGRAMS[name](imu()).items():
+        model = {"gyro": GYRO, "accel": ACCEL}[quantity]
+        # what the recursion stands for: white noise halves where two fresh ends are averaged
+        N = sample / np.sqrt(rate) / (np.sqrt(2.0) if maker is midpoint else 1.0)
+        implied = NoiseModel(N=N, K=step * np.sqrt(rate))
+        tau = np.array([0.1, 60.0])
+        ratio = implied.allan_variance(tau) / model.allan_variance(tau)
+        # the slow terms are in the Allan variance at 0.1 s as well
+        np.testing.assert_allclose(ratio, 1.0, rtol=2e-4)
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+@pytest.mark.parametrize("quantity", ["gyro", "accel"])
+def test_what_the_program_simulates_has_the_allan_deviation_of_the_model(
+    name: str, quantity: str
+) -> None:
+    maker, sample, step, rate = PROGRAMS[name](imu())[quantity]
+    model = {"gyro": GYRO, "accel": ACCEL}[quantity]
+    log = maker(sample, step, round(20_000.0 * rate), 1)
+    n = np.array([round(0.2 * rate), round(rate), round(60.0 * rate)])
+    curve = allan_variance(log, rate, cluster_sizes=n, overlap="octave")
+    spread = np.sqrt(2.0 / curve.edf)
+    ratio = curve.variance / model.allan_variance(curve.tau)
+    assert np.all(np.abs(ratio - 1.0) < 4.0 * spread + 1e-3), ratio
+
+
+def test_white_noise_alone_takes_the_upper_limit_or_is_refused() -> None:
+    white = NoiseModel(N=1e-4)
+    for writer in (kalibr, openvins, orb_slam3, basalt):
+        with pytest.raises(ExportError, match="gyro: K is 0"):
+            writer.write(imu(gyro=white))
+    assert ekf2(px4.write(imu(gyro=white)))["EKF2_GYR_B_NOISE"] == 0.0
+    assert "no upper limit of one is known" in px4.write(imu(gyro=white)).replace("\n#  ", "")
+
+
+def test_px4_keeps_its_ranges_and_says_so() -> None:
+    quiet = imu(gyro=NoiseModel(N=1e-6, K=1e-9), accel=NoiseModel(N=1.0, K=1e-3))
+    text = px4.write(quiet)
+    assert ekf2(text)["EKF2_GYR_NOISE"] == 1e-4
+    assert ekf2(text)["EKF2_ACC_NOISE"] == 1.0
+    assert "EKF2_GYR_NOISE: 1e-05 is outside the range" in text
+    with pytest.raises(ExportError, match="EKF2_PREDICT_US"):
+        px4.write(imu(), period=100)
+
+
+def test_px4_at_another_period() -> None:
+    fast, slow = (ekf2(px4.write(imu(), period=period)) for period in (2_500, 10_000))
+    assert fast["EKF2_GYR_NOISE"] == pytest.approx(2.0 * slow["EKF2_GYR_NOISE"])
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_every_file_names_its_axis_its_horizon_where_it_matters_and_units(name: str) -> None:
+    content = TARGETS[name].write(imu(rate=RATE))
+    text = content if isinstance(content, str) else content.decode("utf-32-le", "ignore")
+    joined = re.sub(r"\n[#%]  +", " ", text)
+    if isinstance(content, str):
+        assert "gyro_z of recording a" in joined
+        assert "two-sided" in joined
+        longest = max(len(line) for line in text.splitlines())
+        assert name in ("basalt", "json", "matlab", "python") or longest <= 100
+    if TARGETS[name].family == "N+K":
+        assert "horizon of 60 s" in joined
+        assert "at 30 s" in joined
+        assert "at 120 s" in joined
+
+
+def test_numbers_are_written_the_same_way_twice() -> None:
+    for target in TARGETS.values():
+        assert target.write(imu()) == target.write(imu())

@@ -1,0 +1,56 @@
+import pytest
+
+from imubench_pipeline.export.imu import AxisNoise, ExportError, Imu, inflated, normal_gravity
+from imubench_pipeline.export.kalibr import write
+from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
+from tests.export.sensors import GYRO, imu
+
+
+def test_inflation_is_of_densities_and_amplitudes_and_not_of_times() -> None:
+    model = NoiseModel(
+        Q=1.0, N=2.0, B=3.0, T_B=4.0, K=5.0, R=-6.0, further=[GaussMarkov(7.0, 8.0)],
+        sinusoids=[Sinusoid(9.0, 10.0)],
+    )  # fmt: skip
+    assert inflated(model, 2.0) == NoiseModel(
+        Q=2.0, N=4.0, B=6.0, T_B=4.0, K=10.0, R=-12.0, further=[GaussMarkov(14.0, 8.0)],
+        sinusoids=[Sinusoid(18.0, 10.0)],
+    )  # fmt: skip
+
+
+def test_an_inflation_needs_a_reason_and_the_file_gives_it() -> None:
+    with pytest.raises(ExportError, match="needs its reason"):
+        imu(inflation=1.5)
+    with pytest.raises(ExportError, match="needs its reason"):
+        imu(inflation=1.5, because=" ")
+    text = write(imu(inflation=1.5, because="vibration in flight"))
+    assert "1.5 times" in text
+    assert "vibration in flight" in text
+    assert f"gyroscope_noise_density: {1.5 * GYRO.N:.6e}" in text
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"rate": 0.0}, {"horizon": -1.0}, {"gravity": float("nan")}, {"horizon": 0.03}]
+)
+def test_numbers_out_of_range_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(ExportError):
+        imu(**wrong)  # type: ignore[arg-type]
+
+
+def test_gravity_on_the_ellipsoid() -> None:
+    # TR8350.2, table 3.4: at the equator and at the poles
+    assert normal_gravity(0.0) == pytest.approx(9.7803253359, abs=1e-10)
+    assert normal_gravity(90.0) == pytest.approx(9.8321849378, abs=1e-9)
+    assert normal_gravity(-45.0) == normal_gravity(45.0)
+    with pytest.raises(ExportError, match="latitude"):
+        normal_gravity(91.0)
+
+
+def test_a_program_that_needs_both_says_what_is_missing() -> None:
+    alone = Imu(sensor="one", rate=100.0, gyro=AxisNoise(GYRO, "gyro_x"))
+    with pytest.raises(ExportError, match="one: no estimate of accel"):
+        write(alone)
+
+
+def test_simulated_recordings_are_called_so() -> None:
+    assert "SIMULATED" in write(imu(simulated=True))
+    assert "SIMULATED" not in write(imu())

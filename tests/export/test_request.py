@@ -1,0 +1,130 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pytest
+import yaml
+
+from imubench_pipeline.allan import AllanCurve, cluster_sizes
+from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.export.imu import ExportError
+from imubench_pipeline.export.request import Request, imu_of, load, made
+from imubench_pipeline.export.targets import TARGETS
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.results import Key, Row, allan_rows, parameter_rows
+from imubench_pipeline.tables import build, write_arrow
+from tests.export.sensors import ACCEL, GYRO
+
+CHANNELS = {
+    "gyro_x": GYRO,
+    "gyro_y": NoiseModel(N=2e-4, B=1e-4, T_B=50.0, K=1e-6),
+    "accel_x": ACCEL,
+}
+RATE = 50.0
+
+
+def curve(model: NoiseModel) -> AllanCurve:
+    n = cluster_sizes(1_800_000)
+    variance = model.allan_variance(n / RATE, RATE)
+    return AllanCurve(n / RATE, n, variance, np.maximum(1_800_000 / n / 2.0, 1.0))
+
+
+@pytest.fixture(scope="module")
+def tables() -> dict[str, pa.Table]:
+    parameters: list[Row] = []
+    allan: list[Row] = []
+    for channel, model in CHANNELS.items():
+        key = Key("mti_7", "sim_a", channel)
+        values = {name: Parameter(getattr(model, name)) for name in ("N", "B", "T_B", "K")}
+        parameters += parameter_rows(key, Estimate("likelihood", values), recommended=True)
+        allan += allan_rows(key, curve(model))
+    recording = {
+        "sensor": "mti_7", "device": "serial 1", "recording": "sim_a", "kind": "static",
+        "simulated": True, "status": "ok", "rate": RATE, "samples": 1_800_000,
+    }  # fmt: skip
+    return {
+        "recordings": build("recordings", [recording]),
+        "parameters": build("parameters", parameters),
+        "allan": build("allan", allan),
+    }
+
+
+REQUEST = Request(sensor="mti_7", target="kalibr")
+
+
+def test_the_file_of_the_worst_axes(tables: dict[str, pa.Table]) -> None:
+    text = made(tables, REQUEST)
+    assert isinstance(text, str)
+    found = yaml.safe_load(text)
+    assert found["gyroscope_noise_density"] == 2e-4
+    assert found["accelerometer_noise_density"] == 1.1e-3
+    assert found["update_rate"] == RATE
+    assert "SIMULATED" in text
+    assert "gyro_y of recording sim_a by method likelihood, the worst of 2 axes" in text
+
+
+def test_the_tables_of_a_run_are_found_in_its_folder(
+    tables: dict[str, pa.Table], tmp_path: Path
+) -> None:
+    (tmp_path / "tables").mkdir()
+    for name, table in tables.items():
+        write_arrow(table, tmp_path / "tables" / f"{name}.parquet")
+    assert made(load(tmp_path), REQUEST) == made(load(tmp_path / "tables"), REQUEST)
+    assert made(load(tmp_path), REQUEST) == made(tables, REQUEST)
+    with pytest.raises(ExportError, match="recordings"):
+        load(tmp_path / "elsewhere")
+
+
+@pytest.mark.parametrize("name", ["px4", "gnss-ins-sim", "matlab"])
+def test_an_overbound_has_the_terms_that_the_program_holds(
+    tables: dict[str, pa.Table], name: str
+) -> None:
+    gyros = tables | {"parameters": tables["parameters"].slice(0, 8)}
+    sensor = imu_of(gyros, replace(REQUEST, target=name, overbound=True))
+    assert sensor.gyro is not None
+    assert set(sensor.gyro.model.name.split("+")) <= set(TARGETS[name].family.split("+"))
+    both = replace(sensor, accel=sensor.gyro)
+    text = TARGETS[name].write(both)
+    assert isinstance(text, str)
+    assert "replaced by" not in text
+
+
+def test_an_overbound_is_larger_and_says_what_it_is(tables: dict[str, pa.Table]) -> None:
+    plain = yaml.safe_load(made(tables, REQUEST))
+    text = made(tables, replace(REQUEST, overbound=True))
+    assert isinstance(text, str)
+    found = yaml.safe_load(text)
+    for key in ("gyroscope_noise_density", "gyroscope_random_walk", "accelerometer_random_walk"):
+        assert plain[key] < found[key] < 2.0 * plain[key]
+    joined = text.replace("\n#  ", "")
+    assert "the smallest N+K that lies above the measured Allan variance" in joined
+    assert "at every tau up to 60 s (95 % for all together)" in joined
+
+
+def test_gravity_and_rate_and_inflation(tables: dict[str, pa.Table]) -> None:
+    asked = replace(
+        REQUEST, latitude=0.0, rate=200.0, inflation=2.0, because="it flies", axis="serial 1"
+    )
+    sensor = imu_of(tables, asked)
+    assert sensor.gravity == pytest.approx(9.7803253359)
+    assert sensor.rate == 200.0
+    assert sensor.axes["accel"].model.N == pytest.approx(2.2e-3)
+    assert sensor.simulated
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"sensor": "other"}, "no sensor 'other'; there are: mti_7"),
+        ({"target": "other"}, "there are: kalibr, openvins"),
+        ({"axis": "serial 2"}, "there are: serial 1"),
+        ({"inflation": 2.0}, "needs its reason"),
+        ({"horizon": 1e6, "overbound": True}, "the curve ends"),
+    ],
+)
+def test_what_cannot_be_made_says_why(
+    tables: dict[str, pa.Table], wrong: dict[str, object], words: str
+) -> None:
+    with pytest.raises(ExportError, match=words):
+        made(tables, replace(REQUEST, **wrong))  # type: ignore[arg-type]

@@ -1,0 +1,142 @@
+"""Files of simulators: their parameters, read back, in the recursions of the programs."""
+
+import re
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from imubench_pipeline.allan import allan_variance
+from imubench_pipeline.export import gnss_ins_sim, matlab
+from imubench_pipeline.export.imu import AxisNoise, Imu
+from imubench_pipeline.noise import GaussMarkov, NoiseModel
+from tests.export.sensors import ACCEL, GYRO, Array, imu
+
+RATE = 20.0
+
+
+def compared(log: Array, model: NoiseModel, rate: float, tau: list[float]) -> Array:
+    """Return the relative differences of the Allan variance, over their spread."""
+    n = np.array([round(t * rate) for t in tau])
+    curve = allan_variance(log, rate, cluster_sizes=n, overlap="octave")
+    ratio = curve.variance / model.allan_variance(curve.tau)
+    return (ratio - 1.0) / np.sqrt(2.0 / curve.edf)
+
+
+def error_dictionary(sensor: Imu) -> dict[str, Array]:
+    namespace: dict[str, dict[str, Array]] = {}
+    exec(gnss_ins_sim.write(sensor), namespace)
+    return namespace["imu_err"]
+
+
+def gnss_ins_sim_log(
+    walk: float, stability: float, corr: float, rate: float, samples: int, seed: int
+) -> Array:
+    """Return what bias_drift and the white noise of gyro_gen and acc_gen make; SI."""
+    rng = np.random.default_rng(seed)
+    drive = stability * np.sqrt(1.0 - np.exp(-2.0 / (rate * corr)))
+    drift = lfilter([0.0, drive], [1.0, -(1.0 - 1.0 / rate / corr)], rng.standard_normal(samples))
+    return drift + walk * np.sqrt(rate) * rng.standard_normal(samples)
+
+
+def test_gnss_ins_sim_makes_the_model() -> None:
+    found = error_dictionary(imu(rate=RATE))
+    assert all(value.shape == (3,) for value in found.values())
+    samples = round(40_000.0 * RATE)
+    gyro = gnss_ins_sim_log(
+        np.radians(found["gyro_arw"][0]) / 60.0,
+        np.radians(found["gyro_b_stability"][0]) / 3600.0,
+        found["gyro_b_corr"][0],
+        RATE,
+        samples,
+        1,
+    )
+    accel = gnss_ins_sim_log(
+        found["accel_vrw"][0] / 60.0,
+        found["accel_b_stability"][0],
+        found["accel_b_corr"][0],
+        RATE,
+        samples,
+        2,
+    )
+    for log, model in ((gyro, GYRO), (accel, ACCEL)):
+        assert np.all(np.abs(compared(log, model, RATE, [0.2, 2.0, 20.0, 60.0])) < 4.0)
+
+
+def test_gnss_ins_sim_takes_the_deviation_of_the_process_and_not_its_bias_instability() -> None:
+    found = error_dictionary(imu(gyro=NoiseModel(N=1e-4, B=1e-4, T_B=50.0)))
+    assert np.radians(found["gyro_b_stability"][0]) / 3600.0 == pytest.approx(1.0761e-4, rel=1e-4)
+    assert found["gyro_b_corr"][0] == 50.0
+    none = error_dictionary(imu(gyro=NoiseModel(N=1e-4)))
+    # an infinite correlation time would be white noise to the program
+    assert none["gyro_b_stability"][0] == 0.0
+    assert np.isfinite(none["gyro_b_corr"][0])
+
+
+def test_gnss_ins_sim_says_where_a_process_is_too_short_for_it() -> None:
+    text = gnss_ins_sim.write(imu(gyro=NoiseModel(N=1e-4, B=1e-4, T_B=0.1), rate=RATE))
+    assert "coarse" in text
+
+
+def imu_sensor_log(text: str, member: str, rate: float, samples: int, seed: int) -> Array:
+    """Return what an imuSensor of the script makes."""
+    block = re.search(rf"IMU\.{member} = \w+\((.*?)\); ", text, re.DOTALL)
+    assert block
+    assert "'NoiseType', 'single-sided'" in block[1]
+    values = {
+        name: float(value)
+        for name, value in re.findall(r"'(\w+)', \[([^,\]]+), [^\]]+\]", block[1])
+        if name != "Denominator"
+    }
+    poles = re.search(r"fractalcoef\((\d+)\)", block[1])
+    denominator = re.search(r"'Denominator', \[1, ([^\]]+)\]", block[1])
+    if poles:
+        k = np.arange(1, int(poles[1]) + 1)
+        coefficients = np.concatenate(([1.0], np.cumprod((k - 1.5) / k)))  # Kasdin, eq. 116
+    else:
+        assert denominator
+        coefficients = np.array([1.0, float(denominator[1])])
+    rng = np.random.default_rng(seed)
+    bandwidth = rate  # "single-sided"; half of it otherwise
+    drift = lfilter([1.0], coefficients, values["BiasInstability"] * rng.standard_normal(samples))
+    walk = np.cumsum(values["RandomWalk"] / np.sqrt(bandwidth) * rng.standard_normal(samples))
+    white = values["NoiseDensity"] * np.sqrt(bandwidth) * rng.standard_normal(samples)
+    return drift + walk + white
+
+
+@pytest.mark.parametrize("member", ["Gyroscope", "Accelerometer"])
+def test_matlab_makes_the_model_at_every_tau(member: str) -> None:
+    text = matlab.write(imu(rate=RATE))
+    assert f"IMU.SampleRate = {RATE:g};" in text
+    log = imu_sensor_log(text, member, RATE, round(80_000.0 * RATE), 3)
+    model = {"Gyroscope": GYRO, "Accelerometer": ACCEL}[member]
+    assert np.all(np.abs(compared(log, model, RATE, [0.2, 2.0, 20.0, 60.0, 500.0])) < 4.0)
+
+
+def test_matlab_makes_flicker_noise_up_to_the_horizon() -> None:
+    model = NoiseModel(N=1e-5, B=1e-3, K=1e-6)
+    rate = 10.0
+    text = matlab.write(imu(gyro=model, rate=rate, horizon=15.0))
+    assert "fractalcoef(300)" in text
+    log = imu_sensor_log(text, "Gyroscope", rate, 400_000, 4)
+    n = np.array([10, 50, 150])
+    curve = allan_variance(log, rate, cluster_sizes=n, overlap="octave")
+    np.testing.assert_allclose(curve.deviation / np.sqrt(model.allan_variance(n / rate)), 1.0, 0.05)
+
+
+def test_matlab_without_poles_enough_takes_the_nearest_process() -> None:
+    text = matlab.write(imu(gyro=NoiseModel(N=1e-5, B=1e-3), rate=1000.0, horizon=60.0))
+    assert "replaced by a Gauss-Markov process" in text.replace("\n%  ", "")
+
+
+def test_matlab_takes_one_quantity_alone() -> None:
+    text = matlab.write(Imu(sensor="one", rate=100.0, gyro=AxisNoise(GYRO, "gyro_x")))
+    assert "IMU.Gyroscope" in text
+    assert "IMU.Accelerometer" not in text
+
+
+def test_two_processes_are_replaced_by_one_in_both() -> None:
+    model = NoiseModel(N=1e-4, B=1e-4, T_B=5.0, further=[GaussMarkov(1e-4, 50.0)])
+    for text in (matlab.write(imu(gyro=model)), gnss_ins_sim.write(imu(gyro=model))):
+        joined = re.sub(r"\n[#%]  +", " ", text)
+        assert "of the same Allan variance at the horizon of 60 s" in joined

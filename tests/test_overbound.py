@@ -1,0 +1,215 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import block_diag
+
+from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes
+from imubench_pipeline.export.growth import growth
+from imubench_pipeline.noise import GaussMarkov, NoiseModel
+from imubench_pipeline.noise_terms import Array
+from imubench_pipeline.overbound import (
+    FAMILIES,
+    Family,
+    Overbound,
+    limits_of,
+    overbound,
+    simultaneous_upper,
+    smallest,
+)
+from imubench_pipeline.simulate import simulate
+
+GYRO = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7)
+RATE = 5.0
+SAMPLES = 180_000
+
+
+def measured(model: NoiseModel, edf: float | None = None) -> AllanCurve:
+    """Return the curve of a model as if measured; of so many degrees of freedom, or as sure."""
+    n = cluster_sizes(SAMPLES)
+    degrees = SAMPLES / n / 2.0 if edf is None else np.full(len(n), edf)
+    return AllanCurve(n / RATE, n, model.allan_variance(n / RATE, RATE), degrees, SAMPLES)
+
+
+def above(model: NoiseModel, other: NoiseModel, longest: float, horizon: float) -> list[float]:
+    """Return the least ratios of Allan variance, density, and the two integrals."""
+    n = np.unique(np.rint(np.geomspace(1.0, longest * RATE, 300)))
+    frequency = np.geomspace(0.1 / horizon, RATE / 2.0, 200)
+    time = np.geomspace(1.0 / RATE, horizon, 100)
+    own, theirs = growth(model, time, RATE), growth(other, time, RATE)
+    variance = model.allan_variance(n / RATE, RATE) / other.allan_variance(n / RATE, RATE)
+    return [
+        float(np.min(variance)),
+        float(np.min(model.psd(frequency) / other.psd(frequency))),
+        float(np.min(own.first / theirs.first)),
+        float(np.min(own.second / theirs.second)),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("family", "model"),
+    [
+        ("N+K", NoiseModel(N=1e-4, K=1e-5)),
+        ("N+GM", NoiseModel(N=1e-4, B=2e-4, T_B=15.0)),
+        ("N+GM+K", NoiseModel(N=1e-4, B=2e-4, T_B=5.0, K=3e-5)),
+    ],
+)
+def test_without_uncertainty_the_smallest_is_the_model_itself(
+    family: Family, model: NoiseModel
+) -> None:
+    found = overbound(measured(model, 1e9), model, RATE, family=family, longest=300.0).model
+    assert pytest.approx(model.N, rel=2e-3) == found.N
+    assert found.B == pytest.approx(model.B, rel=2e-2)
+    assert pytest.approx(model.K, rel=2e-2) == found.K
+    if model.T_B:
+        assert found.T_B == pytest.approx(model.T_B, rel=3e-2)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("model", [GYRO, NoiseModel(N=1e-4, B=6e-5, K=1e-6), NoiseModel(N=1e-4)])
+def test_it_lies_above_everything_that_was_measured_and_fitted(
+    family: Family, model: NoiseModel
+) -> None:
+    curve = measured(model)
+    found = overbound(curve, model, RATE, family=family)
+    assert min(above(found.model, model, 60.0, 60.0)) >= 1.0
+    within = curve.tau <= 60.0
+    upper = curve.limits(0.95)[1] ** 2
+    assert np.all(found.model.allan_variance(curve.tau, RATE)[within] > upper[within])
+    assert np.all(found.ratio > 1.0)
+    assert found.touches
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_no_term_of_it_can_be_smaller(family: Family) -> None:
+    limits = limits_of(measured(GYRO), GYRO, RATE, 60.0, 60.0, (1 / 600, RATE / 2))
+    model = smallest(limits, family, (0.4, 1800.0))
+
+    def inside(trial: NoiseModel) -> bool:
+        return all(
+            np.all(np.sum([limit.of_term(t) for t in trial.terms], axis=0) >= limit.value)
+            for limit in limits
+        )
+
+    assert inside(model)
+    for name in ("N", "B", "K"):
+        if getattr(model, name):
+            assert not inside(replace(model, **{name: 0.99 * getattr(model, name)}))
+
+
+def test_it_is_close_to_the_truth_where_the_curve_is_lowest() -> None:
+    for family, most in (("N+K", 1.25), ("N+GM", 1.2), ("N+GM+K", 1.2)):
+        found = overbound(measured(GYRO), GYRO, RATE, family=family)  # type: ignore[arg-type]
+        assert 1.0 < found.at_minimum < most
+
+
+def test_a_longer_tau_asks_for_more() -> None:
+    short, long = (
+        overbound(measured(GYRO), GYRO, RATE, family="N+GM", longest=longest)
+        for longest in (60.0, 1000.0)
+    )
+    tau = np.array([1000.0])
+    truth = GYRO.allan_variance(tau)
+    assert short.model.allan_variance(tau) < long.model.allan_variance(tau)
+    assert long.model.allan_variance(tau) > truth
+
+
+def test_where_a_walk_must_be_far_too_large_white_noise_does_not_make_room() -> None:
+    found = overbound(measured(GYRO), GYRO, RATE, longest=4000.0).model
+    assert found.K > 5.0 * GYRO.K
+    assert found.N < 1.35 * GYRO.N
+
+
+def test_the_band_can_be_narrower() -> None:
+    quantized = NoiseModel(Q=1e-4, N=8.4e-5, K=1e-6)
+    curve = measured(NoiseModel(N=8.4e-5, K=1e-6))
+    whole = overbound(curve, quantized, RATE)
+    part = overbound(curve, quantized, RATE, band=(None, 0.1))
+    assert whole.model.N > 2.0 * part.model.N
+    assert part.band == pytest.approx((1 / 600, 0.1))
+
+
+def test_limits_for_all_tau_together_hold_in_so_many_logs() -> None:
+    """Pointwise limits leave out the true curve in a quarter of the logs and more."""
+    rng = np.random.default_rng(7)
+    model = NoiseModel(N=1.0, K=0.03)
+    pointwise = together = 0
+    logs = 150
+    for _ in range(logs):
+        curve = allan_variance(simulate(model, 1.0, 20_000, rng), 1.0, overlap="octave")
+        within = curve.tau <= 1000.0
+        truth = model.allan_variance(curve.tau, 1.0)[within]
+        pointwise += bool(np.all(curve.limits(0.95)[1][within] ** 2 > truth))
+        together += bool(np.all(simultaneous_upper(curve, 1000.0)[within] > truth))
+    assert pointwise / logs < 0.85
+    assert together / logs > 0.91
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        ({"family": "N+F"}, "family 'N\\+F' is not known"),
+        ({"horizon": 0.3}, "shorter than two samples"),
+        ({"longest": 1e9}, "the curve ends at"),
+    ],
+)
+def test_what_cannot_be_done_is_refused(found: dict[str, object], expected: str) -> None:
+    with pytest.raises(ValueError, match=expected):
+        overbound(measured(GYRO), GYRO, RATE, **found)  # type: ignore[arg-type]
+
+
+def joined(*parts: float | Array) -> Array:
+    return np.asarray(block_diag(*(np.atleast_2d(part) for part in parts)))
+
+
+def expected_over_true(model: NoiseModel, truth: NoiseModel, start: float) -> float:
+    """Return the least ratio of the variance a filter expects to its true one as it coasts.
+
+    It measures its angle every second for ten minutes, and then goes without for one.
+    """
+    own, real = model.state_space(1.0), truth.state_space(1.0)
+    m, r = len(own.output), len(real.output)
+    step, true_step = joined(1.0, own.transition), joined(1.0, real.transition)
+    step[0, 1:], true_step[0, 1:] = own.output, real.output
+    covariance = joined(0.0, np.eye(m) * start)
+    truth_and_filter = joined(0.0, real.initial_variance, np.zeros((1 + m, 1 + m)))
+    drive = joined(own.measurement_noise, own.process_noise)
+    true_drive = joined(real.measurement_noise, real.process_noise, np.zeros((1 + m, 1 + m)))
+    see = np.eye(1 + m)[0]
+    error = np.concatenate(([1.0], np.zeros(r), -see))
+    noise = (10.0 * truth.N) ** 2
+    least = math.inf
+    for k in range(660):
+        covariance = step @ covariance @ step.T + drive
+        truth_and_filter = (
+            joined(true_step, step) @ truth_and_filter @ joined(true_step, step).T + true_drive
+        )
+        if k >= 600:
+            least = min(least, covariance[0, 0] / float(error @ truth_and_filter @ error))
+            continue
+        gain = covariance @ see / (see @ covariance @ see + noise)
+        covariance = (np.eye(1 + m) - np.outer(gain, see)) @ covariance
+        update = np.eye(2 + r + m)
+        update[1 + r :, 0] = gain
+        update[1 + r :, 1 + r] -= gain
+        truth_and_filter = update @ truth_and_filter @ update.T
+        truth_and_filter[1 + r :, 1 + r :] += np.outer(gain, gain) * noise
+    return least
+
+
+def test_a_filter_that_loads_it_is_not_overconfident() -> None:
+    start = GaussMarkov(GYRO.B, GYRO.T_B or 0.0).density * (GYRO.T_B or 0.0) / 2.0
+    assert expected_over_true(GYRO, GYRO, start) == pytest.approx(1.0, abs=0.02)
+    plain = NoiseModel(N=GYRO.N, K=0.5e-5)
+    assert expected_over_true(plain, GYRO, start) < 0.9
+    found = [overbound(measured(GYRO), GYRO, RATE, family=family) for family in FAMILIES]
+    ratios = [expected_over_true(one.model, GYRO, start) for one in found]
+    assert min(ratios) >= 1.0
+    assert max(ratios) < 1.8
+
+
+def test_its_words_tell_how_large_it_is() -> None:
+    found: Overbound = overbound(measured(GYRO), GYRO, RATE)
+    assert f"{math.sqrt(found.at_minimum):.2f} times the measured one" in found.words
+    assert "from 0.00167 to 2.5 Hz" in found.words

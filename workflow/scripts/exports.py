@@ -1,0 +1,25 @@
+"""Write what filters and simulators load, for every sensor."""
+
+import json
+from pathlib import Path
+
+from imubench_pipeline.config import ExportSettings
+from imubench_pipeline.export.of_run import exports
+from imubench_pipeline.export.request import load
+from imubench_pipeline.tables import write_content
+
+
+def main(tables: Path, settings: str, folder: Path) -> None:
+    """Write a folder a sensor, with a file a program."""
+    folder.mkdir(parents=True)
+    how = ExportSettings.model_validate(json.loads(settings))
+    for place, content in exports(load(tables), how):
+        write_content(content, folder / place)
+
+
+if __name__ == "__main__":
+    main(
+        Path(snakemake.input[0]).parent,
+        snakemake.params.settings,
+        Path(snakemake.output[0]),
+    )
