@@ -200,7 +200,7 @@ def _repeated(columns: Mapping[str, ColumnSummary], settings: QualitySettings) -
 
 
 def _implausible(columns: Mapping[str, ColumnSummary], rate: float) -> list[Finding]:
-    means = {name: column.mean for name, column in columns.items()}
+    means = {name: levels.level_of(column) for name, column in columns.items()}
     densities = {
         name: levels.noise_of(column) / math.sqrt(rate)
         for name, column in columns.items()

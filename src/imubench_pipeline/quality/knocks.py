@@ -15,6 +15,9 @@ Array = NDArray[np.float64]
 _NEIGHBOURS = 16
 """Blocks on either side whose median tells what a block would be without a knock."""
 
+_FEWEST_AROUND = 2
+"""Blocks that must be there to compare with."""
+
 _SETTLED = 4.0
 """Standard deviations within which the samples after a knock are as before."""
 
@@ -66,7 +69,7 @@ def suspects(blocks: Blocks, sigmas: float) -> tuple[NDArray[np.int64], Array, A
         around = np.r_[max(0, k - _NEIGHBOURS) : k, k + 1 : k + _NEIGHBOURS + 1]
         around = around[(around < len(blocks.mean))]
         around = around[np.isfinite(blocks.mean[around])]
-        if len(around) < 4:
+        if len(around) < _FEWEST_AROUND:
             continue
         near = around[np.argsort(np.abs(around - k))[:4]]
         level = float(np.median(blocks.mean[near]))

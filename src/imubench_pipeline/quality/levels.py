@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from imubench_pipeline.quality.summary import ColumnSummary
 
@@ -47,8 +48,16 @@ def quantisation(column: ColumnSummary) -> Quantisation | None:
 
 def noise_of(column: ColumnSummary) -> float:
     """Return the usual standard deviation of the samples of a block, SI."""
-    spread = column.blocks().spread
-    there = spread[np.isfinite(spread)]
+    return _median(column.blocks().spread)
+
+
+def level_of(column: ColumnSummary) -> float:
+    """Return the usual mean of a block, SI: a knock does not move it."""
+    return _median(column.blocks().mean)
+
+
+def _median(values: NDArray[np.float64]) -> float:
+    there = values[np.isfinite(values)]
     return float(np.median(there)) if len(there) else float("nan")
 
 

@@ -90,13 +90,6 @@ class ColumnSummary:
         """Smallest difference between neighbours that differ, SI; infinite if none do."""
         return float(self._state[_STEP])
 
-    @property
-    def mean(self) -> float:
-        """Mean of the samples present, SI."""
-        blocks = self.blocks()
-        there = blocks.count > 0
-        return float(np.average(blocks.mean[there], weights=blocks.count[there]))
-
     def blocks(self) -> Blocks:
         """Return the statistics of the blocks, the last one as far as it goes."""
         return self._blocks.blocks(_closed(self._state))
@@ -123,8 +116,7 @@ def _close(state: Array, row: Array) -> None:
         row[4] = state[_MOST]
     else:
         row[1:] = np.nan
-    # The next block is summed about a value near its mean: no digit is lost to a large bias.
-    state[_SHIFT] = row[1]
+    state[_SHIFT] = np.nan
     state[_FILLED] = 0
     state[_COUNT] = 0
     state[_SUM] = 0.0
@@ -142,7 +134,11 @@ def _take(values: Array, state: Array, rows: Array) -> tuple[int, bool]:
     while start < values.size:
         stop = min(values.size, start + FIRST_SIZE - int(state[_FILLED]))
         piece = values[start:stop]
-        begun = state[_PRESENT] > 0.0 and not np.isnan(state[_SHIFT])
+        begun = state[_PRESENT] > 0.0 and np.isfinite(piece[0])
+        if begun and np.isnan(state[_SHIFT]):
+            # A block is summed about its first sample: no digit is lost to a large bias, nor to
+            # an outlier in another block.
+            state[_SHIFT] = piece[0]
         if not (begun and _nothing(piece) == 0.0 and _take_plain(piece, state)):
             _take_each(piece, state)
         state[_TAKEN] += stop - start
