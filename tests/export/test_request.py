@@ -7,8 +7,11 @@ import pytest
 import yaml
 
 from imubench_pipeline.allan import AllanCurve, cluster_sizes
+from imubench_pipeline.cli import main
+from imubench_pipeline.config import ExportSettings
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.export.imu import ExportError
+from imubench_pipeline.export.of_run import exports
 from imubench_pipeline.export.request import Request, imu_of, load, made
 from imubench_pipeline.export.targets import TARGETS
 from imubench_pipeline.noise import NoiseModel
@@ -128,3 +131,38 @@ def test_what_cannot_be_made_says_why(
 ) -> None:
     with pytest.raises(ExportError, match=words):
         made(tables, replace(REQUEST, **wrong))  # type: ignore[arg-type]
+
+
+def test_a_run_leaves_a_file_a_program_and_says_what_it_cannot(
+    tables: dict[str, pa.Table],
+) -> None:
+    settings = ExportSettings(targets=("kalibr", "npz", "none"), horizon="30 s")
+    found = {str(place): content for place, content in exports(tables, settings)}
+    assert set(found) == {"mti_7/kalibr/imu.yaml", "mti_7/npz/noise.npz", "mti_7/not_made.txt"}
+    assert "horizon of 30 s" in str(found["mti_7/kalibr/imu.yaml"])
+    assert str(found["mti_7/not_made.txt"]).startswith("none: target 'none' is not known; ")
+
+
+def test_the_command_writes_a_file_or_says_why_not(
+    tables: dict[str, pa.Table], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, table in tables.items():
+        write_arrow(table, tmp_path / f"tables/{name}.parquet")
+    ask = ["export", str(tmp_path), "--sensor", "mti_7", "--target"]
+    assert main([*ask, "kalibr"]) == 0
+    printed = capsys.readouterr().out
+    assert main([*ask, "kalibr", "--output", str(tmp_path / "imu.yaml")]) == 0
+    assert (tmp_path / "imu.yaml").read_text() == printed
+    assert yaml.safe_load(printed)["gyroscope_noise_density"] == 2e-4
+    assert main([*ask, "npz", "--output", str(tmp_path / "a.npz")]) == 0
+    with np.load(tmp_path / "a.npz") as arrays:
+        assert len(arrays.files) > 0
+    capsys.readouterr()
+    for wrong, said in (
+        ([*ask, "npz"], "expected --output"),
+        ([*ask, "kalibr", "--inflate", "2"], "reason"),
+        ([*ask, "other"], "there are: kalibr"),
+        (["export", str(tmp_path / "none"), *ask[2:], "json"], "none"),
+    ):
+        assert main(wrong) == 2
+        assert said in capsys.readouterr().err

@@ -23,7 +23,10 @@ CHANNELS = {
     "accel_x": {"column": "ax", "unit": "m/s^2"},
 }
 DATASHEET = {"gyro": {"noise_density": {"value": 0.01, "unit": "deg/s/sqrt(Hz)"}}}
-STEPS_OF_A_RECORDING = {"ingest", "allan", "estimate", "reconstruct", "datasheet"}
+STEPS_OF_A_RECORDING = dict.fromkeys(
+    ("ingest", "allan", "estimate", "reconstruct", "datasheet", "error_budget"), 1
+)
+GLOBAL_STEPS = dict.fromkeys(("tables", "ranking", "exports", "report"), 1)
 
 
 @dataclass
@@ -131,7 +134,7 @@ def test_one_core_and_two_give_the_same_tables(project: Project, tmp_path: Path)
 def test_an_edit_of_a_datasheet_runs_its_deltas_and_the_global_steps(project: Project) -> None:
     density = {"value": 0.02, "unit": "deg/s/sqrt(Hz)"}
     put_sensor(project.folder / "sensors/one.yaml", datasheet={"gyro": {"noise_density": density}})
-    assert project.jobs() == {"datasheet": 2, "tables": 1, "report": 1}
+    assert project.jobs() == {"datasheet": 2, "coverage": 1} | GLOBAL_STEPS
     assert project.run().returncode == 0
     printed = {
         row["sensor"]: row["printed"] for row in project.table("datasheet") if row["printed"]
@@ -141,15 +144,14 @@ def test_an_edit_of_a_datasheet_runs_its_deltas_and_the_global_steps(project: Pr
 
 def test_one_more_log_runs_its_own_steps_and_the_global_ones(project: Project) -> None:
     put_log(project.folder / "logs/two/b.csv", 4)
-    expected = dict.fromkeys(STEPS_OF_A_RECORDING, 1) | {"tables": 1, "report": 1}
-    assert project.jobs() == expected
+    assert project.jobs() == STEPS_OF_A_RECORDING | GLOBAL_STEPS
     assert project.run().returncode == 0
     assert len(project.table("recordings")) == 4
 
 
 def test_a_removed_log_runs_the_global_steps(project: Project) -> None:
     (project.folder / "logs/two/b.csv").unlink()
-    assert project.jobs() == {"tables": 1, "report": 1}
+    assert project.jobs() == GLOBAL_STEPS
     assert project.run().returncode == 0
     assert len(project.table("recordings")) == 3
 
