@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from imubench_pipeline.config import QualitySettings
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.quality import levels, plausibility, stationarity
-from imubench_pipeline.quality.summary import ColumnSummary
+from imubench_pipeline.quality.summary import LARGEST, ColumnSummary
 from imubench_pipeline.readers.batch import TEMPERATURE
 from imubench_pipeline.sensor import QUANTITIES, quantity_of
 from imubench_pipeline.units import SI_UNITS, from_si
@@ -82,7 +82,10 @@ def _cells(channel: str, column: ColumnSummary) -> Iterator[Finding]:
         detail += "; treated as missing samples"
         yield Finding("empty_cells", "note", detail, column.missing, channel)
     if column.not_finite:
-        detail = f"{channel} has {column.not_finite} infinities; treated as missing samples"
+        detail = (
+            f"{channel} has {column.not_finite} infinities, or figures beyond {LARGEST:g}; treated "
+            "as missing samples"
+        )
         yield Finding("not_finite", "warning", detail, column.not_finite, channel)
 
 

@@ -16,6 +16,9 @@ from imubench_pipeline.quality.blocks import FIRST_SIZE, Blocks, Gathering
 
 Array = NDArray[np.float64]
 
+LARGEST = 1e75
+"""SI. What is larger was never measured, and its fourth power would overflow; it counts as infinite."""
+
 _PRESENT, _MISSING, _INFINITE, _LOW, _HIGH, _AT_LOW, _AT_HIGH = range(7)
 _LAST, _RUN, _LONGEST, _LONGEST_END, _REPEATS, _STEP, _TAKEN = range(7, 14)
 _FILLED, _COUNT, _SUM, _SQUARES, _LEAST, _MOST, _SHIFT = range(14, 21)
@@ -38,12 +41,12 @@ class ColumnSummary:
     _blocks: Gathering = field(default_factory=Gathering)
 
     def add(self, values: Array) -> Array:
-        """Count a piece of the column and return it with infinities made missing."""
+        """Count a piece of the column and return it with what is not finite made missing."""
         rows = np.empty((len(values) // FIRST_SIZE + 2, 5))
         number, infinite = _take(np.ascontiguousarray(values), self._state, rows)
         if number:
             self._blocks.add(rows[:number])
-        return np.where(np.isfinite(values), values, np.nan) if infinite else values
+        return np.where(np.abs(values) <= LARGEST, values, np.nan) if infinite else values
 
     @property
     def present(self) -> int:
@@ -57,7 +60,7 @@ class ColumnSummary:
 
     @property
     def not_finite(self) -> int:
-        """Infinities."""
+        """Infinities, and figures beyond `LARGEST`."""
         return int(self._state[_INFINITE])
 
     @property
@@ -134,7 +137,7 @@ def _take(values: Array, state: Array, rows: Array) -> tuple[int, bool]:
     while start < values.size:
         stop = min(values.size, start + FIRST_SIZE - int(state[_FILLED]))
         piece = values[start:stop]
-        begun = state[_PRESENT] > 0.0 and np.isfinite(piece[0])
+        begun = state[_PRESENT] > 0.0 and abs(piece[0]) <= LARGEST
         if begun and np.isnan(state[_SHIFT]):
             # A block is summed about its first sample: no digit is lost to a large bias, nor to
             # an outlier in another block.
@@ -213,7 +216,7 @@ def _take_each(piece: Array, state: Array) -> None:
     count, repeats = 0, 0
     for i in range(piece.size):
         x = piece[i]
-        if not np.isfinite(x):
+        if not abs(x) <= LARGEST:
             state[_MISSING if np.isnan(x) else _INFINITE] += 1
             continue
         count += 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 from importlib import import_module
+from itertools import islice
 from pathlib import Path
 
 from imubench_pipeline.readers.batch import TEMPERATURE, Batch, LogFile, RecordingError
@@ -14,7 +15,7 @@ from imubench_pipeline.readers.compressed import (
     members,
     visible,
 )
-from imubench_pipeline.readers.content import is_ros_2_bag, reader_of
+from imubench_pipeline.readers.content import is_endless, is_ros_2_bag, reader_of
 from imubench_pipeline.sensor import ColumnSource, LogFormat, Reader
 
 _CLASSES: dict[Reader, tuple[str, str]] = {
@@ -60,13 +61,9 @@ def log_files(path: Path) -> list[Path]:
         return sorted(
             file for file in path.rglob("*") if file.is_file() and visible(file.relative_to(path))
         )
-    if _is_endless(path):
+    if is_endless(path):
         raise OSError(errno.EINVAL, "it is neither a file nor a folder")
     return [path]
-
-
-def _is_endless(path: Path) -> bool:
-    return path.exists() and not path.is_file() and not path.is_dir()
 
 
 def read(path: Path, log: LogFormat) -> list[LogFile]:
@@ -90,7 +87,7 @@ def read(path: Path, log: LogFormat) -> list[LogFile]:
         If a file that the format names is not there, or the recording is a folder and the
         format does not say which file a channel is in.
     """
-    if _is_endless(path):
+    if is_endless(path):
         raise RecordingError(f"{path.name}: is neither a file nor a folder; expected a log")
     sources = {str(name): source for name, source in log.channels.items()}
     if log.temperature is not None:
@@ -161,7 +158,7 @@ def only_log(path: Path, present: list[Path]) -> Path:
     """
     found = [file for file in present if file.parent == path] or present
     if len(found) > 1 and not path.is_dir():
-        found = [file for file in found if holds_text(file)]
+        found = list(islice(filter(holds_text, found), 2))  # two are as bad as a thousand
     if len(found) != 1:
         raise RecordingError(
             f"{path.name}: expected one file, the folder has {_names(path, present)}; name the "

@@ -167,7 +167,7 @@ def explained(path: Path) -> Iterator[None]:
         raise RecordingError(f"{path.name}: {error}") from None
     # The libraries raise nearly every kind of exception on damaged files.
     except Exception as error:
-        said = " ".join(str(error).split()) or type(error).__name__
+        said = " ".join(str(error).split())[:300] or type(error).__name__
         raise RecordingError(
             f"{path.name}: corrupt data, or cut short ({said}); copy it again"
         ) from error

@@ -22,13 +22,20 @@ TEMPERATURE = "temperature"
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Seconds in a unit of time stamps."""
 
-_BEYOND = 2.0**684
-"""What this factor makes infinite, beyond 2e102 in SI, was never measured, and stays infinite:
-sums of its squares would be. A power of two loses no digit of what was."""
+_HALF_REASON = 700
 
 
 class RecordingError(ValueError):
-    """A recording that cannot be used; the text is the reason, with what to mend."""
+    """A recording that cannot be used; the text is the reason, with what to mend.
+
+    What a damaged file puts into it, such as a name of a million letters, is left out of the
+    middle.
+    """
+
+    def __init__(self, reason: str) -> None:
+        if len(reason) > 2 * _HALF_REASON:
+            reason = f"{reason[:_HALF_REASON]} [...] {reason[-_HALF_REASON:]}"
+        super().__init__(reason)
 
 
 @dataclass(frozen=True)
@@ -95,16 +102,12 @@ class LogFile(ABC):
         return np.asarray((stamps - first) * (SECONDS[unit] * scale), np.float64)
 
     def to_si(self, name: str, raw: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Convert the figures of a column as written to SI: scale * (raw - offset), then unit.
-
-        What is absurdly large becomes infinite.
-        """
+        """Convert the figures of a column as written to SI: scale * (raw - offset), then unit."""
         source = self.sources[name]
         dimension = TEMPERATURE if name == TEMPERATURE else QUANTITIES[quantity_of(name)]
         factor, zero = conversion(source.unit, dimension)
         if source.offset:
             raw = raw - source.offset
-        with np.errstate(over="ignore"):
-            figures = raw * (source.scale * factor * _BEYOND)
-        figures *= 1.0 / _BEYOND
+        with np.errstate(over="ignore"):  # infinite, and counted as such
+            figures = raw * (source.scale * factor)
         return figures + zero if zero else figures

@@ -12,6 +12,7 @@ import zipfile
 import zlib
 from collections.abc import Callable, Mapping
 from contextlib import closing
+from functools import lru_cache
 from pathlib import Path
 from typing import IO, Any
 
@@ -201,7 +202,8 @@ _CORRUPT = (
 def _corrupt(name: str, error: Exception) -> RecordingError:
     if isinstance(error, RecordingError):
         return error
-    return RecordingError(f"{name}: corrupt compressed data ({error}); copy it again")
+    said = str(error)[:300]
+    return RecordingError(f"{name}: corrupt compressed data ({said}); copy it again")
 
 
 def open_bytes(path: Path) -> Bytes:
@@ -287,8 +289,18 @@ def holds_text(path: Path) -> bool:
     return b"\0" not in begin or begin.startswith((b"\xff\xfe", b"\xfe\xff"))
 
 
-def _directory(archive: Path) -> dict[str, zipfile.ZipInfo]:
+def _directory(archive: Path) -> Mapping[str, zipfile.ZipInfo]:
     """Return the files of an archive by name, also of one whose end is missing."""
+    try:
+        state = archive.stat()
+    except OSError as error:
+        raise RecordingError(f"{archive.name}: cannot be opened ({error.strerror})") from None
+    return _directory_of(archive, state.st_size, state.st_mtime_ns)
+
+
+@lru_cache(maxsize=2)
+def _directory_of(archive: Path, _size: int, _written: int) -> Mapping[str, zipfile.ZipInfo]:
+    """Read the directory of an archive once, and not for each of its files."""
     try:
         try:
             with zipfile.ZipFile(archive) as file:
@@ -303,7 +315,7 @@ def _directory(archive: Path) -> dict[str, zipfile.ZipInfo]:
         # A name that begins with / would leave the archive.
         Path(info.filename.lstrip("/")).as_posix(): info
         for info in found
-        if not info.is_dir() and len(info.filename) <= _LONGEST_MEMBER_NAME
+        if 0 < len(info.filename) <= _LONGEST_MEMBER_NAME and not info.is_dir()
     }
 
 

@@ -42,6 +42,11 @@ def is_ros_2_bag(path: Path) -> bool:
     return path.is_dir() and (path / _ROS_2_BAG).is_file()
 
 
+def is_endless(path: Path) -> bool:
+    """Tell whether a path is a device or a named pipe, which may never answer."""
+    return path.exists() and not path.is_file() and not path.is_dir()
+
+
 def reader_of(path: Path) -> Reader:
     """Return the reader that a file needs (see `content_of`).
 
@@ -94,6 +99,8 @@ def _compression_of(path: Path) -> str:
     """Return how a file is compressed; empty where it is not."""
     if is_member(path):
         return "zip"
+    if is_endless(path):
+        raise RecordingError(f"{path.name}: is neither a file nor a folder; expected a log")
     try:
         with path.open("rb") as file:
             return _named(file.read(_LONGEST_MAGIC))

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from itertools import accumulate
 from pathlib import Path
+
+import numpy as np
 
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.readers.stream import blocks
@@ -49,6 +50,7 @@ class Frames:
             ended = not block
             self.read += len(block)
             data += block
+            first, second = _sums(data)
             at = 0
             while (found := data.find(_SYNC, at)) >= 0:
                 at = found
@@ -62,14 +64,13 @@ class Frames:
                     self.cut[data[at + 2 : at + 4]] += 1
                     at += 2
                     continue
-                body = data[at + 2 : end - 2]
-                key = body[:2]
-                # The second sum is that of all values which the first one takes.
-                right = sum(body) & 0xFF == data[end - 2]
-                if right and sum(accumulate(body)) & 0xFF == data[end - 1]:
+                body, key = at + 2, data[at + 2 : at + 4]
+                right = (first[end - 2] - first[body]) & 0xFF == data[end - 2]
+                over = second[end - 2] - second[body] - (end - 2 - body) * first[body]
+                if right and over & 0xFF == data[end - 1]:
                     self.right[key] += 1
                     at = end
-                    yield key, body[4:]
+                    yield key, data[body + 4 : end - 2]
                 else:
                     self.wrong[key] += 1
                     at += 2
@@ -77,3 +78,13 @@ class Frames:
                 # The last byte may be the first one of the next message.
                 at = max(at, len(data) - 1)
             data = data[at:]
+
+
+def _sums(data: bytes) -> tuple[bytes, bytes]:
+    """Return the sums of all bytes before each place, and the sums of these, modulo 256.
+
+    Those of a message are their differences: what begins as a message and is none costs nothing.
+    """
+    first = np.cumsum(np.frombuffer(data, np.uint8), dtype=np.uint8)
+    second = np.cumsum(first, dtype=np.uint8)
+    return b"\0" + first.tobytes(), b"\0" + second.tobytes()
