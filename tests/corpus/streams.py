@@ -1,0 +1,236 @@
+"""The binary and the sentences of receivers and inertial units: UBX and VectorNav."""
+
+from __future__ import annotations
+
+import gzip
+from typing import Any
+
+import numpy as np
+
+from tests.corpus.entry import Entry, Rejected, file, flipped, kept, part
+from tests.corpus.signals import RATE, ROWS, rest
+from tests.readers.test_ubx import NMEA, RTCM, meas, nav_pvt, raw, samples
+from tests.readers.test_vectornav import logged, sentence
+
+# -------------------------------------------------------------------------------------- UBX
+
+SIX = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
+UNITS = {"gyro": "deg/s", "accel": "m/s^2"}
+COUNTS = np.round(np.random.default_rng(4).standard_normal((ROWS, 6)) * 300).astype(int)
+COUNTS[:, 5] += 10_042
+TAGS = np.arange(ROWS) * 256
+
+
+def ubx(channels: tuple[str, ...] = SIX, **time: Any) -> dict[str, Any]:
+    """Return the log format of a receiver."""
+    return {
+        "time": {"column": "time_tag", "unit": "ms"} | time,
+        "channels": {name: {"column": name, "unit": UNITS[name[:-2]]} for name in channels},
+    }
+
+
+def of_raw(tags: np.ndarray, size: int = 10) -> list[bytes]:
+    each = samples(COUNTS, tags)
+    return [raw(each[start : start + size]) for start in range(0, ROWS, size)]
+
+
+RAW = of_raw(TAGS)
+MEAS = [
+    meas(10 * row, {14: int(COUNTS[row, 0]), 16: int(COUNTS[row, 3]), 12: 2500})
+    for row in range(ROWS)
+]
+UBX = b"".join(RAW)
+WRONG = b"".join([*RAW[:40], flipped(RAW[40], 0.5), *RAW[41:]])
+
+RECEIVERS = [
+    Entry("ubx of ESF-RAW", file(UBX, "log.ubx"), ubx(), kept(ROWS)),
+    Entry(
+        "ubx of ESF-MEAS", file(b"".join(MEAS), "log.ubx"), ubx(("gyro_x", "accel_x")), kept(ROWS)
+    ),
+    Entry("ubx in gzip", file(gzip.compress(UBX), "log.ubx.gz"), ubx(), kept(ROWS)),
+    Entry(
+        "ubx with a wrong checksum",
+        file(WRONG, "log.ubx"),
+        ubx(),
+        kept(ROWS - 10, "wrong_checksum", "missing_samples"),
+    ),
+    Entry(
+        "ubx cut in a message",
+        file(UBX[:-20], "log.ubx"),
+        ubx(),
+        kept(ROWS - 10, "incomplete_last_record"),
+    ),
+    Entry(
+        "ubx in gzip cut short",
+        file(part(gzip.compress(UBX), 0.5), "log.ubx.gz"),
+        ubx(),
+        kept(500, "truncated_file", "incomplete_last_record"),
+    ),
+    Entry(
+        "ubx between NMEA and RTCM",
+        file(
+            b"".join(b for message in RAW for b in (NMEA, message, RTCM, nav_pvt(valid=0))),
+            "log.ubx",
+        ),
+        ubx(),
+        kept(ROWS),
+    ),
+    Entry(
+        "ubx with counters that wrap",
+        file(b"".join(of_raw((TAGS + 2**24 - 1000) % 2**24)), "log.ubx"),
+        ubx(),
+        kept(ROWS),
+    ),
+    Entry(
+        "ubx without sensors",
+        file(nav_pvt() * 50, "log.ubx"),
+        ubx(),
+        Rejected(r"log\.ubx: found no ESF-MEAS and no ESF-RAW among 50 UBX messages"),
+    ),
+    Entry(
+        "ubx without an axis",
+        file(b"".join(MEAS), "log.ubx"),
+        ubx(),
+        Rejected(r"log\.ubx: .*data types 12, 14, 16.*expected .* 13 \(gyro_y\)"),
+    ),
+    Entry(
+        "ubx of both messages",
+        file(UBX + b"".join(MEAS), "log.ubx"),
+        ubx(("gyro_x",)),
+        Rejected("both ESF-MEAS and ESF-RAW hold the columns; say which"),
+    ),
+    Entry(
+        "ubx of nothing",
+        file(b"", "log.ubx"),
+        ubx() | {"reader": "ubx"},
+        Rejected(r"log\.ubx: found no ESF-MEAS and no ESF-RAW among 0 UBX messages"),
+    ),
+    Entry(
+        "ubx of syncs alone",
+        file(b"\xb5\x62" * 50_000, "log.ubx"),
+        ubx() | {"reader": "ubx"},
+        Rejected("among 0 UBX messages"),
+    ),
+    Entry(
+        "ubx of the beginnings of long messages",
+        file(b"\xb5\x62\x10\x02\xff\xff" * 200_000 + bytes(70_000), "log.ubx"),
+        ubx() | {"reader": "ubx"},
+        Rejected(r"log\.ubx: found no ESF-MEAS and no ESF-RAW .* 200000 with a wrong checksum"),
+    ),
+    Entry(
+        "ubx after a restart",
+        file(UBX + b"".join(RAW[:50]), "log.ubx"),
+        ubx(),
+        kept(ROWS + 500, "segments"),
+    ),
+]
+
+# -------------------------------------------------------------------------------- VectorNav
+
+
+def vectornav(**keys: Any) -> dict[str, Any]:
+    """Return the log format of a VectorNav sensor."""
+    given: dict[str, Any] = {} if "time" in keys else {"rate": f"{RATE} Hz"}
+    return (
+        {
+            "channels": {
+                "gyro_x": {"column": "gyro_x", "unit": "rad/s"},
+                "accel_z": {"column": "accel_z", "unit": "m/s^2"},
+            }
+        }
+        | given
+        | keys
+    )
+
+
+def sentences(appended: bool = False) -> list[bytes]:
+    lines = []
+    for row, (wx, az) in enumerate(zip(rest()["wx"], rest()["az"], strict=True)):
+        figures = [0.0] * 8 + [float(az), float(wx), 0.0, 0.0]
+        lines.append(sentence("VNYMR", figures, f",T{10 * row:010d}" if appended else ""))
+    return lines
+
+
+LINES = sentences()
+DAMAGED = [*LINES[:500], LINES[500].replace(b"VNYMR,+", b"VNYMR,-"), *LINES[501:]]
+HOST = {"column": "host_time", "unit": "s"}
+
+TEXTS = [
+    Entry("vectornav", file(logged(LINES), "log.txt"), vectornav(), kept(ROWS)),
+    Entry(
+        "vectornav with a wrong checksum",
+        file(logged(DAMAGED), "log.txt"),
+        vectornav(),
+        kept(ROWS, "wrong_checksum", "empty_cells"),
+    ),
+    Entry(
+        "vectornav with a wrong checksum and stamps",
+        file(
+            logged([b"%.2f " % (row / RATE) + line for row, line in enumerate(DAMAGED)]), "log.txt"
+        ),
+        vectornav(time=HOST),
+        kept(ROWS - 1, "wrong_checksum", "missing_samples"),
+    ),
+    Entry(
+        "vectornav with a counter",
+        file(logged(sentences(appended=True)), "log.txt"),
+        vectornav(time={"column": "counter", "unit": "ms"}),
+        kept(ROWS),
+    ),
+    Entry(
+        "vectornav cut in a sentence",
+        file(logged(LINES)[:-20], "log.txt"),
+        vectornav(),
+        kept(ROWS - 1, "incomplete_last_record"),
+    ),
+    Entry(
+        "vectornav with other sentences",
+        file(
+            logged([b for line in LINES for b in (line, b"$VNYPR,+010.071,+000.278,-002.026*60")]),
+            "log.txt",
+        ),
+        vectornav(),
+        kept(ROWS, "other_sentences"),
+    ),
+    Entry(
+        "vectornav with garbage",
+        file(logged([*LINES[:300], b"\xfa\x01\x29\0\x80", b"ready", *LINES[300:]]), "log.txt"),
+        vectornav(),
+        kept(ROWS, "not_sentences"),
+    ),
+    Entry(
+        "vectornav with every checksum wrong",
+        file(logged([line[:-2] + b"zz" for line in LINES]), "log.txt"),
+        vectornav(),
+        Rejected(r"log\.txt: found no sentence with a right checksum"),
+    ),
+    Entry(
+        "vectornav of other sentences",
+        file(logged([b"$VNYPR,+010.071,+000.278,-002.026*60"] * ROWS), "log.txt"),
+        vectornav(),
+        Rejected(r"log\.txt: found VNYPR; expected one of VNYMR"),
+    ),
+    Entry(
+        "vectornav without the stamps that are named",
+        file(logged(LINES), "log.txt"),
+        vectornav(time=HOST),
+        Rejected("no stamp that can be read in the first"),
+    ),
+]
+
+PACKED = [
+    Entry(
+        "vectornav in gzip cut short",
+        file(part(gzip.compress(logged(LINES)), 0.5), "log.txt.gz"),
+        vectornav(),
+        kept(487, "truncated_file", "incomplete_last_record"),
+    ),
+    Entry(
+        "vectornav in gzip",
+        file(gzip.compress(logged(LINES)), "log.txt.gz"),
+        vectornav(),
+        kept(ROWS),
+    ),
+]
+
+BINARY = [*RECEIVERS, *PACKED]

@@ -1,0 +1,158 @@
+"""Broken and odd logs: each ends in what is expected of it, alone and among all others."""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from imubench_pipeline.ingest import ingest_as_planned
+from imubench_pipeline.plan import Plan
+from imubench_pipeline.recording import channel_logs, log_paths
+from imubench_pipeline.results import Quality
+from tests.corpus import ENTRIES, Cut, Entry, Kept, Rejected
+
+LIMIT_S = 60
+LIMIT_MB = 500
+LONGEST_REASON = 1500
+GOOD = "csv"
+CHECK = """
+import sys
+from pathlib import Path
+from imubench_pipeline.cli import main
+
+status = main(sys.argv[1:])
+peak = Path("/proc/self/status").read_text().partition("VmHWM:")[2].split()[0]
+print(f"peak: {int(peak) // 1024} MB", file=sys.stderr)
+sys.exit(status)
+"""
+"""The command, which then says how much memory it took. Not ru_maxrss, which begins with the size
+of the process that started this one."""
+
+SAID_OF_ALL = {"short_recording"}
+SAID = re.compile(r"^(\S.*)/[^/\n]+: (ok|warnings|rejected)$", re.MULTILINE)
+
+
+@contextmanager
+def watched(seconds: int) -> Iterator[None]:
+    """Fail where what is done takes longer."""
+
+    def stop(*_: object) -> None:
+        pytest.fail(f"not done in {seconds} s")  # no error that a reader takes for one of a file
+
+    before = signal.signal(signal.SIGALRM, stop)
+    signal.alarm(seconds)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def plan_of(place: Path) -> Plan:
+    places = {"logs": str(place / "logs"), "sensors": str(place / "sensors")}
+    return Plan({**places, "simulated": None})
+
+
+def ingested(plan: Plan, sensor: str, kept: Path) -> Quality:
+    """Ingest the one recording of a sensor."""
+    (key,) = (key for key in plan.recordings if key[0] == sensor)
+    settings = plan.ingest_settings(*key)
+    return ingest_as_planned(plan.recordings[key].path, settings, *key, kept)
+
+
+def names_of(quality: Quality) -> set[str]:
+    return {str(finding["finding"]) for finding in quality.findings} - SAID_OF_ALL
+
+
+def check_accounts(quality: Quality, kept: Path) -> None:
+    """Every sample that was read is used, or counted under a finding."""
+    told = {
+        (finding["finding"], finding["channel"]): finding["value"] for finding in quality.findings
+    }
+    for name, log in channel_logs(kept).items():
+        counts = quality.channels[name]
+        present = counts["used"] + counts["knocks"] + counts["repeated"]
+        assert counts["present"] == present > 0, name
+        without = sum(int(told.get((kind, name), 0)) for kind in ("empty_cells", "not_finite"))
+        file = pq.ParquetFile(log.path)
+        rows = file.metadata.num_rows
+        values = file.read([name]).column(name)
+        assert len(values) - values.null_count == counts["used"], name
+        # A record left out for its stamp may lack the sample too.
+        assert rows <= present + without <= rows + int(told.get(("repeated_stamps", None), 0)), name
+
+
+@pytest.mark.parametrize("name", ENTRIES)
+def test_entry(name: str, tmp_path: Path) -> None:
+    entry = ENTRIES[name]
+    if entry.skip:
+        pytest.skip(entry.skip)
+    entry.place(tmp_path / "logs", tmp_path / "sensors")
+    before = sorted((tmp_path / "logs").rglob("*"))
+    with watched(LIMIT_S):
+        quality = ingested(plan_of(tmp_path), name, tmp_path / "kept")
+    check_outcome(entry, quality)
+    check_accounts(quality, tmp_path / "kept")
+    assert sorted((tmp_path / "logs").rglob("*")) == before
+    if (tmp_path / "kept").exists():
+        assert sorted((tmp_path / "kept").iterdir()) == log_paths(tmp_path / "kept")
+
+
+def check_outcome(entry: Entry, quality: Quality) -> None:
+    status, reason = quality.recording["status"], str(quality.recording.get("reason"))
+    match entry.expected:
+        case Rejected(expected):
+            assert status == "rejected"
+            assert re.search(expected, reason), reason
+            assert names_of(quality) == {"rejected"}
+            assert len(reason) < LONGEST_REASON
+        case Kept(samples, findings):
+            assert status == "ok", reason
+            assert names_of(quality) == findings, quality.findings
+            assert quality.recording["samples"] == samples
+        case Cut():
+            if status == "ok":
+                assert "truncated_file" in names_of(quality)
+            else:
+                assert re.match(r"\w+\.\w+\.gz[:,] |no channel can be used: ", reason), reason
+                assert len(reason) > 40
+
+
+def test_all_entries_beside_a_good_recording(tmp_path: Path) -> None:
+    present = [entry for entry in ENTRIES.values() if not entry.skip]
+    for entry in present:
+        entry.place(tmp_path / "logs", tmp_path / "sensors")
+    ENTRIES[GOOD].place(tmp_path / "alone/logs", tmp_path / "alone/sensors")
+    command = ["check", str(tmp_path / "logs"), "--sensors", str(tmp_path / "sensors")]
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", CHECK, *command],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=5 * LIMIT_S,
+    )
+    assert done.returncode == 1, done.stderr[-3000:]
+    assert re.fullmatch(r"peak: \d+ MB\n", done.stderr), done.stderr[-3000:]
+    assert int(done.stderr.split()[1]) < LIMIT_MB
+    lines = [line for line in done.stdout.splitlines() if not line.startswith("  ")]
+    said = dict(SAID.findall(done.stdout))
+    assert len(lines) == len(said) == len(present)
+    assert said[GOOD] == "ok"
+    for entry in present:
+        if not isinstance(entry.expected, Cut):
+            assert (said[entry.name] == "rejected") == isinstance(entry.expected, Rejected)
+    qualities = []
+    for place, kept in ((tmp_path, tmp_path / "among"), (tmp_path / "alone", tmp_path / "kept")):
+        qualities.append(ingested(plan_of(place), GOOD, kept))
+    assert qualities[0] == qualities[1]
+    assert (tmp_path / "among/log.parquet").read_bytes() == (
+        tmp_path / "kept/log.parquet"
+    ).read_bytes()
