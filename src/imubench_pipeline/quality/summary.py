@@ -17,7 +17,7 @@ from imubench_pipeline.quality.blocks import FIRST_SIZE, Blocks, Gathering
 Array = NDArray[np.float64]
 
 LARGEST = 1e75
-"""SI. What is larger was never measured, and its fourth power would overflow; it counts as infinite."""
+"""SI. What is larger was never measured; its fourth power would overflow. It counts as infinite."""
 
 _PRESENT, _MISSING, _INFINITE, _LOW, _HIGH, _AT_LOW, _AT_HIGH = range(7)
 _LAST, _RUN, _LONGEST, _LONGEST_END, _REPEATS, _STEP, _TAKEN = range(7, 14)
