@@ -110,7 +110,8 @@ rule datasheet:
         parameters=FOLDER + "/parameters.parquet",
         fixed_bias=FOLDER + "/fixed_bias.parquet",
     output:
-        FOLDER + "/datasheet.parquet",
+        datasheet=FOLDER + "/datasheet.parquet",
+        datasheet_curve=FOLDER + "/datasheet_curve.parquet",
     params:
         settings=lambda w: plan.datasheet_settings(w.sensor),
         code=plan.code("datasheet"),
@@ -141,6 +142,7 @@ rule tables:
         reconstruction=[f"{folder}/reconstruction.parquet" for folder in FOLDERS],
         scores=[f"{folder}/scores.parquet" for folder in FOLDERS],
         datasheet=[f"{folder}/datasheet.parquet" for folder in FOLDERS],
+        datasheet_curve=[f"{folder}/datasheet_curve.parquet" for folder in FOLDERS],
         error_budget=[f"{folder}/error_budget.parquet" for folder in FOLDERS],
     output:
         as_files(*sorted(set(TABLES) - {"ranking", "coverage", "coverage_by_vendor"})),

@@ -209,6 +209,14 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _text("verdict", "better than typ, as printed, worse than typ, not sure, ..."),
         _text("reason", "in words", required=False),
     ),
+    "datasheet_curve": (
+        *_KEYS,
+        _text("sidedness", "of the noise density, as assumed in this row", required=False),
+        _number("N", _SI + " times sqrt(s)", "line N / sqrt(tau) of the datasheet"),
+        _number("floor", _SI, "bias instability of the datasheet"),
+        _number("rms", _SI, "RMS over tau of measured Allan deviation minus the lines'"),
+        _number("rms_log10", "decades", "RMS over tau of the difference of log10"),
+    ),
     "coverage": (
         _SENSOR,
         _text("vendor", "of the sensor"),

@@ -5,7 +5,8 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 
-from imubench_pipeline.datasheet import bias_deltas, deltas
+from imubench_pipeline.comparable import comparables
+from imubench_pipeline.datasheet import bias_deltas, curve_rms, deltas
 from imubench_pipeline.printed import Datasheet
 from imubench_pipeline.results import Quality, Row, curves, estimates
 from imubench_pipeline.tables import read, write
@@ -28,12 +29,30 @@ def rows(folder: Path, sensor: str, recording: str, settings: str) -> Iterator[R
             yield names | {"method": "mean"} | asdict(delta)
 
 
+def curve_rows(folder: Path, sensor: str, recording: str, settings: str) -> Iterator[Row]:
+    """Yield the rows of the table ``datasheet_curve``; none where a datasheet has no line."""
+    measured = curves(folder / "allan.parquet", Quality.read(folder / "quality.json"))
+    datasheet = Datasheet.model_validate(json.loads(settings)["datasheet"])
+    for channel, curve in measured.items():
+        names = {"sensor": sensor, "recording": recording, "channel": channel}
+        printed = list(comparables(datasheet, channel))
+        for found in curve_rms(printed, curve.tau, curve.deviation):
+            yield names | {
+                "sidedness": found.noise.sidedness if found.noise else None,
+                "N": found.noise.value if found.noise else None,
+                "floor": found.floor.value if found.floor else None,
+                "rms": found.rms,
+                "rms_log10": found.rms_log10,
+            }
+
+
 if __name__ == "__main__":
     names = snakemake.wildcards
-    found = rows(
+    given = (
         Path(snakemake.input.parameters).parent,
         names.sensor,
         names.recording,
         snakemake.params.settings,
     )
-    write("datasheet", found, Path(snakemake.output[0]))
+    write("datasheet", rows(*given), Path(snakemake.output.datasheet))
+    write("datasheet_curve", curve_rows(*given), Path(snakemake.output.datasheet_curve))

@@ -72,6 +72,7 @@ def render(tables: Mapping[str, pa.Table], settings: Mapping[str, Any]) -> str:
                 "view": view,
                 "curve": channel_figure(view, system),
                 "datasheet": datasheet_figure(view, system),
+                "away": list(_away(view, system)),
                 "spectrum": spectrum_figure(view, system),
             }
             for view in views
@@ -232,6 +233,14 @@ def _deltas(views: list[ChannelView], system: System) -> Iterator[dict[str, Any]
             )
         if rows:
             yield {"view": view, "rows": rows}
+
+
+def _away(view: ChannelView, system: System) -> Iterator[str]:
+    """Yield how far the curve is from the lines of the datasheet."""
+    unit = page_unit(view.quantity, "adev", system)
+    for row in view.datasheet_curve:
+        reading = f", density read as {row['sidedness']}" if row["sidedness"] else ""
+        yield f"{unit.text(row['rms'], 3)} {unit.sign}, {row['rms_log10']:.3f} decades{reading}"
 
 
 def _percent(share: float | None) -> str:

@@ -41,6 +41,7 @@ class ChannelView:
     reconstruction: dict[str, dict[str, NDArray[np.float64]]] = field(default_factory=dict)
     scores: dict[str, Row] = field(default_factory=dict)
     datasheet: list[Row] = field(default_factory=list)
+    datasheet_curve: list[Row] = field(default_factory=list)
     truth: dict[str, Row] = field(default_factory=dict)
     models: list[Row] = field(default_factory=list)
     lines: list[Row] = field(default_factory=list)
@@ -106,7 +107,7 @@ def channel_views(tables: Mapping[str, pa.Table]) -> list[ChannelView]:
                 column: _floats(chosen, column)
                 for column in ("tau", "adev", "lower", "upper", "reconstructed")
             }
-    for table in ("models", "lines"):
+    for table in ("models", "lines", "datasheet", "datasheet_curve"):
         for row in tables[table].to_pylist():
             getattr(views[_name(row)], table).append(row)
     for name, part in _by_channel(tables["spectrum"]).items():
@@ -116,8 +117,6 @@ def channel_views(tables: Mapping[str, pa.Table]) -> list[ChannelView]:
         }
     for row in tables["scores"].to_pylist():
         views[_name(row)].scores[row["method"]] = row
-    for row in tables["datasheet"].to_pylist():
-        views[_name(row)].datasheet.append(row)
     for row in tables["simulated_truth"].to_pylist():
         if _name(row) in views:
             views[_name(row)].truth[row["parameter"]] = row
