@@ -380,3 +380,21 @@ def test_a_disagreement_of_aic_and_bic_is_said_with_its_size() -> None:
     assert disagreement([simple, rich]) == "AIC favours N+K by 2.4, BIC N by 1.3"
     assert disagreement([simple, scored(Terms("NK"), 104.0, 98.0)]) is None
     assert disagreement([simple]) is None
+
+
+def test_a_ramp_in_place_of_a_walk_must_be_the_better() -> None:
+    """Beside a walk that is left at 0 it pays as a slow process does."""
+    seen = set()
+    for seed, K in enumerate((0.0, 0.0, 1e-3, 1e-3)):
+        rng = np.random.default_rng(seed)
+        log = simulate(NoiseModel(N=1e-3, K=K, R=1e-5), 5.0, 3000, rng)
+        whittle = whittle_of(spectra([log], len(log), 5.0)[0], 2.5)
+        penalty = np.log(len(whittle.spectrum.density))
+        for candidate in compare(whittle, quantization=False):
+            found = candidate.found
+            if found.terms.ramp:
+                alone = found.parameter("K") == 0.0
+                seen.add(alone)
+                plain = 2.0 * found.cost + found.terms.parameters * penalty
+                assert candidate.bic - plain == pytest.approx(4.0 if alone else 0.0, abs=1e-6)
+    assert seen == {True, False}

@@ -140,6 +140,9 @@ def _parameter(
         # B and T_B trade off along a ridge that the bound, which is local, does not see.
         error = max(error, math.log(upper / lower) / _WIDTH_OF_INTERVAL)
         most = NOT_IDENTIFIED_TIME if name.startswith("T_B") else NOT_IDENTIFIED
+    if name == "R" and lower < 0.0 < upper:
+        reason = "its interval contains 0; only that is given"
+        return Parameter(None, "not_identified", reason, lower, upper, needed, value)
     if error > most:
         reason = (
             f"a log of this length tells it to {100 * error:.0f} % (standard error); only "

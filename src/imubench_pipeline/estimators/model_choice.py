@@ -34,8 +34,9 @@ _LIKE_A_WALK = 1 / 10
 """Part of the longest correlation time beyond which a process looks like a random walk."""
 
 _UNIT_ROOT = 4.0
-"""BIC by which such a process, where there is no walk, must be the better: a walk often looks as
-if it came back to its mean (D. Dickey and W. Fuller, J. Am. Stat. Assoc. 74, 1979)."""
+"""BIC by which such a process, or a ramp, must be the better where there is no walk: a walk often
+looks as if it came back to its mean, or had a trend (D. Dickey and W. Fuller, J. Am. Stat. Assoc.
+74, 1979; C. R. Nelson and H. Kang, Econometrica 49, 1981)."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +47,8 @@ class Candidate:
     ----------
     found : Maximum
     bic, aic : float
-        2 (-log L) + p log(number of bins), and + 2 p. Where a Gauss-Markov process stands for a
-        random walk, 4 is added to the BIC.
+        2 (-log L) + p log(number of bins), and + 2 p. Where a Gauss-Markov process or a ramp
+        stands for a random walk, 4 is added to the BIC.
     weight : float
         Weight of the model among the candidates, proportional to e^(-BIC/2).
     share : float
@@ -83,6 +84,8 @@ def compare(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
             and len(found.times) > 0
             and found.times[-1] > _LIKE_A_WALK * whittle.longest
         )
+        # A ramp is tried beside a walk: it stands for the walk where none is left.
+        like_a_walk |= found.terms.ramp and found.parameter("K") == 0.0
         return 2.0 * found.cost + found.terms.parameters * penalty + _UNIT_ROOT * like_a_walk
 
     def add(terms: Terms) -> None:
