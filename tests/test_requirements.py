@@ -49,6 +49,7 @@ def test_a_fault_names_file_and_key(tmp_path: Path, changes: dict, said: str) ->
     with pytest.raises(ConfigError, match=r"robot\.yaml: ") as caught:
         read_requirements(written(tmp_path, **changes))
     assert said in str(caught.value)
+    assert len(str(caught.value).splitlines()) == 1
 
 
 def test_a_missing_folder_is_named(tmp_path: Path) -> None:

@@ -98,6 +98,7 @@ def test_sensors_are_ranked_with_ties() -> None:
     assert found["fair"]["tied_with"] == "alike" and found["good"]["tied_with"] is None
     # 0.1 deg at 95 % is 8.9e-4 rad; N sqrt(100 s) is 2e-4, 5e-4 and 1e-2.
     assert found["good"]["verdict"] == "passes"
+    assert found["good"]["at_most"] == pytest.approx(0.1 * DEGREE)
     assert found["good"]["margin"] == pytest.approx(0.1 * DEGREE / 1.959964 / 2e-4, rel=0.03)
     assert found["poor"]["verdict"] == "surely fails" and found["poor"]["chance"] < 1e-6
     assert found["accelerometer"]["verdict"] == "not enough data"
@@ -159,6 +160,8 @@ def test_a_sensor_outside_the_price_class_is_not_ranked() -> None:
     asked = requirement(("heading", "100 s", "0.1 deg"), price_class=["chip"])
     found = ranking({"s": {"gyro_x": white(5e-5)}}, asked, "tactical")
     assert found["s"]["rank"] is None and found["s"]["verdict"] == "outside the price class"
+    found = ranking({"s": {"gyro_x": white(5e-5)}}, asked, None)
+    assert found["s"]["verdict"] == "price class not stated"
 
 
 def test_ties_are_stable(rng: np.random.Generator) -> None:

@@ -15,6 +15,7 @@ from pydantic import BaseModel
 from imubench_pipeline.config import Run, Simulated
 from imubench_pipeline.sensor import RecordingNotes, Sensor
 from imubench_pipeline.tables import replacing, write_content, write_json
+from imubench_pipeline.units import UnitError, quantity_to_si
 from imubench_pipeline.validation import ConfigError, read_yaml
 
 SCHEMAS: dict[str, type[BaseModel]] = {
@@ -84,10 +85,10 @@ def _add_export(exporting: argparse.ArgumentParser) -> None:
     )
     exporting.add_argument(
         "--horizon",
-        type=float,
-        default=60.0,
-        metavar="S",
-        help="time of coasting for which terms that the program lacks are mapped; default: 60",
+        type=_seconds,
+        default="60 s",
+        metavar="TIME",
+        help="of coasting, for which terms that the program lacks are mapped; default: 60 s",
     )
     exporting.add_argument(
         "--inflate", type=float, default=1.0, metavar="FACTOR", help="multiplies every deviation"
@@ -96,7 +97,7 @@ def _add_export(exporting: argparse.ArgumentParser) -> None:
     exporting.add_argument(
         "--overbound",
         action="store_true",
-        help="the smallest model above the upper 95 %% limit of the measured curve",
+        help="the smallest model above the upper 95 %% limit of the measured curve up to --horizon",
     )
     exporting.add_argument("--method", help="of the estimates; default: the recommended one")
     exporting.add_argument("--latitude", type=float, metavar="DEG", help="for gravity")
@@ -104,10 +105,24 @@ def _add_export(exporting: argparse.ArgumentParser) -> None:
     exporting.add_argument("--output", type=Path, help="where to write; default: the terminal")
 
 
+def _seconds(text: str) -> float:
+    """Return a time in s, written with its unit or without."""
+    try:
+        return float(text)
+    except ValueError:
+        try:
+            return quantity_to_si(text, "time")
+        except UnitError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+
+
 def _export(given: argparse.Namespace) -> int:
     from imubench_pipeline.export.imu import ExportError
     from imubench_pipeline.export.request import Request, load, made
 
+    if given.inflate != 1.0 and not given.because:
+        print("--inflate needs its reason; expected --because '...'", file=sys.stderr)
+        return 2
     asked = Request(
         sensor=given.sensor,
         target=given.target,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from statistics import NormalDist
 from typing import Any
 
 from imubench_pipeline.error_budget import (
@@ -109,7 +108,6 @@ def standard(
 def of_requirement(name: str, requirement: Requirement) -> Iterator[Question]:
     """Yield the questions of a requirement."""
     latitude = requirement.latitude and quantity_to_si(requirement.latitude, "angle")
-    sigmas = NormalDist().inv_cdf((1.0 + requirement.confidence) / 2.0)
     for limit in requirement.limits:
         yield Question(
             name,
@@ -118,7 +116,7 @@ def of_requirement(name: str, requirement: Requirement) -> Iterator[Question]:
             start_of(requirement),
             requirement.axis,
             latitude if isinstance(latitude, float) else None,
-            limit.size / sigmas,
+            limit.size / requirement.sigmas,
         )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from statistics import NormalDist
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
@@ -113,6 +114,11 @@ class Requirement(Strict):
         if self.latitude is None and any(limit.error == "north" for limit in self.limits):
             raise ValueError("a limit of north needs 'latitude', such as 45 deg")
         return self
+
+    @property
+    def sigmas(self) -> float:
+        """How many standard deviations a limit is, at the confidence that is asked for."""
+        return NormalDist().inv_cdf((1.0 + self.confidence) / 2.0)
 
     def admits(self, price_class: str | None) -> bool:
         """Tell whether sensors of a price class may be chosen."""

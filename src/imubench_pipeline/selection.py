@@ -118,14 +118,19 @@ def ranking_rows(
         for sensor, found in standings.items():
             one = deciding[sensor]
             rank, tied = _rank(sensor, ranked) if sensor in ranked else (None, [])
-            outside = not requirement.admits(sensors[sensor]["price_class"])
+            price_class = sensors[sensor]["price_class"]
+            outside = None if requirement.admits(price_class) else "outside the price class"
+            if outside and price_class is None:
+                outside = "price class not stated"
             for standing in found:
                 yield {
                     "requirement": name,
                     "sensor": sensor,
                     "rank": rank,
                     "tied_with": ", ".join(tied) or None,
-                    "verdict": "outside the price class" if outside else one.verdict,
+                    "verdict": outside or one.verdict,
+                    "confidence": requirement.confidence,
+                    "at_most": standing.total["limit"] * requirement.sigmas,
                     "decides": standing is one,
                     **_limit_row(standing),
                 }

@@ -206,6 +206,8 @@ def _targets() -> dict[str, pint.Unit]:
 
 @lru_cache(maxsize=1024)
 def _converter(unit: str, dimension: str) -> tuple[float, float]:
+    if unit.strip() == "?":
+        raise UnitError(f"the unit '?' is left to fill in; {_expected(dimension)}")
     target = _targets()[dimension]
     try:
         power, source = _parsed(unit)

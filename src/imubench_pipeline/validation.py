@@ -73,9 +73,14 @@ def parse(model: type[_Model], data: object, file: str) -> _Model:
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        raise ConfigError("\n".join(_fault(file, fault, model) for fault in error.errors())) from (
-            None
-        )
+        told = "\n".join(_fault(file, fault, model) for fault in _first_faults(error.errors()))
+        raise ConfigError(told) from None
+
+
+def _first_faults(faults: list[Any]) -> list[Any]:
+    """Leave out that a list is too short where its elements cannot be used, which is said too."""
+    inside = {fault["loc"][:n] for fault in faults for n in range(len(fault["loc"]))}
+    return [f for f in faults if f["type"] != "too_short" or f["loc"] not in inside]
 
 
 def _fault(file: str, fault: Any, model: type[BaseModel]) -> str:

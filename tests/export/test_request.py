@@ -155,12 +155,14 @@ def test_the_command_writes_a_file_or_says_why_not(
     assert (tmp_path / "imu.yaml").read_text() == printed
     assert yaml.safe_load(printed)["gyroscope_noise_density"] == 2e-4
     assert main([*ask, "npz", "--output", str(tmp_path / "a.npz")]) == 0
+    assert main([*ask, "kalibr", "--horizon", "1 min", "--output", str(tmp_path / "same")]) == 0
+    assert (tmp_path / "same").read_text() == printed
     with np.load(tmp_path / "a.npz") as arrays:
         assert len(arrays.files) > 0
     capsys.readouterr()
     for wrong, said in (
         ([*ask, "npz"], "expected --output"),
-        ([*ask, "kalibr", "--inflate", "2"], "reason"),
+        ([*ask, "kalibr", "--inflate", "2"], "--because"),
         ([*ask, "other"], "there are: kalibr"),
         (["export", str(tmp_path / "none"), *ask[2:], "json"], "none"),
     ):

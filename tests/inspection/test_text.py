@@ -69,7 +69,9 @@ def test_a_gyro_without_a_unit_is_never_given_one(
     assert [data[f"gyro_{axis}"]["unit"] for axis in "xyz"] == ["?"] * 3
     assert "deg/s or rad/s?" in found.block
     assert not found.complete and "left to fill in: channels.gyro_*.unit" in found.proof.said
-    with pytest.raises(ConfigError, match=r"gyro_x.unit: cannot read '\?' as a unit; expected"):
+    with pytest.raises(
+        ConfigError, match=r"gyro_x.unit: the unit '\?' is left to fill in; expected"
+    ):
         sensor_of(found)
     truth = {name: si[name] for name in ("time", *CHANNELS)}
     same(read_as_drafted(path, sensor_of(found, gyro="deg/s")), truth)

@@ -127,7 +127,7 @@ def imu_of(tables: Tables, request: Request) -> Imu:
         )
         about = by_name[choice.recording]
         simulated = simulated or bool(about["simulated"])
-        rates.append(float(about["rate"]))
+        rates.append(float(f"{about['rate']:.9g}"))  # stamps are not sure of more
         axes[quantity] = choice.axis
         if request.overbound:
             family = TARGETS[request.target].family
@@ -135,7 +135,8 @@ def imu_of(tables: Tables, request: Request) -> Imu:
                 tables["allan"], choice, request, float(about["rate"]), family
             )
     if not axes:
-        raise ExportError(f"{request.sensor}: no estimate")
+        reasons = "; ".join(row["reason"] for row in recordings if row["reason"])
+        raise ExportError(f"{request.sensor}: no estimate; its recordings were rejected: {reasons}")
     gravity = STANDARD_GRAVITY if request.latitude is None else normal_gravity(request.latitude)
     return Imu(
         sensor=request.sensor,

@@ -186,7 +186,7 @@ def datasheet_figure(view: ChannelView, system: System) -> str | None:
         for row in view.datasheet
         if row["method"] == view.recommended
         and row["comparable"] is not None
-        and row["quantity"] in ("N", "bias_instability")
+        and row["statistic"] in ("N", "adev_minimum")
     ]
     if not rows:
         return None
