@@ -171,8 +171,8 @@ def test_one_model_is_chosen_and_scores_add_up(found: Estimation, channel: str) 
     for row in rows:
         # -2 log L + p log(bins), + 2 p, and the shares of e^(-BIC/2)
         bic = -2 * row["log_likelihood"] + row["free"] * np.log(row["bins"])
-        # A slow process in place of a random walk pays 4 more.
-        instead = "GM" in row["model"] and "K" not in row["model"]
+        # A slow process in place of a random walk pays 4 more, and a ramp beside a walk of 0.
+        instead = ("GM" in row["model"] and "K" not in row["model"]) or "R" in row["model"]
         assert row["bic"] - bic == pytest.approx(0.0, abs=1e-6) or (
             instead and row["bic"] - bic == pytest.approx(4.0, abs=1e-6)
         )

@@ -104,10 +104,9 @@ def test_the_command_tells_what_it_did(tmp_path: Path, capsys: pytest.CaptureFix
     assert row.split()[0] == "numpy"
 
 
-@pytest.mark.parametrize("said", ["no", "a.csv: " + "x" * 5000], ids=["too short", "too long"])
-def test_a_reason_that_is_none_is_a_failure(monkeypatch: pytest.MonkeyPatch, said: str) -> None:
+def test_a_reason_that_is_none_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object) -> None:
-        raise RecordingError(said)
+        raise RecordingError("no")
 
     monkeypatch.setattr(target, "read", refuse)
     with pytest.raises(target.WrongError, match="a reason of"):

@@ -133,7 +133,9 @@ def _shortened(data: bytes) -> bytes:
             return gzip.compress(_shortened(gzip.decompress(data)))
     if data.startswith(b"PK\3\4"):
         with suppress(zipfile.BadZipFile), zipfile.ZipFile(io.BytesIO(data)) as packed:
-            return archive({name: _shortened(packed.read(name)) for name in packed.namelist()})
+            # What writes archives takes no empty name.
+            names = [name for name in packed.namelist() if name]
+            return archive({name: _shortened(packed.read(name)) for name in names})
     if data.startswith(b"\xb5\x62"):
         return data[:_BYTES]
     lines = data.splitlines(keepends=True)
