@@ -221,8 +221,7 @@ def _deltas(views: list[ChannelView], system: System) -> Iterator[dict[str, Any]
                 {
                     "quantity": _STATISTIC_NAMES.get(row["statistic"], plain),
                     "printed": f"{row['printed']:g} {row['unit']}" if published else "–",
-                    "kind": row["kind"] or "",
-                    "condition": row["condition"] or "",
+                    "about": ", ".join(filter(None, (row["kind"], row["condition"]))),
                     "comparable": unit.text(row["comparable"]),
                     "measured": _with_limits(row, unit.text),
                     "unit": "" if row["comparable"] is None and not row["measured"] else unit.sign,
@@ -247,13 +246,15 @@ def _percent(share: float | None) -> str:
     return "–" if share is None else f"{round(100 * share):+d} %"
 
 
-def _with_limits(row: Mapping[str, Any], text: Callable[[float | None], str], of: str = "") -> str:
-    """Return a figure, and its 95 % limits behind it."""
+def _with_limits(
+    row: Mapping[str, Any], text: Callable[[float | None], str], of: str = ""
+) -> list[str]:
+    """Return a figure, and its 95 % limits below it."""
     value, ends = (of, f"{of}_") if of else ("measured", "")
     lower, upper = row[f"{ends}lower"], row[f"{ends}upper"]
     if lower is None or upper is None:
-        return text(row[value])
-    return f"{text(row[value])} ({text(lower)} to {text(upper)})"
+        return [text(row[value])]
+    return [text(row[value]), f"{text(lower)} to {text(upper)}"]
 
 
 def _models(views: list[ChannelView]) -> Iterator[dict[str, Any]]:
