@@ -1,7 +1,7 @@
 """From static logs of inertial sensors to a cross-IMU report: `snakemake -c2`."""
 
 from imubench_pipeline.plan import Plan
-from imubench_pipeline.tables import TABLES
+from imubench_pipeline.tables import OF_ONE_RECORDING, TABLES
 from imubench_pipeline.validation import ConfigError
 
 
@@ -15,6 +15,8 @@ except ConfigError as error:
 
 RESULTS = str(plan.run.results)
 FOLDER = RESULTS + "/recordings/{sensor}/{recording}"
+JOINED = sorted(set(TABLES) - set(OF_ONE_RECORDING))
+RANKED = {"ranking", "coverage", "coverage_by_vendor"}
 ESTIMATED = ("parameters", "models", "lines", "spectrum", "fixed_bias")
 FOLDERS = [FOLDER.format(sensor=s, recording=r) for s, r in plan.recordings]
 
@@ -37,6 +39,7 @@ localrules:
 rule all:
     input:
         RESULTS + "/report/index.html",
+        RESULTS + "/report/figures",
         RESULTS + "/exports",
 
 
@@ -54,7 +57,9 @@ rule ingest:
     input:
         lambda w: plan.recordings[w.sensor, w.recording].files,
     output:
-        FOLDER + "/quality.json",
+        quality=FOLDER + "/quality.json",
+        envelope=FOLDER + "/envelope.parquet",
+        histogram=FOLDER + "/histogram.parquet",
     params:
         source=lambda w: str(plan.recordings[w.sensor, w.recording].path),
         settings=lambda w: plan.ingest_settings(w.sensor, w.recording),
@@ -145,7 +150,7 @@ rule tables:
         datasheet_curve=[f"{folder}/datasheet_curve.parquet" for folder in FOLDERS],
         error_budget=[f"{folder}/error_budget.parquet" for folder in FOLDERS],
     output:
-        as_files(*sorted(set(TABLES) - {"ranking", "coverage", "coverage_by_vendor"})),
+        as_files(*(table for table in JOINED if table not in RANKED)),
     params:
         truths=plan.truths(),
         catalogue=plan.catalogue(),
@@ -191,9 +196,26 @@ rule exports:
         "workflow/scripts/exports.py"
 
 
+rule figures:
+    input:
+        [f"{RESULTS}/tables/{table}.parquet" for table in JOINED],
+    output:
+        directory(RESULTS + "/report/figures"),
+    params:
+        settings=plan.report_settings(),
+        code=plan.code("figures"),
+    script:
+        "workflow/scripts/figures.py"
+
+
 rule report:
     input:
-        [f"{RESULTS}/tables/{table}.parquet" for table in TABLES],
+        [
+            f"{folder}/{table}.parquet"
+            for folder in FOLDERS
+            for table in OF_ONE_RECORDING
+        ],
+        tables=[f"{RESULTS}/tables/{table}.parquet" for table in JOINED],
     output:
         report(RESULTS + "/report/index.html", category="Comparison"),
     params:
@@ -203,5 +225,17 @@ rule report:
         "workflow/scripts/report.py"
 
 
+onstart:
+    from imubench_pipeline.progress import follow
+
+    follow()
+
+
 onsuccess:
     print(plan.summary())
+
+
+onerror:
+    import sys
+
+    print(plan.failure(log), file=sys.stderr)

@@ -12,7 +12,10 @@ from pathlib import Path
 
 from pydantic import BaseModel
 
+from imubench_pipeline import show
 from imubench_pipeline.config import Run, Simulated
+from imubench_pipeline.report import command as report
+from imubench_pipeline.report.static_figures import command as figures
 from imubench_pipeline.sensor import RecordingNotes, Sensor
 from imubench_pipeline.tables import replacing, write_content, write_json
 from imubench_pipeline.units import UnitError, quantity_to_si
@@ -63,6 +66,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--output", type=Path, help="where to write the sensor file; default: the terminal"
     )
     _add_export(commands.add_parser("export", help="write what a filter or simulator loads"))
+    show.add_arguments(
+        commands.add_parser("show", help="show the comparison of the sensors in the terminal")
+    )
+    report.add_arguments(
+        commands.add_parser("report", help="write the report again, elsewhere or in one file")
+    )
+    figures.add_arguments(
+        commands.add_parser("figures", help="draw the figures of channels for print")
+    )
     given = parser.parse_args(arguments)
     try:
         status = _COMMANDS[given.command](given)
@@ -216,4 +228,12 @@ def _inspect(given: argparse.Namespace) -> int:
     return 0 if found.complete else 1
 
 
-_COMMANDS = {"schema": _schema, "check": _check, "inspect": _inspect, "export": _export}
+_COMMANDS = {
+    "schema": _schema,
+    "check": _check,
+    "inspect": _inspect,
+    "export": _export,
+    "show": show.run,
+    "report": report.run,
+    "figures": figures.run,
+}

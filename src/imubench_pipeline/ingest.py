@@ -152,6 +152,7 @@ def _ingest(
     metadata = provenance | {
         "sources": sources.result(),
         "reader": log.reader,
+        "begins": notes.use.start,
         "started": notes.started
         or next((p.source.started for p in parts if p.source.started), None),
     }

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,7 +19,6 @@ from imubench_pipeline.provenance import source_digest
 from imubench_pipeline.readers import log_files
 from imubench_pipeline.requirements import Requirement, read_requirements
 from imubench_pipeline.sensor import RecordingNotes, Sensor, merged_log, read_sensors
-from imubench_pipeline.tables import read
 from imubench_pipeline.units import quantity_to_si
 from imubench_pipeline.validation import ConfigError, parse, read_yaml
 
@@ -30,7 +29,7 @@ _LONGEST_NAME = 120
 
 STEPS: Mapping[str, tuple[str, ...]] = {
     "simulate": ("simulated_logs",),
-    "ingest": ("ingest", "results"),
+    "ingest": ("ingest", "overview", "results"),
     "allan": ("allan", "recording", "results"),
     "estimate": ("estimation",),
     "reconstruct": ("reconstruction",),
@@ -40,7 +39,8 @@ STEPS: Mapping[str, tuple[str, ...]] = {
     "coverage": ("coverage", "results"),
     "exports": ("export.of_run",),
     "tables": ("results",),
-    "report": ("report.page",),
+    "figures": ("report.static_figures.of_run",),
+    "report": ("report.publish",),
 }
 """The modules that each step runs: their edit runs the step again."""
 
@@ -248,6 +248,7 @@ class Plan:
         return _text(
             {
                 "report": self.run.report.model_dump(mode="json"),
+                "results": str(self.run.results),
                 "settings": {
                     section: getattr(self.run, section).model_dump(mode="json")
                     for section in (
@@ -275,16 +276,17 @@ class Plan:
         return _text([entry.model_dump(mode="json") for entry in self._simulated.values()])
 
     def summary(self) -> str:
-        """Return what a finished run says: recordings analysed and rejected, and the report."""
-        table = self.run.results / "tables/recordings.parquet"
-        if not table.is_file():
-            return ""
-        rows = read("recordings", [table]).to_pylist()
-        rejected = [row for row in rows if row["status"] == "rejected"]
-        lines = [f"{len(rows) - len(rejected)} recordings analysed, {len(rejected)} rejected"]
-        lines += [f"  rejected: {r['sensor']}/{r['recording']}: {r['reason']}" for r in rejected]
-        lines.append(f"report: {self.run.results / 'report/index.html'}")
-        return "\n".join(lines)
+        """Return what a finished run says."""
+        # Tables are read at the end of a run alone: a run should begin at once.
+        from imubench_pipeline.run_summary import summary
+
+        return summary(self.run.results)
+
+    def failure(self, logs: Sequence[str]) -> str:
+        """Return what a run says in which a step failed, from the logs of Snakemake."""
+        from imubench_pipeline.run_summary import failure
+
+        return failure(logs, self.run.results)
 
     @staticmethod
     def code(step: str) -> str:

@@ -14,6 +14,8 @@ _NAME = _PACKAGE.name
 def source_digest(*modules: str) -> str:
     """Return a digest of modules of this package and of all that they import from it.
 
+    Of a package of which a module is used, its other files count too: templates, texts.
+
     Parameters
     ----------
     *modules : str
@@ -30,6 +32,8 @@ def source_digest(*modules: str) -> str:
         if path not in seen:
             seen.add(path)
             todo += _imports(path)
+    folders = {path.parent for path in seen} - {_PACKAGE}
+    seen |= {path for folder in folders for path in _data_files(folder)}
     digest = hashlib.sha256()
     for path in sorted(seen):
         digest.update(str(path.relative_to(_PACKAGE)).encode() + b"\0" + path.read_bytes())
@@ -42,6 +46,13 @@ def _path(module: str) -> Path:
         if path.is_file():
             return path
     raise ValueError(f"no module {module!r} in {_NAME}")
+
+
+@lru_cache(maxsize=64)
+def _data_files(folder: Path) -> tuple[Path, ...]:
+    """Return the files of a package that are no modules."""
+    files = (path for path in folder.rglob("*") if path.is_file())
+    return tuple(path for path in files if path.suffix != ".py" and "__pycache__" not in path.parts)
 
 
 @lru_cache(maxsize=256)

@@ -13,6 +13,7 @@ import pyarrow as pa
 
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.config import SimulatedRecording
+from imubench_pipeline.drift import drift_rows
 from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate, Parameter, Status
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.noise import FLOOR
@@ -170,6 +171,9 @@ def joined_tables(
     joined["pooled"] = build(
         "pooled",
         pooled_rows(recommended.to_pylist(), joined["fixed_bias"].to_pylist(), devices),
+    )
+    joined["drift"] = build(
+        "drift", drift_rows(recommended.to_pylist(), joined["fixed_bias"].to_pylist(), about)
     )
     joined["recordings"] = build("recordings", about)
     of_logs = (row for quality in qualities for row in quality.findings)

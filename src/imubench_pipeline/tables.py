@@ -137,6 +137,21 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _number("false_alarm", "-", "chance of one like it in a channel without lines"),
         _number("width", "Hz", "how wide it is"),
     ),
+    "envelope": (
+        *_KEYS,
+        _number("start", "s", "begin of a part of the log, from the first sample", required=True),
+        _number("end", "s", "its end", required=True),
+        _number("low", "SI", "least sample; degC for temperature"),
+        _number("high", "SI", "largest sample"),
+        _number("mean", "SI", "mean of the samples"),
+        _count("samples", "samples present", required=True),
+    ),
+    "histogram": (
+        *_KEYS,
+        _number("lower", "SI", "lower edge of the bin", required=True),
+        _number("upper", "SI", "upper edge of the bin", required=True),
+        _count("count", "samples in it", required=True),
+    ),
     "spectrum": (
         *_KEYS,
         _number("frequency", "Hz", "mean of the bin", required=True),
@@ -151,6 +166,26 @@ TABLES: dict[str, tuple[Column, ...]] = {
         *_KEYS,
         _number("value", "as in unit", "mean of the samples", required=True),
         _text("unit", "SI unit of value"),
+    ),
+    "drift": (
+        _SENSOR,
+        _text("device", "of which the recordings are compared"),
+        _CHANNEL,
+        _text("parameter", "N, B, K, T_B, Q, R, or bias: the fixed bias"),
+        _RECORDING,
+        _count("position", "place in the order of the device's recordings, from 1", required=True),
+        _text("started", "date and time of the first sample, where known", required=False),
+        _number("value", "as in unit", "estimate of this recording"),
+        _number("lower", "as in unit", "lower 95 % limit"),
+        _number("upper", "as in unit", "upper 95 % limit"),
+        _text("unit", "SI unit"),
+        _number("expected", "as in unit", "what the earlier recordings let one expect"),
+        _number("expected_lower", "as in unit", "lower 95 % limit of the estimate expected"),
+        _number("expected_upper", "as in unit", "upper 95 % limit of the estimate expected"),
+        _number("change", "-", "value / expected - 1; null for a bias"),
+        _number("p_value", "-", "chance of such a difference, if the device has not changed"),
+        _text("verdict", "changed or as before; null: cannot be judged", required=False),
+        _text("reason", "in words", required=False),
     ),
     "pooled": (
         _SENSOR,
@@ -291,6 +326,9 @@ TABLES: dict[str, tuple[Column, ...]] = {
     ),
 }
 """Every table a run leaves, by name; all numbers are SI (temperatures in degC)."""
+
+OF_ONE_RECORDING = ("envelope", "histogram")
+"""The tables that are kept with each recording and not joined."""
 
 
 class TableError(ValueError):

@@ -4,15 +4,20 @@ from dataclasses import asdict
 from pathlib import Path
 
 from imubench_pipeline.ingest import ingest_as_planned
-from imubench_pipeline.tables import write_json
+from imubench_pipeline.overview import overview
+from imubench_pipeline.tables import write, write_json
 
 if __name__ == "__main__":
-    output = Path(snakemake.output[0])
+    names, outputs = snakemake.wildcards, snakemake.output
+    folder = Path(outputs.quality).parent
     quality = ingest_as_planned(
         Path(snakemake.params.source),
         snakemake.params.settings,
-        snakemake.wildcards.sensor,
-        snakemake.wildcards.recording,
-        output.parent,
+        names.sensor,
+        names.recording,
+        folder,
     )
-    write_json(asdict(quality), output)
+    seen = overview(folder, names.sensor, names.recording)
+    write("envelope", seen.envelope, Path(outputs.envelope))
+    write("histogram", seen.histogram, Path(outputs.histogram))
+    write_json(asdict(quality), Path(outputs.quality))

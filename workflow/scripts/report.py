@@ -1,23 +1,21 @@
-"""Render the cross-IMU report."""
+"""Write the pages of the report whose data changed."""
 
-import json
 from pathlib import Path
 
-from imubench_pipeline.report.page import render
-from imubench_pipeline.tables import read, replacing
+from imubench_pipeline.report.publish import publish, site_of
+from imubench_pipeline.tables import read
 
 
-def main(tables: list[Path], settings: str, page: Path) -> None:
-    """Write the report, a single file that needs nothing else."""
-    read_tables = {path.stem: read(path.stem, [path]) for path in tables}
-    text = render(read_tables, json.loads(settings))
-    with replacing(page) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+def main(tables: list[Path], settings: str, start_page: Path) -> None:
+    """Write the report; its start page is the last to appear."""
+    folder = start_page.parent
+    site = site_of({path.stem: read(path.stem, [path]) for path in tables}, settings, folder.parent)
+    publish(site, folder)
 
 
 if __name__ == "__main__":
     main(
-        [Path(path) for path in snakemake.input],
+        [Path(path) for path in snakemake.input.tables],
         snakemake.params.settings,
         Path(snakemake.output[0]),
     )

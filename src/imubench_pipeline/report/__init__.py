@@ -1,1 +1,1 @@
-"""The cross-IMU report: tables to views, views to figures, all to one page."""
+"""The report: tables to views, views to pages and figures."""

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-from imubench_pipeline.report.practical import PageUnit, System, duration_text, unit_of
+from imubench_pipeline.report.practical import (
+    PageUnit,
+    System,
+    duration_text,
+    interval_text,
+    number_text,
+    unit_of,
+)
 from imubench_pipeline.requirements import DIMENSIONS, Requirement
 
 Row = Mapping[str, Any]
@@ -76,9 +83,9 @@ def _limit(row: Row, system: System) -> dict[str, Any]:
         "limit": f"{_NAMES[row['error']]}, {duration_text(row['time'])}",
         "allowed": unit.text(row["limit"], 3),
         "sigma": _shown(row["error"], row["sigma"], unit) if known else "–",
-        "interval": _interval(row, unit),
+        "interval": interval_text(row, unit),
         "unit": unit.sign,
-        "margin": f"{row['margin']:.3g}" if known else "–",
+        "margin": number_text(row["margin"], 3) if known else "–",
         "chance": _percent(row["chance"]) if known else "–",
         "source": f"{row['source']} ({_percent(row['share'])})" if row["source"] else "–",
         "reached": duration_text(reached) if reached is not None else "–",
@@ -127,14 +134,26 @@ def budget_tables(
             "times": [duration_text(time) for time in times],
             "lines": list(lines.values()),
             "missing": "; ".join(missing),
+            "notes": list(_notes(lines.values())),
         }
+
+
+def _notes(lines: Iterable[Mapping[str, Any]]) -> Iterator[str]:
+    """Yield what is said of the cells of a budget, each thing once, with the errors it is about."""
+    found: dict[str, dict[str, None]] = {}
+    for line in lines:
+        for cell in line["cells"]:
+            if cell["note"]:
+                found.setdefault(cell["note"], {})[line["error"].split(" (")[0]] = None
+    for note, errors in found.items():
+        yield f"{', '.join(errors).capitalize()}: {note}"
 
 
 def _cell(rows: Sequence[Row], unit: PageUnit) -> dict[str, Any]:
     """Return an error with its interval, and what it comes of."""
     (total,) = (row for row in rows if row["source"] == "total")
     shown = _shown(total["error"], total["sigma"], unit)
-    lines = [shown, _interval(total, unit)] if shown[0].isdigit() else [shown]
+    lines = [shown, interval_text(total, unit)] if shown[0].isdigit() else [shown]
     if total["sigma"] > 0.0:
         parts = [row for row in rows if row["source"] != "total"][:_SHOWN_SOURCES]
         shares = ((row["source"], (row["sigma"] / total["sigma"]) ** 2) for row in parts)
@@ -148,11 +167,20 @@ def _shown(error: str, sigma: float, unit: PageUnit) -> str:
     return unit.text(sigma, 3)
 
 
-def _interval(row: Row, unit: PageUnit) -> str:
-    if row["lower"] is None or row["upper"] is None:
-        return "–"
-    return f"{unit.text(row['lower'], 3)} to {unit.text(row['upper'], 3)}"
-
-
 def _percent(share: float) -> str:
     return f"{100 * share:.0f} %"
+
+
+def budget_words(settings: Mapping[str, Any]) -> str:
+    """Return what the errors of a budget mean.
+
+    Parameters
+    ----------
+    settings : mapping
+        The section ``error_budget`` of the run's settings.
+    """
+    return (
+        "Errors that the noise alone causes in dead reckoning, with 95 % intervals and the largest "
+        f"parts of the variance. Biases and tilt are taken over {settings['static_window']} at "
+        f"rest right before; north is found at rest at a latitude of {settings['latitude']}."
+    )

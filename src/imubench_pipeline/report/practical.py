@@ -1,14 +1,35 @@
-"""The units in which engineers state inertial errors, and numbers as they are printed."""
+"""The units in which engineers state inertial errors, and numbers as they are printed.
+
+A page can show each quantity in several units and switch between them; `units_of_pages` is what
+it needs for that. The first choice is the practical one, the last is SI.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from imubench_pipeline.sensor import QUANTITIES
 from imubench_pipeline.units import conversion
 
 System = Literal["practical", "si"]
+
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_LEAST_PLAIN, _MOST_PLAIN = 1e-4, 1e6
+
+
+def number_text(value: float, digits: int = 4) -> str:
+    """Return a number rounded to some digits, with a power of ten where it is small or large."""
+    rounded = float(f"{value:.{digits - 1}e}")
+    if rounded == 0.0 or _LEAST_PLAIN <= abs(rounded) < _MOST_PLAIN:
+        text = f"{rounded:.12f}".rstrip("0").rstrip(".")
+    else:
+        mantissa, exponent = f"{rounded:.{digits - 1}e}".split("e")
+        if "." in mantissa:
+            mantissa = mantissa.rstrip("0").rstrip(".")
+        text = f"{mantissa}×10{str(int(exponent)).translate(_SUPERSCRIPTS)}"
+    return text.replace("-", "−")
 
 
 @dataclass(frozen=True)
@@ -20,56 +41,81 @@ class PageUnit:
 
     def text(self, value: float | None, digits: int = 4) -> str:
         """Return a SI value in this unit, rounded to some digits; a dash where there is none."""
-        if value is None:
-            return "–"
-        return f"{value * self.per_si:.{digits}g}"
+        return "–" if value is None else number_text(value * self.per_si, digits)
 
 
-_PRACTICAL: dict[str, dict[str, str]] = {
+_CHOICES: dict[str, dict[str, dict[str, str]]] = {
     "gyro": {
-        "Q": "°",
-        "N": "°/√h",
-        "B": "°/h",
-        "T_B": "s",
-        "K": "°/h/√h",
-        "R": "°/h/h",
-        "adev": "°/h",
-        "psd": "°/s/√Hz",
+        "°/h and °/√h": {
+            "Q": "°",
+            "N": "°/√h",
+            "B": "°/h",
+            "T_B": "s",
+            "K": "°/h/√h",
+            "R": "°/h/h",
+            "adev": "°/h",
+            "psd": "°/s/√Hz",
+            "signal": "°/s",
+        },
+        "°/s": {
+            "Q": "°",
+            "N": "°/s/√Hz",
+            "B": "°/s",
+            "T_B": "s",
+            "K": "°/s/√s",
+            "R": "°/s/s",
+            "adev": "°/s",
+            "psd": "°/s/√Hz",
+            "signal": "°/s",
+        },
+        "SI: rad/s": {
+            "Q": "rad",
+            "N": "rad/s/√Hz",
+            "B": "rad/s",
+            "T_B": "s",
+            "K": "rad/s/√s",
+            "R": "rad/s²",
+            "adev": "rad/s",
+            "psd": "rad/s/√Hz",
+            "signal": "rad/s",
+        },
     },
     "accel": {
-        "Q": "m/s",
-        "N": "µg/√Hz",
-        "B": "µg",
-        "T_B": "s",
-        "K": "µg/√h",
-        "R": "µg/h",
-        "adev": "µg",
-        "psd": "µg/√Hz",
+        "µg and µg/√Hz": {
+            "Q": "m/s",
+            "N": "µg/√Hz",
+            "B": "µg",
+            "T_B": "s",
+            "K": "µg/√h",
+            "R": "µg/h",
+            "adev": "µg",
+            "psd": "µg/√Hz",
+            "signal": "mg",
+        },
+        "mg and m/s/√h": {
+            "Q": "m/s",
+            "N": "m/s/√h",
+            "B": "mg",
+            "T_B": "s",
+            "K": "mg/√h",
+            "R": "mg/h",
+            "adev": "mg",
+            "psd": "mg/√Hz",
+            "signal": "mg",
+        },
+        "SI: m/s²": {
+            "Q": "m/s",
+            "N": "m/s²/√Hz",
+            "B": "m/s²",
+            "T_B": "s",
+            "K": "m/s²/√s",
+            "R": "m/s³",
+            "adev": "m/s²",
+            "psd": "m/s²/√Hz",
+            "signal": "m/s²",
+        },
     },
 }
-_SI: dict[str, dict[str, str]] = {
-    "gyro": {
-        "Q": "rad",
-        "N": "rad/s/√Hz",
-        "B": "rad/s",
-        "T_B": "s",
-        "K": "rad/s/√s",
-        "R": "rad/s²",
-        "adev": "rad/s",
-        "psd": "rad/s/√Hz",
-    },
-    "accel": {
-        "Q": "m/s",
-        "N": "m/s²/√Hz",
-        "B": "m/s²",
-        "T_B": "s",
-        "K": "m/s²/√s",
-        "R": "m/s³",
-        "adev": "m/s²",
-        "psd": "m/s²/√Hz",
-    },
-}
-
 
 _OF_DIMENSION: dict[System, dict[str, str]] = {
     "practical": {"angle": "°", "velocity": "m/s", "length": "m"},
@@ -77,24 +123,44 @@ _OF_DIMENSION: dict[System, dict[str, str]] = {
 }
 
 
-def unit_of(dimension: str, system: System) -> PageUnit:
-    """Return the unit in which a page shows an angle, a velocity or a length."""
-    sign = _OF_DIMENSION[system][dimension]
-    factor, _ = conversion(sign, dimension)
-    return PageUnit(sign, 1.0 / factor)
-
-
-def duration_text(seconds: float) -> str:
-    """Return a time in the unit in which it is easily read."""
-    for size, name in ((86400.0, "days"), (3600.0, "h"), (60.0, "min")):
-        if seconds >= 2.0 * size:
-            return f"{seconds / size:.3g} {name}"
-    return f"{seconds:.3g} s"
-
-
 def page_unit(quantity: str, symbol: str, system: System) -> PageUnit:
-    """Return the unit in which a page shows a parameter, or ``adev``, of a quantity."""
-    sign = (_PRACTICAL if system == "practical" else _SI)[quantity][symbol]
+    """Return the unit in which a page first shows a figure of a quantity.
+
+    Parameters
+    ----------
+    quantity : str
+        ``gyro`` or ``accel``.
+    symbol : str
+        A parameter, or ``adev``, ``psd`` (root of a density) or ``signal`` (the log itself).
+    system : str
+        ``practical`` or ``si``.
+    """
+    return _unit(quantity, symbol, _chosen(quantity, system))
+
+
+def units_of_pages() -> dict[str, dict[str, dict[str, PageUnit]]]:
+    """Return quantity -> name of the choice -> symbol -> unit, the practical choice first."""
+    return {
+        quantity: {
+            name: {symbol: _unit(quantity, symbol, name) for symbol in symbols}
+            for name, symbols in choices.items()
+        }
+        for quantity, choices in _CHOICES.items()
+    }
+
+
+def first_choices(system: System) -> Mapping[str, str]:
+    """Return the name of the choice with which a page opens, by quantity."""
+    return {quantity: _chosen(quantity, system) for quantity in _CHOICES}
+
+
+def _chosen(quantity: str, system: System) -> str:
+    names = list(_CHOICES[quantity])
+    return names[0] if system == "practical" else names[-1]
+
+
+def _unit(quantity: str, symbol: str, choice: str) -> PageUnit:
+    sign = _CHOICES[quantity][choice][symbol]
     dimension = {
         "Q": f"{quantity}_quantization",
         "R": f"{quantity}_ramp",
@@ -103,5 +169,29 @@ def page_unit(quantity: str, symbol: str, system: System) -> PageUnit:
         "K": f"{quantity}_random_walk",
         "T_B": "time",
     }.get(symbol, QUANTITIES[quantity])
+    return _page_unit(sign, dimension)
+
+
+def unit_of(dimension: str, system: System) -> PageUnit:
+    """Return the unit in which a page shows an angle, a velocity or a length."""
+    return _page_unit(_OF_DIMENSION[system][dimension], dimension)
+
+
+def _page_unit(sign: str, dimension: str) -> PageUnit:
     factor, _ = conversion(sign, dimension)
     return PageUnit(sign, 1.0 / factor)
+
+
+def duration_text(seconds: float) -> str:
+    """Return a time in the unit in which it is easily read."""
+    for size, name in ((86400.0, "days"), (3600.0, "h"), (60.0, "min")):
+        if seconds >= 2.0 * size:
+            return f"{number_text(seconds / size, 3)} {name}"
+    return f"{number_text(seconds, 3)} s"
+
+
+def interval_text(row: Mapping[str, Any], unit: PageUnit, digits: int = 3) -> str:
+    """Return ``lower to upper`` of a row of a table; a dash where they are not known."""
+    if row["lower"] is None or row["upper"] is None:
+        return "–"
+    return f"{unit.text(row['lower'], digits)} to {unit.text(row['upper'], digits)}"

@@ -1,9 +1,12 @@
-"""What the report shows of each channel, taken from the tables."""
+"""What the tables say of each channel and each recording, gathered for the pages."""
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -14,7 +17,6 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.results import estimate_of
 
 Row = Mapping[str, Any]
-Name = tuple[str, str, str]
 METHOD_NAMES = {
     "likelihood": "likelihood",
     "likelihood_gm": "likelihood, papers' model",
@@ -22,6 +24,7 @@ METHOD_NAMES = {
     "paper": "fit, weights as printed",
     "weighted": "fit, right weights",
 }
+QUANTITY_NAMES = {"gyro": "Gyroscope", "accel": "Accelerometer"}
 
 
 @dataclass
@@ -47,12 +50,14 @@ class ChannelView:
     lines: list[Row] = field(default_factory=list)
     spectrum: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     findings: list[Row] = field(default_factory=list)
+    fixed_bias: float | None = None
+    _models: dict[str, NoiseModel] = field(default_factory=dict)
 
     @property
     def warnings(self) -> list[str]:
         """Names of the findings that put the results of the channel in doubt, each once."""
         serious = [row["finding"] for row in self.findings if row["severity"] != "note"]
-        return [name.replace("_", " ") for name in dict.fromkeys(serious)]
+        return list(dict.fromkeys(serious))
 
     @property
     def quantity(self) -> str:
@@ -60,9 +65,14 @@ class ChannelView:
         return self.channel.split("_", maxsplit=1)[0]
 
     @property
-    def anchor(self) -> str:
-        """Name of the section of the page."""
-        return f"{self.sensor}-{self.recording}-{self.channel}"
+    def axis(self) -> str:
+        """``x``, ``y`` or ``z``."""
+        return self.channel.rsplit("_", maxsplit=1)[-1]
+
+    @property
+    def title(self) -> str:
+        """The channel in words."""
+        return f"{QUANTITY_NAMES[self.quantity]} {self.axis}"
 
     @property
     def label(self) -> str:
@@ -71,78 +81,199 @@ class ChannelView:
 
     def model(self, method: str) -> NoiseModel:
         """Return the noise model that a method estimated."""
-        return estimate_of(method, self.parameters[method]).model
+        if method not in self._models:
+            self._models[method] = estimate_of(method, self.parameters[method]).model
+        return self._models[method]
 
     def named(self, method: str, symbol: str) -> list[Row]:
         """Return the rows of a parameter of a method, one a component."""
         return [row for row in self.parameters[method] if row["parameter"] == symbol]
 
 
-def channel_views(tables: Mapping[str, pa.Table]) -> list[ChannelView]:
-    """Gather the tables by channel, in their order."""
-    simulated = {
-        (row["sensor"], row["recording"]): row["simulated"]
-        for row in tables["recordings"].to_pylist()
-    }
-    views: dict[Name, ChannelView] = {}
-    for name, part in _by_channel(tables["allan"]).items():
-        views[name] = ChannelView(
-            *name,
-            simulated[name[0], name[1]],
+@dataclass
+class RecordingView:
+    """One recording: what the tables say of it alone.
+
+    The channels of a thousand recordings do not fit into memory at once: they are made when they
+    are asked for, and are not kept.
+
+    Attributes
+    ----------
+    row : mapping
+        Of the table ``recordings``.
+    parts : mapping of str to pyarrow.Table
+        Its rows of each table.
+    page : str
+        Its page.
+    device_page : str or None
+        That of its device, where the device has a name of its own or several recordings.
+    """
+
+    row: Row
+    parts: Mapping[str, pa.Table]
+    page: str = ""
+    device_page: str | None = None
+
+    @property
+    def sensor(self) -> str:
+        """Name of the sensor file."""
+        return str(self.row["sensor"])
+
+    @property
+    def name(self) -> str:
+        """Name of the recording."""
+        return str(self.row["recording"])
+
+    @property
+    def simulated(self) -> bool:
+        """Made from known parameters, not measured."""
+        return bool(self.row["simulated"])
+
+    @property
+    def rejected(self) -> bool:
+        """Whether it could not be used."""
+        return bool(self.row["status"] == "rejected")
+
+    @cached_property
+    def key(self) -> str:
+        """Digest of all that the tables say of it."""
+        return _digest(self.parts)
+
+    @cached_property
+    def findings(self) -> list[Row]:
+        """What is wrong with it or worth knowing, but that it is rejected."""
+        return [row for row in self.rows("findings") if row["finding"] != "rejected"]
+
+    @property
+    def warnings(self) -> list[Row]:
+        """The findings that put results in doubt."""
+        return [row for row in self.findings if row["severity"] == "warning"]
+
+    @property
+    def budget(self) -> list[Row]:
+        """Its errors after the times of the settings."""
+        return [row for row in self.rows("error_budget") if row["requirement"] is None]
+
+    def rows(self, table: str) -> list[Row]:
+        """Return its rows of a table."""
+        rows: list[Row] = self.parts[table].to_pylist()
+        return rows
+
+    def recommended(self) -> dict[str, str]:
+        """Return the method to use for each channel."""
+        part = self.parts["parameters"]
+        chosen = part.filter(part["recommended"])
+        return dict(zip(chosen["channel"].to_pylist(), chosen["method"].to_pylist(), strict=True))
+
+    def channels(self) -> list[ChannelView]:
+        """Return its channels, made anew."""
+        return _channels(self)
+
+
+_OF_RECORDINGS = (
+    "recordings",
+    "findings",
+    "allan",
+    "parameters",
+    "reconstruction",
+    "scores",
+    "models",
+    "lines",
+    "datasheet",
+    "datasheet_curve",
+    "spectrum",
+    "fixed_bias",
+    "simulated_truth",
+    "error_budget",
+)
+"""The tables of which a recording has rows of its own."""
+
+
+def recording_views(tables: Mapping[str, pa.Table]) -> list[RecordingView]:
+    """Gather the tables by recording, in the order of the table ``recordings``."""
+    divided = {name: _by(tables[name], "sensor", "recording") for name in _OF_RECORDINGS}
+    views = []
+    for row in tables["recordings"].to_pylist():
+        name = (row["sensor"], row["recording"])
+        parts = {
+            table: found[name] if name in found else tables[table].slice(0, 0)
+            for table, found in divided.items()
+        }
+        views.append(RecordingView(row, parts))
+    return views
+
+
+def _channels(view: RecordingView) -> list[ChannelView]:
+    channels = {
+        name: ChannelView(
+            view.sensor,
+            view.name,
+            name,
+            view.simulated,
             tau=_floats(part, "tau"),
             adev=_floats(part, "adev"),
             lower=_floats(part, "lower"),
             upper=_floats(part, "upper"),
         )
-    for row in tables["parameters"].to_pylist():
-        view = views[_name(row)]
-        view.parameters.setdefault(row["method"], []).append(row)
-        if row["recommended"]:
-            view.recommended = row["method"]
-    for name, part in _by_channel(tables["reconstruction"]).items():
-        methods = part["method"].to_pylist()
-        for method in dict.fromkeys(methods):
-            chosen = part.filter(pa.array([each == method for each in methods]))
-            views[name].reconstruction[method] = {
-                column: _floats(chosen, column)
-                for column in ("tau", "adev", "lower", "upper", "reconstructed")
-            }
+        for (name,), part in _by(view.parts["allan"], "channel").items()
+    }
+    for one in view.rows("parameters"):
+        channel = channels[one["channel"]]
+        channel.parameters.setdefault(one["method"], []).append(one)
+        if one["recommended"]:
+            channel.recommended = one["method"]
+    for (name, method), part in _by(view.parts["reconstruction"], "channel", "method").items():
+        channels[name].reconstruction[method] = {
+            column: _floats(part, column)
+            for column in ("tau", "adev", "lower", "upper", "reconstructed")
+        }
     for table in ("models", "lines", "datasheet", "datasheet_curve"):
-        for row in tables[table].to_pylist():
-            getattr(views[_name(row)], table).append(row)
-    for name, part in _by_channel(tables["spectrum"]).items():
-        views[name].spectrum = {
+        for one in view.rows(table):
+            getattr(channels[one["channel"]], table).append(one)
+    for (name,), part in _by(view.parts["spectrum"], "channel").items():
+        channels[name].spectrum = {
             column: _floats(part, column)
             for column in ("frequency", "ordinates", "density", "fitted", "used")
         }
-    for row in tables["scores"].to_pylist():
-        views[_name(row)].scores[row["method"]] = row
-    for row in tables["simulated_truth"].to_pylist():
-        if _name(row) in views:
-            views[_name(row)].truth[row["parameter"]] = row
-    for row in tables["findings"].to_pylist():
-        for (sensor, recording, channel), view in views.items():
-            here = (sensor, recording) == (row["sensor"], row["recording"])
-            if here and row["channel"] in (None, channel):
-                view.findings.append(row)
-    return list(views.values())
+    for one in view.rows("scores"):
+        channels[one["channel"]].scores[one["method"]] = one
+    for one in view.rows("fixed_bias"):
+        channels[one["channel"]].fixed_bias = one["value"]
+    for one in view.rows("simulated_truth"):
+        if one["channel"] in channels:
+            channels[one["channel"]].truth[one["parameter"]] = one
+    for name, channel in channels.items():
+        channel.findings = [one for one in view.findings if one["channel"] in (None, name)]
+    return list(channels.values())
 
 
-def _name(row: Row) -> Name:
-    return row["sensor"], row["recording"], row["channel"]
+def _digest(parts: Mapping[str, pa.Table]) -> str:
+    digest = hashlib.sha256()
+    for name, part in parts.items():
+        sink = pa.BufferOutputStream()
+        with pa.ipc.new_stream(sink, part.schema) as stream:
+            stream.write_table(part.combine_chunks())
+        digest.update(name.encode() + sink.getvalue())
+    return digest.hexdigest()
 
 
 def _floats(part: pa.Table, column: str) -> NDArray[np.float64]:
     return np.asarray(part[column].to_numpy(), dtype=np.float64)
 
 
-def _by_channel(table: pa.Table) -> dict[Name, pa.Table]:
-    """Divide a table, whose channels stand together, into one slice a channel."""
-    keys = ("sensor", "recording", "channel")
-    names: list[Name] = list(zip(*(table[key].to_pylist() for key in keys), strict=True))
-    starts = [i for i, name in enumerate(names) if i == 0 or name != names[i - 1]]
-    stops = [*starts[1:], len(names)] if names else []
-    return {
-        names[start]: table.slice(start, stop - start)
-        for start, stop in zip(starts, stops, strict=True)
-    }
+def _by(table: pa.Table, *names: str) -> dict[tuple[str, ...], pa.Table]:
+    """Divide a table by the values of columns, in the order in which they appear."""
+    if not table.num_rows:
+        return {}
+    labels = np.zeros(table.num_rows, dtype=np.int64)
+    for name in names:
+        encoded = table[name].combine_chunks().dictionary_encode()
+        codes = np.asarray(encoded.indices.to_numpy(zero_copy_only=False), dtype=np.int64)
+        labels = labels * len(encoded.dictionary) + codes
+    order = np.argsort(labels, kind="stable")
+    if np.any(order[1:] < order[:-1]):
+        table, labels = table.take(pa.array(order)), labels[order]
+    starts = np.concatenate(([0], np.flatnonzero(np.diff(labels)) + 1, [len(labels)]))
+    parts = [table.slice(a, b - a) for a, b in pairwise(starts.tolist())]
+    keys = [tuple(part[name][0].as_py() for name in names) for part in parts]
+    return dict(zip(keys, parts, strict=True))

@@ -1,0 +1,53 @@
+"""`imubench report`: the report of a finished run again, elsewhere or in one file."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command is given."""
+    parser.add_argument("results", type=Path, help="folder of the results of a run")
+    parser.add_argument(
+        "--one-file",
+        type=Path,
+        metavar="FILE",
+        help="write all pages into one HTML file, to send by mail",
+    )
+    parser.add_argument(
+        "--output", type=Path, metavar="FOLDER", help="where the pages go; default: RESULTS/report"
+    )
+
+
+def run(given: argparse.Namespace) -> int:
+    """Write the report; return the exit status: 2 where there are no results."""
+    # Templates and figures cost half a second, which the other commands need not wait for.
+    from imubench_pipeline.report.publish import one_file, publish, published
+    from imubench_pipeline.report.static_figures.of_run import draw_comparison
+    from imubench_pipeline.tables import write_content
+
+    try:
+        site = published(given.results)
+    except FileNotFoundError as error:
+        print(
+            f"{given.results}: found no {Path(error.filename).name}; expected the results of a "
+            "finished run: run snakemake -c2 first",
+            file=sys.stderr,
+        )
+        return 2
+    if given.one_file is not None:
+        write_content(one_file(site), given.one_file)
+        print(f"{given.one_file}: {given.one_file.stat().st_size / 1e6:.1f} MB")
+        return 0
+    folder = given.output or given.results / "report"
+    written = publish(site, folder, _say if sys.stderr.isatty() else lambda _: None)
+    if given.output is not None:
+        draw_comparison(site.tables, site.system, folder / "figures")
+    print(f"{folder / 'index.html'}: {len(written)} files written")
+    return 0
+
+
+def _say(path: str) -> None:
+    print(path, file=sys.stderr)

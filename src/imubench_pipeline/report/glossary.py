@@ -1,0 +1,112 @@
+"""The words of the report: what each term means, in a sentence, and where it is explained."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from pydantic import RootModel
+
+from imubench_pipeline.validation import ConfigError, Strict, parse, read_yaml
+
+_FILE = Path(__file__).with_name("glossary.yaml")
+
+
+class _Entry(Strict):
+    """A term as the file has it."""
+
+    name: str
+    short: str
+    action: str | None = None
+
+
+class _Sections(RootModel[dict[str, dict[str, _Entry]]]):
+    """The file: sections of the theory page, and their terms."""
+
+
+@dataclass(frozen=True)
+class Term:
+    """A term of the report.
+
+    Attributes
+    ----------
+    key : str
+    name : str
+        As it is shown.
+    short : str
+        One plain sentence: what it is, and why it matters.
+    section : str
+        Anchor on the theory page.
+    action : str or None
+        What to do; of a finding alone.
+    """
+
+    key: str
+    name: str
+    short: str
+    section: str
+    action: str | None = None
+
+
+class UnknownTermError(KeyError):
+    """A term that the glossary does not have."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+class _Glossary(dict[str, Term]):
+    def __missing__(self, key: str) -> Term:
+        close = difflib.get_close_matches(str(key), self, n=3)
+        hint = f"; did you mean {' or '.join(close)}?" if close else ""
+        raise UnknownTermError(f"{key!r} is not in {_FILE.name}{hint}")
+
+
+@lru_cache(maxsize=1)
+def glossary() -> dict[str, Term]:
+    """Return all terms by their keys, in the order of the file; read once, not to be changed.
+
+    Returns
+    -------
+    dict
+        One that says which terms are close to one that it does not have.
+
+    Raises
+    ------
+    ConfigError
+        If the file cannot be used, or a key stands in two sections.
+    UnknownTermError
+        From the result, where an unknown key is asked for.
+    """
+    found = _Glossary()
+    for section, entries in parse(_Sections, read_yaml(_FILE), str(_FILE)).root.items():
+        for key, entry in entries.items():
+            if key in found:
+                raise ConfigError(f"{_FILE}: {key} stands in {found[key].section} and {section}")
+            anchor = f"finding-{key}" if entry.action else section
+            found[key] = Term(key, entry.name, entry.short, anchor, entry.action)
+    return found
+
+
+def term(value: str, kind: str = "") -> Term:
+    """Return the term of a value that a table holds.
+
+    Parameters
+    ----------
+    value : str
+        As the table has it, such as ``not comparable (condition)``.
+    kind : str
+        What begins the key where the value alone says too little: ``verdict``, ``published``,
+        ``kind`` (of a printed figure, or a recording), ``line`` (its kind), ``axis``,
+        ``rate_from``, ``recording`` (its status).
+
+    Raises
+    ------
+    UnknownTermError
+        If the glossary does not have it.
+    """
+    words = re.findall(r"\w+", f"{kind} {value}")
+    return glossary()["_".join(words)]

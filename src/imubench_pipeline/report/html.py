@@ -1,0 +1,80 @@
+"""The templates of the report, and what they may call."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+from urllib.parse import quote
+
+import jinja2
+from jinja2.runtime import Context
+from markupsafe import Markup, escape
+
+from imubench_pipeline.report.glossary import term
+from imubench_pipeline.report.practical import (
+    PageUnit,
+    System,
+    duration_text,
+    number_text,
+    page_unit,
+)
+
+
+def environment(system: System) -> jinja2.Environment:
+    """Return the templates, with the units in which the pages open."""
+    made = jinja2.Environment(
+        loader=jinja2.PackageLoader("imubench_pipeline.report"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+    def si(value: float | None, unit: str, digits: int = 4, *, inside: bool = False) -> Markup:
+        """Return a SI number that the reader can switch to another unit.
+
+        ``inside``: an element around it has the unit, and the digits where they are not 4.
+        """
+        if value is None:
+            return Markup("–")
+        text = _unit(unit, system).text(value, digits)
+        of = "" if inside else Markup(' data-unit="{}" data-digits="{}"').format(unit, digits)
+        return Markup('<data value="{}"{}>{}</data>').format(f"{value:.5g}", of, text)
+
+    def sign(unit: str) -> Markup:
+        """Return the sign of a unit that the reader can switch."""
+        return Markup('<span data-sign="{}">{}</span>').format(unit, _unit(unit, system).sign)
+
+    made.globals |= {"si": si, "sign": sign, "term": _term, "to": _to}
+    made.filters |= {"duration": duration_text, "number": number_text, "json": _json}
+    made.filters["attribute"] = _compact
+    return made
+
+
+def _unit(reference: str, system: System) -> PageUnit:
+    quantity, symbol = reference.split(".")
+    return page_unit(quantity, symbol, system)
+
+
+@jinja2.pass_context
+def _to(context: Context, path: str) -> str:
+    """Return the way from this page to another, or to a file beside the report."""
+    return str(context["root"]) + quote(path)
+
+
+@jinja2.pass_context
+def _term(context: Context, key: str, text: str | None = None) -> Markup:
+    """Return a term of the glossary, with its explanation and a link to the theory."""
+    one = term(key)
+    return Markup('<a class="term" href="{}theory.html#{}" data-term="{}">{}</a>').format(
+        context["root"], one.section, one.key, escape(text or one.name)
+    )
+
+
+def _json(value: Any) -> Markup:
+    """Return JSON that can stand inside a script element."""
+    return Markup(_compact(value).replace("<", "\\u003c"))
+
+
+def _compact(value: Any) -> str:
+    return json.dumps(value, separators=(",", ":"), ensure_ascii=False, allow_nan=False)

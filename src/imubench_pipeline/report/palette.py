@@ -1,0 +1,83 @@
+"""How sensors and methods look in every figure: never by their colour alone.
+
+The colours are told apart by the colour-blind and have a contrast of 3 : 1 with their
+background: Okabe and Ito's, with the pale ones darkened for a light page and the dark ones
+lightened for a dark one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Appearance:
+    """The look of a line.
+
+    Attributes
+    ----------
+    light, dark : str
+        Colour on a light and on a dark background.
+    dash : str
+        ``solid``, ``dash``, ``dot``, ``dashdot`` or ``longdash``.
+    marker : str
+        ``circle``, ``square``, ``diamond``, ``triangle-up``, ``triangle-down``, ``cross``, ``x``.
+    """
+
+    light: str
+    dark: str
+    dash: str
+    marker: str
+
+
+_COLOURS = (
+    ("#0072B2", "#4DA3D9"),
+    ("#D55E00", "#F08A3C"),
+    ("#008F6B", "#2EC4A0"),
+    ("#B3508C", "#DB8FBC"),
+    ("#9A6B00", "#E0A82E"),
+    ("#666666", "#B8B8B8"),
+    ("#7A4B3A", "#C69A88"),
+    ("#5B5FC7", "#A3A6F2"),
+)
+_MARKERS = ("circle", "square", "diamond", "triangle-up", "triangle-down", "cross", "x")
+_DASHES = ("solid", "dash", "dot", "dashdot", "longdash")
+
+_METHODS = {
+    "likelihood": Appearance("#008F6B", "#2EC4A0", "solid", "diamond"),
+    "likelihood_gm": Appearance("#9A6B00", "#E0A82E", "longdash", "square"),
+    "curve": Appearance("#D55E00", "#F08A3C", "dash", "triangle-up"),
+    "paper": Appearance("#B3508C", "#DB8FBC", "dashdot", "triangle-down"),
+    "weighted": Appearance("#0072B2", "#4DA3D9", "dot", "cross"),
+}
+
+
+def sensor_appearances(sensors: list[str]) -> dict[str, Appearance]:
+    """Return the look of each sensor, by its place among all sensors of the run.
+
+    Colours repeat after eight sensors; marker and dash then differ.
+    """
+    looks = {}
+    for place, sensor in enumerate(sensors):
+        colour, turn = place % len(_COLOURS), place // len(_COLOURS)
+        marker = _MARKERS[(place + turn) % len(_MARKERS)]
+        looks[sensor] = Appearance(*_COLOURS[colour], _DASHES[turn % len(_DASHES)], marker)
+    return looks
+
+
+def method_appearance(method: str) -> Appearance:
+    """Return the look of an estimation method."""
+    return _METHODS[method]
+
+
+def places() -> list[Appearance]:
+    """Return the looks of the recordings of one sensor, by their place; they repeat."""
+    count = len(_COLOURS) * len(_MARKERS)
+    return [
+        Appearance(
+            *_COLOURS[place % len(_COLOURS)],
+            _DASHES[(place // len(_COLOURS)) % len(_DASHES)],
+            _MARKERS[place % len(_MARKERS)],
+        )
+        for place in range(count)
+    ]

@@ -1,0 +1,81 @@
+"""Parameters in a table: a cell has a value with its interval, or says why there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from imubench_pipeline.estimators.estimate import FAMILY, PARAMETERS
+from imubench_pipeline.report.practical import System, page_unit
+from imubench_pipeline.report.view import ChannelView, Row
+from imubench_pipeline.report.words import untold
+
+
+def shown_symbols(channel: ChannelView) -> list[str]:
+    """Return the parameters of the papers' model, and those others that a channel has."""
+    there = {
+        row["parameter"]
+        for rows in channel.parameters.values()
+        for row in rows
+        if row["status"] != "absent"
+    }
+    return [symbol for symbol in FAMILY if symbol in PARAMETERS or symbol in there]
+
+
+def methods_table(
+    channel: ChannelView, duration: float | None, system: System
+) -> tuple[list[str], list[dict[str, Any]]]:
+    """Return the parameters of all methods side by side, and the truth of a simulation.
+
+    Returns
+    -------
+    symbols : list of str
+    lines : list of dict
+        One a method.
+    """
+    symbols = shown_symbols(channel)
+    lines: list[dict[str, Any]] = [
+        {
+            "method": method,
+            "recommended": method == channel.recommended,
+            "model": channel.parameters[method][0]["model"],
+            "cells": [cell(channel, method, s, duration, system) for s in symbols],
+        }
+        for method in channel.parameters
+    ]
+    if channel.truth:
+        cells = [_truth(channel.truth.get(symbol)) for symbol in symbols]
+        lines.append({"method": None, "recommended": False, "model": "", "cells": cells})
+    return symbols, lines
+
+
+def cell(
+    channel: ChannelView, method: str, symbol: str, duration: float | None, system: System
+) -> dict[str, Any]:
+    """Return a cell with a part for each component: its value, interval and status."""
+    unit = page_unit(channel.quantity, symbol, system)
+    rows = channel.named(method, symbol)
+    parts = [
+        {
+            "value": row["value"],
+            "lower": None if row["status"] == "absent" else row["lower"],
+            "upper": row["upper"],
+            "status": "" if row["status"] == "ok" else row["status"],
+        }
+        for row in rows
+    ]
+    words = [sentence for row in rows if (sentence := untold(row, unit, duration))]
+    return {"parts": parts, "words": " ".join(words), "value": rows[0]["value"] if rows else None}
+
+
+def _truth(row: Row | None) -> dict[str, Any]:
+    if row is None:
+        return {"parts": [], "words": "The simulation has none.", "value": None}
+    status = "assumed" if row["assumed"] else ""
+    part: Mapping[str, Any] = {
+        "value": row["value"],
+        "lower": None,
+        "upper": None,
+        "status": status,
+    }
+    return {"parts": [part], "words": row["source"], "value": row["value"]}

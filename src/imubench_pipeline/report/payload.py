@@ -1,0 +1,266 @@
+"""What the figures of a page are drawn from: numbers in SI, as JSON that a page can hold."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise_terms import Sinusoid
+from imubench_pipeline.report.palette import Appearance, method_appearance
+from imubench_pipeline.report.view import METHOD_NAMES, ChannelView, Row
+
+FOREST = ("N", "B", "T_B", "K")
+"""The parameters that are drawn across sensors."""
+
+_SMOOTH = 80
+"""Points of the curve of a term in a spectrum."""
+
+_FEW = 24
+"""Points of a model's curve among those of other channels."""
+
+
+class Arrays:
+    """Arrays of a page: each stands in it once, as base64 with no more digits than are seen.
+
+    ``levels``: 0 stands for no value, the others divide the range evenly, or its logarithm.
+    """
+
+    def __init__(self) -> None:
+        self._places: dict[tuple[Any, ...], int] = {}
+
+    def exact(self, values: ArrayLike) -> int:
+        """Return the place of an array that is kept as float32."""
+        return self._place("float", 0.0, 0.0, np.asarray(values, dtype="<f4"))
+
+    def log(self, values: ArrayLike) -> int:
+        """Return the place of an array of positive numbers, right to a few parts in 10,000."""
+        numbers = np.asarray(values, dtype=np.float64)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            logarithms = np.where(numbers > 0.0, np.log10(numbers), np.nan)
+        return self._levels("log", logarithms, 65534)
+
+    def even(self, values: ArrayLike) -> int:
+        """Return the place of an array that is drawn on an even axis, in 254 steps."""
+        return self._levels("even", np.asarray(values, dtype=np.float64), 254)
+
+    def _levels(self, kind: str, values: NDArray[np.float64], levels: int) -> int:
+        there = np.isfinite(values)
+        low, high = (
+            (float(values[there].min()), float(values[there].max())) if there.any() else (0.0, 0.0)
+        )
+        step = (high - low) / levels or 1.0
+        filled = np.where(there, values, low)
+        codes = np.where(there, 1.0 + np.rint((filled - low) / step), 0.0)
+        return self._place(kind, low, step, codes.astype("<u2" if levels > 255 else "<u1"))
+
+    def _place(self, kind: str, low: float, step: float, data: NDArray[Any]) -> int:
+        key = (kind, low, step, data.tobytes())
+        return self._places.setdefault(key, len(self._places))
+
+    @property
+    def texts(self) -> list[list[Any]]:
+        """Kind, begin, step and base64 of each array."""
+        return [
+            [kind, float(f"{low:.7g}"), float(f"{step:.7g}"), base64.b64encode(data).decode()]
+            for kind, low, step, data in self._places
+        ]
+
+
+def looks(sensors: Mapping[str, Appearance]) -> dict[str, Any]:
+    """Return how sensors and methods look."""
+    return {
+        "sensors": {name: asdict(look) for name, look in sensors.items()},
+        "methods": {
+            name: asdict(method_appearance(name)) | {"name": text}
+            for name, text in METHOD_NAMES.items()
+        },
+    }
+
+
+def compared(view: ChannelView, arrays: Arrays, link: str) -> dict[str, Any]:
+    """Return a channel as it is drawn among others: curve, models, datasheet, parameters."""
+    tau = view.tau
+    return {
+        "sensor": view.sensor,
+        "recording": view.recording,
+        "channel": view.channel,
+        "simulated": view.simulated,
+        "link": link,
+        "recommended": view.recommended,
+        "tau": arrays.log(tau),
+        "adev": arrays.log(view.adev),
+        "lower": arrays.log(view.lower),
+        "upper": arrays.log(view.upper),
+        "models": {method: _model(view.model(method), tau, arrays) for method in view.parameters},
+        "parameters": {
+            method: _estimates(view, method)
+            for method in dict.fromkeys((view.recommended, "likelihood_gm"))
+            if method in view.parameters
+        },
+    }
+
+
+def _model(model: NoiseModel, tau: NDArray[np.float64], arrays: Arrays) -> list[int]:
+    """Return the curve of a model, on few points where it is smooth."""
+    if not model.sinusoids:
+        tau = np.geomspace(tau[0], tau[-1], _FEW)
+    return [arrays.log(tau), arrays.log(_curve(model, tau))]
+
+
+def channel_payload(view: ChannelView, rate: float, arrays: Arrays) -> dict[str, Any]:
+    """Return everything that is drawn of one channel, but its samples; the rate is in Hz."""
+    model = view.model(view.recommended)
+    return {
+        "channel": view.channel,
+        "sensor": view.sensor,
+        "simulated": view.simulated,
+        "recommended": view.recommended,
+        "tau": arrays.log(view.tau),
+        "adev": arrays.log(view.adev),
+        "lower": arrays.log(view.lower),
+        "upper": arrays.log(view.upper),
+        "methods": {
+            method: _method(view, method, curve, arrays)
+            for method, curve in view.reconstruction.items()
+        },
+        "terms": [
+            {
+                "name": name,
+                "adev": arrays.log(np.sqrt(term.allan_variance(view.tau))),
+            }
+            for name, term in _named_terms(model)
+        ],
+        "datasheet": datasheet_lines(view),
+        "spectrum": _spectrum(view, model, rate, arrays),
+    }
+
+
+def _method(
+    view: ChannelView, method: str, curve: Mapping[str, Any], arrays: Arrays
+) -> dict[str, Any]:
+    found = {
+        "tau": arrays.log(curve["tau"]),
+        "model": arrays.log(_curve(view.model(method), curve["tau"])),
+    }
+    if method == view.recommended:
+        found |= {name: arrays.log(curve[name]) for name in ("lower", "upper", "reconstructed")}
+    return found
+
+
+def _curve(model: NoiseModel, tau: Any) -> Any:
+    return np.sqrt(model.allan_variance(tau))
+
+
+def _named_terms(model: NoiseModel) -> list[tuple[str, Any]]:
+    names = {
+        "Q": "quantization Q",
+        "N": "white noise N",
+        "F": "flicker noise B",
+        "GM": "Gauss-Markov B, T_B",
+        "K": "random walk K",
+        "R": "ramp R",
+        "S": "line",
+    }
+    return [(names[term.symbol], term) for term in model.terms]
+
+
+def datasheet_lines(view: ChannelView) -> list[dict[str, Any]]:
+    """Return the lines of the datasheet that can be drawn beside the curve of a channel."""
+    lines = []
+    for row in view.datasheet:
+        if row["method"] != view.recommended or row["comparable"] is None:
+            continue
+        if row["statistic"] not in ("N", "adev_minimum"):
+            continue
+        name = {"N": "noise density", "adev_minimum": "bias instability"}[row["statistic"]]
+        reading = f", read as {row['sidedness']}" if row["sidedness"] else ""
+        lines.append(
+            {
+                "of": row["statistic"],
+                "value": row["comparable"],
+                "label": f"{name} {row['printed']:g} {row['unit']} ({row['kind']}{reading})",
+            }
+        )
+    return lines
+
+
+def _estimates(view: ChannelView, method: str) -> dict[str, Any]:
+    found = {}
+    for symbol in FOREST:
+        rows = view.named(method, symbol)
+        if rows:
+            row = rows[0]
+            numbers = (_rounded(row[name]) for name in ("value", "lower", "upper"))
+            found[symbol] = [*numbers, row["status"]]
+    return found
+
+
+def _spectrum(
+    view: ChannelView, model: NoiseModel, rate: float, arrays: Arrays
+) -> dict[str, Any] | None:
+    if not view.spectrum:
+        return None
+    spectrum = view.spectrum
+    frequency = spectrum["frequency"]
+    terms = [(name, term) for name, term in _named_terms(model) if not isinstance(term, Sinusoid)]
+    smooth = np.geomspace(frequency[0], frequency[-1], _SMOOTH)
+    return {
+        "frequency": arrays.log(frequency),
+        "density": arrays.log(np.sqrt(spectrum["density"])),
+        "fitted": arrays.log(np.sqrt(spectrum["fitted"])),
+        "used": arrays.even(spectrum["used"]),
+        "model": next((row["model"] for row in view.models if row["chosen"]), ""),
+        "smooth": arrays.log(smooth),
+        "terms": [
+            {"name": name, "density": arrays.log(np.sqrt(term.psd(smooth, 1.0 / rate)))}
+            for name, term in terms
+        ],
+        "lines": [
+            {"frequency": row["frequency"], "amplitude": row["amplitude"], "kind": row["kind"]}
+            for row in view.lines
+        ],
+    }
+
+
+def samples_payload(
+    envelope: Sequence[Row], histogram: Sequence[Row], arrays: Arrays
+) -> dict[str, Any]:
+    """Return the envelope of the samples and their histogram, by channel.
+
+    Parameters
+    ----------
+    envelope, histogram : sequence of mapping
+        Rows of these tables, of one recording.
+    arrays : Arrays
+    """
+    found: dict[str, Any] = {"envelope": {}, "histogram": {}}
+    for channel in dict.fromkeys(row["channel"] for row in envelope):
+        rows = [row for row in envelope if row["channel"] == channel]
+        found["envelope"][channel] = {
+            "start": rows[0]["start"],
+            "end": rows[-1]["end"],
+            "low": arrays.even([_number(row["low"]) for row in rows]),
+            "high": arrays.even([_number(row["high"]) for row in rows]),
+            "mean": arrays.even([_number(row["mean"]) for row in rows]),
+        }
+    for channel in dict.fromkeys(row["channel"] for row in histogram):
+        rows = [row for row in histogram if row["channel"] == channel]
+        found["histogram"][channel] = {
+            "edges": arrays.exact([rows[0]["lower"], *(row["upper"] for row in rows)]),
+            "count": arrays.exact([row["count"] for row in rows]),
+        }
+    return found
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else float(f"{value:.5g}")
+
+
+def _number(value: float | None) -> float:
+    return np.nan if value is None else value

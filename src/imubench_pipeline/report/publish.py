@@ -1,0 +1,210 @@
+"""Writing the report: a folder of pages of which only what changed is written, or one file."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Callable, Iterator, Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import pyarrow as pa
+from plotly.offline import get_plotlyjs
+
+from imubench_pipeline.provenance import source_digest
+from imubench_pipeline.report.glossary import glossary
+from imubench_pipeline.report.html import environment
+from imubench_pipeline.report.practical import units_of_pages
+from imubench_pipeline.report.recording import recording_page
+from imubench_pipeline.report.sensor import device_page, sensor_page
+from imubench_pipeline.report.site import Page, Site
+from imubench_pipeline.report.start import datasheets_page, recordings_page, start_page
+from imubench_pipeline.report.static_figures.files import figure_text
+from imubench_pipeline.report.static_figures.theory import theory_figure
+from imubench_pipeline.tables import OF_ONE_RECORDING, TABLES, read, write_content, write_json
+
+_KEYS = "pages.json"
+_SETTINGS = "settings.json"
+_STATIC = Path(__file__).with_name("static")
+_SCRIPTS = ("numbers", "terms", "tables", "plot", "overlay", "channel", "decisions", "start")
+_LIBRARIES = (
+    "imubench_pipeline",
+    "numpy",
+    "scipy",
+    "numba",
+    "pyarrow",
+    "matplotlib",
+    "plotly",
+    "snakemake",
+)
+
+Progress = Callable[[str], None]
+
+
+def pages(site: Site) -> Iterator[Page]:
+    """Yield the pages of the report, the start page last: it stands for the finished report."""
+    for view in site.views:
+        yield recording_page(site, view)
+    for sensor in site.sensors:
+        yield sensor_page(site, sensor)
+    for path in dict.fromkeys(view.device_page for view in site.views):
+        if path is not None:
+            yield device_page(site, path)
+    yield recordings_page(site)
+    yield datasheets_page(site)
+    yield Page(
+        "theory.html",
+        "theory.html.jinja",
+        site.common,
+        lambda: {"figure": figure_text(theory_figure(site.system)), "terms": glossary()},
+    )
+    yield Page("made.html", "made.html.jinja", site.common, lambda: _made(site))
+    yield start_page(site)
+
+
+def _made(site: Site) -> dict[str, Any]:
+    return {
+        "results": site.results_name,
+        "versions": {"python": platform.python_version()} | {n: version(n) for n in _LIBRARIES},
+        "settings": {
+            f"{section}.{key}": value
+            for section, values in site.settings["settings"].items()
+            for key, value in values.items()
+        },
+    }
+
+
+def publish(site: Site, folder: Path, say: Progress = lambda _: None) -> list[str]:
+    """Write the pages of the report whose data changed, and remove those that are no more.
+
+    Parameters
+    ----------
+    site : Site
+    folder : Path
+        Of the report.
+    say : callable
+        Is told what is being written.
+
+    Returns
+    -------
+    list of str
+        What was written, below ``folder``.
+    """
+    written = []
+    before = _keys(folder / _KEYS)
+    keys: dict[str, str] = {}
+    for path, content in _assets().items():
+        written += _put(folder, path, content)
+    templates = environment(site.system)
+    for page in pages(site):
+        keys[page.path] = page.key
+        if before.get(page.path) != page.key or not (folder / page.path).is_file():
+            say(page.path)
+            written += _put(folder, page.path, _rendered(site, templates, page))
+    for path in before.keys() - keys.keys():
+        (folder / path).unlink(missing_ok=True)
+    _put(folder, _SETTINGS, json.dumps(site.settings, indent=1, sort_keys=True) + "\n")
+    write_json(keys, folder / _KEYS)
+    return written
+
+
+def _keys(path: Path) -> dict[str, str]:
+    """Return what the pages that are there show; nothing where that is not known."""
+    try:
+        found: dict[str, str] = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return found
+
+
+def _put(folder: Path, path: str, content: str | bytes) -> list[str]:
+    """Write a file if it has another content; return its path if so."""
+    data = content.encode() if isinstance(content, str) else content
+    target = folder / path
+    if target.is_file() and target.read_bytes() == data:
+        return []
+    write_content(data, target)
+    return [path]
+
+
+def _rendered(
+    site: Site, templates: jinja2.Environment, page: Page, base: str = "base.html.jinja"
+) -> str:
+    alone = base != "base.html.jinja"
+    template = templates.get_template(page.template)
+    of_page = {"base": base, "path": page.path, "root": page.root}
+    return template.render(site=site.shown(alone=alone), **of_page, **page.context()) + "\n"
+
+
+def _assets() -> dict[str, str]:
+    return {
+        "assets/report.css": (_STATIC / "report.css").read_text(encoding="utf-8"),
+        "assets/report.js": _script(),
+        "assets/plotly.min.js": get_plotlyjs(),
+    }
+
+
+def _script() -> str:
+    """Return the scripts of the pages, with the units that they know, as one."""
+    units = {
+        quantity: {
+            choice: {symbol: [unit.sign, unit.per_si] for symbol, unit in symbols.items()}
+            for choice, symbols in choices.items()
+        }
+        for quantity, choices in units_of_pages().items()
+    }
+    parts = [(_STATIC / f"{name}.js").read_text(encoding="utf-8") for name in _SCRIPTS]
+    terms = {key: one.short for key, one in glossary().items()}
+    head = "".join(
+        f"const {name} = {json.dumps(value, ensure_ascii=False)};\n"
+        for name, value in (("UNITS", units), ("TERMS", terms))
+    )
+    return '(() => {\n"use strict";\n' + head + "\n".join(parts) + "})();\n"
+
+
+def one_file(site: Site) -> str:
+    """Return the whole report as one page that needs no other file."""
+    templates = environment(site.system)
+    given = {"site": site.shown(alone=True), "path": "index.html", "root": ""}
+    shown = [
+        {"path": page.path, "content": _rendered(site, templates, page, "fragment.html.jinja")}
+        for page in pages(site)
+    ]
+    assets = _assets()
+    scripts = [
+        assets[f"assets/{name}.js"].replace("</script", "<\\/script")
+        for name in ("report", "plotly.min")
+    ]
+    page = templates.get_template("one_file.html.jinja")
+    return page.render(
+        {"pages": shown, "css": assets["assets/report.css"], "scripts": scripts} | given
+    )
+
+
+def site_of(tables: Mapping[str, pa.Table], settings: str, results: Path) -> Site:
+    """Return the site of a run.
+
+    Parameters
+    ----------
+    tables : mapping of str to pyarrow.Table
+    settings : str
+        As `imubench_pipeline.plan.Plan.report_settings` gives them.
+    results : Path
+    """
+    return Site(tables, json.loads(settings), results, source_digest("report.publish"))
+
+
+def published(results: Path) -> Site:
+    """Return the site of a finished run, from what it left.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no report.
+    """
+    settings = (results / "report" / _SETTINGS).read_text(encoding="utf-8")
+    names = sorted(set(TABLES) - set(OF_ONE_RECORDING))
+    tables = {name: read(name, [results / f"tables/{name}.parquet"]) for name in names}
+    return site_of(tables, settings, results)

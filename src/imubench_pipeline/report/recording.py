@@ -1,0 +1,215 @@
+"""The page of one recording: everything that is known of it and its channels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from imubench_pipeline.estimators.estimate import PARAMETERS
+from imubench_pipeline.recording import log_paths, read_metadata
+from imubench_pipeline.report.datasheets import curve_distances, delta_rows
+from imubench_pipeline.report.meaning import budget_tables, budget_words
+from imubench_pipeline.report.parameters import methods_table
+from imubench_pipeline.report.payload import Arrays, channel_payload, looks, samples_payload
+from imubench_pipeline.report.practical import (
+    System,
+    duration_text,
+    number_text,
+    page_unit,
+)
+from imubench_pipeline.report.site import Page, Site
+from imubench_pipeline.report.view import ChannelView, RecordingView, Row
+from imubench_pipeline.report.words import counted, precision
+from imubench_pipeline.tables import read
+
+_EXACT = 1e-9
+"""Relative error of a rate that is not worth a word."""
+
+_SHOWN_MODELS = 6
+
+
+def recording_page(site: Site, view: RecordingView) -> Page:
+    """Return the page of a recording."""
+    folder = site.results / "recordings" / view.sensor / view.name
+    samples = [folder / f"{table}.parquet" for table in ("envelope", "histogram")]
+    own = [path.read_bytes() for path in samples if path.is_file()]
+    key = site.key_of(view.key, view.device_page, site.looks.get(view.sensor), *own)
+    return Page(view.page, "recording.html.jinja", key, lambda: _context(site, view, folder))
+
+
+def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
+    arrays = Arrays()
+    envelope, histogram = (
+        read(table, [path]).to_pylist() if (path := folder / f"{table}.parquet").is_file() else []
+        for table in ("envelope", "histogram")
+    )
+    order = {"fatal": 0, "warning": 1, "note": 2}
+    channels = view.channels()
+    names = {channel.channel for channel in channels}
+    numbered = [
+        {**row, "number": i, "linked": row["channel"] in names}
+        for i, row in enumerate(sorted(view.findings, key=lambda r: order[r["severity"]]), start=1)
+    ]
+    samples = samples_payload(envelope, histogram, arrays)
+    budgets = list(
+        budget_tables(view.budget, {(view.sensor, view.name): view.simulated}, site.system)
+    )
+    return {
+        "view": view,
+        "name": site.names[view.sensor],
+        "sensor_page": site.sensor_page(view.sensor),
+        "summary": _summary(view, len(channels)),
+        "findings": numbered,
+        "serious": [row for row in numbered if row["severity"] != "note"],
+        "notes": [row for row in numbered if row["severity"] == "note"],
+        "channels": [_channel(site, view, one, samples) for one in channels],
+        "has_temperature": "temperature" in samples["envelope"],
+        "budget": budgets[0] if budgets else None,
+        "budget_words": budget_words(site.settings["settings"]["error_budget"]),
+        "provenance": list(_provenance(view, channels, folder)),
+        "sources": _metadata(folder).get("sources", []),
+        "command": f"snakemake -c2 --forcerun ingest -- "
+        f"{site.results_name}/recordings/{view.sensor}/{view.name}/scores.parquet",
+        "figures_command": f"imubench figures {site.results_name} --sensor {view.sensor} "
+        f"--recording {view.name}",
+        "page": {
+            "looks": looks({view.sensor: site.looks[view.sensor]}),
+            "channels": [channel_payload(one, view.row["rate"], arrays) for one in channels],
+            "samples": samples,
+            "findings": [
+                {name: row[name] for name in ("number", "channel", "start", "end")}
+                for row in numbered
+            ],
+            "arrays": arrays.texts,
+        },
+    }
+
+
+def _summary(view: RecordingView, channels: int) -> str:
+    row = view.row
+    if view.rejected:
+        return "This recording could not be used; nothing of it is in the comparison."
+    parts = [f"{duration_text(row['duration'])} at {number_text(row['rate'])} Hz"]
+    if row["started"]:
+        parts.append(f"from {row['started']}")
+    if row["temperature_min"] is not None:
+        low, high = (number_text(row[f"temperature_{end}"], 3) for end in ("min", "max"))
+        parts.append(f"{low} to {high} °C")
+    parts.append(counted(channels, "channel"))
+    warnings = len(view.warnings)
+    parts.append(counted(warnings, "warning") if warnings else "no warnings")
+    kind = "Simulated from known parameters, not measured: " if view.simulated else ""
+    return kind + ", ".join(parts) + "."
+
+
+def _channel(
+    site: Site, view: RecordingView, channel: ChannelView, samples: Mapping[str, Any]
+) -> dict[str, Any]:
+    symbols, lines = methods_table(channel, view.row["duration"], site.system)
+    used = next(line for line in lines if line["recommended"])
+    for line in lines:
+        score = channel.scores.get(line["method"] or "")
+        known = score is not None and score["rms_log10"] is not None
+        line["score"] = number_text(score["rms_log10"], 2) if known and score else "–"
+        line["inside"] = f"{100 * score['inside_band']:.0f} %" if known and score else "–"
+    best = channel.models[0] if channel.models else None
+    return {
+        "view": channel,
+        "answer": _answer(channel, site.system),
+        "words": list(_untold(symbols, used["cells"])),
+        "symbols": symbols,
+        "lines": lines,
+        "has_spectrum": bool(channel.spectrum),
+        "has_samples": channel.channel in samples["envelope"],
+        "model": _model_words(channel),
+        "models": [
+            {
+                "model": row["model"],
+                "chosen": row["chosen"],
+                "above": number_text(row["bic"] - best["bic"], 3) if best else "",
+                "deviance": "–" if row["deviance"] is None else number_text(row["deviance"], 3),
+                "verdict": row["verdict"],
+            }
+            for row in _best(channel.models)
+        ],
+        "spectral_lines": channel.lines,
+        "line_count": counted(len(channel.lines), "line"),
+        "deltas": list(delta_rows(channel, site.system)),
+        "away": list(curve_distances(channel, site.system)),
+    }
+
+
+def _untold(symbols: Sequence[str], cells: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Yield what the log does not tell."""
+    of = dict(zip(symbols, cells, strict=True))
+    statuses = {symbol: {part["status"] for part in cell["parts"]} for symbol, cell in of.items()}
+    for symbol, cell in of.items():
+        if symbol == "T_B" and statuses["T_B"] == {"absent"}:
+            # Where B is absent, that says it.
+            if statuses["B"] != {"absent"}:
+                yield "B is flicker noise here, which has no correlation time T_B."
+        elif cell["words"]:
+            yield cell["words"]
+
+
+def _answer(channel: ChannelView, system: System) -> str:
+    """Return the values to use, with how well they are known, in a sentence."""
+    parts = []
+    for symbol in PARAMETERS:
+        unit = page_unit(channel.quantity, symbol, system)
+        for row in channel.named(channel.recommended, symbol)[:1]:
+            if row["value"] is not None:
+                known = precision(row, unit)
+                text = f"{symbol} {unit.text(row['value'], 3)} {unit.sign}"
+                parts.append(f"{text} ({known})" if known else text)
+    if channel.fixed_bias is not None:
+        unit = page_unit(channel.quantity, "signal", system)
+        parts.append(f"mean {unit.text(channel.fixed_bias, 4)} {unit.sign}")
+    return "; ".join(parts) + "."
+
+
+def _best(models: Sequence[Row]) -> Sequence[Row]:
+    """Return the models that come close, and that of the papers."""
+    return [row for i, row in enumerate(models) if i < _SHOWN_MODELS or row["model"] == "N+GM+K"]
+
+
+def _model_words(channel: ChannelView) -> str:
+    if not channel.models:
+        return ""
+    best = channel.models[0]
+    text = (
+        f"{best['model']} is the model that the data favour ({best['verdict']}; deviance of a bin "
+        f"{number_text(best['deviance'], 3)}, about 1 where the model is right)."
+    )
+    notes = [note for note in (best["note"], best["band_source"]) if note]
+    return text + (" " + "; ".join(notes).rstrip(".") + "." if notes else "")
+
+
+def _metadata(folder: Path) -> Mapping[str, Any]:
+    paths = log_paths(folder)
+    return read_metadata(paths[0]) if paths else {}
+
+
+def _provenance(
+    view: RecordingView, channels: Sequence[ChannelView], folder: Path
+) -> Iterator[tuple[str, str]]:
+    row, kept = view.row, _metadata(folder)
+    yield "Recording", f"{row['sensor']} / {row['recording']}"
+    yield "Device", str(row["device"])
+    yield "Kind", row["kind"] + (", simulated" if row["simulated"] else "")
+    yield "Started", row["started"] or "not stated in the log"
+    if "reader" in kept:
+        yield "Read as", str(kept["reader"] or "found by its content")
+    if row["rate"] is not None:
+        known = ""
+        if row["rate_error"] is not None and row["rate_error"] > _EXACT * row["rate"]:
+            known = f" ± {number_text(row['rate_error'], 2)} Hz"
+        yield "Rate", f"{number_text(row['rate'], 7)} Hz{known}, from {row['rate_from']}"
+    if row["samples"] is not None:
+        yield "Samples", f"{row['samples']:,}".replace(",", " ")
+    segments: Sequence[Any] = kept.get("segments", [])
+    if len(segments) > 1:
+        yield "Segments", str(len(segments))
+    for truth in {one["source"] for channel in channels for one in channel.truth.values()}:
+        yield "Simulated from", truth

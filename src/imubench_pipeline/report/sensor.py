@@ -1,0 +1,176 @@
+"""The pages of a sensor and of a device: whether its recordings agree, and have changed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from imubench_pipeline.report.comparison import Comparison
+from imubench_pipeline.report.datasheets import delta_rows
+from imubench_pipeline.report.meaning import budget_tables, budget_words
+from imubench_pipeline.report.palette import places
+from imubench_pipeline.report.payload import FOREST, looks
+from imubench_pipeline.report.site import Page, Site
+from imubench_pipeline.report.start import summary
+from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView, Row
+from imubench_pipeline.report.words import counted
+
+_MANY = 12
+"""Recordings of a sensor beyond which its page leaves budgets and deltas to those of recordings."""
+
+
+def sensor_page(site: Site, sensor: str) -> Page:
+    """Return the page of a sensor."""
+    own = [view for view in site.views if view.sensor == sensor]
+    key = site.key_of(
+        *(view.key for view in own),
+        *(view.device_page for view in own),
+        [row for row in site.rows("pooled") if row["sensor"] == sensor],
+        [row for row in site.rows("ranking") if row["sensor"] == sensor],
+        site.looks[sensor],
+    )
+    return Page(
+        site.sensor_page(sensor), "sensor.html.jinja", key, lambda: _sensor(site, sensor, own)
+    )
+
+
+def _sensor(site: Site, sensor: str, own: Sequence[RecordingView]) -> dict[str, Any]:
+    together = Comparison(own, site.names, site.system)
+    pooled = [_pooled(row) for row in site.rows("pooled") if row["sensor"] == sensor]
+    shown = own if len(own) <= _MANY else []
+    simulated = {(view.sensor, view.name): view.simulated for view in own}
+    budget = [row for view in shown for row in view.budget]
+    return {
+        "name": site.names[sensor],
+        "summary": _about(site, sensor) + summary(own, several=False),
+        "standings": list(_standings(site, sensor)),
+        "devices": list(_devices(own)),
+        "forest": FOREST,
+        "parameter_tables": list(together.tables()),
+        "pooled": pooled,
+        "pooled_filters": {
+            "axis": list(dict.fromkeys(row["channel"] for row in pooled)),
+            "parameter": list(dict.fromkeys(row["name"] for row in pooled)),
+        },
+        "budgets": list(budget_tables(budget, simulated, site.system)),
+        "budget_words": budget_words(site.settings["settings"]["error_budget"]),
+        "deltas": [
+            {"view": channel, "rows": rows}
+            for view in shown
+            for channel in view.channels()
+            if (rows := list(delta_rows(channel, site.system)))
+        ],
+        "page": {
+            "grouped": "recording",
+            "recordings": [view.name for view in own],
+            "looks": looks({sensor: site.looks[sensor]})
+            | {"places": [asdict(look) for look in places()]},
+            "names": site.names,
+            **together.page,
+        },
+    }
+
+
+def _about(site: Site, sensor: str) -> str:
+    price_class = site.settings["sensors"].get(sensor, {}).get("price_class")
+    return f"Price class: {price_class}. " if price_class else ""
+
+
+def _standings(site: Site, sensor: str) -> Iterator[dict[str, str]]:
+    """Yield how the sensor stands to each requirement."""
+    for row in site.rows("ranking"):
+        if row["sensor"] == sensor and row["decides"]:
+            title = site.settings["requirements"][row["requirement"]]["title"]
+            place = f", rank {row['rank']}" if row["rank"] else ""
+            yield {"title": title, "text": row["verdict"] + place}
+
+
+def _devices(own: Sequence[RecordingView]) -> Iterator[dict[str, Any]]:
+    for device in dict.fromkeys((view.row["device"], view.device_page) for view in own):
+        views = [view for view in own if (view.row["device"], view.device_page) == device]
+        count = counted(len(views), "recording")
+        yield {"name": device[0], "page": device[1], "views": views, "count": count}
+
+
+def _pooled(row: Row) -> Row:
+    quantity = row["channel"].split("_", maxsplit=1)[0]
+    bias = row["parameter"] == "bias"
+    return row | {  # type: ignore[operator]
+        "ref": f"{quantity}.{'signal' if bias else row['parameter']}",
+        "name": "fixed bias" if bias else row["parameter"],
+    }
+
+
+def device_page(site: Site, page: str) -> Page:
+    """Return the page of a device: its recordings over time."""
+    own = [view for view in site.views if view.device_page == page]
+    rows = [row for row in site.rows("drift") if site.device_page_of(row) == page]
+    key = site.key_of(*(view.key for view in own), rows)
+    return Page(page, "device.html.jinja", key, lambda: _device(site, own, rows))
+
+
+def _device(site: Site, own: Sequence[RecordingView], rows: Sequence[Row]) -> dict[str, Any]:
+    sensor, device = own[0].sensor, own[0].row["device"]
+    named = {(view.sensor, view.name) for view in own}
+    rows = [row for row in rows if (row["sensor"], row["recording"]) in named]
+    dated = bool(rows) and all(row["started"] for row in rows)
+    trends: dict[str, list[dict[str, Any]]] = {}
+    payload: list[dict[str, Any]] = []
+    for channel, parameter in dict.fromkeys((row["channel"], row["parameter"]) for row in rows):
+        series = sorted(
+            (row for row in rows if (row["channel"], row["parameter"]) == (channel, parameter)),
+            key=lambda row: row["position"],
+        )
+        if all(row["value"] is None for row in series):
+            continue
+        quantity, axis = channel.split("_")
+        title = f"{QUANTITY_NAMES[quantity]} {axis}"
+        name = "fixed bias" if parameter == "bias" else parameter
+        changes = [row["recording"] for row in series if row["verdict"] == "changed"]
+        trends.setdefault(channel, []).append(
+            {
+                "title": title,
+                "number": len(payload),
+                "label": f"{name} of {title} in {counted(len(series), 'recording')}",
+                "caption": f"{name}: changed in {', '.join(changes)}."
+                if changes
+                else f"{name}: no change.",
+            }
+        )
+        columns = ("value", "lower", "upper", "expected_lower", "expected_upper", "verdict")
+        payload.append(
+            {
+                "channel": channel,
+                "parameter": parameter,
+                "dated": dated,
+                "started": [row["started"] for row in series],
+                "recordings": [row["recording"] for row in series],
+                **{name: [row[name] for row in series] for name in columns},
+            }
+        )
+    return {
+        "sensor_page": site.sensor_page(sensor),
+        "name": site.names[sensor],
+        "device": device,
+        "views": own,
+        "summary": summary(own, several=False),
+        "changes": [change_words(row) for row in rows if row["verdict"] == "changed"],
+        "order": "The recordings stand at the time when they were started."
+        if dated
+        else "The logs do not all say when they were started: the recordings stand in the order "
+        "of their names.",
+        "trends": list(trends.items()),
+        "page": {"trends": payload, "arrays": []},
+    }
+
+
+def change_words(row: Row) -> str:
+    """Return a change of a device in words."""
+    name = "fixed bias" if row["parameter"] == "bias" else row["parameter"]
+    by = ""
+    if row["change"] is not None:
+        by = f" by {100 * row['change']:+.0f} %".replace("-", "−")
+    chance = f"{row['p_value']:.1g}" if row["p_value"] is not None else "–"
+    where = row["channel"].replace("_", " ")
+    return f"{row['recording']}, {where}: {name} changed{by} (chance if it had not: {chance})."

@@ -1,0 +1,232 @@
+"""The pages of the report: which there are, and which must be written again."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+
+from imubench_pipeline.report.palette import Appearance, sensor_appearances
+from imubench_pipeline.report.practical import System, first_choices, units_of_pages
+from imubench_pipeline.report.view import RecordingView, Row, recording_views
+from imubench_pipeline.tables import OF_ONE_RECORDING, TABLES
+
+NAVIGATION = (
+    ("index.html", "Comparison"),
+    ("recordings.html", "Recordings"),
+    ("datasheets.html", "Datasheets"),
+    ("theory.html", "Theory"),
+    ("made.html", "How this was made"),
+)
+_CHANNELS = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
+_FIRST_ROWS = 100
+"""Rows of a long table that stand in the page; the others are made when they are asked for."""
+_NOT_IN_NAMES = re.compile(r"[^\w .+()-]")
+
+
+@dataclass(frozen=True)
+class Page:
+    """One page.
+
+    Attributes
+    ----------
+    path : str
+        Below the folder of the report.
+    template : str
+    key : str
+        Digest of what it shows: the page is written again only if it changes.
+    context : callable
+        Returns what the template is given.
+    """
+
+    path: str
+    template: str
+    key: str
+    context: Callable[[], Mapping[str, Any]]
+
+    @property
+    def root(self) -> str:
+        """The way from the page to the folder of the report."""
+        return "../" * self.path.count("/")
+
+
+@dataclass
+class Site:
+    """What the pages are made of.
+
+    Parameters
+    ----------
+    tables : mapping of str to pyarrow.Table
+        All joined tables.
+    settings : mapping
+        As `imubench_pipeline.plan.Plan.report_settings` gives them.
+    results : Path
+        Folder of the results, for what is kept of each recording alone.
+    code : str
+        Digest of the code that makes the pages.
+    """
+
+    tables: Mapping[str, pa.Table]
+    settings: Mapping[str, Any]
+    results: Path
+    code: str = ""
+    _rows: dict[str, list[Row]] = field(default_factory=dict)
+
+    @property
+    def title(self) -> str:
+        """Title of the report."""
+        return str(self.settings["report"]["title"])
+
+    @property
+    def system(self) -> System:
+        """Units in which the pages open."""
+        system: System = self.settings["report"]["units"]
+        return system
+
+    @property
+    def results_name(self) -> str:
+        """The folder of the results, as the commands of the pages name it."""
+        return str(self.settings.get("results", "results"))
+
+    @cached_property
+    def views(self) -> list[RecordingView]:
+        """The recordings, with the pages that they have."""
+        views = recording_views(self.tables)
+        together: dict[tuple[str, str, bool], int] = {}
+        for view in views:
+            device = (view.sensor, view.row["device"], view.simulated)
+            together[device] = together.get(device, 0) + 1
+        for view in views:
+            view.page = f"recordings/{view.sensor}/{view.name}.html"
+            device = (view.sensor, view.row["device"], view.simulated)
+            if together[device] > 1 or view.row["device"] != view.name:
+                view.device_page = _device_page(*device)
+        return views
+
+    def device_page_of(self, row: Row) -> str | None:
+        """Return the page of the device of a row that names a recording."""
+        return self._device_pages.get((row["sensor"], row["recording"]))
+
+    @cached_property
+    def _device_pages(self) -> dict[tuple[str, str], str | None]:
+        return {(view.sensor, view.name): view.device_page for view in self.views}
+
+    @cached_property
+    def sensors(self) -> list[str]:
+        """The sensors that have recordings."""
+        return sorted({view.sensor for view in self.views})
+
+    @cached_property
+    def names(self) -> dict[str, str]:
+        """Vendor and model of each sensor."""
+        described = self.settings["sensors"]
+        return {
+            sensor: f"{described[sensor]['vendor']} {described[sensor]['model']}"
+            if sensor in described
+            else sensor
+            for sensor in self.sensors
+        }
+
+    @cached_property
+    def looks(self) -> dict[str, Appearance]:
+        """How each sensor looks in every figure."""
+        return sensor_appearances(self.sensors)
+
+    @cached_property
+    def channel_names(self) -> list[str]:
+        """The channels that some recording has."""
+        there = set(self.tables["allan"]["channel"].unique().to_pylist())
+        return [name for name in _CHANNELS if name in there]
+
+    def sensor_page(self, sensor: str) -> str:
+        """Return the page of a sensor."""
+        return f"sensors/{sensor}.html"
+
+    def rows(self, table: str) -> list[Row]:
+        """Return the rows of a joined table."""
+        if table not in self._rows:
+            self._rows[table] = self.tables[table].to_pylist()
+        return self._rows[table]
+
+    def changed_devices(self) -> list[dict[str, Any]]:
+        """Return the recordings that show a change of their device, with what has changed."""
+        found: dict[tuple[str, str], dict[str, Any]] = {}
+        for row in self.rows("drift"):
+            if row["verdict"] != "changed":
+                continue
+            one = found.setdefault(
+                (row["sensor"], row["recording"]),
+                {key: row[key] for key in ("sensor", "device", "recording")}
+                | {"page": self.device_page_of(row), "what": []},
+            )
+            name = "fixed bias" if row["parameter"] == "bias" else row["parameter"]
+            one["what"].append(f"{name} of {row['channel'].replace('_', ' ')}")
+        return [one | {"channels": ", ".join(one["what"])} for one in found.values()]
+
+    @cached_property
+    def common(self) -> str:
+        """Digest of what every page shows: settings, names, code."""
+        return _digest(self.settings, self.names, self.code, self.version)
+
+    @cached_property
+    def key(self) -> str:
+        """Digest of everything, for pages that show all recordings."""
+        parts = (self.rows(table) for table in ("pooled", "ranking", "drift", "coverage"))
+        return _digest(self.common, [view.key for view in self.views], *parts)
+
+    def key_of(self, *parts: object) -> str:
+        """Return the digest of what a page shows."""
+        return _digest(self.common, *parts)
+
+    @property
+    def version(self) -> str:
+        """Version of this package."""
+        return version("imubench_pipeline")
+
+    def shown(self, *, alone: bool = False) -> dict[str, Any]:
+        """Return what every template is given of the site.
+
+        ``alone``: no other file lies beside the report.
+        """
+        return {
+            "title": self.title,
+            "navigation": NAVIGATION,
+            "units": {quantity: list(found) for quantity, found in units_of_pages().items()},
+            "first_units": first_choices(self.system),
+            "names": self.names,
+            "tables": [] if alone else sorted(set(TABLES) - set(OF_ONE_RECORDING)),
+            "alone": alone,
+            "version": self.version,
+            "first_rows": _FIRST_ROWS,
+        }
+
+
+def _device_page(sensor: str, device: str, simulated: bool) -> str:
+    """Return the page of a device, whose name may hold what a file name cannot."""
+    safe = _NOT_IN_NAMES.sub("_", device)[:80]
+    if safe != device:
+        safe += "-" + hashlib.sha256(device.encode()).hexdigest()[:8]
+    return f"devices/{sensor}/{safe}{'-simulated' if simulated else ''}.html"
+
+
+def _digest(*parts: object) -> str:
+    digest = hashlib.sha256()
+    for part in _flat(parts):
+        digest.update(part + b"\0")
+    return digest.hexdigest()
+
+
+def _flat(parts: Iterable[object]) -> Iterable[bytes]:
+    for part in parts:
+        if isinstance(part, bytes):
+            yield hashlib.sha256(part).digest()
+        else:
+            yield json.dumps(part, sort_keys=True, default=str).encode()

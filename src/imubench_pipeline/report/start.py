@@ -1,0 +1,152 @@
+"""The pages that compare: the start page, all recordings, all datasheets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from imubench_pipeline.report.comparison import Comparison
+from imubench_pipeline.report.datasheets import coverage_tables, deltas_of_sensors
+from imubench_pipeline.report.meaning import rankings
+from imubench_pipeline.report.payload import FOREST, looks
+from imubench_pipeline.report.practical import duration_text
+from imubench_pipeline.report.site import Page, Site
+from imubench_pipeline.report.view import RecordingView, Row
+from imubench_pipeline.report.words import counted, requirement_verdict
+
+
+def start_page(site: Site) -> Page:
+    """Return the page that says which sensor to buy, how sure that is, and what is wrong."""
+    return Page("index.html", "index.html.jinja", site.key, lambda: _start(site))
+
+
+def _start(site: Site) -> dict[str, Any]:
+    views = site.views
+    ranked = list(_rankings(site))
+    together = Comparison(views, site.names, site.system)
+    warned = [view for view in views if view.warnings]
+    return {
+        "summary": summary(views),
+        "rejected": [view for view in views if view.rejected],
+        "warned": [{"view": view, "found": _grouped(view.warnings)} for view in warned],
+        "warning_count": f"{counted(sum(len(v.warnings) for v in warned), 'warning')} in "
+        f"{counted(len(warned), 'recording')}",
+        "changed": site.changed_devices(),
+        "rankings": ranked,
+        "forest": FOREST,
+        "twins": [(name, name.replace("_", " ")) for name in site.channel_names],
+        "parameter_tables": list(together.tables()),
+        "sensors": [_sensor(site, name) for name in site.sensors],
+        "page": {
+            "grouped": "sensor",
+            "looks": looks(site.looks),
+            "names": site.names,
+            "rankings": {one["name"]: one["drawn"] for one in ranked},
+            **together.page,
+        },
+    }
+
+
+def summary(views: Sequence[RecordingView], several: bool = True) -> str:
+    """Return what was compared: how many recordings, of when, how long, and how many are real."""
+    sensors = {view.sensor for view in views}
+    rejected = sum(view.rejected for view in views)
+    made = sum(view.simulated for view in views)
+    of = f" of {counted(len(sensors), 'sensor')}" if several else ""
+    parts = [counted(len(views), "recording") + of]
+    lasting = sum(view.row["duration"] or 0.0 for view in views)
+    if lasting:
+        parts.append(f"{duration_text(lasting)} of data")
+    started = sorted(view.row["started"][:10] for view in views if view.row["started"])
+    if started:
+        parts.append(
+            f"recorded from {started[0]} to {started[-1]}"
+            if started[0] != started[-1]
+            else f"recorded on {started[0]}"
+        )
+    text = ", ".join(parts) + f": {len(views) - rejected} analysed, {rejected} rejected."
+    if made:
+        text += (
+            " All are simulated from published parameters, not measured."
+            if made == len(views)
+            else f" {made} of them are simulated from published parameters, not measured."
+        )
+    return text
+
+
+def _grouped(rows: Sequence[Row]) -> list[tuple[str, str]]:
+    """Return each finding once, with its channels."""
+    found: dict[str, dict[str, None]] = {}
+    for row in rows:
+        channels = found.setdefault(row["finding"], {})
+        if row["channel"]:
+            channels[row["channel"].replace("_", " ")] = None
+    return [(name, ", ".join(channels)) for name, channels in found.items()]
+
+
+def _rankings(site: Site) -> Iterator[dict[str, Any]]:
+    simulated = {(view.sensor, view.name): view.simulated for view in site.views}
+    rows = site.tables["ranking"].to_pylist()
+    for one in rankings(rows, site.settings["requirements"], simulated, site.system):
+        decisive = {
+            row["sensor"]: row
+            for row in rows
+            if row["requirement"] == one["name"] and row["decides"]
+        }
+        yield one | {
+            "verdict": requirement_verdict(one["groups"], site.names),
+            "drawn": [_margin(decisive[group["sensor"]], group) for group in one["groups"]],
+        }
+
+
+def _margin(row: Row, group: dict[str, Any]) -> dict[str, Any]:
+    known = row["margin"] is not None
+    bounded = known and bool(row["lower"]) and bool(row["upper"])
+    return {
+        "sensor": row["sensor"],
+        "verdict": group["verdict"],
+        "margin": row["margin"] if known else None,
+        "low": row["limit"] / row["upper"] if bounded else None,
+        "high": row["limit"] / row["lower"] if bounded else None,
+    }
+
+
+def _sensor(site: Site, name: str) -> dict[str, Any]:
+    own = [view for view in site.views if view.sensor == name]
+    rejected = sum(view.rejected for view in own)
+    counts = counted(len(own), "recording") + (f", {rejected} rejected" if rejected else "")
+    if all(view.simulated for view in own):
+        counts += ", simulated"
+    return {
+        "name": name,
+        "price_class": site.settings["sensors"].get(name, {}).get("price_class"),
+        "counts": counts,
+    }
+
+
+def recordings_page(site: Site) -> Page:
+    """Return the page that lists every recording with its state."""
+
+    def context() -> dict[str, Any]:
+        filters = {
+            "status": list(dict.fromkeys(view.row["status"] for view in site.views)),
+            "sensor": [site.names[sensor] for sensor in site.sensors],
+        }
+        return {"views": site.views, "summary": summary(site.views), "filters": filters}
+
+    return Page("recordings.html", "recordings.html.jinja", site.key, context)
+
+
+def datasheets_page(site: Site) -> Page:
+    """Return the page of all comparisons with datasheets, and of who publishes what."""
+
+    def context() -> dict[str, Any]:
+        lines = list(deltas_of_sensors(site.views, site.system))
+        coverage = coverage_tables(site.tables["coverage"].to_pylist())
+        filters = {
+            "figure": list(dict.fromkeys(line["quantity"] for line in lines)),
+            "sensor": list(dict.fromkeys(site.names[line["sensor"]] for line in lines)),
+        }
+        return {"lines": lines, "filters": filters, "coverage": list(coverage)}
+
+    return Page("datasheets.html", "datasheets.html.jinja", site.key, context)

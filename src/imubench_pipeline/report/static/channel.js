@@ -1,0 +1,217 @@
+// The figures of one channel: curve, spectrum, samples over time, histogram.
+
+const black = () => ({ light: inks().ink, dark: inks().ink });
+const PLACES = [
+  ["#0072B2", "#4DA3D9"], ["#D55E00", "#F08A3C"], ["#B3508C", "#DB8FBC"], ["#9A6B00", "#E0A82E"], ["#7A4B3A", "#C69A88"], ["#5B5FC7", "#A3A6F2"],
+];
+const TERM_DASHES = ["dash", "dot", "dashdot", "longdash"];
+const termLook = (place) => {
+  const [light, darkened] = PLACES[place % PLACES.length];
+  return { light, dark: darkened, dash: TERM_DASHES[place % TERM_DASHES.length], width: 1.4 };
+};
+
+function channelOf(figure) {
+  return pageData.channels.find((one) => one.channel === figure.dataset.channel);
+}
+
+kinds.allan = (figure) => {
+  const one = channelOf(figure);
+  const unit = unitOf(quantityOf(one.channel), "adev");
+  const tau = array(one.tau);
+  const [y, low, high] = [one.adev, one.lower, one.upper].map((place) => scaled(place, unit.factor));
+  const what = one.simulated ? "simulated log" : "measured";
+  const best = one.methods[one.recommended];
+  const look = pageData.looks.methods;
+  const traces = [
+    ...band(tau, low, high, black(), 0.2).map((trace) => ({ ...trace, group: "limits" })),
+  ];
+  const groups = [
+    { key: "measured", label: what, on: true, look: { ...black(), marker: "circle" } },
+    { key: "limits", label: "95 % limits", on: true, look: { ...black(), filled: true } },
+  ];
+  if (best) {
+    const times = array(best.tau);
+    traces.push(...band(times, scaled(best.lower, unit.factor), scaled(best.upper, unit.factor), look[one.recommended], 0.22)
+      .map((trace) => ({ ...trace, group: "band" })));
+    traces.push({
+      group: "reconstructed", type: "scatter", mode: "markers", x: times, y: scaled(best.reconstructed, unit.factor), hoverinfo: "skip",
+      marker: { color: colourOf(look[one.recommended]), symbol: "x-thin-open", size: 6 },
+    });
+  }
+  traces.push({
+    group: "measured", type: "scatter", mode: "lines+markers", x: tau, y, line: { color: inks().ink, width: 1.2 }, marker: { size: 4, color: inks().ink },
+    text: tau.map((t, i) => `τ ${numberText(t, 3)} s: <b>${numberText(y[i], 3)} ${unit.sign}</b><br>95 %: ${interval(low[i], high[i])} ${unit.sign}`),
+    hovertemplate: `${what}<br>%{text}<extra></extra>`,
+  });
+  for (const [method, curve] of Object.entries(one.methods)) {
+    const key = `method ${method}`;
+    const use = method === one.recommended;
+    traces.push(line(array(curve.tau), scaled(curve.model, unit.factor), { ...look[method], width: use ? 2.4 : 1.3 }, {
+      group: key, hoverinfo: "name", name: look[method].name,
+    }));
+    groups.push({ key, label: look[method].name + (use ? " (use this)" : ""), on: use, look: { ...look[method], marker: undefined } });
+  }
+  one.terms.forEach((term, place) => {
+    traces.push(line(tau, scaled(term.adev, unit.factor), termLook(place), { group: `term ${place}`, hoverinfo: "name", name: term.name }));
+    groups.push({ key: `term ${place}`, label: term.name, on: false, look: termLook(place) });
+  });
+  if (best) {
+    groups.push(
+      { key: "band", label: "95 % band of reconstructions", on: true, look: { ...look[one.recommended], filled: true, marker: undefined } },
+      { key: "reconstructed", label: "a log simulated from the model", on: false, look: { ...look[one.recommended], line: false, marker: "x" } },
+    );
+  }
+  one.datasheet.forEach((printed, place) => {
+    const value = printed.value * unit.factor;
+    const own = { light: "#B3001B", dark: "#FF8F8F", dash: TERM_DASHES[place % 4], width: 1.6 };
+    traces.push(line(tau, printed.of === "N" ? tau.map((t) => value / Math.sqrt(t)) : tau.map(() => value), own, {
+      group: `datasheet ${place}`, hoverinfo: "name", name: `datasheet: ${printed.label}`,
+    }));
+    groups.push({ key: `datasheet ${place}`, label: `datasheet: ${printed.label}`, on: true, look: own });
+  });
+  return {
+    traces, groups,
+    layout: {
+      xaxis: logAxis("averaging time τ (s)", logRange(tau, 0.1)),
+      yaxis: logAxis(`Allan deviation (${unit.sign})`, logRange(y, 0.7, 0.25)),
+    },
+  };
+};
+
+kinds.spectrum = (figure) => {
+  const one = channelOf(figure);
+  const found = one.spectrum;
+  const unit = unitOf(quantityOf(one.channel), "psd");
+  const f = array(found.frequency);
+  const density = scaled(found.density, unit.factor);
+  const used = array(found.used);
+  const look = pageData.looks.methods.likelihood;
+  const points = (keep, key, colour, symbol) => {
+    const chosen = f.map((_, i) => i).filter((i) => (used[i] > 0) === keep);
+    return {
+      group: key, type: "scatter", mode: "markers", x: chosen.map((i) => f[i]), y: chosen.map((i) => density[i]),
+      marker: { color: colour, size: keep ? 4 : 5, symbol },
+      text: chosen.map((i) => `${numberText(f[i], 4)} Hz: ${numberText(density[i], 3)} ${unit.sign}`),
+      hovertemplate: "%{text}<extra></extra>",
+    };
+  };
+  const traces = [points(false, "left", inks().soft, "x-thin-open"), points(true, "used", inks().ink, "circle")];
+  const groups = [
+    { key: "used", label: "bins used", on: true, look: { ...black(), line: false, marker: "circle" } },
+    { key: "left", label: "bins left out", on: true, look: { light: inks().soft, dark: inks().soft, line: false, marker: "x" }, absent: used.every((is) => is > 0) },
+  ];
+  traces.push(line(f, scaled(found.fitted, unit.factor), { ...look, width: 2.2 }, { group: "fit" }));
+  groups.push({ key: "fit", label: `fit ${found.model}`, on: true, look: { ...look, marker: undefined } });
+  found.terms.forEach((term, place) => {
+    traces.push(line(array(found.smooth), scaled(term.density, unit.factor), termLook(place), { group: `term ${place}`, hoverinfo: "name", name: term.name }));
+    groups.push({ key: `term ${place}`, label: term.name, on: false, look: termLook(place) });
+  });
+  const range = logRange(density, 0.3);
+  if (found.lines.length > 0) {
+    const own = { light: "#B3001B", dark: "#FF8F8F", dash: "dot", width: 1.2 };
+    for (const each of found.lines) {
+      traces.push(line([each.frequency, each.frequency], range.map((power) => 10 ** power), own, {
+        group: "lines", hoverinfo: "text", text: `${each.kind}, ${numberText(each.frequency, 5)} Hz`,
+      }));
+    }
+    groups.push({ key: "lines", label: found.lines.length === 1 ? "line" : "lines", on: true, look: own });
+  }
+  return {
+    traces, groups,
+    layout: {
+      xaxis: logAxis("frequency f (Hz)", logRange(f, 0.1)),
+      yaxis: logAxis(`root of the two-sided density (${unit.sign})`, range),
+    },
+  };
+};
+
+function timeScale(longest) {
+  for (const [size, name] of [[86400, "days"], [3600, "h"], [60, "min"]]) if (longest >= 2 * size) return { size, name };
+  return { size: 1, name: "s" };
+}
+
+kinds.series = (figure) => {
+  const channel = figure.dataset.channel;
+  const envelope = pageData.samples.envelope[channel];
+  const warmth = pageData.samples.envelope.temperature;
+  const unit = unitOf(quantityOf(channel), "signal");
+  const scale = timeScale(envelope.end);
+  const middle = (of) => {
+    const count = array(of.mean).length;
+    return array(of.mean).map((_, i) => (of.start + ((i + 0.5) * (of.end - of.start)) / count) / scale.size);
+  };
+  const x = middle(envelope);
+  const look = { light: "#0072B2", dark: "#4DA3D9" };
+  const low = scaled(envelope.low, unit.factor);
+  const high = scaled(envelope.high, unit.factor);
+  const mean = scaled(envelope.mean, unit.factor);
+  const traces = band(x, low, high, look, 0.35).map((trace) => ({ ...trace, group: "envelope" }));
+  traces.push({
+    ...line(x, mean, black()), group: "mean", hoverinfo: "text",
+    text: x.map((t, i) => `${numberText(t, 4)} ${scale.name}: mean ${numberText(mean[i], 4)} ${unit.sign}<br>${interval(low[i], high[i])} ${unit.sign}`),
+  });
+  const groups = [
+    { key: "envelope", label: "least and largest sample", on: true, look: { ...look, filled: true } },
+    { key: "mean", label: "mean", on: true, look: black() },
+  ];
+  const layout = { xaxis: linearAxis(`time (${scale.name})`), yaxis: linearAxis(`${channel.replace("_", " ")} (${unit.sign})`) };
+  if (warmth) {
+    const warm = { light: "#D55E00", dark: "#F08A3C", dash: "solid" };
+    traces.push({ ...line(middle(warmth), array(warmth.mean), warm), group: "temperature", yaxis: "y2", hoverinfo: "x+y" });
+    groups.push({ key: "temperature", label: "temperature", on: true, look: warm });
+    if (shown(figure, "temperature")) {
+      layout.yaxis.domain = [0.36, 1];
+      layout.yaxis2 = { ...linearAxis("°C"), domain: [0, 0.26] };
+      layout.xaxis.anchor = "y2";
+    }
+  }
+  const there = pageData.findings.filter((one) => one.start !== null && (one.channel === null || one.channel === channel));
+  if (there.length > 0) {
+    groups.push({ key: "findings", label: "findings", on: true, look: { light: "#B3001B", dark: "#FF8F8F", filled: true } });
+    if (shown(figure, "findings")) {
+      layout.shapes = there.map((one) => ({
+        type: "rect", xref: "x", yref: "paper", y0: 0, y1: 1, x0: one.start / scale.size, x1: (one.end ?? one.start) / scale.size,
+        fillcolor: faint(inks().mark, 0.13), line: { color: inks().mark, width: 1, dash: "dot" }, layer: "below",
+      }));
+      layout.annotations = there.map((one, i) => ({
+        xref: "x", yref: "paper", x: one.start / scale.size, y: 1 - 0.06 * (i % 4), text: `${one.number}`, showarrow: false,
+        font: { color: inks().mark, size: 12 }, bgcolor: inks().paper, borderpad: 1, xanchor: "left", yanchor: "top",
+      }));
+    }
+  }
+  return { traces, groups, layout };
+};
+
+kinds.histogram = (figure) => {
+  const channel = figure.dataset.channel;
+  const found = pageData.samples.histogram[channel];
+  const unit = unitOf(quantityOf(channel), "signal");
+  const edges = scaled(found.edges, unit.factor);
+  const [lower, upper] = [edges.slice(0, -1), edges.slice(1)];
+  const count = array(found.count);
+  const total = count.reduce((sum, each) => sum + each, 0);
+  const height = count.map((each, i) => each / total / (upper[i] - lower[i] || 1));
+  const middle = lower.map((low, i) => (low + upper[i]) / 2);
+  const mean = middle.reduce((sum, each, i) => sum + each * count[i], 0) / total;
+  const deviation = Math.sqrt(middle.reduce((sum, each, i) => sum + (each - mean) ** 2 * count[i], 0) / total);
+  const look = { light: "#0072B2", dark: "#4DA3D9" };
+  const traces = [{
+    group: "samples", type: "bar", x: middle, y: height, width: lower.map((low, i) => upper[i] - low),
+    marker: { color: faint(colourOf(look), 0.6), line: { width: 0 } },
+    text: count.map((each, i) => `${numberText(each, 6)} samples, ${interval(lower[i], upper[i])} ${unit.sign}`), textposition: "none",
+    hovertemplate: "%{text}<extra></extra>",
+  }];
+  if (deviation > 0) {
+    const x = Array.from({ length: 121 }, (_, i) => mean + (i / 20 - 3) * 1.5 * deviation);
+    const y = x.map((each) => Math.exp(-(((each - mean) / deviation) ** 2) / 2) / (deviation * Math.sqrt(2 * Math.PI)));
+    traces.push(line(x, y, black(), { group: "normal" }));
+  }
+  return {
+    traces,
+    groups: [
+      { key: "samples", label: "samples", on: true, look: { ...look, filled: true } },
+      { key: "normal", label: "normal distribution of the same spread", on: true, look: black(), absent: !(deviation > 0) },
+    ],
+    layout: { xaxis: linearAxis(`${channel.replace("_", " ")} (${unit.sign})`), yaxis: { ...linearAxis(`share of the samples per ${unit.sign}`), rangemode: "tozero" }, bargap: 0 },
+  };
+};

@@ -1,0 +1,73 @@
+// Numbers as they are printed, and the units that the reader chose.
+// UNITS: quantity -> choice -> symbol -> [sign, factor from SI]; written by the page builder.
+
+const SUPERSCRIPTS = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
+
+function numberText(value, digits) {
+  const rounded = Number(value.toPrecision(digits));
+  let text;
+  if (rounded === 0 || (Math.abs(rounded) >= 1e-4 && Math.abs(rounded) < 1e6)) {
+    text = String(rounded);
+  } else {
+    const [mantissa, exponent] = rounded.toExponential().split("e");
+    const power = [...exponent.replace("+", "")].map((sign) => SUPERSCRIPTS[sign]).join("");
+    text = `${mantissa}×10${power}`;
+  }
+  return text.replaceAll("-", "−");
+}
+
+const chosenUnits = {};
+
+function unitOf(quantity, symbol) {
+  const [sign, factor] = UNITS[quantity][chosenUnits[quantity]][symbol];
+  return { sign, factor };
+}
+
+function remembered(key) {
+  try {
+    return window.localStorage.getItem(key);
+  } catch {
+    return null; // a page opened from disk may have no storage
+  }
+}
+
+function remember(key, value) {
+  try {
+    window.localStorage.setItem(key, value);
+  } catch {
+    // then the choice lasts as long as the page
+  }
+}
+
+function startUnits(first) {
+  for (const [quantity, choices] of Object.entries(UNITS)) {
+    const before = remembered(`imubench ${quantity}`);
+    chosenUnits[quantity] = before in choices ? before : first[quantity];
+  }
+  document.querySelectorAll("select[data-quantity]").forEach((select) => {
+    select.value = chosenUnits[select.dataset.quantity];
+    select.addEventListener("change", () => {
+      chosenUnits[select.dataset.quantity] = select.value;
+      remember(`imubench ${select.dataset.quantity}`, select.value);
+      showUnits(document);
+      redrawAll();
+    });
+  });
+}
+
+// A figure in the text is <data value=SI>; it has data-unit="gyro.N", or the head of its column has
+// it. Limits, in <small>, have fewer digits. A unit in the text is a <span data-sign="gyro.N">.
+function showUnits(root) {
+  root.querySelectorAll("data").forEach((element) => {
+    const of = element.dataset.unit ?? unitOfColumn(element.closest("td"));
+    const digits = element.dataset.digits ?? (element.parentNode.localName === "small" ? 3 : 4);
+    element.textContent = numberText(Number(element.value) * unitOf(...of.split(".")).factor, Number(digits));
+  });
+  root.querySelectorAll("[data-sign]").forEach((element) => {
+    element.textContent = unitOf(...element.dataset.sign.split(".")).sign;
+  });
+}
+
+function unitOfColumn(cell) {
+  return cell.closest("table").tHead.rows[0].cells[cell.cellIndex].dataset.unit;
+}

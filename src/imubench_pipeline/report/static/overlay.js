@@ -1,0 +1,217 @@
+// Allan deviations of several sensors, or of several recordings of one, in one pair of axes.
+
+const CHANNEL_NAMES = {
+  gyro_x: "gyro x", gyro_y: "gyro y", gyro_z: "gyro z", accel_x: "accel x", accel_y: "accel y", accel_z: "accel z",
+};
+const MANY = 40; // curves beyond which one recording a sensor is shown first
+let chosenChannel = null;
+let chosenMethod = "recommended";
+let everyRecording = true;
+
+const quantityOf = (channel) => channel.split("_")[0];
+
+function startChooser(root) {
+  const chooser = root.querySelector(".chooser");
+  if (!chooser || !pageData.channels) return;
+  const present = Object.keys(CHANNEL_NAMES).filter((name) => pageData.channels.some((one) => one.channel === name));
+  if (!present.includes(chosenChannel)) chosenChannel = present[0];
+  const most = Math.max(0, ...present.map((name) => pageData.channels.filter((one) => one.channel === name).length));
+  everyRecording = most <= MANY || pageData.grouped === "recording";
+  const set = document.createElement("fieldset");
+  set.append(Object.assign(document.createElement("legend"), { textContent: "Axis" }));
+  for (const name of present) {
+    const radio = Object.assign(document.createElement("input"), {
+      type: "radio", name: "channel", value: name, checked: name === chosenChannel,
+    });
+    radio.addEventListener("change", () => {
+      chosenChannel = name;
+      redrawAll();
+    });
+    const label = document.createElement("label");
+    label.append(radio, ` ${CHANNEL_NAMES[name]}`);
+    set.append(label);
+  }
+  const method = document.createElement("select");
+  method.append(new Option("recommended", "recommended"),
+    ...Object.entries(pageData.looks.methods).map(([key, look]) => new Option(look.name, key)));
+  method.value = chosenMethod;
+  method.addEventListener("change", () => {
+    chosenMethod = method.value;
+    redrawAll();
+  });
+  chooser.append(set, labelled("Model of", method));
+  if (pageData.grouped === "sensor" && new Set(pageData.channels.map((one) => one.recording)).size > 1) {
+    const which = document.createElement("select");
+    which.append(new Option("all", "all"), new Option("the last of each sensor", "last"));
+    which.value = everyRecording ? "all" : "last";
+    which.addEventListener("change", () => {
+      everyRecording = which.value === "all";
+      redrawAll();
+    });
+    chooser.append(labelled("Recordings", which));
+  }
+}
+
+function comparedChannels(channel) {
+  const found = pageData.channels.filter((one) => one.channel === channel);
+  if (everyRecording) return found;
+  return [...new Map(found.map((one) => [one.sensor, one])).values()];
+}
+
+// Among sensors, a curve looks as its sensor; among recordings of one, as its place.
+function lookOf(one) {
+  const own = pageData.looks.sensors[one.sensor];
+  if (pageData.grouped === "sensor") return own;
+  const place = pageData.recordings.indexOf(one.recording);
+  return pageData.looks.places[place % pageData.looks.places.length];
+}
+
+function groupOf(one) {
+  return pageData.grouped === "sensor" ? one.sensor : one.recording;
+}
+
+function nameOf(key) {
+  return pageData.names[key] ?? key;
+}
+
+function interval(low, high) {
+  return Number.isFinite(low) && Number.isFinite(high) ? `${numberText(low, 3)} to ${numberText(high, 3)}` : "not known";
+}
+
+function spread(count, places) {
+  return Array.from({ length: places }, (_, i) => Math.round(((i + 0.5) * count) / places));
+}
+
+kinds.overlay = (figure) => {
+  const quantity = quantityOf(chosenChannel);
+  const unit = unitOf(quantity, "adev");
+  const here = comparedChannels(chosenChannel);
+  const traces = [];
+  const groups = new Map();
+  for (const one of pageData.channels) {
+    const key = groupOf(one);
+    if (!groups.has(key)) {
+      groups.set(key, { key, label: nameOf(key) + (one.simulated ? " (simulated)" : ""), on: true, look: lookOf(one), absent: true });
+    }
+  }
+  for (const one of here) {
+    const key = groupOf(one);
+    groups.get(key).absent = false;
+    const look = lookOf(one);
+    const colour = colourOf(look);
+    const tau = array(one.tau);
+    const [y, low, high] = [one.adev, one.lower, one.upper].map((place) => scaled(place, unit.factor));
+    traces.push(...band(tau, low, high, look).map((trace) => ({ ...trace, group: [key, "limits"] })));
+    const title = `${nameOf(one.sensor)}${one.simulated ? " (simulated)" : ""}, ${one.recording}`;
+    traces.push({
+      group: [key, "measured"], type: "scatter", mode: "lines+markers", x: tau, y, name: title,
+      line: { color: colour, dash: look.dash, width: 1.6 },
+      marker: { color: colour, symbol: look.marker, size: tau.map((_, i) => (i % 8 === 4 ? 7 : 0.1)) },
+      text: tau.map((t, i) => `τ ${numberText(t, 3)} s: <b>${numberText(y[i], 3)} ${unit.sign}</b><br>95 %: ${interval(low[i], high[i])} ${unit.sign}`),
+      hovertemplate: `${title}<br>%{text}<extra></extra>`,
+    });
+    const method = chosenMethod === "recommended" ? one.recommended : chosenMethod;
+    if (one.models[method] !== undefined) {
+      const [times, curve] = one.models[method];
+      traces.push(line(array(times), scaled(curve, unit.factor), { ...look, width: 1.2 }, { group: [key, "model"], opacity: 0.8 }));
+    }
+  }
+  const drawnSheets = new Set();
+  for (const one of here) {
+    if (drawnSheets.has(one.sensor)) continue;
+    drawnSheets.add(one.sensor);
+    const look = lookOf(one);
+    const tau = array(one.tau);
+    pageData.datasheets[one.sensor][chosenChannel].forEach((printed) => {
+      const value = printed.value * unit.factor;
+      traces.push(line(tau, printed.of === "N" ? tau.map((t) => value / Math.sqrt(t)) : tau.map(() => value),
+        { ...look, dash: "dot", width: 1.2 }, {
+          group: [groupOf(one), "datasheet"], hoverinfo: "text", text: `${nameOf(one.sensor)}, datasheet: ${printed.label}`,
+        }));
+    });
+  }
+  const { ink } = inks();
+  const plain = { light: ink, dark: ink };
+  const layers = [
+    { key: "measured", label: "curves", on: true, look: plain },
+    { key: "limits", label: "95 % limits", on: here.length <= 12, look: { ...plain, filled: true } },
+    { key: "model", label: "model", on: false, look: plain },
+    { key: "datasheet", label: "datasheet", on: false, look: { ...plain, dash: "dot" } },
+  ];
+  return {
+    traces, groups: [...layers, ...groups.values()],
+    layout: {
+      xaxis: logAxis("averaging time τ (s)", logRange(here.flatMap((one) => array(one.tau)), 0.1)),
+      yaxis: logAxis(`Allan deviation (${unit.sign})`, logRange(here.flatMap((one) => scaled(one.adev, unit.factor)), 0.4)),
+    },
+  };
+};
+
+const FOREST_NAMES = {
+  N: "N, white noise", B: "B, bias instability", T_B: "T_B, correlation time", K: "K, random walk",
+};
+
+// Dot and 95 % interval of a parameter; hollow where only the interval is known.
+kinds.forest = (figure) => {
+  const symbol = figure.dataset.symbol;
+  const quantity = quantityOf(chosenChannel);
+  const unit = unitOf(quantity, symbol);
+  const here = comparedChannels(chosenChannel);
+  const names = [...new Set(here.map(groupOf))].reverse();
+  const traces = [];
+  const counts = new Map();
+  for (const one of here) counts.set(groupOf(one), (counts.get(groupOf(one)) ?? 0) + 1);
+  const seen = new Map();
+  const extent = [];
+  for (const one of here) {
+    const key = groupOf(one);
+    const number = seen.get(key) ?? 0;
+    seen.set(key, number + 1);
+    const method = chosenMethod === "recommended" || !one.parameters[chosenMethod] ? one.recommended : chosenMethod;
+    const found = one.parameters[method]?.[symbol];
+    if (!found) continue;
+    const [value, lower, upper, status] = found;
+    const known = value !== null;
+    const bounded = lower !== null && lower > 0 && upper !== null;
+    const middle = known ? value : bounded ? Math.sqrt(lower * upper) : upper;
+    if (middle === null || middle <= 0) continue;
+    extent.push(middle * unit.factor, ...(bounded ? [lower * unit.factor, upper * unit.factor] : []));
+    const look = lookOf(one);
+    const colour = colourOf(look);
+    const words = known
+      ? `<b>${numberText(value * unit.factor, 4)} ${unit.sign}</b>`
+      : status === "absent" ? `absent: below ${numberText(upper * unit.factor, 3)} ${unit.sign}` : status.replaceAll("_", " ");
+    const limits = lower !== null && upper !== null ? `<br>95 %: ${interval(lower * unit.factor, upper * unit.factor)} ${unit.sign}` : "";
+    const place = names.indexOf(key) + ((number + 1) / (counts.get(key) + 1) - 0.5) * -0.7;
+    traces.push({
+      type: "scatter", mode: "markers", x: [middle * unit.factor], y: [place],
+      marker: {
+        color: known ? colour : "rgba(0,0,0,0)", size: known ? 9 : 8, line: { color: colour, width: 2 },
+        symbol: known ? look.marker : status === "absent" ? "triangle-left" : "circle-open",
+      },
+      error_x: bounded ? {
+        type: "data", symmetric: false, array: [(upper - middle) * unit.factor], arrayminus: [(middle - lower) * unit.factor],
+        color: colour, thickness: 1.6, width: 4,
+      } : undefined,
+      hovertemplate: `${nameOf(one.sensor)}${one.simulated ? " (simulated)" : ""}, ${one.recording}<br>${symbol} ${words}${limits}<extra></extra>`,
+    });
+  }
+  const most = Math.max(1, ...counts.values());
+  return {
+    traces, groups: [], height: 90 + names.length * Math.min(30 + 8 * (most - 1), 130),
+    layout: {
+      margin: { l: 10, r: 14, t: 30, b: 45 },
+      title: { text: FOREST_NAMES[symbol], font: { size: 14 }, x: 0, xanchor: "left", xref: "container", pad: { l: 8 }, y: 0.98, yanchor: "top" },
+      xaxis: logAxis(`${symbol.replace("T_B", "T<sub>B</sub>")} (${unit.sign})`, logRange(extent, 0.08)),
+      yaxis: {
+        ...linearAxis(""), tickvals: names.map((_, i) => i), ticktext: names.map((key) => wrapped(nameOf(key))),
+        range: [-0.6, names.length - 0.4], fixedrange: true,
+      },
+    },
+  };
+};
+
+function wrapped(text) {
+  const short = text.length > 34 ? `${text.slice(0, 33)}…` : text;
+  return short.length > 18 ? short.replace(/^(.{8,18}) /, "$1<br>") : short;
+}

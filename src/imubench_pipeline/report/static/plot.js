@@ -1,0 +1,280 @@
+// Figures: drawn when they come into view, again when units, colours or choices change.
+// A kind of figure is a pure function (figure) -> { traces, layout, groups }; `groups` are what
+// can be switched on and off, and serve as the legend.
+
+const kinds = {};
+const choices = new WeakMap(); // figure -> Map of group -> shown
+const drawn = new Set();
+let pageData = null;
+let decoded = [];
+
+// Kinds of arrays: float32 as they are; else levels, of which 0 stands for no value.
+function array(place) {
+  if (decoded[place] === undefined) {
+    const [kind, low, step, text] = pageData.arrays[place];
+    const bytes = Uint8Array.from(atob(text), (sign) => sign.charCodeAt(0));
+    if (kind === "float") {
+      decoded[place] = [...new Float32Array(bytes.buffer)];
+    } else {
+      const levels = kind === "even" ? bytes : new Uint16Array(bytes.buffer);
+      decoded[place] = Array.from(levels, (level) => {
+        if (level === 0) return NaN;
+        const value = low + (level - 1) * step;
+        return kind === "log" ? 10 ** value : value;
+      });
+    }
+  }
+  return decoded[place];
+}
+
+function scaled(place, factor) {
+  return array(place).map((value) => value * factor);
+}
+
+function printing() {
+  return window.matchMedia("print").matches || document.documentElement.dataset.printing === "yes";
+}
+
+function dark() {
+  return !printing() && window.matchMedia("(prefers-color-scheme: dark)").matches;
+}
+
+function inks() {
+  return dark()
+    ? { ink: "#e8e8e8", soft: "#a9b1b8", grid: "#3a424a", paper: "#161a1e", mark: "#ff8f8f" }
+    : { ink: "#1b1b1b", soft: "#5a636b", grid: "#dfe3e6", paper: "#ffffff", mark: "#b3001b" };
+}
+
+function colourOf(look) {
+  return dark() ? look.dark : look.light;
+}
+
+function faint(colour, opacity) {
+  const parts = [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16));
+  return `rgba(${parts.join(",")},${opacity})`;
+}
+
+function line(x, y, look, more = {}) {
+  const colour = colourOf(look);
+  return {
+    type: "scatter", mode: "lines", x, y, hoverinfo: "skip",
+    line: { color: colour, dash: look.dash ?? "solid", width: look.width ?? 1.8 },
+    ...more,
+  };
+}
+
+function band(x, low, high, look, opacity = 0.18) {
+  const edge = { type: "scatter", mode: "lines", x, hoverinfo: "skip", line: { width: 0, color: colourOf(look) } };
+  return [{ ...edge, y: low }, { ...edge, y: high, fill: "tonexty", fillcolor: faint(colourOf(look), opacity) }];
+}
+
+function tickText(value) {
+  return (value >= 1e-3 && value < 1e5 ? numberText(value, 3) : numberText(value, 3).replace(/^1×/, ""));
+}
+
+// Labels at decades, at 1, 2, 5 or at even steps, as many as can be read; lines at all multiples.
+function logTicks(low, high) {
+  const span = high - low;
+  const decades = Array.from({ length: Math.ceil(high) - Math.floor(low) + 1 }, (_, i) => Math.floor(low) + i);
+  let tickvals;
+  if (span > 2.2) {
+    const step = Math.ceil(span / 8);
+    tickvals = decades.filter((power) => power % step === 0).map((power) => 10 ** power);
+  } else if (span > 0.75) {
+    tickvals = decades.flatMap((power) => [1, 2, 5].map((each) => each * 10 ** power));
+  } else {
+    const width = 10 ** high - 10 ** low;
+    const rough = 10 ** Math.floor(Math.log10(width / 4));
+    const step = [1, 2, 5, 10].map((each) => each * rough).find((each) => width / each <= 5);
+    const first = Math.ceil(10 ** low / step);
+    tickvals = Array.from({ length: 6 }, (_, i) => (first + i) * step);
+  }
+  tickvals = tickvals.filter((value) => value >= 10 ** low && value <= 10 ** high);
+  const every = decades.flatMap((power) => [2, 3, 4, 5, 6, 7, 8, 9].map((each) => each * 10 ** power));
+  return { tickvals, ticktext: tickvals.map(tickText), minor: every };
+}
+
+function logAxis(title, range) {
+  const { ink, grid } = inks();
+  const { tickvals, ticktext, minor } = logTicks(...range);
+  return {
+    type: "log", title: { text: title, standoff: 8 }, color: ink, gridcolor: grid, zeroline: false, automargin: true,
+    range, tickmode: "array", tickvals, ticktext,
+    minor: { tickmode: "array", tickvals: minor, showgrid: true, gridcolor: faint(grid, 0.55), ticks: "" },
+  };
+}
+
+// The decades that hold all values above 0, with some room.
+function logRange(values, below, above = below) {
+  let [least, most] = [Infinity, -Infinity];
+  for (const value of values) {
+    if (value > 0 && value < least) least = value;
+    if (value > most && Number.isFinite(value)) most = value;
+  }
+  return least <= most ? [Math.log10(least) - below, Math.log10(most) + above] : [0, 1];
+}
+
+// Labels follow when the reader zooms.
+function followZoom(canvas) {
+  canvas.on("plotly_relayout", (changes) => {
+    const update = {};
+    for (const name of ["xaxis", "yaxis"]) {
+      const axis = canvas.layout[name];
+      if (axis.type !== "log" || !Object.keys(changes).some((key) => key.startsWith(`${name}.range`))) continue;
+      const { tickvals, ticktext } = logTicks(...axis.range);
+      Object.assign(update, { [`${name}.tickvals`]: tickvals, [`${name}.ticktext`]: ticktext });
+    }
+    if (Object.keys(update).length > 0) Plotly.relayout(canvas, update);
+  });
+}
+
+function linearAxis(title) {
+  const { ink, grid } = inks();
+  return { title: { text: title, standoff: 8 }, color: ink, gridcolor: grid, zeroline: false, automargin: true };
+}
+
+function baseLayout() {
+  const { ink, paper } = inks();
+  return {
+    margin: { l: 60, r: 14, t: 14, b: 50 }, showlegend: false, hovermode: "closest",
+    paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
+    font: { family: "system-ui, sans-serif", size: 13, color: ink },
+    hoverlabel: { bgcolor: paper, bordercolor: ink, font: { color: ink } },
+  };
+}
+
+function shown(figure, group) {
+  return choices.get(figure)?.get(group) ?? true;
+}
+
+function drawFigure(figure) {
+  const made = kinds[figure.dataset.kind](figure);
+  if (!choices.has(figure)) {
+    choices.set(figure, new Map(made.groups.map((group) => [group.key, group.on])));
+    drawControls(figure, made.groups);
+    return drawFigure(figure);
+  }
+  syncControls(figure, made.groups);
+  const traces = made.traces.filter((trace) => [trace.group].flat().every((group) => !group || shown(figure, group)));
+  const canvas = figure.querySelector(".canvas");
+  canvas.classList.toggle("empty", traces.length === 0);
+  const layout = { ...baseLayout(), ...made.layout, datarevision: Math.random() };
+  if (made.height) canvas.style.height = `${made.height}px`;
+  const first = !drawn.has(figure);
+  drawn.add(figure);
+  Plotly.react(canvas, traces.map(({ group, ...trace }) => trace), layout, {
+    displayModeBar: false, responsive: true, doubleClick: "reset", showTips: false,
+  });
+  if (first) followZoom(canvas);
+}
+
+const DASHES = { solid: "", dash: "6 4", dot: "2 3", dashdot: "7 3 2 3", longdash: "11 4" };
+const SHAPES = {
+  circle: '<circle cx="14" cy="7" r="4"/>', square: '<rect x="10" y="3" width="8" height="8"/>',
+  diamond: '<path d="M14 2l5 5-5 5-5-5z"/>', "triangle-up": '<path d="M14 2l5 9H9z"/>',
+  "triangle-down": '<path d="M14 12l5-9H9z"/>', cross: '<path d="M12.5 2h3v3.5H19v3h-3.5V12h-3V8.5H9v-3h3.5z"/>',
+  x: '<path d="M10 4l1.6-1.6L14 5l2.4-2.6L18 4l-2.5 3 2.5 3-1.6 1.6L14 9l-2.4 2.6L10 10l2.5-3z"/>',
+};
+
+function swatch(look) {
+  const colour = colourOf(look);
+  const mark = look.marker ? `<g fill="${colour}">${SHAPES[look.marker]}</g>` : "";
+  const body = look.filled
+    ? `<rect y="2" width="28" height="10" fill="${colour}" opacity=".35"/>`
+    : `<line x1="0" y1="7" x2="28" y2="7" stroke="${colour}" stroke-width="2" stroke-dasharray="${DASHES[look.dash ?? "solid"]}"/>`;
+  return `<svg class="swatch" aria-hidden="true" viewBox="0 0 28 14" width="28" height="14">${look.line === false ? "" : body}${mark}</svg>`;
+}
+
+function drawControls(figure, groups) {
+  const controls = figure.querySelector(".controls");
+  if (!controls) return;
+  for (const group of groups) {
+    const label = document.createElement("label");
+    label.className = "toggle";
+    label.dataset.group = group.key;
+    const box = document.createElement("input");
+    box.type = "checkbox";
+    box.checked = group.on;
+    box.addEventListener("change", () => {
+      choices.get(figure).set(group.key, box.checked);
+      drawFigure(figure);
+    });
+    const sign = document.createElement("span");
+    label.append(box, sign, ` ${group.label}`);
+    controls.append(label);
+  }
+  if (groups.length > 8) controls.append(allOrNone(figure, true), allOrNone(figure, false));
+}
+
+function allOrNone(figure, on) {
+  const button = document.createElement("button");
+  button.type = "button";
+  button.textContent = on ? "all on" : "all off";
+  button.addEventListener("click", () => {
+    const known = choices.get(figure);
+    known.forEach((_, key) => known.set(key, on));
+    figure.querySelectorAll(".controls input[type=checkbox]").forEach((box) => (box.checked = on));
+    drawFigure(figure);
+  });
+  return button;
+}
+
+// Colours follow the theme; what has no data under the present choices is not offered.
+function syncControls(figure, groups) {
+  const known = new Map(groups.map((group) => [group.key, group]));
+  figure.querySelectorAll(".controls .toggle").forEach((label) => {
+    const group = known.get(label.dataset.group);
+    label.hidden = !group || group.absent === true;
+    if (group) label.querySelector("span").innerHTML = group.look ? swatch(group.look) : "";
+  });
+}
+
+const watcher = new IntersectionObserver(
+  (entries) => entries.forEach((entry) => {
+    if (!entry.isIntersecting) return;
+    watcher.unobserve(entry.target);
+    drawFigure(entry.target);
+    entry.target.dataset.drawn = "yes";
+  }),
+  { rootMargin: "300px" },
+);
+
+// The script that draws is large: the page is there, and works, before it.
+let plotting = null;
+
+function loadPlotting() {
+  plotting ??= window.Plotly ? Promise.resolve() : new Promise((loaded) => {
+    const place = document.body.dataset.plotting;
+    if (!place) {
+      window.addEventListener("load", loaded, { once: true });
+      return;
+    }
+    const script = document.createElement("script");
+    script.src = place;
+    script.addEventListener("load", loaded, { once: true });
+    document.head.append(script);
+  });
+  return plotting;
+}
+
+function startFigures(root) {
+  drawn.clear();
+  watcher.disconnect();
+  const figures = root.querySelectorAll("figure[data-kind]");
+  if (figures.length > 0) loadPlotting().then(() => figures.forEach((figure) => watcher.observe(figure)));
+}
+
+function redrawAll() {
+  [...drawn].filter((figure) => figure.isConnected).forEach(drawFigure);
+}
+
+function startPrinting() {
+  const redraw = (state) => () => {
+    if (!window.Plotly) return;
+    document.documentElement.dataset.printing = state;
+    document.querySelectorAll("figure[data-kind]").forEach((figure) => state === "yes" || drawn.has(figure) ? drawFigure(figure) : null);
+  };
+  window.addEventListener("beforeprint", redraw("yes"));
+  window.addEventListener("afterprint", redraw("no"));
+  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redrawAll);
+}

@@ -1,0 +1,139 @@
+// Tables that can be sorted by a column and filtered by their rows' data. Of a long one the first
+// rows stand in the page; the others lie beside it as text, and become rows when they are needed.
+
+const FEW = 100;
+
+function startTables(root) {
+  root.querySelectorAll("table.sortable").forEach((table) => new LongTable(table));
+}
+
+class LongTable {
+  constructor(table) {
+    this.table = table;
+    this.body = table.tBodies[0];
+    this.further = table.closest(".scroll").nextElementSibling;
+    if (!this.further?.matches("script.rows")) this.further = null;
+    this.rows = [...this.body.rows];
+    this.asked = {};
+    this.all = false;
+    this.order = null;
+    [...table.tHead.rows[0].cells].forEach((head, column) => this.addSort(head, column));
+    this.bar = document.createElement("form");
+    this.bar.className = "filters";
+    this.bar.addEventListener("submit", (event) => event.preventDefault());
+    this.count = document.createElement("output");
+    this.more = Object.assign(document.createElement("button"), { type: "button", hidden: true });
+    this.more.addEventListener("click", () => {
+      this.all = true;
+      this.show();
+    });
+    if (table.dataset.filters !== undefined) this.addFilters(JSON.parse(table.dataset.filters));
+    if (this.further) {
+      this.count.textContent = `the first ${this.rows.filter((row) => !row.hidden).length} rows`;
+      this.more.hidden = false;
+      this.more.textContent = "show all";
+      this.bar.append(this.count, this.more);
+    }
+    if (this.bar.childElementCount > 0) table.closest(".scroll").before(this.bar);
+    if (Object.values(this.asked).some(Boolean) && !this.further) this.show();
+  }
+
+  // All rows, those too that were not in the page yet.
+  get every() {
+    if (this.further) {
+      const holder = document.createElement("template");
+      holder.innerHTML = `<table><tbody>${this.further.textContent}</tbody></table>`;
+      const made = [...holder.content.querySelectorAll("tr")];
+      this.rows.push(...made);
+      this.further.remove();
+      this.further = null;
+    }
+    return this.rows;
+  }
+
+  addSort(head, column) {
+    if (head.dataset.sort === undefined) return;
+    const button = document.createElement("button");
+    button.type = "button";
+    button.className = "sort";
+    button.setAttribute("aria-label", `Sort by ${head.textContent.trim()}`);
+    button.addEventListener("click", () => {
+      const direction = head.getAttribute("aria-sort") === "ascending" ? -1 : 1;
+      this.table.querySelectorAll("thead th[aria-sort]").forEach((other) => other.removeAttribute("aria-sort"));
+      head.setAttribute("aria-sort", direction === 1 ? "ascending" : "descending");
+      this.order = { column, direction, kind: head.dataset.sort };
+      this.show();
+    });
+    head.append(button);
+  }
+
+  addFilters(filters) {
+    const search = document.createElement("input");
+    search.type = "search";
+    search.addEventListener("input", () => {
+      this.asked.text = search.value.trim().toLowerCase();
+      this.show();
+    });
+    this.bar.append(labelled("Find", search));
+    for (const [key, values] of Object.entries(filters)) {
+      if (values.length < 2) continue;
+      const select = document.createElement("select");
+      const first = this.table.dataset[`first${capital(key)}`] ?? "";
+      select.append(new Option("all", ""), ...values.map((value) => new Option(value, value)));
+      select.value = first;
+      this.asked[key] = first;
+      select.addEventListener("change", () => {
+        this.asked[key] = select.value;
+        this.show();
+      });
+      this.bar.append(labelled(capital(key), select));
+    }
+    this.bar.append(this.count, this.more);
+  }
+
+  fits(row) {
+    return Object.entries(this.asked).every(([key, value]) =>
+      !value || (key === "text" ? row.textContent.toLowerCase().includes(value) : row.dataset[key] === value));
+  }
+
+  show() {
+    const found = this.every.filter((row) => this.fits(row));
+    if (this.order) sortRows(found, this.order);
+    const shown = this.all ? found : found.slice(0, FEW);
+    shown.forEach((row) => (row.hidden = false));
+    this.body.replaceChildren(...shown);
+    showUnits(this.body);
+    const those = found.length === this.rows.length ? `${found.length} rows` : `${found.length} of ${this.rows.length} rows`;
+    this.count.textContent = shown.length < found.length ? `the first ${shown.length} of ${those}` : those;
+    this.more.hidden = shown.length === found.length;
+    this.more.textContent = `show all ${found.length}`;
+  }
+}
+
+function sortRows(rows, { column, direction, kind }) {
+  const collator = new Intl.Collator("en", { numeric: true });
+  const keys = new Map(rows.map((row) => [row, sortKey(row, column, kind)]));
+  rows.sort((one, other) => {
+    const [a, b] = [keys.get(one), keys.get(other)];
+    if (a === null || b === null) return (a === null) - (b === null); // what is not known stands last
+    return direction * (typeof a === "number" ? a - b : collator.compare(a, b));
+  });
+}
+
+function sortKey(row, column, kind) {
+  const cell = row.cells[column];
+  const value = cell.dataset.value ?? (cell.classList.contains("none") ? "" : cell.querySelector("data")?.value);
+  const text = value ?? cell.textContent.trim();
+  if (kind !== "number") return text;
+  return text === "" || Number.isNaN(Number(text)) ? null : Number(text);
+}
+
+function capital(text) {
+  return text[0].toUpperCase() + text.slice(1);
+}
+
+function labelled(text, control) {
+  const label = document.createElement("label");
+  label.append(`${text} `, control);
+  return label;
+}

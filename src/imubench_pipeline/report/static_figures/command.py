@@ -1,0 +1,215 @@
+"""The command `imubench figures`: figures of a run as SVG and PDF."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from imubench_pipeline.tables import TABLES, read
+
+if TYPE_CHECKING:
+    from imubench_pipeline.report.static_figures.files import Make
+
+NEEDED = ("recordings", "allan", "parameters")
+"""The tables without which there is no figure; the others add to them."""
+
+KINDS = ("comparison", "forest", "allan", "methods", "terms", "datasheet", "spectrum", "theory")
+_NEEDS = {
+    "methods": "an estimate with a model",
+    "terms": "an estimate with a model",
+    "datasheet": "a printed figure of the channel that is comparable",
+    "spectrum": "the spectrum of the channel",
+}
+"""What a channel may lack; the other kinds need its curve alone."""
+
+_FORMATS = ("svg", "pdf")
+
+
+class SelectionError(ValueError):
+    """What was asked for is not in the results."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    parser.description = (
+        "Write figures for print. Exit status: 0 written, 2 what was asked for is not there."
+    )
+    parser.add_argument("results", type=Path, help="folder of the results of a run")
+    parser.add_argument("--sensor", help="only this sensor; default: all")
+    parser.add_argument("--recording", help="only this recording; default: all")
+    parser.add_argument("--channel", help="only this channel, such as gyro_x; default: all")
+    parser.add_argument(
+        "--kind",
+        type=_listed(KINDS),
+        default=KINDS,
+        metavar="KIND,...",
+        help=f"some of {', '.join(KINDS)}; default: all",
+    )
+    parser.add_argument(
+        "--format",
+        type=_listed(_FORMATS),
+        default=_FORMATS,
+        metavar="FORMAT,...",
+        help="svg, pdf; default: both",
+    )
+    parser.add_argument(
+        "--units", choices=("practical", "si"), default="practical", help="default: practical"
+    )
+    parser.add_argument("--output", type=Path, help="folder; default: RESULTS/figures")
+
+
+def _listed(known: Sequence[str]) -> Callable[[str], tuple[str, ...]]:
+    """Return a reader of names with commas between them; ``all`` stands for every one."""
+
+    def names(text: str) -> tuple[str, ...]:
+        asked = [name.strip() for name in text.split(",")]
+        for name in asked:
+            if name not in known and name != "all":
+                raise argparse.ArgumentTypeError(
+                    f"found {name!r}, expected all, or some of {', '.join(known)}"
+                )
+        return tuple(known) if "all" in asked else tuple(dict.fromkeys(asked))
+
+    return names
+
+
+def run(given: argparse.Namespace) -> int:
+    """Write the figures that are asked for; return the exit status."""
+    try:
+        tables = _load(given.results)
+        chosen = select(tables, given.sensor, given.recording, given.channel)
+        written = _write(tables, chosen, given)
+    except (SelectionError, OSError) as error:
+        print(error, file=sys.stderr)
+        return 2
+    if not written:
+        needs = [f"{kind} needs {_NEEDS[kind]}" for kind in given.kind if kind in _NEEDS]
+        print(f"found nothing to draw: {'; '.join(needs)}", file=sys.stderr)
+        return 2
+    return 0
+
+
+def _load(results: Path) -> dict[str, pa.Table]:
+    """Read the tables of a run; ``results`` may be the folder ``tables`` itself."""
+    folder = results / "tables" if (results / "tables").is_dir() else results
+    paths = {name: folder / f"{name}.parquet" for name in TABLES}
+    missing = [name for name in NEEDED if not paths[name].is_file()]
+    if missing:
+        raise SelectionError(
+            f"{folder}: found no {missing[0]}.parquet, expected the tables of a run"
+        )
+    try:
+        return {name: read(name, [path] if path.is_file() else []) for name, path in paths.items()}
+    except (OSError, ValueError) as error:
+        raise SelectionError(f"{folder}: {error}") from error
+
+
+def select(
+    tables: Mapping[str, pa.Table], sensor: str | None, recording: str | None, channel: str | None
+) -> dict[str, pa.Table]:
+    """Return the part of the tables that a sensor, recording and channel have.
+
+    Parameters
+    ----------
+    tables : mapping of str to pyarrow.Table
+    sensor, recording, channel : str or None
+        None: all.
+
+    Raises
+    ------
+    SelectionError
+        If there is no such curve; it says what there is.
+    """
+    chosen = dict(tables)
+    for column, asked in (("sensor", sensor), ("recording", recording), ("channel", channel)):
+        if asked is None:
+            continue
+        known = chosen["allan"][column].unique().to_pylist()
+        if asked not in known:
+            reason = _rejection(chosen["recordings"], column, asked)
+            raise SelectionError(
+                f"found no {column} {asked!r}{reason}; there are: {', '.join(sorted(known))}"
+            )
+        chosen = {name: _part(table, column, asked) for name, table in chosen.items()}
+    if not chosen["allan"].num_rows:
+        raise SelectionError("the results have no curve: every recording was rejected")
+    return chosen
+
+
+def _part(table: pa.Table, column: str, asked: str) -> pa.Table:
+    if column not in table.schema.names:
+        return table
+    kept = pc.equal(table[column], asked)
+    # A finding without a channel is about all of them.
+    return table.filter(pc.fill_null(kept, True) if column == "channel" else kept)
+
+
+def _rejection(recordings: pa.Table, column: str, asked: str) -> str:
+    """Return why a recording or all of a sensor have no curve, where they were rejected."""
+    if column == "channel":
+        return ""
+    reasons = [
+        row["reason"]
+        for row in recordings.to_pylist()
+        if row[column] == asked and row["status"] == "rejected"
+    ]
+    return f" but a rejected one ({reasons[0]})" if reasons else ""
+
+
+def _write(
+    tables: Mapping[str, pa.Table], chosen: Mapping[str, pa.Table], given: argparse.Namespace
+) -> int:
+    """Write the figures, and say which; return how many files."""
+    # Matplotlib is loaded when it is sure that there is something to draw.
+    from imubench_pipeline.report.static_figures.files import save
+
+    output: Path = given.output or given.results / "figures"
+    # The order of the pages of the report, so that a sensor looks the same in both.
+    sensors = sorted(set(tables["recordings"]["sensor"].to_pylist()))
+    written = 0
+    for name, make in _figures(chosen, sensors, given):
+        figure = make()
+        if figure is None:
+            continue
+        for ending in given.format:
+            path = output / f"{name}.{ending}"
+            save(figure, path)
+            written += 1
+            print(path, flush=True)
+    return written
+
+
+def _figures(
+    chosen: Mapping[str, pa.Table], sensors: Sequence[str], given: argparse.Namespace
+) -> Iterator[tuple[str, Make]]:
+    """Yield name and maker of each figure that is asked for."""
+    from imubench_pipeline.report.static_figures.files import (
+        CHANNEL_KINDS,
+        CROSS_KINDS,
+        channel_figures,
+        cross_figures,
+    )
+    from imubench_pipeline.report.static_figures.theory import theory_figure
+    from imubench_pipeline.report.view import recording_views
+
+    cross = [kind for kind in given.kind if kind in CROSS_KINDS]
+    of_channel = [kind for kind in given.kind if kind in CHANNEL_KINDS]
+    if "theory" in given.kind:
+        yield "theory", partial(theory_figure, given.units)
+    views = []
+    if cross or of_channel:
+        views = [view for one in recording_views(chosen) for view in one.channels()]
+    # What shows only a part must not take the place of the figure of all sensors.
+    part = "".join(f"{name}/" for name in (given.sensor, given.recording) if name)
+    for name, make in cross_figures(views, given.units, sensors=sensors, kinds=cross):
+        yield part + name, make
+    for number, view in enumerate(views if of_channel else [], start=1):
+        print(f"channel {number} of {len(views)}: {view.label} {view.channel}", file=sys.stderr)
+        yield from channel_figures(view, given.units, kinds=of_channel)

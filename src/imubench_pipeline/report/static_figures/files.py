@@ -1,0 +1,132 @@
+"""Which figures a run has, what they are called, and their files."""
+
+from __future__ import annotations
+
+import base64
+import io
+import re
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from imubench_pipeline.report.practical import System
+from imubench_pipeline.report.static_figures.comparison import comparison_figure
+from imubench_pipeline.report.static_figures.curves import allan_figure, methods_figure
+from imubench_pipeline.report.static_figures.datasheet import datasheet_figure
+from imubench_pipeline.report.static_figures.forest import forest_figure
+from imubench_pipeline.report.static_figures.spectrum import spectrum_figure
+from imubench_pipeline.report.static_figures.style import style
+from imubench_pipeline.report.static_figures.terms import terms_figure
+from imubench_pipeline.report.view import ChannelView
+from imubench_pipeline.tables import replacing
+
+Make = Callable[[], Figure | None]
+
+CROSS_KINDS: dict[str, Callable[[Sequence[ChannelView], Sequence[str], System], Figure]] = {
+    "comparison": comparison_figure,
+    "forest": lambda views, sensors, system: forest_figure(views, sensors, system=system),
+}
+"""Figures of one channel of all sensors."""
+
+CHANNEL_KINDS: dict[str, Callable[[ChannelView, System], Figure | None]] = {
+    "allan": allan_figure,
+    "methods": methods_figure,
+    "terms": terms_figure,
+    "datasheet": datasheet_figure,
+    "spectrum": spectrum_figure,
+}
+"""Figures of one channel of one recording; None where there is nothing to show."""
+
+_CROSS_NAMES = {"comparison": "allan", "forest": "forest"}
+
+
+_COORDINATES = re.compile(rb' (?:d|x|y|points|transform)="[^"]*"')
+_DECIMALS = re.compile(rb"(\.\d\d)\d+")
+
+
+def cross_figures(
+    views: Sequence[ChannelView],
+    system: System = "practical",
+    *,
+    sensors: Sequence[str] | None = None,
+    kinds: Sequence[str] = tuple(CROSS_KINDS),
+) -> Iterator[tuple[str, Callable[[], Figure]]]:
+    """Yield the name of each cross-IMU figure, and what makes it.
+
+    Parameters
+    ----------
+    views : sequence of ChannelView
+    system : str
+        ``practical`` or ``si``.
+    sensors : sequence of str, optional
+        All sensors of the run, for their looks; default: those of the views.
+    kinds : sequence of str
+        Of `CROSS_KINDS`.
+    """
+    every = sorted({view.sensor for view in views}) if sensors is None else list(sensors)
+    for channel in dict.fromkeys(view.channel for view in views):
+        chosen = [view for view in views if view.channel == channel]
+        for kind in kinds:
+            yield (
+                f"{_CROSS_NAMES[kind]}_{channel}",
+                partial(CROSS_KINDS[kind], chosen, every, system),
+            )
+
+
+def channel_figures(
+    view: ChannelView,
+    system: System = "practical",
+    *,
+    kinds: Sequence[str] = tuple(CHANNEL_KINDS),
+) -> Iterator[tuple[str, Make]]:
+    """Yield the name of each figure of a channel, and what makes it or says that there is none.
+
+    Parameters
+    ----------
+    view : ChannelView
+    system : str
+        ``practical`` or ``si``.
+    kinds : sequence of str
+        Of `CHANNEL_KINDS`.
+    """
+    for kind in kinds:
+        # A folder a recording: joined by any sign, two names could make the same one.
+        name = f"{view.sensor}/{view.recording}/{view.channel}_{kind}"
+        yield name, partial(CHANNEL_KINDS[kind], view, system)
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure, atomically; the same figure has the same bytes.
+
+    Parameters
+    ----------
+    figure : Figure
+    path : Path
+        Its ending is the format, ``.svg`` or ``.pdf``.
+    """
+    with replacing(path) as temporary:
+        temporary.write_bytes(_bytes(figure, path.suffix[1:]))
+
+
+def figure_text(figure: Figure) -> str:
+    """Return a figure as SVG in a data URI, which a page can hold."""
+    return "data:image/svg+xml;base64," + base64.b64encode(_bytes(figure, "svg")).decode()
+
+
+def _bytes(figure: Figure, kind: str) -> bytes:
+    # No date, and no version of the program that drew it.
+    metadata = {"Title": str(figure.get_label()), "Creator": "imubench_pipeline"} | (
+        {"Date": None} if kind == "svg" else {"Producer": None, "CreationDate": None}
+    )
+    buffer = io.BytesIO()
+    with style():
+        figure.savefig(buffer, format=kind, metadata=metadata)
+    data = buffer.getvalue()
+    return _COORDINATES.sub(_shortened, data) if kind == "svg" else data
+
+
+def _shortened(found: re.Match[bytes]) -> bytes:
+    """Return coordinates to a hundredth of a point, which halves the file."""
+    return _DECIMALS.sub(rb"\1", found[0])

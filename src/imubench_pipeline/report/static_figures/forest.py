@@ -1,0 +1,294 @@
+"""The parameters of one channel of all sensors, each with its interval."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.path import Path
+
+from imubench_pipeline.estimators.estimate import PARAMETERS
+from imubench_pipeline.report.palette import Appearance, sensor_appearances
+from imubench_pipeline.report.practical import System, page_unit
+from imubench_pipeline.report.static_figures.marks import Kind, Mark, marks
+from imubench_pipeline.report.static_figures.names import SYMBOLS, channel_name
+from imubench_pipeline.report.static_figures.style import (
+    DOUBLE,
+    SINGLE,
+    extent,
+    legend_below,
+    log_x,
+    marker_look,
+    new_figure,
+    settled,
+    shortened,
+    style,
+)
+from imubench_pipeline.report.view import ChannelView
+
+_SLOT = 2.6  # mm, of a recording where there is room
+_LEAST_ROW = 4.2  # mm, of a sensor: its name must fit
+_MOST = 205.0  # mm, of all sensors: the figure stands on one page
+_AROUND = 16.0  # mm, title and axis
+_WIDEST = 1.5
+"""Decades that an interval reaches beyond all values, before it is cut."""
+
+# A bar at the limit and an arrow to the left of it, in units of the bar.
+_ARROW = Path(
+    [(0, -0.3), (0, 0.3), (0, 0), (-1, 0), (-0.75, 0.2), (-1, 0), (-0.75, -0.2)],
+    [Path.MOVETO, Path.LINETO, Path.MOVETO, Path.LINETO, Path.MOVETO, Path.LINETO, Path.LINETO],
+)
+_ARROW_SIZE = 4.5  # of a dot
+
+
+@dataclass(frozen=True)
+class _Block:
+    """The row of one sensor: its recordings and where they stand, mm from the top."""
+
+    sensor: str
+    views: Sequence[ChannelView]
+    top: float
+    bottom: float
+
+    @property
+    def places(self) -> list[float]:
+        step = (self.bottom - self.top) / (len(self.views) + 0.5)
+        return [self.top + step * (number + 0.75) for number in range(len(self.views))]
+
+
+@style()
+def forest_figure(
+    views: Sequence[ChannelView],
+    sensors: Sequence[str],
+    symbol: str | Sequence[str] = PARAMETERS,
+    system: System = "practical",
+) -> Figure:
+    """Draw parameters of one channel across sensors, with their 95 % limits.
+
+    Parameters
+    ----------
+    views : sequence of ChannelView
+        Of one channel.
+    sensors : sequence of str
+        All sensors of the run: the place in it gives the look.
+    symbol : str or sequence of str
+        Parameters, Q, N, B, T_B, K or R; each has a panel.
+    system : str
+        ``practical`` or ``si``.
+    """
+    symbols = [symbol] if isinstance(symbol, str) else list(symbol)
+    looks = sensor_appearances(list(sensors))
+    blocks = _blocks(views, sensors)
+    total = blocks[-1].bottom
+    name = channel_name(views[0].channel)
+    figure = new_figure(
+        SINGLE if len(symbols) == 1 else DOUBLE,
+        total + _AROUND,
+        f"{name}: {', '.join(symbols)} of all sensors",
+    )
+    panels = figure.subplots(1, len(symbols), sharey=True, squeeze=False)[0]
+    kinds: set[str] = set()
+    for panel, each in zip(panels, symbols, strict=True):
+        kinds |= _draw_panel(
+            panel, blocks, looks, each, system, ticks=7 if len(symbols) == 1 else 4
+        )
+    first = panels[0]
+    first.set_ylim(total, 0.0)
+    first.set_yticks([(block.top + block.bottom) / 2.0 for block in blocks])
+    first.set_yticklabels([_block_name(figure, block) for block in blocks])
+    for panel in panels:
+        panel.tick_params(axis="y", length=0, which="both")
+        panel.grid(visible=False, axis="y")
+    first.set_title(name, loc="left")
+    legend_below(figure, _legend(kinds))
+    return settled(figure)
+
+
+def _blocks(views: Sequence[ChannelView], sensors: Sequence[str]) -> list[_Block]:
+    """Give each sensor a row, higher the more recordings it has, as far as a page allows."""
+    by_sensor = {
+        sensor: [view for view in views if view.sensor == sensor]
+        for sensor in sensors
+        if any(view.sensor == sensor for view in views)
+    }
+    slot = _SLOT
+    while True:
+        heights = [max(_LEAST_ROW, slot * (len(each) + 0.5)) for each in by_sensor.values()]
+        if sum(heights) <= max(_MOST, _LEAST_ROW * len(heights)):
+            break
+        slot *= 0.95
+    bottoms = np.cumsum(heights)
+    return [
+        _Block(sensor, of_sensor, float(bottom - height), float(bottom))
+        for (sensor, of_sensor), height, bottom in zip(
+            by_sensor.items(), heights, bottoms, strict=True
+        )
+    ]
+
+
+def _block_name(figure: Figure, block: _Block) -> str:
+    count = len(block.views)
+    name = shortened(figure, block.sensor, 110.0)
+    simulated = sum(view.simulated for view in block.views)
+    if simulated not in (0, count):
+        return f"{name} (n = {count}, {simulated} simulated)"
+    words = [f"n = {count}"] * (count > 1) + ["simulated"] * (simulated > 0)
+    return f"{name} ({', '.join(words)})" if words else name
+
+
+def _draw_panel(
+    axes: Axes,
+    blocks: Sequence[_Block],
+    looks: dict[str, Appearance],
+    symbol: str,
+    system: System,
+    *,
+    ticks: int,
+) -> set[str]:
+    """Draw one parameter of all sensors; return the kinds of marks there are."""
+    unit = page_unit(blocks[0].views[0].quantity, symbol, system)
+    there: list[Mark] = []
+    truths: list[tuple[float, float]] = []
+    for number, block in enumerate(blocks):
+        if number % 2:
+            axes.axhspan(block.top, block.bottom, color="0.955", lw=0, zorder=0.0)
+        step = block.places[1] - block.places[0] if len(block.views) > 1 else _SLOT
+        of_block = [
+            mark
+            for view, place in zip(block.views, block.places, strict=True)
+            for mark in marks(view, symbol, place, 0.8 * step)
+        ]
+        truths += [
+            (place, view.truth[symbol]["value"] * unit.per_si)
+            for view, place in zip(block.views, block.places, strict=True)
+            if symbol in view.truth and view.truth[symbol]["value"] > 0.0
+        ]
+        _draw_marks(axes, of_block, looks[block.sensor], unit.per_si, step)
+        if not of_block:
+            _say_why(axes, block, symbol)
+        there += of_block
+    if truths:
+        axes.plot(
+            [value for _, value in truths],
+            [place for place, _ in truths],
+            ls="none",
+            color="black",
+            marker="|",
+            ms=6.0,
+            mew=0.8,
+            zorder=3.5,
+        )
+    _limit(axes, there, [value for _, value in truths], unit.per_si, ticks)
+    axes.set_xlabel(f"{SYMBOLS[symbol]} ({unit.sign})")
+    return {mark.kind for mark in there} | ({"truth"} if truths else set())
+
+
+def _limit(
+    axes: Axes, there: Sequence[Mark], truths: Sequence[float], scale: float, ticks: int
+) -> None:
+    """Set limits that hold all values, and their intervals within reason."""
+    values = [mark.value * scale for mark in there if mark.value] + list(truths)
+    # The arrow of a limit needs room at its left.
+    values += [mark.value * scale / 2.5 for mark in there if mark.value and mark.kind == "limit"]
+    ends = [end * scale for mark in there for end in (mark.lower, mark.upper) if end]
+    values = values or ends
+    if not values:
+        axes.set_xticks([])
+        return
+    reach = 10.0**_WIDEST
+    near = np.clip(ends, min(values) / reach, max(values) * reach)
+    log_x(axes, extent(values, near, margin=1.6), ticks=ticks)
+
+
+def _draw_marks(
+    axes: Axes, of_block: Sequence[Mark], look: Appearance, scale: float, step: float
+) -> None:
+    """Draw the marks of one sensor; they are smaller where recordings stand close."""
+    size = float(np.clip(step * 72.0 / 25.4 * 0.8, 1.2, 4.0))
+    width = min(1.0, 0.3 * size)
+    dots: dict[Kind, dict[str, Any]] = {
+        "estimate": marker_look(look),
+        "not identified": marker_look(look, hollow=True),
+        "limit": {"marker": _ARROW, "markerfacecolor": "none", "markeredgecolor": look.light},
+    }
+    for kind, dot in dots.items():
+        chosen = [mark for mark in of_block if mark.kind == kind]
+        if not chosen:
+            continue
+        ranges = [mark for mark in chosen if mark.lower and mark.upper]
+        if ranges:
+            axes.hlines(
+                [mark.place for mark in ranges],
+                [mark.lower * scale for mark in ranges if mark.lower],
+                [mark.upper * scale for mark in ranges if mark.upper],
+                color=look.light,
+                lw=width,
+                ls="-" if kind == "estimate" else (0, (2, 1)),
+            )
+        shown = [mark for mark in chosen if mark.value]
+        axes.plot(
+            [mark.value * scale for mark in shown if mark.value],
+            [mark.place for mark in shown],
+            ls="none",
+            ms=_ARROW_SIZE * size if kind == "limit" else size,
+            markeredgewidth=width,
+            zorder=3.0,
+            **dot,
+        )
+
+
+def _say_why(axes: Axes, block: _Block, symbol: str) -> None:
+    """Write why a row of a panel is empty."""
+    found = {
+        row["status"].replace("_", " ")
+        for view in block.views
+        if view.recommended in view.parameters
+        for row in view.named(view.recommended, symbol)
+    }
+    axes.annotate(
+        ", ".join(sorted(found)) or "not estimated",
+        (0.0, (block.top + block.bottom) / 2.0),
+        xycoords=("axes fraction", "data"),
+        xytext=(3.0, 0.0),
+        textcoords="offset points",
+        va="center",
+        color="0.4",
+    )
+
+
+def _legend(kinds: set[str]) -> list[Line2D]:
+    """Return the samples of the marks that there are, in black: colour tells the sensor."""
+    black: dict[str, Any] = {"color": "black", "markersize": 4.0}
+    samples = {
+        "estimate": Line2D([], [], marker="o", label="estimate, 95 % limits", **black),
+        "not identified": Line2D(
+            [],
+            [],
+            marker="o",
+            markerfacecolor="white",
+            ls=(0, (2, 1)),
+            label="not identified: as fitted, 95 % limits",
+            **black,
+        ),
+        "limit": Line2D(
+            [],
+            [],
+            ls="none",
+            marker=_ARROW,
+            markerfacecolor="none",
+            label="upper 95 % limit",
+            color="black",
+            markersize=_ARROW_SIZE * 4.0,
+        ),
+        "truth": Line2D(
+            [], [], ls="none", marker="|", ms=6.0, color="black", label="truth of the simulation"
+        ),
+    }
+    return [sample for kind, sample in samples.items() if kind in kinds] or [
+        Line2D([], [], ls="none", label="no recording has a value")
+    ]

@@ -1,0 +1,48 @@
+"""What the figures call channels, logs and noise terms."""
+
+from __future__ import annotations
+
+from imubench_pipeline.report.view import QUANTITY_NAMES, ChannelView
+
+TERMS = {
+    "gyro": {
+        "Q": "angle quantization",
+        "N": "angle random walk",
+        "F": "bias instability (flicker)",
+        "GM": "bias instability (GM)",
+        "K": "rate random walk",
+        "R": "rate ramp",
+        "S": "lines",
+    },
+    "accel": {
+        "Q": "velocity quantization",
+        "N": "velocity random walk",
+        "F": "bias instability (flicker)",
+        "GM": "bias instability (GM)",
+        "K": "acceleration random walk",
+        "R": "acceleration ramp",
+        "S": "lines",
+    },
+}
+"""The field's names of the terms, by quantity and symbol of the term."""
+
+SYMBOLS = {"T_B": "$T_B$", "R": "$|R|$"} | {symbol: f"${symbol}$" for symbol in "QNBK"}
+"""The parameters as they are set; a logarithmic axis has no sign of R."""
+
+
+def channel_name(channel: str) -> str:
+    """Return a channel in words, such as ``Gyroscope, x axis``."""
+    quantity, axis = channel.split("_", maxsplit=1)
+    return f"{QUANTITY_NAMES[quantity]}, {axis} axis"
+
+
+def log_name(view: ChannelView) -> str:
+    """Return what the curve of a log is called: never measured, where it is simulated."""
+    return "simulated log" if view.simulated else "measured"
+
+
+def entitled(view: ChannelView) -> tuple[str, str]:
+    """Return the names of the user, and what follows them in the title of a channel's figure."""
+    name = channel_name(view.channel)
+    rest = " (simulated)" * view.simulated + f": {name[0].lower()}{name[1:]}"
+    return f"{view.sensor} / {view.recording}", rest

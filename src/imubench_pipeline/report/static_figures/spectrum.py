@@ -1,0 +1,146 @@
+"""The spectrum of a channel with the chosen model, its terms and its lines."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from scipy.special import chdtri
+
+from imubench_pipeline.report.practical import System, page_unit
+from imubench_pipeline.report.static_figures.curves import channel_axes
+from imubench_pipeline.report.static_figures.names import TERMS, log_name
+from imubench_pipeline.report.static_figures.style import (
+    GREY,
+    MEASURED,
+    extent,
+    legend_below,
+    log_x,
+    log_y,
+    settled,
+    style,
+)
+from imubench_pipeline.report.static_figures.terms import SUM_LOOK, TERM_LOOKS
+from imubench_pipeline.report.view import ChannelView
+
+_METHOD = "likelihood"
+"""The method whose model the table ``spectrum`` has."""
+
+_MOST_NAMED = 3
+_BESIDE = 0.05  # of the frequency axis: the height of a letter, and more
+_CURVES = 200  # points of a term: it is smooth
+
+
+@style()
+def spectrum_figure(view: ChannelView, system: System = "practical") -> Figure | None:
+    """Draw the root of the two-sided spectrum with the model of the likelihood.
+
+    None where there is no spectrum.
+
+    Parameters
+    ----------
+    view : ChannelView
+    system : str
+        ``practical`` or ``si``.
+    """
+    if not view.spectrum:
+        return None
+    unit = page_unit(view.quantity, "psd", system)
+    figure, axes, _ = channel_axes(view, system, "spectrum")
+    axes.set_xlabel("frequency (Hz)")
+    axes.set_ylabel(f"root of the two-sided density ({unit.sign})")
+    spectrum = view.spectrum
+    frequency = spectrum["frequency"]
+    level = np.sqrt(spectrum["density"]) * unit.per_si
+    fitted = np.sqrt(spectrum["fitted"]) * unit.per_si
+    _draw_bins(axes, view, level, fitted)
+    if _METHOD in view.parameters:
+        _draw_terms(axes, view, unit.per_si)
+    if np.isfinite(fitted).any():
+        name = next((f": {row['model']}" for row in view.models if row["chosen"]), "")
+        axes.plot(frequency, fitted, label=f"fit by likelihood{name}", zorder=3.0, **SUM_LOOK)
+    _draw_lines(axes, view)
+    log_x(axes, extent(frequency))
+    # Single ordinates scatter to almost 0; limits for them would hide the rest.
+    low, high = np.nanquantile(level, [0.01, 1.0])
+    log_y(axes, extent([low, high], fitted, margin=1.6))
+    legend_below(figure, axes.get_legend_handles_labels()[0])
+    return settled(figure)
+
+
+def _draw_bins(
+    axes: Axes, view: ChannelView, level: NDArray[np.float64], fitted: NDArray[np.float64]
+) -> None:
+    """Draw the bins, and where 95 % of them lie if the fit is right."""
+    spectrum = view.spectrum
+    used = spectrum["used"] > 0
+    nu = spectrum["ordinates"]
+    lower, upper = (fitted * np.sqrt(chdtri(nu, tail) / nu) for tail in (0.975, 0.025))
+    if np.isfinite(fitted).any():
+        axes.fill_between(
+            spectrum["frequency"], lower, upper, color="0.87", lw=0, label="95 % of bins by the fit"
+        )
+    for chosen, face, edge, label in (
+        (used, MEASURED, MEASURED, f"{log_name(view)}, bins used"),
+        (~used, "white", GREY, "bins left out"),
+    ):
+        if chosen.any():
+            axes.plot(
+                spectrum["frequency"][chosen],
+                level[chosen],
+                ls="none",
+                marker="o",
+                markersize=1.8,
+                markerfacecolor=face,
+                markeredgecolor=edge,
+                markeredgewidth=0.4,
+                label=label,
+                zorder=2.4,
+            )
+
+
+def _draw_terms(axes: Axes, view: ChannelView, scale: float) -> None:
+    """Draw each term as sampled, so that the terms add up to the fit."""
+    frequency = view.spectrum["frequency"]
+    grid = np.geomspace(frequency[0], frequency[-1], _CURVES)
+    interval = view.tau[0]  # the first cluster is one sample
+    for term in view.model(_METHOD).terms:
+        density = term.sampled_spectrum(2.0 * np.pi * grid * interval, interval) * interval
+        if density.any():
+            axes.plot(
+                grid,
+                np.sqrt(density) * scale,
+                lw=0.8,
+                label=TERMS[view.quantity][term.symbol],
+                zorder=2.8,
+                **TERM_LOOKS[term.symbol],
+            )
+
+
+def _draw_lines(axes: Axes, view: ChannelView) -> None:
+    """Draw the lines that were found; the largest have their frequency beside them."""
+    frequency = view.spectrum["frequency"]
+    apart = (frequency[-1] / frequency[0]) ** _BESIDE
+    named: list[float] = []
+    look = TERM_LOOKS["S"]
+    strongest = sorted(view.lines, key=lambda row: -row["ratio"])
+    for number, row in enumerate(strongest):
+        line = row["frequency"]
+        label = f"{TERMS[view.quantity]['S']} ({len(strongest)})" if number == 0 else None
+        axes.axvline(line, lw=0.5, label=label, zorder=1.5, **look)
+        crowded = any(1.0 / apart < line / other < apart for other in named)
+        if len(named) == _MOST_NAMED or crowded:
+            continue
+        named.append(line)
+        axes.annotate(
+            f"{line:.4g} Hz",
+            (line, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(-1.0, -3.0),
+            textcoords="offset points",
+            rotation=90,
+            ha="right",
+            va="top",
+            color=look["color"],
+        )

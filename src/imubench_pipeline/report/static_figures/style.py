@@ -1,0 +1,267 @@
+"""The look of the static figures: sizes, fonts, logarithmic axes and legends of a journal."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from numpy.typing import ArrayLike
+
+from imubench_pipeline.report.palette import Appearance
+
+SINGLE, DOUBLE = 88.0, 180.0
+"""Widths of one and of two columns of a journal, mm."""
+
+MEASURED = "black"
+GREY = "0.6"
+FONT_SIZE = 7.0
+"""pt; no text of a figure is smaller."""
+
+_TITLE_SIZE = FONT_SIZE + 0.5
+_EDGE = 4.0  # pt
+_LEGEND_ROW = 3.7  # mm
+_HANDLE = 24.0  # pt: the sample of a line in a legend, and the space beside it
+_BETWEEN = 9.0  # pt: between columns of a legend
+_LEAST_SPAN = 0.7  # decades of an axis, below which its ticks would say too little
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+# Newer releases of Matplotlib have a type of their own for the names of settings.
+_STYLE: Any = {
+    # Matplotlib brings this font, so a figure has the same layout on every machine.
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],
+    "mathtext.fontset": "dejavusans",
+    "font.size": FONT_SIZE,
+    "axes.labelsize": FONT_SIZE + 0.5,
+    "axes.titlesize": _TITLE_SIZE,
+    "axes.titlepad": 4.0,
+    "axes.linewidth": 0.6,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "0.88",
+    "grid.linewidth": 0.5,
+    "xtick.direction": "in",
+    "ytick.direction": "in",
+    "xtick.top": True,
+    "ytick.right": True,
+    "xtick.minor.top": False,
+    "ytick.minor.right": False,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "xtick.minor.width": 0.4,
+    "ytick.minor.width": 0.4,
+    "xtick.labelsize": FONT_SIZE,
+    "ytick.labelsize": FONT_SIZE,
+    "legend.fontsize": FONT_SIZE,
+    "legend.frameon": False,
+    "legend.borderpad": 0.2,
+    "legend.labelspacing": 0.35,
+    "legend.columnspacing": 1.2,
+    "legend.handlelength": 2.8,
+    "legend.handletextpad": 0.6,
+    "lines.linewidth": 1.0,
+    "lines.markersize": 3.0,
+    "lines.markeredgewidth": 0.6,
+    # Without hinting a text has the same width in every format.
+    "text.hinting": "none",
+    # Text stays text: it can be searched, and edited for a journal.
+    "svg.fonttype": "none",
+    "svg.hashsalt": "imubench",
+    "pdf.fonttype": 42,
+}
+
+_DASHES: dict[str, str | tuple[float, tuple[float, ...]]] = {
+    "solid": "-",
+    "dash": (0.0, (4.0, 2.0)),
+    "dot": (0.0, (1.0, 1.4)),
+    "dashdot": (0.0, (5.0, 1.5, 1.0, 1.5)),
+    "longdash": (0.0, (8.0, 2.0)),
+}
+_MARKERS = {
+    "circle": "o",
+    "square": "s",
+    "diamond": "D",
+    "triangle-up": "^",
+    "triangle-down": "v",
+    "cross": "P",
+    "x": "X",
+}
+
+
+@contextlib.contextmanager
+def style() -> Iterator[None]:
+    """Set the look of figures that are made or saved inside; settings of the user do not count."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_STYLE)
+        yield
+
+
+def line_look(look: Appearance) -> dict[str, Any]:
+    """Return colour and dash of an appearance as Matplotlib names them."""
+    return {"color": look.light, "linestyle": _DASHES[look.dash]}
+
+
+def marker_look(look: Appearance, *, hollow: bool = False) -> dict[str, Any]:
+    """Return the marker of an appearance as Matplotlib names it."""
+    return {
+        "marker": _MARKERS[look.marker],
+        "markerfacecolor": "white" if hollow else look.light,
+        "markeredgecolor": look.light,
+    }
+
+
+def new_figure(width: float, height: float, title: str) -> Figure:
+    """Return an empty figure.
+
+    Parameters
+    ----------
+    width, height : float
+        mm; a legend adds to the height.
+    title : str
+        What the figure shows, for the metadata of its files.
+    """
+    figure = Figure(figsize=(width / 25.4, height / 25.4))
+    figure.set_label(title)
+    return figure
+
+
+def plain(text: str) -> str:
+    """Return a name of the user such that nothing in it is read as a formula."""
+    return text.replace("$", r"\$")
+
+
+def text_width(figure: Figure, text: str) -> float:
+    """Return the width of a text in the figure, pt."""
+    drawn = figure.text(0.0, 0.0, text)
+    width = drawn.get_window_extent().width * 72.0 / figure.dpi
+    drawn.remove()
+    return float(width)
+
+
+def shortened(figure: Figure, name: str, width: float) -> str:
+    """Return a name, its middle left out where it is wider than ``width`` pt."""
+    text, kept = name, len(name)
+    while kept > 2 and (excess := text_width(figure, plain(text)) / width) > 1.0:
+        kept = min(kept - 1, int(kept / excess))
+        half = kept // 2
+        text = f"{name[: kept - half]}…{name[len(name) - half :]}"
+    return plain(text)
+
+
+def entitle(figure: Figure, name: str, rest: str) -> None:
+    """Write a name of the user, and what is shown of it, above all axes."""
+    width = figure.get_figwidth() * 72.0
+    enlarged = _TITLE_SIZE / FONT_SIZE
+    room = (width - 2.0 * _EDGE) / enlarged - text_width(figure, rest)
+    figure.suptitle(
+        shortened(figure, name, room) + rest, x=_EDGE / width, ha="left", fontsize=_TITLE_SIZE
+    )
+
+
+def legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
+    """Name lines below the axes, in as many columns as fit; the figure grows by the rows."""
+    width, height = figure.get_size_inches()
+    room = width * 72.0 - 2.0 * _EDGE
+    labels = [_broken(figure, str(handle.get_label()), room - _HANDLE) for handle in handles]
+    widths = [text_width(figure, label) + _HANDLE for label in labels]
+    columns = len(handles)
+    while columns > 1 and _legend_width(widths, columns) > room:
+        columns -= 1
+    rows = math.ceil(len(handles) / columns)
+    # As many rows as before, but filled evenly.
+    columns = math.ceil(len(handles) / rows)
+    rows += sum(label.count("\n") for label in labels)
+    figure.set_size_inches(width, height + rows * _LEGEND_ROW / 25.4)
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns)
+
+
+def _broken(figure: Figure, label: str, width: float) -> str:
+    """Return a label, its last remark on a line of its own where it is too wide."""
+    head, bracket, remark = label.rpartition(" (")
+    fits = not bracket or text_width(figure, label) <= width
+    return label if fits else f"{head}\n({remark}"
+
+
+def _legend_width(widths: Sequence[float], columns: int) -> float:
+    """Return the width of a legend in pt; Matplotlib fills it column by column."""
+    parts = np.array_split(np.asarray(widths), columns)
+    return sum(float(part.max()) for part in parts) + _BETWEEN * (columns - 1)
+
+
+def settled(figure: Figure) -> Figure:
+    """Return a figure whose layout is made and stays: it is the same in every format."""
+    # A figure that has an engine of its own is laid out, and drawn twice, whenever it is saved.
+    ConstrainedLayoutEngine().execute(figure)
+    return figure
+
+
+def extent(*values: ArrayLike, margin: float = 1.25) -> tuple[float, float]:
+    """Return limits of a logarithmic axis that holds all values above 0, and some margin."""
+    joined = np.concatenate([np.ravel(np.asarray(each, dtype=np.float64)) for each in values])
+    there = joined[np.isfinite(joined) & (joined > 0)]
+    low, high = (there.min(), there.max()) if len(there) else (1.0, 1.0)
+    missing = max(0.0, _LEAST_SPAN - math.log10(high / low)) / 2.0
+    return float(low / margin / 10.0**missing), float(high * margin * 10.0**missing)
+
+
+def log_x(axes: Axes, limits: tuple[float, float], *, ticks: int = 8) -> None:
+    """Make the x axis logarithmic, with at most about so many labels."""
+    axes.set_xscale("log")
+    axes.set_xlim(*limits)
+    _label_decades(axes.xaxis, limits, ticks)
+
+
+def log_y(axes: Axes, limits: tuple[float, float], *, ticks: int = 8) -> None:
+    """Make the y axis logarithmic, with at most about so many labels."""
+    axes.set_yscale("log")
+    axes.set_ylim(*limits)
+    _label_decades(axes.yaxis, limits, ticks)
+
+
+def _label_decades(axis: Axis, limits: tuple[float, float], ticks: int) -> None:
+    """Label the decades; between them too where there are few."""
+    low, high = limits
+    span = math.log10(high / low)
+    decades = math.floor(math.log10(high)) - math.ceil(math.log10(low)) + 1
+    ordinary = low > 0.5e-3 and high < 2e4
+    axis.set_major_locator(LogLocator(10.0, numticks=ticks))
+    axis.set_major_formatter(FuncFormatter(_number if ordinary else _power))
+    axis.set_minor_locator(LogLocator(10.0, subs=range(2, 10), numticks=ticks))
+    # A power of ten is wide; between two of them there is no room for others.
+    if (decades > 1 and span > 1.3) or (decades > 0 and not ordinary):
+        axis.set_minor_formatter(NullFormatter())
+    else:
+        labelled = (2, 3, 5) if span < 1.0 and ordinary else (2, 5)
+        axis.set_minor_formatter(FuncFormatter(partial(_between, labelled, ordinary)))
+
+
+def _between(labelled: Sequence[int], ordinary: bool, value: float, _: int | None = None) -> str:
+    factor = round(value / 10.0 ** _exponent(value))
+    if factor not in labelled:
+        return ""
+    return _number(value) if ordinary else f"{factor}×{_power(value)}"
+
+
+def _exponent(value: float) -> int:
+    # The ticks are multiples of powers of ten, but for rounding.
+    return math.floor(math.log10(value) + 1e-9)
+
+
+def _number(value: float, _: int | None = None) -> str:
+    return f"{value:g}"
+
+
+def _power(value: float, _: int | None = None) -> str:
+    return "10" + f"{_exponent(value):d}".translate(_SUPERSCRIPTS)

@@ -1,0 +1,213 @@
+"""The terms of a noise model and their sum, with the points where they are read."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from imubench_pipeline.noise import (
+    FLOOR,
+    PEAK_TAU,
+    Flicker,
+    GaussMarkov,
+    NoiseModel,
+    Quantization,
+    Ramp,
+    RandomWalk,
+    Sinusoid,
+    Term,
+    WhiteNoise,
+)
+from imubench_pipeline.report.practical import System, page_unit
+from imubench_pipeline.report.static_figures.curves import channel_axes, draw_measured, finish
+from imubench_pipeline.report.static_figures.names import SYMBOLS, TERMS
+from imubench_pipeline.report.static_figures.style import style
+from imubench_pipeline.report.view import ChannelView
+
+TERM_LOOKS: dict[str, dict[str, Any]] = {
+    "Q": {"color": "#9A6B00", "linestyle": (0, (1, 1.4))},
+    "N": {"color": "#0072B2", "linestyle": (0, (4, 2))},
+    "F": {"color": "#D55E00", "linestyle": (0, (5, 1.5, 1, 1.5))},
+    "GM": {"color": "#D55E00", "linestyle": (0, (5, 1.5))},
+    "K": {"color": "#B3508C", "linestyle": (0, (8, 2))},
+    "R": {"color": "#7A4B3A", "linestyle": (0, (8, 2, 1, 2))},
+    "S": {"color": "#5B5FC7", "linestyle": (0, (2, 1))},
+}
+"""Colour and dash of each term, the same in every figure."""
+
+SUM_LOOK: dict[str, Any] = {"color": "#008F6B", "linestyle": "-", "linewidth": 1.2}
+
+_REPEATED: list[dict[str, Any]] = [
+    {"linestyle": (0, (3, 1, 1, 1, 1, 1))},
+    {"linestyle": (0, (1, 1))},
+]
+
+_DEEPEST = 300.0
+"""A point is shown at most so far below the curve: else the curve would be a strip at the top."""
+
+_END = 0.15
+"""Part of the axis of tau at its end, where a text is written to the left of its point."""
+
+
+@style()
+def terms_figure(view: ChannelView, system: System = "practical") -> Figure | None:
+    """Draw every term of the recommended model, their sum, and where N, B and K are read.
+
+    N is the white noise at tau = 1 s, 0.664 B the plateau of flicker noise or the peak of a
+    Gauss-Markov process, K the random walk at tau = 3 s (000, Figure 1; 003, Figure 3). None
+    where there is no model.
+
+    Parameters
+    ----------
+    view : ChannelView
+    system : str
+        ``practical`` or ``si``.
+    """
+    if view.recommended not in view.parameters:
+        return None
+    model = view.model(view.recommended)
+    if not model.terms:
+        return None
+    figure, axes, scale = channel_axes(view, system, "terms of the noise model")
+    draw_measured(axes, view, scale, limits=False)
+    # Lines fold at the averaging times of the curve; between them they would be a smear.
+    tau = view.tau if model.sinusoids else np.geomspace(view.tau[0], view.tau[-1], 200)
+    smooth = [term for term in model.terms if not isinstance(term, Sinusoid)]
+    for term, look in _looks(smooth):
+        deviation = np.sqrt(term.allan_variance(tau)) * scale
+        axes.plot(tau, deviation, label=term_label(view, term, system), **look)
+    name = "+".join(term.symbol for term in smooth)
+    if model.sinusoids:
+        lines = np.sqrt(NoiseModel(sinusoids=model.sinusoids).allan_variance(tau)) * scale
+        label = f"{TERMS[view.quantity]['S']} ({len(model.sinusoids)})"
+        axes.plot(tau, lines, label=label, **TERM_LOOKS["S"])
+        name += " and lines"
+    total = np.sqrt(model.allan_variance(tau)) * scale
+    axes.plot(tau, total, label=f"sum: {name}", zorder=2.8, **SUM_LOOK)
+    levels = _mark_readings(axes, smooth, scale, tau, floor_tau=float(tau[np.argmin(total)]))
+    lowest = float(total.min()) / _DEEPEST
+    return finish(figure, axes, view, scale, *(level for level in levels if level > lowest))
+
+
+def _looks(terms: Sequence[Term]) -> Iterator[tuple[Term, dict[str, Any]]]:
+    """Yield the terms with their looks; a repeated term has another dash."""
+    drawn: Counter[str] = Counter()
+    for term in terms:
+        dash = _REPEATED[min(drawn[term.symbol], len(_REPEATED)) - 1] if drawn[term.symbol] else {}
+        drawn[term.symbol] += 1
+        yield term, TERM_LOOKS[term.symbol] | dash
+
+
+def _mark_readings(
+    axes: Axes, terms: Sequence[Term], scale: float, tau: NDArray[np.float64], floor_tau: float
+) -> list[float]:
+    """Mark the points at which the terms have the values of their parameters.
+
+    Parameters
+    ----------
+    axes : Axes
+    terms : sequence of Term
+    scale : float
+        From SI to the unit of the axes.
+    tau : ndarray
+        Averaging times that the axes show, s.
+    floor_tau : float
+        Where the curve is lowest, s.
+
+    Returns
+    -------
+    list of float
+        Levels that the axes must hold: the points and what is written at them.
+    """
+    levels = []
+    for term in terms:
+        reading = _reading(term, floor_tau)
+        if reading is None:
+            continue
+        where, level, label = reading
+        colour = TERM_LOOKS[term.symbol]["color"]
+        at_end = where > tau[-1] * (tau[0] / tau[-1]) ** _END
+        below = isinstance(term, RandomWalk | Flicker)
+        levels.append(level * scale * (0.6 if below else 1.6))
+        if isinstance(term, GaussMarkov):
+            axes.axhline(level * scale, color=colour, lw=0.5, ls=(0, (1, 2)))
+        axes.plot(
+            where,
+            level * scale,
+            ls="none",
+            marker="o",
+            markersize=4.0,
+            markerfacecolor="white",
+            markeredgecolor=colour,
+            markeredgewidth=0.9,
+            zorder=3.2,
+        )
+        axes.annotate(
+            label,
+            (where, level * scale),
+            xytext=(-5.0 if at_end else 5.0, -8.0 if below else 4.0),
+            ha="right" if at_end else "left",
+            textcoords="offset points",
+            color=colour,
+            zorder=3.3,
+            annotation_clip=True,
+        )
+    return levels
+
+
+def _reading(term: Term, floor_tau: float) -> tuple[float, float, str] | None:
+    """Return tau and level at which the parameter of a term is read, and what stands there."""
+    if isinstance(term, WhiteNoise):
+        return 1.0, term.N, "$N$"
+    if isinstance(term, GaussMarkov):
+        return PEAK_TAU * term.T_B, FLOOR * term.B, f"{FLOOR:.3f} $B$"
+    if isinstance(term, Flicker):
+        # It is as high everywhere; the curve shows it where it is lowest.
+        return floor_tau, FLOOR * term.B, f"{FLOOR:.3f} $B$"
+    if isinstance(term, RandomWalk):
+        return 3.0, term.K, "$K$"
+    return None
+
+
+def term_label(view: ChannelView, term: Term, system: System) -> str:
+    """Return the name of a term with its parameters, and whether the log does not tell them."""
+    values = ", ".join(
+        f"{SYMBOLS[symbol]} = {unit.text(value, 3)} {unit.sign}"
+        for symbol, value in parameters_of(term).items()
+        for unit in [page_unit(view.quantity, symbol, system)]
+    )
+    doubts = {
+        row["status"].replace("_", " ")
+        for symbol, value in parameters_of(term).items()
+        for row in view.named(view.recommended, symbol)
+        if row["value"] is None and row["fitted"] is not None
+        if math.isclose(abs(row["fitted"]), value)
+    }
+    return f"{TERMS[view.quantity][term.symbol]}, {values}" + "".join(
+        f" ({doubt})" for doubt in sorted(doubts)
+    )
+
+
+def parameters_of(term: Term) -> dict[str, float]:
+    """Return the parameters of a term, SI; of a ramp without its sign."""
+    match term:
+        case Quantization(Q):
+            return {"Q": Q}
+        case WhiteNoise(N):
+            return {"N": N}
+        case Flicker(B):
+            return {"B": B}
+        case GaussMarkov(B, T_B):
+            return {"B": B, "T_B": T_B}
+        case RandomWalk(K):
+            return {"K": K}
+        case Ramp(R):
+            return {"R": abs(R)}
+    return {}

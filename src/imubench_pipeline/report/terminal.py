@@ -1,0 +1,190 @@
+"""The comparison of the sensors as a terminal shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+from rich.console import RenderableType
+from rich.text import Text
+
+from imubench_pipeline.estimators.estimate import FAMILY, PARAMETERS
+from imubench_pipeline.report.meaning import rankings
+from imubench_pipeline.report.practical import PageUnit, System, duration_text, page_unit
+from imubench_pipeline.report.terminal_table import fitting
+from imubench_pipeline.requirements import Requirement
+from imubench_pipeline.run_summary import one_line, rejections, serious
+from imubench_pipeline.sensor import quantity_of
+
+Row = Mapping[str, Any]
+About = Mapping[tuple[str, str], Row]
+"""The row of the table ``recordings`` of each sensor and recording."""
+
+_TITLES = {"gyro": "Gyroscopes", "accel": "Accelerometers"}
+_STYLES = {
+    "passes": "green",
+    "probably passes": "green",
+    "probably fails": "yellow",
+    "surely fails": "red",
+}
+_LONGEST_FINDING = 400
+
+
+def parts(
+    tables: Mapping[str, Sequence[Row]],
+    *,
+    requirement: str | None,
+    channel: str | None,
+    method: str | None,
+    system: System,
+    width: int,
+) -> Iterator[RenderableType]:
+    """Yield what is shown, from top to bottom.
+
+    Parameters
+    ----------
+    tables : mapping of str to sequence of mapping
+        ``recordings``, ``findings``, ``ranking`` and ``parameters`` of a run.
+    requirement : str or None
+        The ranking for this one alone, with every limit; None: for all, with the limit that
+        decides.
+    channel : str or None
+        Parameters of this one alone.
+    method : str or None
+        Of the parameters; None: the recommended one.
+    system : {"practical", "si"}
+        Units.
+    width : int
+        Columns of the terminal.
+    """
+    about = {(row["sensor"], row["recording"]): row for row in tables["recordings"]}
+    yield _compared(tables["recordings"])
+    yield from _listed("Rejected", rejections(tables["recordings"]))
+    yield from _listed("Warnings", map(_finding, serious(tables["findings"])), cut=True)
+    yield from _ranking_tables(tables["ranking"], requirement, about, system, width)
+    chosen = [
+        row
+        for row in tables["parameters"]
+        if (row["recommended"] if method is None else row["method"] == method)
+        and channel in (None, row["channel"])
+    ]
+    which = f"method {method}" if method else "the recommended method"
+    for quantity, title in _TITLES.items():
+        own = [row for row in chosen if quantity_of(row["channel"]) == quantity]
+        if own:
+            heads, lines = _parameter_lines(quantity, own, about, system)
+            yield fitting(f"{title}: {which}, with 95 % intervals", heads, lines, width, names=0)
+            yield Text()
+
+
+def _compared(recordings: Sequence[Row]) -> Text:
+    rejected = sum(row["status"] == "rejected" for row in recordings)
+    simulated = sum(row["simulated"] for row in recordings)
+    sensors = len({row["sensor"] for row in recordings})
+    return Text(
+        f"Recordings: {len(recordings)} of {sensors} sensors; {len(recordings) - rejected} "
+        f"analysed, {rejected} rejected; {simulated} simulated from published parameters, not "
+        "measured\n"
+    )
+
+
+def _listed(title: str, lines: Iterable[str], *, cut: bool = False) -> Iterator[Text]:
+    """Yield a line each, cut at the edge of the terminal or wrapped."""
+    listed = list(lines)
+    if listed:
+        yield Text(f"{title}: {len(listed)}", style="bold")
+        for line in listed:
+            yield Text(f"  {line}", no_wrap=cut, overflow="ellipsis")
+        yield Text()
+
+
+def _finding(row: Row) -> str:
+    place = " ".join(filter(None, (f"{row['sensor']}/{row['recording']}", row["channel"])))
+    name = row["finding"].replace("_", " ")
+    return one_line(f"{place} ({name}): {row['detail']}", _LONGEST_FINDING)
+
+
+def _ranking_tables(
+    rows: Sequence[Row], requirement: str | None, about: About, system: System, width: int
+) -> Iterator[RenderableType]:
+    # The table tells neither title nor rest before, and neither is shown.
+    asked = {
+        name: Requirement.model_construct(title=name, static_window="-", limits=())
+        for name in dict.fromkeys(row["requirement"] for row in rows)
+        if requirement in (None, name)
+    }
+    simulated = {key: row["simulated"] for key, row in about.items()}
+    limit = "limit" if requirement else "limit that decides"
+    heads = ["", "sensor", "verdict", "error of allowed (1σ)", limit, "margin"]
+    for ranking in rankings(rows, asked, simulated, system):
+        lines = [
+            line
+            for group in ranking["groups"]
+            for line in _ranking_lines(group, every=requirement is not None)
+        ]
+        yield fitting(f"Ranking for {ranking['name']}", heads, lines, width, names=1)
+        yield Text()
+
+
+def _ranking_lines(group: Mapping[str, Any], *, every: bool) -> Iterator[list[str | Text]]:
+    """Yield the lines of a sensor: of every limit, or of the one that decides."""
+    sensor = one_line(group["sensor"] + " (simulated)" * group["simulated"])
+    if group["tied_with"]:
+        sensor += "\n" + one_line(f"tied with {group['tied_with']}")
+    first: list[str | Text] = [
+        str(group["rank"]),
+        sensor,
+        Text(group["verdict"], style=_STYLES.get(group["verdict"], "dim")),
+    ]
+    for limit in group["limits"]:
+        if every or limit["decides"]:
+            shown = limit["reason"]
+            if limit["sigma"] != "–":
+                unit = limit["unit"] if limit["unit"] == "°" else f" {limit['unit']}"
+                shown = f"{limit['sigma']} of {limit['allowed']}{unit}"
+                shown += f"\n{limit['interval']}"
+            error, _, after = limit["limit"].rpartition(", ")
+            yield [*first, shown, f"{error}\nafter {after}", limit["margin"]]
+            first = ["", "", ""]
+
+
+def _parameter_lines(
+    quantity: str, rows: Sequence[Row], about: About, system: System
+) -> tuple[list[str], list[list[str | Text]]]:
+    """Return the heads and a line a channel, with a column a parameter that some channel has."""
+    there = {row["parameter"] for row in rows if row["status"] != "absent"}
+    symbols = [symbol for symbol in FAMILY if symbol in PARAMETERS or symbol in there]
+    units = {symbol: page_unit(quantity, symbol, system) for symbol in symbols}
+    by_channel: dict[tuple[str, str, str], list[Row]] = {}
+    for row in rows:
+        name = (row["sensor"], row["recording"], row["channel"])
+        by_channel.setdefault(name, []).append(row)
+    lines: list[list[str | Text]] = []
+    for (sensor, recording, channel), own in by_channel.items():
+        row = about[sensor, recording]
+        badge = " (simulated)" * row["simulated"]
+        cells = (
+            _cell([one for one in own if one["parameter"] == symbol], unit, row["duration"])
+            for symbol, unit in units.items()
+        )
+        lines.append([one_line(f"{sensor} / {recording} {channel}{badge}"), *cells])
+    return ["recording", *(f"{symbol}\n{unit.sign}" for symbol, unit in units.items())], lines
+
+
+def _cell(rows: Sequence[Row], unit: PageUnit, duration: float | None) -> str:
+    """Return the value of each component with its interval, or why there is none."""
+    lines = []
+    for row in rows:
+        status = row["status"].replace("_", " ")
+        if row["value"] is None:
+            lines.append(status)
+        else:
+            lines.append(unit.text(row["value"]) + f" ({status})" * (status != "ok"))
+        if status == "absent" and row["upper"] is not None:
+            lines.append(f"below {unit.text(row['upper'], 3)}")
+        elif row["lower"] is not None and row["upper"] is not None:
+            lines.append(f"{unit.text(row['lower'], 3)} to {unit.text(row['upper'], 3)}")
+        needed = row["duration_needed"]
+        if status != "ok" and needed is not None and needed > (duration or 0.0):
+            lines.append(f"({duration_text(needed)} would do)")
+    return "\n".join(lines) or "–"

@@ -1,0 +1,120 @@
+"""`imubench show`: the comparison of the sensors in the terminal."""
+
+from __future__ import annotations
+
+import argparse
+import io
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+Rows = list[Mapping[str, Any]]
+
+_NEEDED = ("recordings", "findings", "ranking", "parameters")
+_NARROWEST = 40
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command to its parser."""
+    parser.add_argument("results", type=Path, help="folder of the results of a run")
+    parser.add_argument(
+        "--requirement", metavar="NAME", help="the ranking for this one alone, with every limit"
+    )
+    parser.add_argument("--channel", help="parameters of this one alone, such as gyro_x")
+    parser.add_argument("--method", help="of the parameters; default: the recommended one")
+    parser.add_argument(
+        "--units",
+        choices=("practical", "si"),
+        default="practical",
+        help="practical: deg/h, ug and their like; si: rad/s, m/s^2; default: practical",
+    )
+    parser.add_argument(
+        "--width", type=_width, metavar="COLUMNS", help="default: that of the terminal, or 80"
+    )
+
+
+def run(given: argparse.Namespace) -> int:
+    """Print the comparison; return the exit status."""
+    # Only this command draws: the others answer at once.
+    from rich.console import Console
+    from rich.text import Text
+
+    from imubench_pipeline.report.terminal import parts
+
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # a sign that a terminal lacks stops nothing
+    try:
+        tables = _load(given.results)
+        _check(tables["ranking"], "requirement", given.requirement)
+        _check(tables["parameters"], "channel", given.channel)
+        _check(tables["parameters"], "method", given.method)
+    except _ShowError as error:
+        print(error, file=sys.stderr)
+        return 2
+    console = Console(width=given.width, highlight=False, markup=False, emoji=False)
+    # Another program reads whole lines.
+    whole = given.width is None and not console.is_terminal
+    with console.capture() as captured:
+        for part in parts(
+            tables,
+            requirement=given.requirement,
+            channel=given.channel,
+            method=given.method,
+            system=given.units,
+            width=console.width,
+        ):
+            if isinstance(part, Text) and whole:
+                console.print(part, soft_wrap=True)
+            elif isinstance(part, Text):
+                console.print(part, no_wrap=part.no_wrap, overflow=part.overflow)
+            else:
+                console.print(part)
+        console.print(_where(given.results), soft_wrap=True)
+    # Written at once, so that who calls sees that the reader has gone, as `head` has.
+    sys.stdout.writelines(f"{line.rstrip()}\n" for line in captured.get().splitlines())
+    return 0
+
+
+class _ShowError(ValueError):
+    """What was asked for is not there; the text says what is."""
+
+
+def _load(results: Path) -> dict[str, Rows]:
+    from imubench_pipeline.tables import read
+
+    folder = _tables_folder(results)
+    missing = [name for name in _NEEDED if not (folder / f"{name}.parquet").is_file()]
+    if missing:
+        raise _ShowError(
+            f"{folder}: no table {', '.join(missing)}; expected the folder of the results of a "
+            "finished run, such as results: `snakemake -c2` makes it"
+        )
+    try:
+        return {name: read(name, [folder / f"{name}.parquet"]).to_pylist() for name in _NEEDED}
+    except (OSError, ValueError) as error:
+        raise _ShowError(f"{error}\n`snakemake -c2` makes the tables again") from error
+
+
+def _tables_folder(results: Path) -> Path:
+    return results / "tables" if (results / "tables").is_dir() else results
+
+
+def _where(results: Path) -> str:
+    page = _tables_folder(results).parent / "report/index.html"
+    if page.is_file():
+        return f"Report: {page}"
+    return f"No report at {page}; `snakemake -c2` makes it"
+
+
+def _check(rows: Rows, column: str, asked: str | None) -> None:
+    there = list(dict.fromkeys(row[column] for row in rows))
+    if asked is not None and asked not in there:
+        raise _ShowError(f"no {column} {asked!r}; there are: {', '.join(there) or 'none'}")
+
+
+def _width(text: str) -> int:
+    width = int(text)
+    if width < _NARROWEST:
+        raise argparse.ArgumentTypeError(f"found {width}; expected at least {_NARROWEST} columns")
+    return width

@@ -1,0 +1,525 @@
+import ast
+import math
+import re
+from collections import Counter
+from collections.abc import Iterator
+from functools import lru_cache
+from html import unescape
+from html.parser import HTMLParser
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, get_args, get_type_hints
+
+import jinja2
+import numpy as np
+import pytest
+import yaml
+from scipy.optimize import minimize_scalar
+
+from imubench_pipeline import coverage, datasheet, findings, pooled
+from imubench_pipeline.error_budget import Gyrocompass, Start, budget
+from imubench_pipeline.estimators import estimate, lines
+from imubench_pipeline.estimators.identifiability import bounds_of
+from imubench_pipeline.noise import FLOOR, GaussMarkov, NoiseModel
+from imubench_pipeline.report import glossary as module
+from imubench_pipeline.report.glossary import UnknownTermError, glossary, term
+from imubench_pipeline.units import from_si, to_si
+from imubench_pipeline.validation import ConfigError
+from tests.conftest import PROJECT
+
+SOURCE = PROJECT / "src/imubench_pipeline"
+BASE = "{% block title %}{% endblock %}<main>{% block main %}{% endblock %}</main>"
+VOID = {"br", "img", "meta", "link", "hr", "input"}
+
+
+@lru_cache(maxsize=1)
+def theory() -> str:
+    environment = jinja2.Environment(
+        loader=jinja2.ChoiceLoader(
+            [
+                jinja2.DictLoader({"base.html.jinja": BASE}),
+                jinja2.PackageLoader("imubench_pipeline.report"),
+            ]
+        ),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    page = environment.get_template("theory.html.jinja")
+    return page.render(figure="figures/theory.svg", terms=glossary())
+
+
+class Page(HTMLParser):
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.faults: list[str] = []
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.texts: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        if not self.open or self.open.pop() != tag:
+            self.faults.append(f"</{tag}> at {self.getpos()}")
+
+    def handle_data(self, data: str) -> None:
+        self.texts.append(data)
+
+    def of(self, *names: str) -> list[dict[str, str | None]]:
+        return [attributes for tag, attributes in self.tags if tag in names]
+
+
+@lru_cache(maxsize=1)
+def page() -> Page:
+    parsed = Page()
+    parsed.feed(theory())
+    parsed.close()
+    return parsed
+
+
+def text() -> str:
+    return " ".join("".join(page().texts).split())
+
+
+# ------------------------------------------------------------------------------- the glossary
+
+
+def test_every_term_is_a_short_sentence() -> None:
+    for one in glossary().values():
+        assert one.name and one.short, one.key
+        assert len(one.short.split()) <= 25, f"{one.key}: {one.short}"
+        assert one.short.endswith(".") and one.short[0].isupper(), f"{one.key}: {one.short}"
+        assert one.action is None or one.action.endswith("."), one.key
+
+
+def test_every_section_is_a_place_on_the_theory_page() -> None:
+    ids = {attributes.get("id") for _, attributes in page().tags}
+    for one in glossary().values():
+        assert one.section in ids, one.key
+
+
+def test_no_key_stands_twice() -> None:
+    tree: Any = yaml.compose((SOURCE / "report/glossary.yaml").read_text())
+    keys = [key.value for _, section in tree.value for key, _ in section.value]
+    assert Counter(keys).most_common(1)[0][1] == 1
+    assert keys == list(glossary())
+    sections = [key.value for key, _ in tree.value]
+    assert len(sections) == len(set(sections))
+
+
+def test_a_key_in_two_sections_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "glossary.yaml"
+    file.write_text("one:\n  N: {name: N, short: A.}\ntwo:\n  N: {name: N, short: B.}\n")
+    monkeypatch.setattr(module, "_FILE", file)
+    with pytest.raises(ConfigError, match="N stands in one and two"):
+        glossary.__wrapped__()
+
+
+def test_an_unknown_term_is_an_error_that_names_close_ones() -> None:
+    with pytest.raises(UnknownTermError, match=r"'alan_deviation' is not .* allan_deviation"):
+        glossary()["alan_deviation"]
+    with pytest.raises(UnknownTermError):
+        term("splendid", "verdict")
+    assert "alan_deviation" not in glossary()
+
+
+def test_what_a_table_holds_is_looked_up_by_its_kind() -> None:
+    assert term("not comparable (condition)", "verdict").name == "not comparable (condition)"
+    assert term("band", "line") is not term("band")
+    assert term("not_identified").name == "not identified"
+
+
+# --------------------------------------------------------- what the program can say has an entry
+
+
+def literals(node: ast.expr | None) -> set[str]:
+    """Return the texts that an expression can be; empty where it is none that is known."""
+    match node:
+        case ast.Constant(value=str(value)):
+            return {value}
+        case ast.IfExp(body=first, orelse=second):
+            return literals(first) | literals(second)
+    return set()
+
+
+def bound(target: ast.expr, value: ast.expr | None, name: str) -> set[str]:
+    """Return the texts that an assignment gives to a name."""
+    match target, value:
+        case ast.Name(id=found), _ if found == name:
+            return literals(value)
+        case ast.Tuple(elts=names), ast.Tuple(elts=values) if len(names) == len(values):
+            parts = zip(names, values, strict=True)
+            return {text for pair in parts for text in bound(*pair, name)}
+    return set()
+
+
+def values_of(name: str, inside: ast.FunctionDef, tree: ast.Module) -> set[str]:
+    """Return the texts that a name in a function can have."""
+    found: set[str] = set()
+    for node in ast.walk(inside):
+        if isinstance(node, ast.Assign):
+            found |= {text for target in node.targets for text in bound(target, node.value, name)}
+        elif isinstance(node, ast.comprehension) and isinstance(node.iter, ast.Name):
+            rows = [
+                row
+                for other in ast.walk(inside)
+                if isinstance(other, ast.Assign | ast.AnnAssign)
+                and isinstance(other.value, ast.Tuple | ast.List)
+                for row in other.value.elts
+            ]
+            found |= {text for row in rows for text in bound(node.target, row, name)}
+    arguments = [argument.arg for argument in inside.args.args if argument.arg != "self"]
+    if name in arguments:
+        place = arguments.index(name)
+        for caller, call in calls(tree, inside.name):
+            found |= texts(call.args[place], caller, tree)
+    return found
+
+
+def texts(node: ast.expr, inside: ast.FunctionDef, tree: ast.Module) -> set[str]:
+    found = values_of(node.id, inside, tree) if isinstance(node, ast.Name) else literals(node)
+    assert found, f"{inside.name}, line {node.lineno}: what is {ast.unparse(node)}?"
+    return found
+
+
+def calls(tree: ast.Module, name: str) -> Iterator[tuple[ast.FunctionDef, ast.Call]]:
+    """Yield the calls of a function, each with the function that it stands in."""
+    for function in ast.walk(tree):
+        if isinstance(function, ast.FunctionDef):
+            for node in ast.walk(function):
+                if isinstance(node, ast.Call):
+                    called = getattr(node.func, "attr", getattr(node.func, "id", None))
+                    if called == name:
+                        yield function, node
+
+
+@lru_cache(maxsize=1)
+def emitted() -> dict[str, str]:
+    """Return the findings that the source can emit, each with a module that does."""
+    found = {}
+    for path in sorted(SOURCE.rglob("*.py")):
+        tree = ast.parse(path.read_text())
+        for function, call in calls(tree, "Finding"):
+            named = [keyword.value for keyword in call.keywords if keyword.arg == "finding"]
+            for name in texts([*call.args, *named][0], function, tree):
+                found[name] = path.stem
+    return found
+
+
+def test_the_scan_finds_what_is_emitted_directly_and_through_helpers() -> None:
+    assert emitted().keys() >= {
+        "knocks",  # itself
+        "damaged_message",  # an argument of a method
+        "wrong_checksum",  # an element of a list of rows
+        "incomplete_first_record",  # one of two, by a name
+        "not_records",
+    }
+
+
+def test_every_finding_has_an_entry_that_says_what_to_do() -> None:
+    known = glossary()
+    missing = {name: where for name, where in emitted().items() if name not in known}
+    assert not missing, f"glossary.yaml lacks {missing}"
+    for name in emitted():
+        assert known[name].action, name
+        assert known[name].name == name.replace("_", " ")
+    for one in known.values():
+        assert one.action is None or one.key in emitted(), f"nothing emits {one.key}"
+
+
+def strings_in(path: str, function: str, parts: type[ast.AST] = ast.Constant) -> set[str]:
+    """Return the texts in a function that are no docstring and no key."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse((SOURCE / path).read_text())):
+        if isinstance(node, ast.FunctionDef) and node.name == function:
+            for inner in node.body[1:]:
+                kept = [part for part in ast.walk(inner) if isinstance(part, parts)]
+                found |= {text for part in kept for text in literals(part)}  # type: ignore[arg-type]
+    return found
+
+
+def values_in_tables() -> Iterator[tuple[str, str]]:
+    for status in get_args(estimate.Status):
+        yield status, ""
+    for severity in get_args(findings.Severity):
+        yield severity, ""
+    for verdict in [*datasheet.VERDICTS, *get_args(pooled.Verdict)]:
+        yield verdict, "verdict"
+    for verdict in strings_in("selection.py", "verdict"):
+        yield verdict, "verdict"
+    for verdict in strings_in("selection.py", "ranking_rows"):
+        if "price class" in verdict:
+            yield verdict, "verdict"
+    for verdict in strings_in("estimators/goodness.py", "goodness", ast.IfExp):
+        yield verdict, "verdict"
+    for verdict in ("changed", "as before"):  # of the table drift
+        yield verdict, "verdict"
+    for published in get_args(coverage.Published):
+        yield published, "published"
+    for kind in get_args(get_type_hints(lines.Line)["kind"]):
+        yield kind, "line"
+    for kind in ("typ", "max", "min", "range", "1sigma", "derived", "static", "two_position"):
+        yield kind, "kind"
+    for side in ("one-sided", "two-sided"):
+        yield side, ""
+    for axis in ("worst", "median"):
+        yield axis, "axis"
+    for source in ("stamps", "stated"):
+        yield source, "rate_from"
+    yield "ok", "recording"
+    yield "rejected", ""
+    for method in ("likelihood", "likelihood_gm", "curve", "paper", "weighted"):
+        yield method, ""
+    for symbol in (*estimate.FAMILY, "F", "GM"):
+        yield symbol, ""
+    for error in ("attitude", "heading", "velocity", "position", "north"):
+        yield error, ""
+
+
+@pytest.mark.parametrize(("value", "kind"), list(values_in_tables()))
+def test_every_status_and_verdict_has_an_entry(value: str, kind: str) -> None:
+    assert term(value, kind).short
+
+
+def test_the_verdicts_are_all_found() -> None:
+    verdicts = {value for value, kind in values_in_tables() if kind == "verdict"}
+    assert verdicts >= {"passes", "probably fails", "not enough data", "outside the price class"}
+    assert verdicts >= {"explained", "not explained", "not sure", "agree", "differ"}
+    spoken = {one.key for one in glossary().values() if one.key.startswith("verdict_")}
+    assert spoken == {term(verdict, "verdict").key for verdict in verdicts}
+
+
+# ---------------------------------------------------------------------------- the theory page
+
+
+def test_tags_are_balanced_and_anchors_unique() -> None:
+    assert page().faults == [] and page().open == []
+    ids = [attributes["id"] for _, attributes in page().tags if "id" in attributes]
+    assert [name for name, number in Counter(ids).items() if number > 1] == []
+    for attributes in page().of("a"):
+        assert (attributes["href"] or "").removeprefix("#") in ids
+
+
+def test_headings_are_in_order() -> None:
+    levels = [int(tag[1]) for tag, _ in page().tags if re.fullmatch("h[1-6]", tag)]
+    assert levels[0] == 1 and levels.count(1) == 1
+    assert all(later <= earlier + 1 for earlier, later in pairwise(levels))
+
+
+def test_tables_images_and_formulas_can_be_read_aloud() -> None:
+    assert len(page().of("caption")) == len(page().of("table")) > 0
+    assert all(attributes.get("scope") in ("col", "row") for attributes in page().of("th"))
+    assert all(attributes.get("alt") for attributes in page().of("img"))
+    assert all(attributes.get("alttext") for attributes in page().of("math"))
+    assert all(attributes.get("title") for attributes in page().of("abbr"))
+    for attributes in page().of("div"):
+        if attributes.get("class") == "scroll":
+            assert attributes.get("aria-label") and attributes.get("role") == "region"
+
+
+def test_the_page_needs_nothing_from_elsewhere() -> None:
+    assert not page().of("script", "style", "link", "iframe")
+    for _, attributes in page().tags:
+        assert "style" not in attributes
+        assert not [name for name in attributes if name.startswith("on")]
+        for name in ("src", "href"):
+            assert "//" not in (attributes.get(name) or "")
+    assert [attributes["src"] for attributes in page().of("img")] == ["figures/theory.svg"]
+
+
+def test_every_finding_is_in_the_table() -> None:
+    ids = {attributes.get("id") for attributes in page().of("tr")}
+    assert ids >= {f"finding-{name}" for name in emitted()}
+
+
+def test_a_page_may_name_another_base() -> None:
+    environment = jinja2.Environment(
+        loader=jinja2.ChoiceLoader(
+            [
+                jinja2.DictLoader({"other": "<p>other</p>{% block main %}{% endblock %}"}),
+                jinja2.PackageLoader("imubench_pipeline.report"),
+            ]
+        )
+    )
+    made = environment.get_template("theory.html.jinja")
+    assert made.render(base="other", figure="f", terms=glossary()).startswith("<p>other</p>")
+
+
+# ------------------------------------------------------ its figures are those of the library
+
+GYRO = NoiseModel(
+    N=to_si(0.3, "deg/sqrt(h)", "gyro_density"),
+    B=to_si(10.0, "deg/h", "angular_rate"),
+    K=to_si(10.0, "deg/h/sqrt(h)", "gyro_random_walk"),
+)
+ACCEL = NoiseModel(
+    N=to_si(100.0, "ug/sqrt(Hz)", "accel_density"), B=to_si(50.0, "ug", "acceleration")
+)
+NOTHING = NoiseModel()
+MTI_7_GYRO = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7)
+MTI_7_ACCEL = NoiseModel(N=9.6e-4, B=3.4e-4, T_B=38.3, K=1.7e-5)
+C102_ACCEL = NoiseModel(N=1.1e-3, B=7.2e-4, T_B=148.9, K=2.0e-5)
+PERFECT = Start.uncalibrated(gyro_bias=0.0, accel_bias=0.0, on_time=0.0)
+CAUSES: dict[str, tuple[NoiseModel, Start]] = {
+    "A bias b that is left over, 10 °/h": (
+        NOTHING,
+        Start.uncalibrated(gyro_bias=GYRO.B, accel_bias=0.0, on_time=0.0),
+    ),
+    "N": (NoiseModel(N=GYRO.N), PERFECT),
+    "B, flicker": (NoiseModel(B=GYRO.B), Start.calibrated(60.0)),
+    "K": (NoiseModel(K=GYRO.K), PERFECT),
+    "R (example: 10 °/h/h)": (NoiseModel(R=to_si(10.0, "deg/h/h", "gyro_ramp")), PERFECT),
+}
+
+
+def cells(row: str) -> list[str]:
+    """Return the cells of a row of a table, without their formulas."""
+    found = re.search(rf'<th scope="row">{re.escape(row)}</th>(.*?)</tr>', theory(), re.DOTALL)
+    assert found, row
+    plain = re.sub(r"<math.*?</math>", "", found[1], flags=re.DOTALL)
+    return [unescape(re.sub(r"<[^>]*>", "", cell)) for cell in plain.split("</td>")[:-1]]
+
+
+def figure(shown: str) -> float:
+    return float(shown.split()[0].rstrip("°"))
+
+
+def minimum(model: NoiseModel) -> float:
+    return math.sqrt(float(np.min(model.allan_variance(np.geomspace(1e-1, 1e6, 20_001)))))
+
+
+@pytest.mark.parametrize("cause", CAUSES)
+def test_the_growth_of_errors(cause: str) -> None:
+    model, start = CAUSES[cause]
+    for shown, quantity in zip(cells(cause), ("heading", "velocity", "position"), strict=True):
+        error = budget(quantity, 60.0, gyro=model, accel=NOTHING, start=start).total  # type: ignore[arg-type]
+        error = math.degrees(error) if quantity == "heading" else error
+        assert figure(shown) == pytest.approx(error, rel=0.04)
+
+
+def test_the_growth_of_an_accelerometers_errors() -> None:
+    for model, start, shown in (
+        (NoiseModel(N=ACCEL.N), PERFECT, "0.0076 m/s and 0.26 m"),
+        (NoiseModel(B=ACCEL.B), Start.calibrated(60.0), "0.028 m/s and 0.80 m"),
+    ):
+        assert shown in text()
+        errors = [
+            budget(quantity, 60.0, gyro=NOTHING, accel=model, start=start).total
+            for quantity in ("velocity", "position")
+        ]
+        assert [figure(part) for part in shown.split(" and ")] == pytest.approx(errors, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    "model",
+    [GYRO, MTI_7_GYRO, NoiseModel(K=1e-6), NoiseModel(N=1e-4, R=1e-9)],
+    ids=lambda model: model.name,
+)
+def test_a_window_as_long_as_the_run_leaves_the_allan_deviation(model: NoiseModel) -> None:
+    for time in (1.0, 60.0, 3600.0):
+        error = budget(
+            "heading", time, gyro=model, accel=NOTHING, start=Start.calibrated(time)
+        ).total
+        deviation = math.sqrt(float(model.allan_variance(np.array([time]))[0]))
+        assert error == pytest.approx(math.sqrt(2.0) * deviation * time, rel=1e-9)
+    assert "1.65°" in text() and math.sqrt(2.0) * 7.0 / 6.0 == pytest.approx(1.65, abs=0.005)
+
+
+def test_the_hump_of_a_gauss_markov_process() -> None:
+    process = GaussMarkov(1.0, 1.0)
+    found = minimize_scalar(
+        lambda tau: -float(process.allan_variance(np.array([tau]))[0]), bounds=(1.0, 3.0)
+    )
+    assert found.x == pytest.approx(1.89, abs=0.005)
+    assert math.sqrt(-found.fun) == pytest.approx(0.664, abs=5e-4)
+    assert math.sqrt(-found.fun / process.density) == pytest.approx(0.437, abs=5e-4)
+    assert math.sqrt(process.density / 2.0) == pytest.approx(1.08, abs=0.005)
+    assert pytest.approx(1.51, abs=0.005) == 1.0 / FLOOR
+    late = budget(
+        "heading", 1e6, gyro=NoiseModel(B=1.0, T_B=1.0), accel=NOTHING, start=PERFECT
+    ).total
+    assert late == pytest.approx(1.52e3, rel=2e-3)
+    for shown in ("0.664 B", "1.51 times", "1.08 B"):
+        assert shown in text()
+
+
+def test_the_minimum_of_the_curve() -> None:
+    assert minimum(GYRO) / (FLOOR * GYRO.B) == pytest.approx(1.04, abs=0.005)
+    assert minimum(MTI_7_GYRO) / (FLOOR * MTI_7_GYRO.B) == pytest.approx(2 / 3, abs=0.01)
+    assert "4 % in the example" in text() and "two thirds of it" in text()
+
+
+def test_the_budget_of_the_example() -> None:
+    found = budget("heading", 600.0, gyro=GYRO, accel=NOTHING, start=Start.calibrated(60.0))
+    shares = {part.source: math.degrees(part.sigma) for part in found.contributions}
+    assert math.degrees(found.total) == pytest.approx(1.9, abs=0.05)
+    assert shares["gyro flicker"] == pytest.approx(1.8, abs=0.05)
+    assert shares["gyro K"] == pytest.approx(0.41, abs=0.005)
+    assert shares["gyro N in the static window"] == pytest.approx(0.39, abs=0.005)
+    assert shares["gyro N"] == pytest.approx(0.12, abs=0.005)
+    north = Gyrocompass(gyro=NoiseModel(N=GYRO.N), latitude=math.pi / 4).heading(600.0).total
+    assert math.degrees(north) == pytest.approx(4.0, abs=0.05)
+    for shown in ("of 1.9° after 600 s: 1.8°", "0.41° from K, 0.39°", "0.12°", "give 4.0°"):
+        assert shown in text()
+
+
+@pytest.mark.parametrize(
+    ("row", "model", "rate", "hours"),
+    [
+        ("MTi-7 gyro, T<sub>B</sub> = 89.5 s", MTI_7_GYRO, 100.0, (1.9, 9.6, 72.0)),
+        ("MTi-7 accelerometer, T<sub>B</sub> = 38.3 s", MTI_7_ACCEL, 100.0, (1.8, 15.0, 14.0)),
+        ("C102-F9R accelerometer, T<sub>B</sub> = 148.9 s", C102_ACCEL, 50.0, (6.2, 28.0, 48.0)),
+        ("The example above, with flicker noise", GYRO, 100.0, (1 / 6, None, 164.0)),
+    ],
+)
+def test_the_logs_that_are_needed(
+    row: str, model: NoiseModel, rate: float, hours: tuple[float | None, ...]
+) -> None:
+    shown = [
+        figure(cell) / (60.0 if cell.endswith("min") else 1.0)
+        for cell in cells(row)[1:]
+        if cell != "none"
+    ]
+    assert shown == pytest.approx([length for length in hours if length])
+    for name, length in zip(("B", "T_B", "K"), hours, strict=True):
+        if length:
+            bound = bounds_of(model, rate, length * 3600.0, rate / 2)[name]
+            assert bound == pytest.approx(0.1, rel=0.05)
+    assert bounds_of(model, rate, 15.0, rate / 20)["N"] < 0.1
+
+
+@pytest.mark.parametrize(
+    ("shown", "value", "unit", "other", "dimension", "expected"),
+    [
+        ("60 °/√h", 1.0, "°/s/√Hz", "°/√h", "gyro_density", 60.0),
+        ("1/60 °/√h", 1.0, "°/h/√Hz", "°/√h", "gyro_density", 1 / 60),
+        ("2.909·10⁻⁴ rad/s/√Hz", 1.0, "°/√h", "rad/s/√Hz", "gyro_density", 2.909e-4),
+        ("206 265 °/h", 1.0, "rad/s", "°/h", "angular_rate", 206265.0),
+        ("4.848·10⁻⁶ rad/s", 1.0, "°/h", "rad/s", "angular_rate", 4.848e-6),
+        ("9.80665·10⁻⁶ m/s²", 1.0, "µg", "m/s²", "acceleration", 9.80665e-6),
+        ("1/60 m/s²/√Hz", 1.0, "m/s/√h", "m/s²/√Hz", "accel_density", 1 / 60),
+        ("1700 µg/√Hz", 1.0, "m/s/√h", "µg/√Hz", "accel_density", 1700.0),
+        ("8.080·10⁻⁸ rad/s/√s", 1.0, "°/h/√h", "rad/s/√s", "gyro_random_walk", 8.080e-8),
+        ("0.34 °/√h", 0.008 / math.sqrt(2.0), "°/s/√Hz", "°/√h", "gyro_density", 0.34),
+    ],
+)
+def test_the_conversions(
+    shown: str, value: float, unit: str, other: str, dimension: str, expected: float
+) -> None:
+    assert shown in text()
+    converted = from_si(to_si(value, unit, dimension), other, dimension)
+    assert converted == pytest.approx(expected, rel=2e-3)
+
+
+def test_the_glossarys_own_figures() -> None:
+    known: dict[str, Any] = glossary()
+    assert "0.9 m in a minute" in known["microg"].short
+    assert 0.5 * ACCEL.B * 60.0**2 == pytest.approx(0.9, abs=0.05)
+    assert "0.05 is 12 %" in known["score_rms_log10"].short
+    assert pytest.approx(1.12, abs=0.005) == 10**0.05
+    assert "1.26" in known["decade"].short and pytest.approx(1.26, abs=0.005) == 10**0.1

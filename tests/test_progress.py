@@ -1,0 +1,128 @@
+"""The progress of a run, in a terminal and in a pipe."""
+
+import logging
+import os
+import pty
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("workflow")]
+
+WORKFLOW = """
+rule all:
+    input: expand("{recording}.done", recording=["a", "b", "bad"])
+rule ingest:
+    output: "{recording}.done"
+    script: "ingest.py"
+onstart:
+    from imubench_pipeline.progress import follow
+    follow()
+onsuccess:
+    print("the summary")
+onerror:
+    print("what failed")
+"""
+SCRIPT = """
+import os, time
+from pathlib import Path
+time.sleep(0.6)
+if snakemake.wildcards.recording == "bad" and "FAIL" in os.environ:
+    raise ValueError("upside down\\nturn it over")
+Path(snakemake.output[0]).touch()
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "Snakefile").write_text(WORKFLOW)
+    (tmp_path / "ingest.py").write_text(SCRIPT)
+    return tmp_path
+
+
+def in_terminal(folder: Path, *flags: str, **variables: str) -> tuple[str, str]:
+    """Return all that was written to a terminal, and what of it stays to be seen."""
+    outer, inner = pty.openpty()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "snakemake", "-c1", "--keep-going", *flags],
+        cwd=folder, stdin=inner, stdout=inner, stderr=inner,
+        env={**os.environ, "TERM": "xterm", "COLUMNS": "100", **variables},
+    )  # fmt: skip
+    os.close(inner)
+    written = b""
+    while True:
+        try:
+            part = os.read(outer, 65536)
+        except OSError:  # the other end is closed
+            break
+        if not part:
+            break
+        written += part
+    os.close(outer)
+    process.wait(timeout=60)
+    text = written.decode()
+    return text, seen(text)
+
+
+def seen(text: str) -> str:
+    """What stays on a terminal: a line can be erased, and the cursor go up to the one before."""
+    lines = [""]
+    for part in re.split(r"(\n|\x1b\[2K|\x1b\[1A)", text):
+        if part == "\n":
+            lines.append("")
+        elif part == "\x1b[2K":
+            lines[-1] = ""
+        elif part == "\x1b[1A":
+            lines.pop()
+        else:
+            lines[-1] += re.sub(r"\x1b\[[?\d;]*[a-zA-Z]|\r", "", part)
+    assert "\x1b[2A" not in text
+    return "\n".join(lines)
+
+
+def test_a_terminal_has_one_line_that_moves(folder: Path) -> None:
+    written, left = in_terminal(folder)
+    assert re.search(r"first steps: ingest (a|b|bad) 0:00", written)
+    assert re.search(r"1 of 4 steps, about \d+ s left: ingest (a|b|bad) 0:00", written)
+    assert "steps, about" not in left and "rule ingest:" not in left
+    assert "Job stats" in left and left.index("Job stats") < left.index("the summary")
+    (log,) = (folder / ".snakemake/log").iterdir()
+    assert log.read_text().count("rule ingest:") == 3
+
+
+def test_what_a_failing_step_says_is_not_drawn_over(folder: Path) -> None:
+    _, left = in_terminal(folder, FAIL="1")
+    assert "Traceback (most recent call last):\n" in left
+    assert "ValueError: upside down\nturn it over\n" in left
+    assert "Error in rule ingest:" in left and "output: bad.done" in left
+    assert left.index("turn it over") < left.index("what failed")
+
+
+@pytest.mark.parametrize("flags", [("--verbose",), ("--quiet",)])
+def test_who_asks_for_more_or_less_gets_what_snakemake_says(
+    folder: Path, flags: tuple[str, ...]
+) -> None:
+    written, left = in_terminal(folder, *flags)
+    assert "of 4 steps, about" not in written and "first steps" not in written
+    assert ("rule ingest:" in left) == (flags == ("--verbose",))
+
+
+def test_a_pipe_gets_the_lines_of_snakemake(folder: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "snakemake", "-c1"], cwd=folder, capture_output=True, text=True,
+        check=True, timeout=60, env={**os.environ, "FORCE_COLOR": "1"},
+    )  # fmt: skip
+    assert done.stderr.count("rule ingest:") == 3 and "\x1b" not in done.stderr
+    assert "4 of 4 steps (100%) done" in done.stderr and done.stdout == "the summary\n"
+
+
+def test_another_logger_is_left_alone() -> None:
+    from imubench_pipeline.progress import follow
+
+    logger = logging.getLogger("snakemake.logging")
+    before = list(logger.handlers)
+    follow()
+    assert logger.handlers == before

@@ -1,0 +1,178 @@
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from imubench_pipeline.plan import Plan
+from imubench_pipeline.run_summary import failure, leaders, one_line, summary, warnings
+from imubench_pipeline.tables import write
+
+
+def recording(sensor: str, name: str = "run", **values: object) -> dict[str, Any]:
+    row = {"sensor": sensor, "device": "1", "recording": name, "kind": "static",
+           "simulated": False, "status": "ok"}  # fmt: skip
+    return row | values
+
+
+def finding(sensor: str, name: str, severity: str = "warning") -> dict[str, Any]:
+    return {"sensor": sensor, "recording": "run", "finding": name, "severity": severity,
+            "detail": "x"}  # fmt: skip
+
+
+def standing(sensor: str, **values: object) -> dict[str, Any]:
+    row = {"requirement": "robot", "sensor": sensor, "recording": "run", "verdict": "passes",
+           "rank": 1, "decides": True, "error": "heading", "unit": "rad", "margin": 2.0,
+           "time": 1.0, "tied_with": None, "limit_verdict": "passes"}  # fmt: skip
+    return row | values
+
+
+def said(folder: Path, **rows: list[dict[str, Any]]) -> list[str]:
+    for name in ("recordings", "findings", "ranking"):
+        write(name, rows.get(name, []), folder / f"tables/{name}.parquet")
+    return summary(folder).splitlines()
+
+
+def test_a_run_says_what_became_of_the_recordings(tmp_path: Path) -> None:
+    recordings = [
+        recording("a"),
+        recording("b", simulated=True),
+        recording("b", "night", status="rejected", reason="the file\nis empty"),
+    ]
+    lines = said(
+        tmp_path,
+        recordings=recordings,
+        findings=[finding("a", "short", "note"), finding("b", "knock")],
+        ranking=[standing("a")],
+    )
+    assert lines == [
+        "2 recordings analysed, 1 rejected; 1 of all are simulated, not measured",
+        "  rejected: b/night: the file is empty",
+        "warnings in 1 of the recordings:",
+        "  b/run: 1 warning: knock",
+        "robot: a: passes",
+        f"report: {tmp_path / 'report/index.html'}",
+    ]
+
+
+def test_long_lists_end_with_how_many_more(tmp_path: Path) -> None:
+    rejected = [recording("a", f"{i:02}", status="rejected", reason="x " * 500) for i in range(30)]
+    lines = said(tmp_path, recordings=rejected)
+    assert lines[0] == "0 recordings analysed, 30 rejected"
+    assert lines[10].startswith("  rejected: a/09: x x") and lines[11] == "  and 20 more"
+    assert max(map(len, lines[1:12])) < 220
+
+
+def test_the_recording_with_the_worst_warnings_comes_first() -> None:
+    rows = [
+        finding("few", "gap"),
+        *(finding("many", name) for name in ("gap", "knock", "knock", "warm_up")),
+        finding("broken", "saturated", "fatal"),
+        finding("rejected", "rejected", "fatal"),
+    ]
+    assert list(warnings(rows)) == [
+        "broken/run: 1 warning: saturated",
+        "many/run: 4 warnings: knock (2), gap, warm up",
+        "few/run: 1 warning: gap",
+    ]
+
+
+def test_a_line_says_which_sensor_leads_a_requirement() -> None:
+    rows = [
+        standing("second", rank=2),
+        standing("best", tied_with="other"),
+        standing("best", decides=False, verdict="surely fails"),
+        standing("made", requirement="hard", verdict="surely fails"),
+        standing("short", requirement="vague", verdict="not enough data"),
+        standing("c", requirement="dear", rank=None, verdict="outside the price class"),
+    ]
+    assert list(leaders(rows, [recording("best"), recording("made", simulated=True)])) == [
+        "robot: best: passes, tied with other",
+        "hard: no sensor fulfils it; best is made (simulated): surely fails",
+        "vague: short: not enough data",
+        "dear: no sensor can be ranked",
+    ]
+
+
+def test_nothing_is_said_without_tables(tmp_path: Path) -> None:
+    assert summary(tmp_path) == ""
+
+
+def test_tables_of_another_form_make_no_run_fail(tmp_path: Path) -> None:
+    said(tmp_path, recordings=[recording("a")])
+    write("recordings", [recording("a")], tmp_path / "tables/ranking.parquet")
+    assert summary(tmp_path).startswith(f"no summary: {tmp_path / 'tables/ranking.parquet'}: col")
+
+
+def test_a_line_is_one_line_and_no_command_to_the_terminal() -> None:
+    assert one_line("a\r\n\x1b[31mb\t c") == "a [31mb c"
+    assert one_line("x" * 200, 10) == "x" * 9 + "…"
+
+
+WORKFLOW = """
+from pathlib import Path
+from imubench_pipeline.run_summary import failure
+
+rule all:
+    input: "results/recordings/s/r/allan.parquet", "results/tables/ranking.parquet"
+rule allan:
+    output: "results/recordings/s/r/allan.parquet"
+    shell: "{command}"
+rule ranking:
+    output: "results/tables/ranking.parquet"
+    shell: "exit 3"
+onerror:
+    print(failure(log, Path("results")))
+"""
+
+
+def snakemake(folder: Path, command: str, *flags: str) -> list[str]:
+    (folder / "Snakefile").write_text(WORKFLOW.replace("{command}", command))
+    done = subprocess.run(
+        [sys.executable, "-m", "snakemake", "-c1", "--keep-going", *flags],
+        cwd=folder, capture_output=True, text=True, check=False, timeout=120,
+    )  # fmt: skip
+    assert done.returncode == 1
+    return done.stdout.splitlines()
+
+
+@pytest.mark.workflow
+@pytest.mark.xdist_group("workflow")
+def test_a_failed_run_says_what_failed_and_how_to_go_on(tmp_path: Path) -> None:
+    lines = snakemake(tmp_path, "exit 3")
+    assert lines[0] == "2 steps failed; why stands above"
+    assert set(lines[1:3]) == {"  allan of s/r", "  ranking"}
+    assert lines[3].endswith("run the same command again: it goes on where this run stopped")
+    assert Path(lines[4].removeprefix("log: ")).is_file()
+    assert snakemake(tmp_path, "exit 3", "--quiet", "all")[0] == "a step failed; why stands above"
+
+
+@pytest.mark.workflow
+@pytest.mark.xdist_group("workflow")
+def test_an_interrupted_run_says_how_to_go_on(tmp_path: Path) -> None:
+    lines = snakemake(tmp_path, "kill -INT $PPID; sleep 2; exit 3")
+    assert lines[0].startswith("stopped before its end; to go on, run the same command again")
+    assert len(lines) == 2
+
+
+def test_a_step_that_was_tried_again_is_named_once(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    log.write_text(
+        "Error in rule allan:\n    message: None\n    jobid: 4\n"
+        "    output: out/recordings/a, b/r (1)/allan.parquet, x\n" * 2
+    )
+    lines = failure([str(log)], Path("out")).splitlines()
+    assert lines[:2] == ["1 step failed; why stands above", "  allan of a, b/r (1)"]
+
+
+def test_a_plan_says_both(tmp_path: Path) -> None:
+    (tmp_path / "sensors").mkdir()
+    (tmp_path / "logs").mkdir()
+    plan = Plan(
+        {"logs": str(tmp_path / "logs"), "sensors": str(tmp_path / "sensors"),
+         "results": str(tmp_path), "simulated": "false"}
+    )  # fmt: skip
+    said(tmp_path, recordings=[recording("a")])
+    assert plan.summary().startswith("1 recording analysed, 0 rejected\n")
+    assert plan.failure([]).startswith("a step failed; why stands above\n")
