@@ -1,7 +1,7 @@
 """From static logs of inertial sensors to a cross-IMU report: `snakemake -c2`."""
 
 from imubench_pipeline.plan import Plan
-from imubench_pipeline.tables import OF_ONE_RECORDING, TABLES
+from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
 from imubench_pipeline.validation import ConfigError
 
 

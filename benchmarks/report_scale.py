@@ -25,7 +25,8 @@ import yaml
 
 from imubench_pipeline.drift import drift_rows
 from imubench_pipeline.report.publish import publish, site_of
-from imubench_pipeline.tables import OF_ONE_RECORDING, TABLES, build, read
+from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
+from imubench_pipeline.tables import build, read
 from resident import peak_memory
 
 PROJECT = Path(__file__).parents[1]

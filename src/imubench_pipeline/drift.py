@@ -37,7 +37,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtr, stdtrit
 
-from imubench_pipeline.pooled import POOLED, Row, _exp, _points, _usable
+from imubench_pipeline.pooled import POOLED, Row, bounded_exp, points_about_median, usable
 
 Order = Literal["started", "name"]
 
@@ -161,7 +161,7 @@ def _rows(series: Series, cells: Sequence[dict[tuple[str, str], Row]]) -> Iterat
             row = cells[place].get(key, _ABSENT)
             index = columns.get((*key, _kind(row)), -1)
             *y, p, changed, count, alone = _NOTHING if index < 0 else found[place][index]
-            expected = [None if math.isnan(x) else _exp(x) if noise else x for x in y]
+            expected = [None if math.isnan(x) else bounded_exp(x) if noise else x for x in y]
             value = row["value"] if row.get("status", "ok") == "ok" else None
             change = value / expected[0] - 1.0 if noise and value and expected[0] else None
             reasons = [_unjudged(row, count)] if math.isnan(p) else []
@@ -190,9 +190,9 @@ def _point(row: Row) -> tuple[float, ...]:
     if "status" not in row:
         return math.nan if row["value"] is None else row["value"], 0.0, 0.0
     triple = (row["value"] if row["status"] == "ok" else None, row["lower"], row["upper"])
-    if not _usable(triple):
+    if not usable(triple):
         return math.nan, math.nan, math.nan
-    y, points = _points([triple])
+    y, points = points_about_median([triple])
     return y, *points[0][1:]
 
 

@@ -139,14 +139,14 @@ def pool(
         If the lengths differ.
     """
     triples = list(zip(values, lower, upper, strict=True))
-    used = [triple for triple in triples if _usable(triple)]
-    others = [triple[1:] for triple in triples if not _usable(triple)]
+    used = [triple for triple in triples if usable(triple)]
+    others = [triple[1:] for triple in triples if not usable(triple)]
     if not used:
         return Pool(None, None, None, 0, len(others))
     if len(used) == 1:
         value, low, high = used[0]
         return Pool(value, low, high, 1, len(others), _outside(others, low, high))
-    middle, points = _points(used)
+    middle, points = points_about_median(used)
     freedom = len(used) - 1
     low_q, high_q, t = _quantiles(freedom)
     spread_squared = _spread_squared(points, float(freedom))
@@ -157,11 +157,13 @@ def pool(
     p_value = float(chdtrc(freedom, _minimum(points, 0.0)[1]))
     return Pool(
         value=math.exp(centre),
-        lower=_exp(centre - half),
-        upper=_exp(centre + half),
+        lower=bounded_exp(centre - half),
+        upper=bounded_exp(centre + half),
         recordings=len(used),
         left_out=len(others),
-        contradicting=_outside(others, _exp(centre - predicted), _exp(centre + predicted)),
+        contradicting=_outside(
+            others, bounded_exp(centre - predicted), bounded_exp(centre + predicted)
+        ),
         spread=math.sqrt(spread_squared),
         spread_lower=math.sqrt(_spread_squared(points, high_q)),
         spread_upper=math.sqrt(_spread_squared(points, low_q)),
@@ -170,7 +172,8 @@ def pool(
     )
 
 
-def _usable(triple: tuple[float | None, ...]) -> TypeGuard[tuple[float, float, float]]:
+def usable(triple: tuple[float | None, ...]) -> TypeGuard[tuple[float, float, float]]:
+    """Return whether value and limits are known, positive and in their order."""
     value, lower, upper = triple
     if value is None or lower is None or upper is None:
         return False
@@ -185,8 +188,9 @@ def _outside(limits: Iterable[Sequence[float | None]], low: float, high: float) 
     )
 
 
-def _exp(exponent: float) -> float:
-    return math.exp(min(exponent, 709.0))  # the largest float
+def bounded_exp(exponent: float) -> float:
+    """Return e to a power, at most the largest float."""
+    return math.exp(min(exponent, 709.0))
 
 
 @lru_cache(maxsize=4096)
@@ -196,7 +200,7 @@ def _quantiles(freedom: int) -> tuple[float, float, float]:
     return low, high, float(stdtrit(freedom, 0.975))
 
 
-def _points(used: Iterable[tuple[float, float, float]]) -> tuple[float, list[_Point]]:
+def points_about_median(used: Iterable[tuple[float, float, float]]) -> tuple[float, list[_Point]]:
     """Return the median of ln value, and the points about it, ascending."""
     logs = sorted((math.log(v), math.log(low), math.log(high)) for v, low, high in used)
     middle = logs[len(logs) // 2][0]  # taken out, to keep the digits of narrow limits
@@ -375,7 +379,7 @@ def _parameter_row(present: list[_Present], absent: int, several: bool) -> tuple
     found = pool(*zip(*triples, strict=True))
     logs, left_out = [], Counter[str]()
     for (device, row), triple in zip(present, triples, strict=True):
-        if _usable(triple):
+        if usable(triple):
             logs.append((math.log(triple[0]), device))
         else:
             left_out[row["status"].replace("ok", "no limits").replace("_", " ")] += 1

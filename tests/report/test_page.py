@@ -5,10 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-
 from imubench_pipeline.report.page import render
+
 from imubench_pipeline.report.practical import page_unit
-from imubench_pipeline.tables import TABLES, build
+from imubench_pipeline.schemas import TABLES
+from imubench_pipeline.tables import build
 
 SETTINGS = {
     "report": {"title": "A <title>", "units": "practical"},

@@ -29,7 +29,8 @@ from imubench_pipeline.report.static_figures.terms import terms_figure
 from imubench_pipeline.report.static_figures.theory import CHARACTERISTIC, theory_figure
 from imubench_pipeline.report.view import ChannelView, recording_views
 from imubench_pipeline.results import Key, parameter_rows
-from imubench_pipeline.tables import TABLES, build, write
+from imubench_pipeline.schemas import TABLES
+from imubench_pipeline.tables import build, write
 
 DEGREE = math.pi / 180
 HOUR = DEGREE / 3600  # of a degree an hour

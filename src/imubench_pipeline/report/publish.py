@@ -23,7 +23,8 @@ from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.start import datasheets_page, recordings_page, start_page
 from imubench_pipeline.report.static_figures.files import figure_text
 from imubench_pipeline.report.static_figures.theory import theory_figure
-from imubench_pipeline.tables import OF_ONE_RECORDING, TABLES, read, write_content, write_json
+from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
+from imubench_pipeline.tables import read, write_content, write_json
 
 _KEYS = "pages.json"
 _SETTINGS = "settings.json"

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from imubench_pipeline.tables import TABLES, read
+from imubench_pipeline.schemas import TABLES
+from imubench_pipeline.tables import read
 
 if TYPE_CHECKING:
     from imubench_pipeline.report.static_figures.files import Make

@@ -1,0 +1,322 @@
+"""What every table holds: its columns with type, unit and meaning."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pyarrow as pa
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a table; ``unit`` is ``-`` for a text, a count or a ratio."""
+
+    name: str
+    type: pa.DataType
+    unit: str
+    meaning: str
+    required: bool = True
+
+
+def _text(name: str, meaning: str, required: bool = True) -> Column:
+    return Column(name, pa.string(), "-", meaning, required)
+
+
+def _number(name: str, unit: str, meaning: str, required: bool = False) -> Column:
+    return Column(name, pa.float64(), unit, meaning, required)
+
+
+def _count(name: str, meaning: str, required: bool = False) -> Column:
+    return Column(name, pa.int64(), "-", meaning, required)
+
+
+_SENSOR = _text("sensor", "name of the sensor file")
+_RECORDING = _text("recording", "name of the recording")
+_CHANNEL = _text("channel", "axis and quantity, gyro_x to accel_z")
+_METHOD = _text("method", "estimation method")
+_SI = "rad/s or m/s^2"
+_DENSITY = "(rad/s)^2/Hz or (m/s^2)^2/Hz"
+_KEYS = (_SENSOR, _RECORDING, _CHANNEL)
+
+TABLES: dict[str, tuple[Column, ...]] = {
+    "recordings": (
+        _SENSOR,
+        _text("device", "specimen of the sensor; by default the recording's name"),
+        _RECORDING,
+        _text("kind", "static or two_position"),
+        _text("started", "date and time of the first sample, where known", required=False),
+        Column("simulated", pa.bool_(), "-", "made from known parameters, not measured"),
+        _text("status", "ok or rejected"),
+        _text("reason", "why a recording is rejected", required=False),
+        _number("rate", "Hz", "sampling rate used"),
+        _text("rate_from", "where it is from: stamps, or stated", required=False),
+        _number("rate_error", "Hz", "its standard deviation, as the stamps' scatter tells"),
+        _count("samples", "samples present in the longest channel"),
+        _number("duration", "s", "from the first to the last sample"),
+        _number("temperature_min", "degC", "lowest temperature"),
+        _number("temperature_max", "degC", "highest temperature"),
+    ),
+    "findings": (
+        _SENSOR,
+        _RECORDING,
+        _text("channel", "the channel concerned; null: the whole recording", required=False),
+        _text("finding", "what was found"),
+        _text("severity", "note, warning or fatal"),
+        _text("detail", "in words, with what to do"),
+        _number("value", "as the finding says", "its size"),
+        _number("start", "s", "begin of the part concerned, from the first sample"),
+        _number("end", "s", "its end"),
+    ),
+    "allan": (
+        *_KEYS,
+        _number("tau", "s", "cluster length, cluster_size / rate", required=True),
+        _count("cluster_size", "samples in a cluster", required=True),
+        _number("adev", _SI, "Allan deviation", required=True),
+        _number("lower", _SI, "lower 95 % limit"),
+        _number("upper", _SI, "upper 95 % limit"),
+        _number("edf", "-", "equivalent degrees of freedom of the Allan variance"),
+        _number(
+            "averaged",
+            "-",
+            "samples that a cluster really averages: fewer than its size where samples are missing",
+        ),
+        _count("exponent", "noise type: 0 white, -1 flicker, -2 random walk, 1 and 2 phase noise"),
+    ),
+    "parameters": (
+        *_KEYS,
+        _METHOD,
+        Column("recommended", pa.bool_(), "-", "the method to use for this channel"),
+        _text("model", "the terms of the model, such as N+GM+K"),
+        _count("component", "number of a repeated term, from 1", required=True),
+        _text("parameter", "Q, N, B, T_B, K, R; amplitude and frequency of a line"),
+        _number("value", "as in unit", "estimate; null where status says why"),
+        _number("lower", "as in unit", "lower 95 % limit"),
+        _number("upper", "as in unit", "upper 95 % limit"),
+        _text("unit", "SI unit of value, lower and upper"),
+        _text("status", "ok, not_shown, at_bound, not_identified or absent"),
+        _text("reason", "why there is no plain value", required=False),
+        _number("duration_needed", "s", "length of a log that gives the value to 10 %"),
+        _number("fitted", "as in unit", "what the model has where value is null; no estimate"),
+    ),
+    "models": (
+        *_KEYS,
+        _text("model", "the terms: Q, N, F (flicker), GM, K, R"),
+        Column("chosen", pa.bool_(), "-", "the model of method likelihood: the lowest BIC"),
+        _count("free", "free parameters", required=True),
+        _number("log_likelihood", "-", "up to a constant of the channel", required=True),
+        _number("bic", "-", "-2 log likelihood + free log(bins); + 4 where GM stands for K", True),
+        _number("aic", "-", "-2 log likelihood + 2 free", required=True),
+        _number("weight", "-", "of the model among the candidates, by BIC", required=True),
+        _number("deviance", "-", "mean of a bin; about 1 where the model is right"),
+        _number("chance", "-", "of so poor a fit, if the model is right"),
+        _text("verdict", "explained or not explained"),
+        _text("note", "where it is furthest from the spectrum; what AIC says", required=False),
+        _count("bins", "bins of the spectrum used", required=True),
+        _number("band", "Hz", "highest frequency used"),
+        _text("band_source", "how it was found", required=False),
+    ),
+    "lines": (
+        *_KEYS,
+        _text("kind", "sinusoid; band of noise; alias of a faster line in block means"),
+        _number("frequency", "Hz", "of the line", required=True),
+        _number("frequency_lower", "Hz", "lower 95 % limit"),
+        _number("frequency_upper", "Hz", "upper 95 % limit"),
+        _number("amplitude", _SI, "of the sinusoid", required=True),
+        _number("amplitude_lower", _SI, "lower 95 % limit"),
+        _number("amplitude_upper", _SI, "upper 95 % limit"),
+        _number("ratio", "-", "highest density over that of the noise"),
+        _number("false_alarm", "-", "chance of one like it in a channel without lines"),
+        _number("width", "Hz", "how wide it is"),
+    ),
+    "envelope": (
+        *_KEYS,
+        _number("start", "s", "begin of a part of the log, from the first sample", required=True),
+        _number("end", "s", "its end", required=True),
+        _number("low", "SI", "least sample; degC for temperature"),
+        _number("high", "SI", "largest sample"),
+        _number("mean", "SI", "mean of the samples"),
+        _count("samples", "samples present", required=True),
+    ),
+    "histogram": (
+        *_KEYS,
+        _number("lower", "SI", "lower edge of the bin", required=True),
+        _number("upper", "SI", "upper edge of the bin", required=True),
+        _count("count", "samples in it", required=True),
+    ),
+    "spectrum": (
+        *_KEYS,
+        _number("frequency", "Hz", "mean of the bin", required=True),
+        _number("lower", "Hz", "lower end of the bin", required=True),
+        _number("upper", "Hz", "upper end of the bin", required=True),
+        _number("ordinates", "-", "degrees of freedom of the bin", required=True),
+        _number("density", _DENSITY, "measured, two-sided", required=True),
+        _number("fitted", _DENSITY, "of the chosen model"),
+        Column("used", pa.bool_(), "-", "inside the band, and clear of lines"),
+    ),
+    "fixed_bias": (
+        *_KEYS,
+        _number("value", "as in unit", "mean of the samples", required=True),
+        _text("unit", "SI unit of value"),
+    ),
+    "drift": (
+        _SENSOR,
+        _text("device", "of which the recordings are compared"),
+        _CHANNEL,
+        _text("parameter", "N, B, K, T_B, Q, R, or bias: the fixed bias"),
+        _RECORDING,
+        _count("position", "place in the order of the device's recordings, from 1", required=True),
+        _text("started", "date and time of the first sample, where known", required=False),
+        _number("value", "as in unit", "estimate of this recording"),
+        _number("lower", "as in unit", "lower 95 % limit"),
+        _number("upper", "as in unit", "upper 95 % limit"),
+        _text("unit", "SI unit"),
+        _number("expected", "as in unit", "what the earlier recordings let one expect"),
+        _number("expected_lower", "as in unit", "lower 95 % limit of the estimate expected"),
+        _number("expected_upper", "as in unit", "upper 95 % limit of the estimate expected"),
+        _number("change", "-", "value / expected - 1; null for a bias"),
+        _number("p_value", "-", "chance of such a difference, if the device has not changed"),
+        _text("verdict", "changed or as before; null: cannot be judged", required=False),
+        _text("reason", "in words", required=False),
+    ),
+    "pooled": (
+        _SENSOR,
+        _text("device", "null: all recordings of the sensor", required=False),
+        _CHANNEL,
+        _text("parameter", "Q, N, B, T_B, K, R, or bias: the fixed bias"),
+        _count("recordings", "recordings pooled", required=True),
+        _count("left_out", "recordings that have no value to pool", required=True),
+        _number("value", "as in unit", "pooled estimate"),
+        _number("lower", "as in unit", "lower 95 % limit, the spread between recordings included"),
+        _number("upper", "as in unit", "upper 95 % limit"),
+        _text("unit", "SI unit"),
+        _number("spread", "as in unit", "standard deviation between recordings"),
+        _number("spread_lower", "as in unit", "lower 95 % limit of the spread"),
+        _number("spread_upper", "as in unit", "upper 95 % limit of the spread"),
+        _number("p_value", "-", "chance of such differences, if the recordings agree"),
+        _text("verdict", "agree or differ, at 1 %", required=False),
+        _text("reason", "in words", required=False),
+    ),
+    "reconstruction": (
+        *_KEYS,
+        _METHOD,
+        _number("tau", "s", "cluster length", required=True),
+        _number("adev", _SI, "median of the ensemble of simulated logs", required=True),
+        _number("lower", _SI, "lower 95 % limit of the ensemble", required=True),
+        _number("upper", _SI, "upper 95 % limit of the ensemble", required=True),
+        _number("reconstructed", _SI, "Allan deviation of the full-length simulated log", True),
+    ),
+    "scores": (
+        *_KEYS,
+        _METHOD,
+        _number("rms", _SI, "RMS over tau of reconstructed minus measured Allan deviation"),
+        _number("rms_log10", "decades", "RMS over tau of the difference of log10"),
+        _number("inside_band", "-", "share of the measured curve inside the 95 % band"),
+        _text("reason", "why there is no score", required=False),
+    ),
+    "datasheet": (
+        *_KEYS,
+        _text("method", "estimation method; mean: the mean of the log"),
+        _text("quantity", "N, bias_instability, K, T_B, allan_deviation, offset, ..."),
+        _text("statistic", "what is compared: N, adev_minimum, plateau (0.664 B), K, T_B, mean"),
+        _number("printed", "as in unit", "figure as printed; null: not published"),
+        _text("unit", "unit as printed", required=False),
+        _text("kind", "typ, max, min, range, 1sigma or derived", required=False),
+        _text("condition", "as printed", required=False),
+        _text("sidedness", "of a noise density, as assumed in this row", required=False),
+        _number("comparable", "SI", "the printed figure in the convention of measured"),
+        _number("comparable_lower", "SI", "least figure that is printed of it, such as typ"),
+        _number("comparable_upper", "SI", "largest figure that is printed of it, such as max"),
+        _number("measured", "SI", "estimate of the same quantity"),
+        _number("lower", "SI", "lower 95 % limit of measured"),
+        _number("upper", "SI", "upper 95 % limit of measured"),
+        _number("delta", "-", "measured / comparable - 1"),
+        _number("delta_lower", "-", "least that both intervals allow"),
+        _number("delta_upper", "-", "largest that both intervals allow"),
+        _text("verdict", "better than typ, as printed, worse than typ, not sure, ..."),
+        _text("reason", "in words", required=False),
+    ),
+    "datasheet_curve": (
+        *_KEYS,
+        _text("sidedness", "of the noise density, as assumed in this row", required=False),
+        _number("N", _SI + " times sqrt(s)", "line N / sqrt(tau) of the datasheet"),
+        _number("floor", _SI, "bias instability of the datasheet"),
+        _number("rms", _SI, "RMS over tau of measured Allan deviation minus the lines'"),
+        _number("rms_log10", "decades", "RMS over tau of the difference of log10"),
+    ),
+    "coverage": (
+        _SENSOR,
+        _text("vendor", "of the sensor"),
+        _text("model", "of the sensor"),
+        _text("quantity", "gyro or accel"),
+        _text("figure", "N, B, K, T_B, temperature_coefficient or offset"),
+        _text("published", "yes, no, other convention, not looked up"),
+        _text("as_printed", "every figure of it", required=False),
+        _text("document", "with its revision", required=False),
+        _text("source", "primary or secondary", required=False),
+    ),
+    "coverage_by_vendor": (
+        _text("vendor", "of the sensors"),
+        _text("quantity", "gyro or accel"),
+        _text("figure", "N, B, K, T_B, temperature_coefficient or offset"),
+        _count("sensors", "of the vendor in the catalogue", required=True),
+        _count("yes", "that have it published", required=True),
+        _count("other_convention", "that have something akin", required=True),
+        _count("no", "that do not", required=True),
+        _count("not_looked_up", "that nobody looked it up for", required=True),
+    ),
+    "error_budget": (
+        _SENSOR,
+        _RECORDING,
+        _text("requirement", "that asks; null: the times of the settings", required=False),
+        _text("axis", "worst or median axis of the sensor"),
+        _text("gyro", "channel that answers", required=False),
+        _text("accel", "channel that answers", required=False),
+        _text("error", "attitude, heading, velocity, position; north: heading found at rest"),
+        _number("time", "s", "of dead reckoning; of rest for north", required=True),
+        _text("source", "total, or what the error comes of"),
+        _number("sigma", "as in unit", "standard deviation; null where reason says why"),
+        _number("lower", "as in unit", "lower 95 % limit of a total"),
+        _number("upper", "as in unit", "upper 95 % limit of a total"),
+        _number("limit", "as in unit", "largest standard deviation that is allowed"),
+        _text("unit", "SI unit"),
+        _number("reached_after", "s", "time after which the limit is reached; null: never"),
+        _text("reason", "what is not known", required=False),
+    ),
+    "ranking": (
+        _text("requirement", "file under config/requirements, without .yaml"),
+        _SENSOR,
+        _count("rank", "1 is the best; null: not ranked"),
+        _text("tied_with", "sensors whose intervals overlap", required=False),
+        _text("verdict", "passes, probably passes, probably fails, surely fails, ..."),
+        Column("decides", pa.bool_(), "-", "the limit with the least margin", required=True),
+        _text("recording", "that answers", required=False),
+        _text("error", "as in error_budget"),
+        _number("time", "s", "as in error_budget", required=True),
+        _number("at_most", "as in unit", "the limit as it was asked for"),
+        _number("confidence", "-", "chance of an error within it that was asked for"),
+        _number("limit", "as in unit", "the same as a standard deviation: the largest allowed"),
+        _number("sigma", "as in unit", "standard deviation of the error"),
+        _number("lower", "as in unit", "lower 95 % limit"),
+        _number("upper", "as in unit", "upper 95 % limit"),
+        _text("unit", "SI unit"),
+        _number("margin", "-", "limit over sigma"),
+        _number("chance", "-", "that sigma is within limit, as far as the estimates tell"),
+        _text("limit_verdict", "of this limit alone"),
+        _text("source", "the largest contribution", required=False),
+        _number("share", "-", "its part of the variance"),
+        _number("reached_after", "s", "time after which the limit is reached"),
+        _text("reason", "what is not known", required=False),
+    ),
+    "simulated_truth": (
+        *_KEYS,
+        _text("parameter", "N, B, K, T_B or bias"),
+        _number("value", "as in unit", "true value of the simulation", required=True),
+        _text("unit", "SI unit of value"),
+        Column("assumed", pa.bool_(), "-", "not published by the source: chosen"),
+        _text("source", "where the parameters are published"),
+    ),
+}
+"""Every table a run leaves, by name; all numbers are SI (temperatures in degC)."""
+
+OF_ONE_RECORDING = ("envelope", "histogram")
+"""The tables that are kept with each recording and not joined."""
