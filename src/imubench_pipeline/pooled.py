@@ -182,10 +182,7 @@ def usable(triple: tuple[float | None, ...]) -> TypeGuard[tuple[float, float, fl
 
 def _outside(limits: Iterable[Sequence[float | None]], low: float, high: float) -> int:
     """Count the limits that lie wholly outside a range; a limit that is None says nothing."""
-    return sum(
-        (upper is not None and upper < low) or (lower is not None and lower > high)
-        for lower, upper in limits
-    )
+    return sum((b is not None and b < low) or (a is not None and a > high) for a, b in limits)
 
 
 def bounded_exp(exponent: float) -> float:

@@ -18,7 +18,7 @@ _STATISTIC_NAMES = {
     "K": "K",
     "T_B": "T_B",
 }
-_SYMBOLS = {"N": "N", "K": "K", "T_B": "T_B"}
+_SYMBOLS = {"N": "N", "K": "K", "T_B": "T_B", "offset": "signal"}
 
 _TITLES = {"gyro": "Gyroscope: published figures", "accel": "Accelerometer: published figures"}
 _SIGNS = {"yes": "yes", "no": "no", "other convention": "other", "not looked up": "?"}
