@@ -16,6 +16,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from datetime import date, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ from resident import peak_memory
 
 PROJECT = Path(__file__).parents[1]
 SENSORS = 20
+FIRST_NIGHT = date(2026, 1, 1)
 TRUTH = {
     "gyro": {"N": "0.3 deg/sqrt(h)", "B": "10 deg/h", "T_B": "100 s", "K": "5 deg/h/sqrt(h)"},
     "accel": {"N": "60 ug/sqrt(Hz)", "B": "30 ug", "T_B": "60 s", "K": "100 ug/sqrt(h)"},
@@ -104,7 +106,10 @@ def multiplied(results: Path, number: int) -> dict[str, pa.Table]:
 def _copy(table: pa.Table, sensor: str, recording: str, number: int, factor: float) -> pa.Table:
     changed = {"sensor": sensor, "recording": recording}
     if "device" in table.column_names:
-        changed |= {"device": f"unit {sensor}", "started": f"2026-01-01T{number // 3600:02d}:00:00"}
+        changed |= {
+            "device": f"unit {sensor}",
+            "started": str(FIRST_NIGHT + timedelta(number // SENSORS)),
+        }
     columns = []
     for name in table.column_names:
         column = table[name]

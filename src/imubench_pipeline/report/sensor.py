@@ -114,7 +114,9 @@ def _device(site: Site, own: Sequence[RecordingView], rows: Sequence[Row]) -> di
     sensor, device = own[0].sensor, own[0].row["device"]
     named = {(view.sensor, view.name) for view in own}
     rows = [row for row in rows if (row["sensor"], row["recording"]) in named]
-    dated = bool(rows) and all(row["started"] for row in rows)
+    # As `imubench_pipeline.drift.order_of` has it: stamps that are all the same tell no order.
+    stamps = {row["started"] for row in rows}
+    dated = None not in stamps and len(stamps) > 1
     trends: dict[str, list[dict[str, Any]]] = {}
     payload: list[dict[str, Any]] = []
     for channel, parameter in dict.fromkeys((row["channel"], row["parameter"]) for row in rows):

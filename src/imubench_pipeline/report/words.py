@@ -78,6 +78,8 @@ def requirement_verdict(groups: Sequence[Mapping[str, Any]], names: Mapping[str,
         Name of each sensor as it is shown.
     """
     ranked = [group for group in groups if group["rank"] != "–"]
+    if not groups:
+        return "No recording answers it."
     if not ranked:
         return "No sensor can be ranked for it: " + _others(groups, names)
     best = ranked[0]
