@@ -26,6 +26,7 @@ import yaml
 
 from imubench_pipeline.drift import drift_rows
 from imubench_pipeline.report.publish import publish, site_of
+from imubench_pipeline.report.static_figures.of_run import draw_comparison
 from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
 from imubench_pipeline.tables import build, read
 from resident import peak_memory
@@ -168,6 +169,9 @@ def main() -> None:
             print(f"{what}: {time.perf_counter() - start:.1f} s, {len(written)} files written")
 
         timed(f"{given.recordings} recordings x {len(CHANNELS)} channels")
+        start = time.perf_counter()
+        draw_comparison(tables, "practical", report / "figures")
+        print(f"figures for print, a step of their own: {time.perf_counter() - start:.1f} s")
         files = [path for path in report.rglob("*") if path.is_file()]
         size = sum(path.stat().st_size for path in files) / 1e6
         twins = sum(p.stat().st_size for p in (report / "figures").iterdir()) / 1e6

@@ -97,6 +97,8 @@ class AllanSettings(Strict):
     longest: FractionOfLog = Field(0.5, description="longest tau, as a part of the log")
 
 
+HeldBack = Annotated[Text, Field(pattern=r"^[^/]+/[^/]+$", examples=["my_sensor/run_7"])]
+
 Method = Literal["likelihood", "likelihood_gm", "curve", "paper", "weighted"]
 
 
@@ -253,6 +255,9 @@ class Run(Strict):
         Path | None, BeforeValidator(_path_or_none, json_schema_input_type=str | bool | None)
     ] = Field(
         Path("config/requirements"), description="what applications need, a file each; false: none"
+    )
+    held_back: tuple[HeldBack, ...] = Field(
+        (), description="recordings whose logs are not read; results that are there stay"
     )
     allan: AllanSettings = AllanSettings()
     estimate: EstimateSettings = EstimateSettings()

@@ -10,6 +10,7 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 from pydantic import BaseModel
@@ -22,7 +23,11 @@ from imubench_pipeline.sensor import RecordingNotes, Sensor, merged_log, read_se
 from imubench_pipeline.units import quantity_to_si
 from imubench_pipeline.validation import ConfigError, parse, read_yaml
 
-_NOT_LOGS = {".yaml", ".yml", ".md", ".part", ".tmp", ".filepart", ".crdownload"}
+PARTIAL = frozenset({".part", ".tmp", ".filepart", ".crdownload"})
+"""How the names of files end that are still being transferred."""
+
+_NOT_LOGS = {".yaml", ".yml", ".md"} | PARTIAL
+_OF_INGEST = ("quality.json", "envelope.parquet", "histogram.parquet")
 _COMPRESSED = {".gz", ".zst", ".xz", ".bz2", ".zip"}
 _UNUSABLE_IN_NAMES = re.compile(r"[^\w .+()-]")
 _LONGEST_NAME = 120
@@ -59,6 +64,8 @@ class Recording:
     simulated : bool
     error : str or None
         Why the file cannot be used, where its name or its place says so already.
+    held_back : bool
+        The log is not read in this run: the results that are there stay.
     """
 
     sensor: str
@@ -67,10 +74,15 @@ class Recording:
     notes: Path | None
     simulated: bool
     error: str | None = None
+    held_back: bool = False
 
     @property
     def files(self) -> list[Path]:
         """What the recording depends on."""
+        if self.held_back:
+            # No such file, but what would be made of it is there: Snakemake takes that as it is,
+            # whatever became of the log, the settings or the code since.
+            return [self.path / "held back"]
         if self.error:
             return []
         logs = [self.path] if self.simulated else log_files(self.path)
@@ -112,26 +124,23 @@ class Plan:
                     "that holds <sensor>/<recording>"
                 )
             return []
-        found = []
-        for folder in sorted(path for path in self.run.logs.iterdir() if path.is_dir()):
-            for path in sorted(folder.iterdir()):
-                if path.name.startswith(".") or path.name.endswith("~"):
-                    continue
-                if path.is_file() and path.suffix.lower() in _NOT_LOGS:
-                    continue
-                name = path.name if path.is_dir() else _stem(path)
-                notes = folder / f"{name}.yaml"
-                found.append(
-                    Recording(
-                        folder.name,
-                        _UNUSABLE_IN_NAMES.sub("_", name)[:_LONGEST_NAME],
-                        path,
-                        notes if notes.is_file() else None,
-                        simulated=False,
-                        error=_fault(path, name),
-                    )
-                )
-        return found
+        found: dict[str, list[Recording]] = {}
+        for log in found_logs(self.run.logs):
+            found.setdefault(f"{log.sensor}/{log.name}", []).append(log)
+        for key in self.run.held_back:
+            found[key] = self._as_it_is(key, found.get(key, []))
+        return sorted(chain.from_iterable(found.values()), key=lambda log: log.path)
+
+    def _as_it_is(self, key: str, logs: list[Recording]) -> list[Recording]:
+        """Return a recording that is held back, if its results are there; its log may be not."""
+        sensor, _, name = key.partition("/")
+        folder = self.run.results / "recordings" / sensor / name
+        if (sensor, name) in self._simulated or not all(
+            (folder / file).is_file() for file in _OF_INGEST
+        ):
+            return []
+        path = logs[0].path if logs else self.run.logs / sensor / name
+        return [Recording(sensor, name, path, None, simulated=False, held_back=True)]
 
     def _to_simulate(self) -> list[Recording]:
         return [
@@ -292,6 +301,39 @@ class Plan:
     def code(step: str) -> str:
         """Return the digest of the code that a step runs."""
         return source_digest(*STEPS[step])
+
+
+def found_logs(logs: Path) -> list[Recording]:
+    """Return the recordings of a drop zone, in order; two logs of one name are there twice."""
+    found = []
+    for folder in sorted(path for path in logs.iterdir() if path.is_dir()):
+        for path in sorted(folder.iterdir()):
+            if path.name.startswith(".") or path.name.endswith("~"):
+                continue
+            if path.is_file() and path.suffix.lower() in _NOT_LOGS:
+                continue
+            name = path.name if path.is_dir() else _stem(path)
+            notes = folder / f"{name}.yaml"
+            found.append(
+                Recording(
+                    folder.name,
+                    _usable(name),
+                    path,
+                    notes if notes.is_file() else None,
+                    simulated=False,
+                    error=_fault(path, name),
+                )
+            )
+    return found
+
+
+def name_of(file: str) -> str:
+    """Return the name of the recording whose log has this file name."""
+    return _usable(_stem(Path(file)))
+
+
+def _usable(name: str) -> str:
+    return _UNUSABLE_IN_NAMES.sub("_", name)[:_LONGEST_NAME]
 
 
 def _fault(path: Path, name: str) -> str | None:

@@ -41,8 +41,7 @@ class Comparison:
                 self._add(view, channel)
 
     def _add(self, view: RecordingView, channel: ChannelView) -> None:
-        link = f"{view.page}#{channel.channel}"
-        self._curves.append(compared(channel, self._arrays, link))
+        self._curves.append(compared(channel, self._arrays))
         own = self._datasheets.setdefault(view.sensor, {})
         if channel.channel not in own:
             own[channel.channel] = datasheet_lines(channel)

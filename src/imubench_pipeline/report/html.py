@@ -45,7 +45,7 @@ def environment(system: System) -> jinja2.Environment:
         """Return the sign of a unit that the reader can switch."""
         return Markup('<span data-sign="{}">{}</span>').format(unit, _unit(unit, system).sign)
 
-    made.globals |= {"si": si, "sign": sign, "term": _term, "to": _to}
+    made.globals |= {"si": si, "sign": sign, "term": _term, "hint": _hint, "to": _to}
     made.filters |= {"duration": duration_text, "number": number_text, "json": _json}
     made.filters["attribute"] = _compact
     return made
@@ -69,6 +69,12 @@ def _term(context: Context, key: str, text: str | None = None) -> Markup:
     return Markup('<a class="term" href="{}theory.html#{}" data-term="{}">{}</a>').format(
         context["root"], one.section, one.key, escape(text or one.name)
     )
+
+
+def _hint(key: str) -> Markup:
+    """Return a term with its explanation alone, for tables of many rows."""
+    one = term(key)
+    return Markup('<i data-term="{}">{}</i>').format(one.key, one.name)
 
 
 def _json(value: Any) -> Markup:

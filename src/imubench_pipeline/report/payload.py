@@ -36,18 +36,18 @@ class Arrays:
 
     def exact(self, values: ArrayLike) -> int:
         """Return the place of an array that is kept as float32."""
-        return self._place("float", 0.0, 0.0, np.asarray(values, dtype="<f4"))
+        return self._place("f", 0.0, 0.0, np.asarray(values, dtype="<f4"))
 
     def log(self, values: ArrayLike) -> int:
         """Return the place of an array of positive numbers, right to a few parts in 10,000."""
         numbers = np.asarray(values, dtype=np.float64)
         with np.errstate(divide="ignore", invalid="ignore"):
             logarithms = np.where(numbers > 0.0, np.log10(numbers), np.nan)
-        return self._levels("log", logarithms, 65534)
+        return self._levels("l", logarithms, 65534)
 
     def even(self, values: ArrayLike) -> int:
         """Return the place of an array that is drawn on an even axis, in 254 steps."""
-        return self._levels("even", np.asarray(values, dtype=np.float64), 254)
+        return self._levels("e", np.asarray(values, dtype=np.float64), 254)
 
     def _levels(self, kind: str, values: NDArray[np.float64], levels: int) -> int:
         there = np.isfinite(values)
@@ -67,7 +67,7 @@ class Arrays:
     def texts(self) -> list[list[Any]]:
         """Kind, begin, step and base64 of each array."""
         return [
-            [kind, float(f"{low:.7g}"), float(f"{step:.7g}"), base64.b64encode(data).decode()]
+            [kind, float(f"{low:.6g}"), float(f"{step:.6g}"), base64.b64encode(data).decode()]
             for kind, low, step, data in self._places
         ]
 
@@ -83,7 +83,7 @@ def looks(sensors: Mapping[str, Appearance]) -> dict[str, Any]:
     }
 
 
-def compared(view: ChannelView, arrays: Arrays, link: str) -> dict[str, Any]:
+def compared(view: ChannelView, arrays: Arrays) -> dict[str, Any]:
     """Return a channel as it is drawn among others: curve, models, datasheet, parameters."""
     tau = view.tau
     return {
@@ -91,7 +91,6 @@ def compared(view: ChannelView, arrays: Arrays, link: str) -> dict[str, Any]:
         "recording": view.recording,
         "channel": view.channel,
         "simulated": view.simulated,
-        "link": link,
         "recommended": view.recommended,
         "tau": arrays.log(tau),
         "adev": arrays.log(view.adev),
@@ -253,7 +252,7 @@ def samples_payload(
         rows = [row for row in histogram if row["channel"] == channel]
         found["histogram"][channel] = {
             "edges": arrays.exact([rows[0]["lower"], *(row["upper"] for row in rows)]),
-            "count": arrays.exact([row["count"] for row in rows]),
+            "count": arrays.log([row["count"] for row in rows]),
         }
     return found
 

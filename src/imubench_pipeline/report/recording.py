@@ -26,7 +26,7 @@ from imubench_pipeline.tables import read
 _EXACT = 1e-9
 """Relative error of a rate that is not worth a word."""
 
-_SHOWN_MODELS = 6
+_SHOWN_MODELS = 4
 
 
 def recording_page(site: Site, view: RecordingView) -> Page:

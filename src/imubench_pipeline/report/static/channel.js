@@ -188,7 +188,7 @@ kinds.histogram = (figure) => {
   const unit = unitOf(quantityOf(channel), "signal");
   const edges = scaled(found.edges, unit.factor);
   const [lower, upper] = [edges.slice(0, -1), edges.slice(1)];
-  const count = array(found.count);
+  const count = array(found.count).map((each) => Math.round(each || 0));
   const total = count.reduce((sum, each) => sum + each, 0);
   const height = count.map((each, i) => each / total / (upper[i] - lower[i] || 1));
   const middle = lower.map((low, i) => (low + upper[i]) / 2);
@@ -198,7 +198,7 @@ kinds.histogram = (figure) => {
   const traces = [{
     group: "samples", type: "bar", x: middle, y: height, width: lower.map((low, i) => upper[i] - low),
     marker: { color: faint(colourOf(look), 0.6), line: { width: 0 } },
-    text: count.map((each, i) => `${numberText(each, 6)} samples, ${interval(lower[i], upper[i])} ${unit.sign}`), textposition: "none",
+    text: count.map((each, i) => `${numberText(each, 3)} samples, ${interval(lower[i], upper[i])} ${unit.sign}`), textposition: "none",
     hovertemplate: "%{text}<extra></extra>",
   }];
   if (deviation > 0) {

@@ -8,19 +8,20 @@ const drawn = new Set();
 let pageData = null;
 let decoded = [];
 
-// Kinds of arrays: float32 as they are; else levels, of which 0 stands for no value.
+// Kinds of arrays: f, float32 as they are; l and e, levels of a logarithm and even ones, of which
+// 0 stands for no value.
 function array(place) {
   if (decoded[place] === undefined) {
     const [kind, low, step, text] = pageData.arrays[place];
     const bytes = Uint8Array.from(atob(text), (sign) => sign.charCodeAt(0));
-    if (kind === "float") {
+    if (kind === "f") {
       decoded[place] = [...new Float32Array(bytes.buffer)];
     } else {
-      const levels = kind === "even" ? bytes : new Uint16Array(bytes.buffer);
+      const levels = kind === "e" ? bytes : new Uint16Array(bytes.buffer);
       decoded[place] = Array.from(levels, (level) => {
         if (level === 0) return NaN;
         const value = low + (level - 1) * step;
-        return kind === "log" ? 10 ** value : value;
+        return kind === "l" ? 10 ** value : value;
       });
     }
   }
