@@ -10,6 +10,7 @@ from imubench_pipeline.report.parameters import cell, shown_symbols
 from imubench_pipeline.report.payload import Arrays, compared, datasheet_lines
 from imubench_pipeline.report.practical import System
 from imubench_pipeline.report.view import QUANTITY_NAMES, ChannelView, RecordingView
+from imubench_pipeline.report.words import model_text
 
 _PAPERS = "likelihood_gm"
 
@@ -61,7 +62,7 @@ class Comparison:
             "channel": channel.channel,
             "warnings": channel.warnings,
             "asked": asked,
-            "model": channel.parameters[method][0]["model"],
+            "model": model_text(channel.parameters[method][0]["model"]),
             "cells": {
                 symbol: cell(channel, method, symbol, duration, self._system)
                 for symbol in shown_symbols(channel)

@@ -18,6 +18,7 @@ from imubench_pipeline.report.practical import (
     number_text,
     page_unit,
 )
+from imubench_pipeline.report.words import started_text
 
 
 def environment(system: System) -> jinja2.Environment:
@@ -39,14 +40,22 @@ def environment(system: System) -> jinja2.Environment:
             return Markup("–")
         text = _unit(unit, system).text(value, digits)
         of = "" if inside else Markup(' data-unit="{}" data-digits="{}"').format(unit, digits)
-        return Markup('<data value="{}"{}>{}</data>').format(f"{value:.5g}", of, text)
+        return Markup('<data value="{}"{}>{}</data>').format(f"{value:.7g}", of, text)
 
     def sign(unit: str) -> Markup:
         """Return the sign of a unit that the reader can switch."""
         return Markup('<span data-sign="{}">{}</span>').format(unit, _unit(unit, system).sign)
 
-    made.globals |= {"si": si, "sign": sign, "term": _term, "hint": _hint, "to": _to}
+    made.globals |= {
+        "action": _action,
+        "si": si,
+        "sign": sign,
+        "term": _term,
+        "hint": _hint,
+        "to": _to,
+    }
     made.filters |= {"duration": duration_text, "number": number_text, "json": _json}
+    made.filters["started"] = started_text
     made.filters["attribute"] = _compact
     return made
 
@@ -75,6 +84,11 @@ def _hint(key: str) -> Markup:
     """Return a term with its explanation alone, for tables of many rows."""
     one = term(key)
     return Markup('<i data-term="{}">{}</i>').format(one.key, one.name)
+
+
+def _action(key: str) -> str:
+    """Return what to do about a finding."""
+    return term(key).action or ""
 
 
 def _json(value: Any) -> Markup:

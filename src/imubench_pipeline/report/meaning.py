@@ -83,7 +83,7 @@ def _limit(row: Row, system: System) -> dict[str, Any]:
         "limit": f"{_NAMES[row['error']]}, {duration_text(row['time'])}",
         "allowed": unit.text(row["limit"], 3),
         "sigma": _shown(row["error"], row["sigma"], unit) if known else "–",
-        "interval": interval_text(row, unit),
+        "interval": interval_text(row, unit) if known and _sensible(row, row["sigma"]) else "–",
         "unit": unit.sign,
         "margin": number_text(row["margin"], 3) if known else "–",
         "chance": _percent(row["chance"]) if known else "–",
@@ -153,7 +153,9 @@ def _cell(rows: Sequence[Row], unit: PageUnit) -> dict[str, Any]:
     """Return an error with its interval, and what it comes of."""
     (total,) = (row for row in rows if row["source"] == "total")
     shown = _shown(total["error"], total["sigma"], unit)
-    lines = [shown, interval_text(total, unit)] if shown[0].isdigit() else [shown]
+    lines = [shown]
+    if _sensible(total, total["sigma"]):
+        lines.append(interval_text(total, unit))
     if total["sigma"] > 0.0:
         parts = [row for row in rows if row["source"] != "total"][:_SHOWN_SOURCES]
         shares = ((row["source"], (row["sigma"] / total["sigma"]) ** 2) for row in parts)
@@ -161,9 +163,14 @@ def _cell(rows: Sequence[Row], unit: PageUnit) -> dict[str, Any]:
     return {"lines": lines, "note": total["reason"] or "", "class": "number"}
 
 
+def _sensible(row: Row, sigma: float) -> bool:
+    """Tell whether an error is below a quarter turn, beyond which an angle means nothing."""
+    return DIMENSIONS[row["error"]] != "angle" or sigma <= 0.5 * _HALF_TURN
+
+
 def _shown(error: str, sigma: float, unit: PageUnit) -> str:
     if DIMENSIONS[error] == "angle" and sigma > 0.5 * _HALF_TURN:  # type: ignore[index]
-        return "none" if error == "north" else f"over {unit.text(0.5 * _HALF_TURN, 3)}"
+        return "not to be found" if error == "north" else f"over {unit.text(0.5 * _HALF_TURN, 3)}"
     return unit.text(sigma, 3)
 
 

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from imubench_pipeline.estimators.estimate import FAMILY, PARAMETERS
-from imubench_pipeline.report.practical import System, page_unit
+from imubench_pipeline.report.practical import System, limit_digits, page_unit
 from imubench_pipeline.report.view import ChannelView, Row
-from imubench_pipeline.report.words import untold
+from imubench_pipeline.report.words import model_text, untold
 
 
 def shown_symbols(channel: ChannelView) -> list[str]:
@@ -38,7 +38,7 @@ def methods_table(
         {
             "method": method,
             "recommended": method == channel.recommended,
-            "model": channel.parameters[method][0]["model"],
+            "model": model_text(channel.parameters[method][0]["model"]),
             "cells": [cell(channel, method, s, duration, system) for s in symbols],
         }
         for method in channel.parameters
@@ -64,13 +64,19 @@ def cell(
         }
         for row in rows
     ]
+    digits = max((limit_digits(row["lower"], row["upper"]) for row in rows), default=3)
     words = [sentence for row in rows if (sentence := untold(row, unit, duration))]
-    return {"parts": parts, "words": " ".join(words), "value": rows[0]["value"] if rows else None}
+    return {
+        "parts": parts,
+        "words": " ".join(words),
+        "value": rows[0]["value"] if rows else None,
+        "digits": digits,
+    }
 
 
 def _truth(row: Row | None) -> dict[str, Any]:
     if row is None:
-        return {"parts": [], "words": "The simulation has none.", "value": None}
+        return {"parts": [], "words": "The simulation has none.", "value": None, "digits": 3}
     status = "assumed" if row["assumed"] else ""
     part: Mapping[str, Any] = {
         "value": row["value"],
@@ -78,4 +84,4 @@ def _truth(row: Row | None) -> dict[str, Any]:
         "upper": None,
         "status": status,
     }
-    return {"parts": [part], "words": row["source"], "value": row["value"]}
+    return {"parts": [part], "words": row["source"], "value": row["value"], "digits": 3}

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.noise_terms import Sinusoid
 from imubench_pipeline.report.palette import Appearance, method_appearance
 from imubench_pipeline.report.view import METHOD_NAMES, ChannelView, Row
 
@@ -133,7 +132,7 @@ def channel_payload(view: ChannelView, rate: float, arrays: Arrays) -> dict[str,
                 "name": name,
                 "adev": arrays.log(np.sqrt(term.allan_variance(view.tau))),
             }
-            for name, term in _named_terms(model)
+            for name, term in [*_named_terms(model), *_lines(model)]
         ],
         "datasheet": datasheet_lines(view),
         "spectrum": _spectrum(view, model, rate, arrays),
@@ -164,9 +163,16 @@ def _named_terms(model: NoiseModel) -> list[tuple[str, Any]]:
         "GM": "Gauss-Markov B, T_B",
         "K": "random walk K",
         "R": "ramp R",
-        "S": "line",
     }
-    return [(names[term.symbol], term) for term in model.terms]
+    return [(names[term.symbol], term) for term in model.terms if term.symbol in names]
+
+
+def _lines(model: NoiseModel) -> list[tuple[str, Any]]:
+    """Return the lines of a model together."""
+    count = len(model.sinusoids)
+    if count == 0:
+        return []
+    return [("line" if count == 1 else f"{count} lines", NoiseModel(sinusoids=model.sinusoids))]
 
 
 def datasheet_lines(view: ChannelView) -> list[dict[str, Any]]:
@@ -190,13 +196,12 @@ def datasheet_lines(view: ChannelView) -> list[dict[str, Any]]:
 
 
 def _estimates(view: ChannelView, method: str) -> dict[str, Any]:
-    found = {}
+    """Return value, limits and status of each component of the parameters that are compared."""
+    found: dict[str, list[list[Any]]] = {}
     for symbol in FOREST:
-        rows = view.named(method, symbol)
-        if rows:
-            row = rows[0]
+        for row in view.named(method, symbol):
             numbers = (_rounded(row[name]) for name in ("value", "lower", "upper"))
-            found[symbol] = [*numbers, row["status"]]
+            found.setdefault(symbol, []).append([*numbers, row["status"]])
     return found
 
 
@@ -207,7 +212,6 @@ def _spectrum(
         return None
     spectrum = view.spectrum
     frequency = spectrum["frequency"]
-    terms = [(name, term) for name, term in _named_terms(model) if not isinstance(term, Sinusoid)]
     smooth = np.geomspace(frequency[0], frequency[-1], _SMOOTH)
     return {
         "frequency": arrays.log(frequency),
@@ -218,7 +222,7 @@ def _spectrum(
         "smooth": arrays.log(smooth),
         "terms": [
             {"name": name, "density": arrays.log(np.sqrt(term.psd(smooth, 1.0 / rate)))}
-            for name, term in terms
+            for name, term in _named_terms(model)
         ],
         "lines": [
             {"frequency": row["frequency"], "amplitude": row["amplitude"], "kind": row["kind"]}
@@ -258,7 +262,7 @@ def samples_payload(
 
 
 def _rounded(value: float | None) -> float | None:
-    return None if value is None else float(f"{value:.5g}")
+    return None if value is None else float(f"{value:.6g}")
 
 
 def _number(value: float | None) -> float:

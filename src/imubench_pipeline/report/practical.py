@@ -6,6 +6,7 @@ it needs for that. The first choice is the practical one, the last is SI.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -17,6 +18,7 @@ System = Literal["practical", "si"]
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _LEAST_PLAIN, _MOST_PLAIN = 1e-4, 1e6
+_MOST_DIGITS = 7
 
 
 def number_text(value: float, digits: int = 4) -> str:
@@ -190,8 +192,18 @@ def duration_text(seconds: float) -> str:
     return f"{number_text(seconds, 3)} s"
 
 
-def interval_text(row: Mapping[str, Any], unit: PageUnit, digits: int = 3) -> str:
+def limit_digits(lower: float | None, upper: float | None, least: int = 3) -> int:
+    """Return with how many digits limits are printed, so that they are seen to differ."""
+    if lower is None or upper is None or not upper > lower:
+        return least
+    ratio = max(abs(lower), abs(upper)) / (upper - lower)
+    return min(max(least, math.ceil(math.log10(ratio)) + 1), _MOST_DIGITS)
+
+
+def interval_text(row: Mapping[str, Any], unit: PageUnit, least: int = 3) -> str:
     """Return ``lower to upper`` of a row of a table; a dash where they are not known."""
-    if row["lower"] is None or row["upper"] is None:
+    lower, upper = row["lower"], row["upper"]
+    if lower is None or upper is None:
         return "–"
-    return f"{unit.text(row['lower'], digits)} to {unit.text(row['upper'], digits)}"
+    digits = limit_digits(lower, upper, least)
+    return f"{unit.text(lower, digits)} to {unit.text(upper, digits)}"

@@ -20,13 +20,15 @@ from imubench_pipeline.report.practical import (
 )
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.view import ChannelView, RecordingView, Row
-from imubench_pipeline.report.words import counted, precision
+from imubench_pipeline.report.words import counted, model_text, precision, sentence, started_text
 from imubench_pipeline.tables import read
 
 _EXACT = 1e-9
 """Relative error of a rate that is not worth a word."""
 
 _SHOWN_MODELS = 4
+
+_RATE_FROM = {"stamps": "from the stamps", "stated": "as stated"}
 
 
 def recording_page(site: Site, view: RecordingView) -> Page:
@@ -78,7 +80,7 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
             "channels": [channel_payload(one, view.row["rate"], arrays) for one in channels],
             "samples": samples,
             "findings": [
-                {name: row[name] for name in ("number", "channel", "start", "end")}
+                {name: row[name] for name in ("number", "finding", "channel", "start", "end")}
                 for row in numbered
             ],
             "arrays": arrays.texts,
@@ -92,7 +94,7 @@ def _summary(view: RecordingView, channels: int) -> str:
         return "This recording could not be used; nothing of it is in the comparison."
     parts = [f"{duration_text(row['duration'])} at {number_text(row['rate'])} Hz"]
     if row["started"]:
-        parts.append(f"from {row['started']}")
+        parts.append(f"from {started_text(row['started'])}")
     if row["temperature_min"] is not None:
         low, high = (number_text(row[f"temperature_{end}"], 3) for end in ("min", "max"))
         parts.append(f"{low} to {high} °C")
@@ -179,11 +181,13 @@ def _model_words(channel: ChannelView) -> str:
         return ""
     best = channel.models[0]
     text = (
-        f"{best['model']} is the model that the data favour ({best['verdict']}; deviance of a bin "
-        f"{number_text(best['deviance'], 3)}, about 1 where the model is right)."
+        f"{model_text(best['model'])} is the model that the data favour ({best['verdict']}). The "
+        f"deviance of a bin is {number_text(best['deviance'], 3)}; it is about 1 where the model "
+        "is right."
     )
-    notes = [note for note in (best["note"], best["band_source"]) if note]
-    return text + (" " + "; ".join(notes).rstrip(".") + "." if notes else "")
+    notes = (best["note"] or "").split("; ")
+    band = f"Band: {best['band_source'].removeprefix('found: ')}" if best["band_source"] else ""
+    return " ".join(filter(None, [text, *(sentence(n) for n in notes), sentence(band)]))
 
 
 def _metadata(folder: Path) -> Mapping[str, Any]:
@@ -198,14 +202,17 @@ def _provenance(
     yield "Recording", f"{row['sensor']} / {row['recording']}"
     yield "Device", str(row["device"])
     yield "Kind", row["kind"] + (", simulated" if row["simulated"] else "")
-    yield "Started", row["started"] or "not stated in the log"
+    yield "Started", started_text(row["started"]) or "not stated in the log"
     if "reader" in kept:
         yield "Read as", str(kept["reader"] or "found by its content")
     if row["rate"] is not None:
         known = ""
         if row["rate_error"] is not None and row["rate_error"] > _EXACT * row["rate"]:
             known = f" ± {number_text(row['rate_error'], 2)} Hz"
-        yield "Rate", f"{number_text(row['rate'], 7)} Hz{known}, from {row['rate_from']}"
+        yield (
+            "Rate",
+            f"{number_text(row['rate'], 7)} Hz{known}, {_RATE_FROM.get(row['rate_from'], '')}",
+        )
     if row["samples"] is not None:
         yield "Samples", f"{row['samples']:,}".replace(",", " ")
     segments: Sequence[Any] = kept.get("segments", [])

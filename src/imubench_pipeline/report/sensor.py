@@ -11,6 +11,7 @@ from imubench_pipeline.report.datasheets import delta_rows
 from imubench_pipeline.report.meaning import budget_tables, budget_words
 from imubench_pipeline.report.palette import places
 from imubench_pipeline.report.payload import FOREST, looks
+from imubench_pipeline.report.practical import limit_digits
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.start import summary
 from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView, Row
@@ -47,10 +48,11 @@ def _sensor(site: Site, sensor: str, own: Sequence[RecordingView]) -> dict[str, 
         "standings": list(_standings(site, sensor)),
         "devices": list(_devices(own)),
         "forest": FOREST,
+        "several": sum(not view.rejected for view in own) > 1,
         "parameter_tables": list(together.tables()),
         "pooled": pooled,
         "pooled_filters": {
-            "axis": list(dict.fromkeys(row["channel"] for row in pooled)),
+            "axis": list(dict.fromkeys(row["axis"] for row in pooled)),
             "parameter": list(dict.fromkeys(row["name"] for row in pooled)),
         },
         "budgets": list(budget_tables(budget, simulated, site.system)),
@@ -97,6 +99,8 @@ def _pooled(row: Row) -> Row:
     quantity = row["channel"].split("_", maxsplit=1)[0]
     bias = row["parameter"] == "bias"
     return row | {  # type: ignore[operator]
+        "axis": row["channel"].replace("_", " "),
+        "digits": limit_digits(row["lower"], row["upper"], 4),
         "ref": f"{quantity}.{'signal' if bias else row['parameter']}",
         "name": "fixed bias" if bias else row["parameter"],
     }

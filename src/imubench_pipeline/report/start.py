@@ -7,12 +7,16 @@ from typing import Any
 
 from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.datasheets import coverage_tables, deltas_of_sensors
+from imubench_pipeline.report.glossary import term
 from imubench_pipeline.report.meaning import rankings
 from imubench_pipeline.report.payload import FOREST, looks
 from imubench_pipeline.report.practical import duration_text
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.view import RecordingView, Row
-from imubench_pipeline.report.words import counted, requirement_verdict
+from imubench_pipeline.report.words import counted, requirement_verdict, requirement_words
+
+_LONGEST_PART = 1 / 9
+"""Part of a log that tells an error of that length."""
 
 
 def start_page(site: Site) -> Page:
@@ -59,11 +63,12 @@ def summary(views: Sequence[RecordingView], several: bool = True) -> str:
         parts.append(f"{duration_text(lasting)} of data")
     started = sorted(view.row["started"][:10] for view in views if view.row["started"])
     if started:
-        parts.append(
-            f"recorded from {started[0]} to {started[-1]}"
-            if started[0] != started[-1]
-            else f"recorded on {started[0]}"
-        )
+        dated = f"recorded from {started[0]} to {started[-1]}"
+        if started[0] == started[-1]:
+            dated = f"recorded on {started[0]}"
+        if len(started) < len(views):
+            dated += f" ({len(started)} of {len(views)} say when)"
+        parts.append(dated)
     text = ", ".join(parts) + f": {len(views) - rejected} analysed, {rejected} rejected."
     if made:
         text += (
@@ -93,10 +98,49 @@ def _rankings(site: Site) -> Iterator[dict[str, Any]]:
             for row in rows
             if row["requirement"] == one["name"] and row["decides"]
         }
-        yield one | {
-            "verdict": requirement_verdict(one["groups"], site.names),
-            "drawn": [_margin(decisive[group["sensor"]], group) for group in one["groups"]],
+        basis = {
+            group["sensor"]: _basis(site, decisive[group["sensor"]]) for group in one["groups"]
         }
+        yield one | {
+            "asked": requirement_words(one["requirement"]),
+            "verdict": requirement_verdict(one["groups"], site.names, basis),
+            "drawn": [
+                _margin(decisive[group["sensor"]], group)
+                for group in one["groups"]
+                if group["rank"] != "–"
+            ],
+            "undrawn": ", ".join(
+                f"{site.names[group['sensor']]} ({group['verdict']})"
+                for group in one["groups"]
+                if group["rank"] == "–"
+            ),
+        }
+
+
+def _basis(site: Site, row: Row) -> str:
+    """Return on which data a sensor is judged, and what puts them in doubt."""
+    own = [v for v in site.views if v.sensor == row["sensor"] and not v.rejected]
+    devices = {view.row["device"] for view in own}
+    chosen = next((view for view in own if view.name == row["recording"]), None)
+    if chosen is None:
+        return ""
+    text = (
+        f"Judged by recording {chosen.name} ({duration_text(chosen.row['duration'])}, "
+        f"{counted(len(chosen.recommended()), 'axis', 'axes')}), one of "
+        f"{counted(len(own), 'recording')} of {counted(len(devices), 'device')}; other specimens "
+        "may differ."
+    )
+    if row["time"] > _LONGEST_PART * chosen.row["duration"]:
+        text += f" The log is short for {duration_text(row['time'])}."
+    models = chosen.rows("models")
+    unexplained = [m["channel"] for m in models if m["chosen"] and m["verdict"] == "not explained"]
+    if unexplained:
+        channels = ", ".join(name.replace("_", " ") for name in unexplained)
+        text += f" No model explains the spectrum of {channels}."
+    doubts = list(dict.fromkeys(finding["finding"] for finding in chosen.warnings))
+    if doubts:
+        text += f" Doubts: {', '.join(term(name).name for name in doubts)}."
+    return text
 
 
 def _margin(row: Row, group: dict[str, Any]) -> dict[str, Any]:

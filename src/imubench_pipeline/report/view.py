@@ -55,8 +55,10 @@ class ChannelView:
 
     @property
     def warnings(self) -> list[str]:
-        """Names of the findings that put the results of the channel in doubt, each once."""
+        """Terms of what puts the results of the channel in doubt, each once."""
         serious = [row["finding"] for row in self.findings if row["severity"] != "note"]
+        if any(row["chosen"] and row["verdict"] == "not explained" for row in self.models):
+            serious.append("verdict_not_explained")
         return list(dict.fromkeys(serious))
 
     @property

@@ -11,6 +11,7 @@ from imubench_pipeline.report.practical import (
     interval_text,
     number_text,
 )
+from imubench_pipeline.requirements import Requirement
 
 Row = Mapping[str, Any]
 
@@ -67,7 +68,9 @@ def precision(row: Row, unit: PageUnit) -> str:
     return f"± {number_text(100.0 * half, 2)} %"
 
 
-def requirement_verdict(groups: Sequence[Mapping[str, Any]], names: Mapping[str, str]) -> str:
+def requirement_verdict(
+    groups: Sequence[Mapping[str, Any]], names: Mapping[str, str], basis: Mapping[str, str]
+) -> str:
     """Return which sensor fulfils a requirement best, and how the others stand, in sentences.
 
     Parameters
@@ -76,20 +79,28 @@ def requirement_verdict(groups: Sequence[Mapping[str, Any]], names: Mapping[str,
         As `imubench_pipeline.report.meaning.rankings` gives them, the best first.
     names : mapping
         Name of each sensor as it is shown.
+    basis : mapping
+        On which data each sensor is judged, in words.
     """
-    ranked = [group for group in groups if group["rank"] != "–"]
     if not groups:
         return "No recording answers it."
+    ranked = [group for group in groups if group["rank"] != "–"]
     if not ranked:
-        return "No sensor can be ranked for it: " + _others(groups, names)
+        return "No sensor can be ranked for it. " + _others(groups, names)
     best = ranked[0]
     decides = next(limit for limit in best["limits"] if limit["decides"])
     said = names[best["sensor"]] + (" (simulated)" if best["simulated"] else "")
+    begin = f"{said} is the best of {len(groups)} and {best['verdict']}"
+    if best["verdict"] != "passes":
+        begin = f"No sensor surely passes. The best of {len(groups)}, {said}, {best['verdict']}"
     text = (
-        f"{said} is the best of {len(groups)} and {best['verdict']}: "
-        f"{decides['limit']}: {decides['sigma']} {decides['unit']} expected "
-        f"({decides['interval']}), {decides['allowed']} {decides['unit']} allowed (1σ)."
+        f"{begin}. The limit that decides is {decides['limit']}: {decides['sigma']} "
+        f"{decides['unit']} expected ({decides['interval']}), {decides['allowed']} "
+        f"{decides['unit']} allowed (1σ)."
     )
+    if decides["reason"]:
+        text += f" Not counted: {decides['reason']}."
+    text += f" {basis[best['sensor']]}"
     if best["tied_with"]:
         tied = ", ".join(names[one] for one in best["tied_with"].split(", "))
         text += f" It cannot be told apart from {tied}."
@@ -99,24 +110,71 @@ def requirement_verdict(groups: Sequence[Mapping[str, Any]], names: Mapping[str,
 def _others(groups: Sequence[Mapping[str, Any]], names: Mapping[str, str]) -> str:
     """Return how many sensors have each verdict, and which where they are few."""
     parts = []
-    verdicts = dict.fromkeys([*_VERDICTS, *(group["verdict"] for group in groups)])
-    for verdict in verdicts:
-        own = [names[group["sensor"]] for group in groups if group["verdict"] == verdict]
+    found: dict[str, list[str]] = {}
+    for verdict in _VERDICTS:
+        found[_CAPITALS[verdict]] = []
+    for group in groups:
+        said = _CAPITALS.get(group["verdict"], group["verdict"].capitalize())
+        reason = next((limit["reason"] for limit in group["limits"] if limit["decides"]), "")
+        if group["verdict"] == "not enough data" and reason:
+            said = f"{said} ({reason})"
+        found.setdefault(said, []).append(names[group["sensor"]])
+    for said, own in found.items():
         if own:
-            listed = ", ".join(own) if len(own) <= 4 else f"{len(own)} sensors"
-            parts.append(f"{_CAPITALS.get(verdict, verdict.capitalize())}: {listed}.")
+            listed = ", ".join(own) if len(own) <= _FEW else f"{len(own)} sensors"
+            parts.append(f"{said}: {listed}.")
     return " ".join(parts)
 
 
+_FEW = 4
 _CAPITALS = {
     "passes": "Pass too",
     "probably passes": "Probably pass",
     "probably fails": "Probably fail",
     "surely fails": "Surely fail",
-    "not enough data": "Too little data",
+    "not enough data": "Cannot be judged",
 }
+
+
+def requirement_words(requirement: Requirement) -> str:
+    """Return what a requirement asks for, in sentences."""
+    limits = "; ".join(limit.text for limit in requirement.limits)
+    if requirement.static_window:
+        begin = f"biases and tilt from {requirement.static_window} at rest right before"
+    elif requirement.turn_on:
+        biases = f"{requirement.turn_on.gyro} and {requirement.turn_on.accel}"
+        begin = f"turn-on biases of {biases} that nothing has taken off"
+    else:
+        begin = ""
+    parts = [
+        "An example, made up." if requirement.example else "",
+        f"Asked: {limits}, in {100 * requirement.confidence:g} % of runs, by the "
+        f"{requirement.axis} axis; {begin}.",
+        f"{requirement.note.rstrip('.')}." if requirement.note else "",
+    ]
+    return " ".join(part for part in parts if part)
+
+
+def model_text(name: str) -> str:
+    """Return the terms of a model, its lines counted: ``N+F + 3 lines``."""
+    terms = name.split("+")
+    lines = terms.count("S")
+    rest = "+".join(term for term in terms if term != "S")
+    return f"{rest} + {counted(lines, 'line')}" if lines else rest
+
+
+def sentence(text: str) -> str:
+    """Return a text as a sentence: a capital first, a full stop at the end."""
+    return text[:1].upper() + text[1:].rstrip(".") + "." if text else ""
 
 
 def counted(number: int, one: str, many: str | None = None) -> str:
     """Return a number with its noun: ``1 recording``, ``3 recordings``."""
     return f"{number} {one if number == 1 else many or one + 's'}"
+
+
+def started_text(started: str | None) -> str:
+    """Return date and time as they are read easily, without a fraction of zero."""
+    if not started:
+        return ""
+    return started.replace("T", " ", 1).removesuffix(".000").removesuffix(".000000")

@@ -169,8 +169,9 @@ kinds.series = (figure) => {
   if (there.length > 0) {
     groups.push({ key: "findings", label: "findings", on: true, look: { light: "#B3001B", dark: "#FF8F8F", filled: true } });
     if (shown(figure, "findings")) {
+      // Knocks are moments between the first and the last: only their range is marked.
       layout.shapes = there.map((one) => ({
-        type: "rect", xref: "x", yref: "paper", y0: 0, y1: 1, x0: one.start / scale.size, x1: (one.end ?? one.start) / scale.size,
+        type: "rect", xref: "x", yref: "paper", y0: one.finding === "knocks" ? 0.97 : 0, y1: 1, x0: one.start / scale.size, x1: (one.end ?? one.start) / scale.size,
         fillcolor: faint(inks().mark, 0.13), line: { color: inks().mark, width: 1, dash: "dot" }, layer: "below",
       }));
       layout.annotations = there.map((one, i) => ({

@@ -39,7 +39,7 @@ function startChooser(root) {
     chosenMethod = method.value;
     redrawAll();
   });
-  chooser.append(set, labelled("Model of", method));
+  chooser.append(set, labelled("Model drawn", method));
   if (pageData.grouped === "sensor" && new Set(pageData.channels.map((one) => one.recording)).size > 1) {
     const which = document.createElement("select");
     which.append(new Option("all", "all"), new Option("the last of each sensor", "last"));
@@ -168,34 +168,35 @@ kinds.forest = (figure) => {
     const number = seen.get(key) ?? 0;
     seen.set(key, number + 1);
     const method = chosenMethod === "recommended" || !one.parameters[chosenMethod] ? one.recommended : chosenMethod;
-    const found = one.parameters[method]?.[symbol];
-    if (!found) continue;
-    const [value, lower, upper, status] = found;
-    const known = value !== null;
-    const bounded = lower !== null && lower > 0 && upper !== null;
-    const middle = known ? value : bounded ? Math.sqrt(lower * upper) : upper;
-    if (middle === null || middle <= 0) continue;
-    extent.push(middle * unit.factor, ...(bounded ? [lower * unit.factor, upper * unit.factor] : []));
-    const look = lookOf(one);
-    const colour = colourOf(look);
-    const words = known
-      ? `<b>${numberText(value * unit.factor, 4)} ${unit.sign}</b>`
-      : status === "absent" ? `absent: below ${numberText(upper * unit.factor, 3)} ${unit.sign}` : status.replaceAll("_", " ");
-    const limits = lower !== null && upper !== null ? `<br>95 %: ${interval(lower * unit.factor, upper * unit.factor)} ${unit.sign}` : "";
     const place = names.indexOf(key) + ((number + 1) / (counts.get(key) + 1) - 0.5) * -0.7;
-    traces.push({
-      type: "scatter", mode: "markers", x: [middle * unit.factor], y: [place],
-      marker: {
-        color: known ? colour : "rgba(0,0,0,0)", size: known ? 9 : 8, line: { color: colour, width: 2 },
-        symbol: known ? look.marker : status === "absent" ? "triangle-left" : "circle-open",
-      },
-      error_x: bounded ? {
-        type: "data", symmetric: false, array: [(upper - middle) * unit.factor], arrayminus: [(middle - lower) * unit.factor],
-        color: colour, thickness: 1.6, width: 4,
-      } : undefined,
-      hovertemplate: `${nameOf(one.sensor)}${one.simulated ? " (simulated)" : ""}, ${one.recording}<br>${symbol} ${words}${limits}<extra></extra>`,
-    });
+    const name = `${nameOf(one.sensor)}${one.simulated ? " (simulated)" : ""}, ${one.recording}`;
+    for (const [value, lower, upper, status] of one.parameters[method]?.[symbol] ?? []) {
+      const known = value !== null && status === "ok";
+      const bounded = lower !== null && lower > 0 && upper !== null;
+      const middle = value ?? (bounded ? Math.sqrt(lower * upper) : upper);
+      if (middle === null || middle <= 0) continue;
+      extent.push(middle * unit.factor, ...(bounded ? [lower * unit.factor, upper * unit.factor] : []));
+      const look = lookOf(one);
+      const colour = colourOf(look);
+      const words = value !== null ? `<b>${numberText(value * unit.factor, 4)} ${unit.sign}</b>${known ? "" : ` (${status.replaceAll("_", " ")})`}`
+        : status === "absent" ? `absent: below ${numberText(upper * unit.factor, 3)} ${unit.sign}` : status.replaceAll("_", " ");
+      const limits = bounded ? `<br>95 %: ${interval(lower * unit.factor, upper * unit.factor)} ${unit.sign}` : "";
+      traces.push({
+        type: "scatter", mode: "markers", x: [middle * unit.factor], y: [place],
+        marker: {
+          color: known ? colour : inks().paper, size: known ? 9 : 8, line: { color: colour, width: known ? 0 : 2 },
+          symbol: known ? look.marker : status === "absent" ? "triangle-left" : "circle",
+        },
+        error_x: bounded ? {
+          type: "data", symmetric: false, array: [(upper - middle) * unit.factor], arrayminus: [(middle - lower) * unit.factor],
+          color: colour, thickness: 1.6, width: 4,
+        } : undefined,
+        hovertemplate: `${name}<br>${symbol} ${words}${limits}<extra></extra>`,
+      });
+    }
   }
+  const marked = new Set(traces.map((trace) => Math.round(trace.y[0])));
+  const unmarked = names.map((_, i) => i).filter((i) => !marked.has(i));
   const most = Math.max(1, ...counts.values());
   return {
     traces, groups: [], height: 90 + names.length * Math.min(30 + 8 * (most - 1), 130),
@@ -207,6 +208,9 @@ kinds.forest = (figure) => {
         ...linearAxis(""), tickvals: names.map((_, i) => i), ticktext: names.map((key) => wrapped(nameOf(key))),
         range: [-0.6, names.length - 0.4], fixedrange: true,
       },
+      annotations: unmarked.map((i) => ({
+        xref: "paper", x: 0.01, y: i, xanchor: "left", showarrow: false, text: "absent, or not to be told", font: { color: inks().soft, size: 12 },
+      })),
     },
   };
 };

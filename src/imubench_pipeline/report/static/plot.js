@@ -160,7 +160,10 @@ function drawFigure(figure) {
   const canvas = figure.querySelector(".canvas");
   canvas.classList.toggle("empty", traces.length === 0);
   const layout = { ...baseLayout(), ...made.layout, datarevision: Math.random() };
-  if (made.height) canvas.style.height = `${made.height}px`;
+  const height = made.height ?? (printing() ? PRINTED.height : null);
+  canvas.style.height = height ? `${height}px` : "";
+  canvas.style.width = printing() ? `${PRINTED.width}px` : "";
+  if (printing()) Object.assign(layout, { width: PRINTED.width, height });
   const first = !drawn.has(figure);
   drawn.add(figure);
   Plotly.react(canvas, traces.map(({ group, ...trace }) => trace), layout, {
@@ -269,13 +272,26 @@ function redrawAll() {
   [...drawn].filter((figure) => figure.isConnected).forEach(drawFigure);
 }
 
+// A printed page has its own width, that figures do not learn in time: they are given one.
+const PRINTED = { width: 660, height: 330 };
+
 function startPrinting() {
-  const redraw = (state) => () => {
-    if (!window.Plotly) return;
-    document.documentElement.dataset.printing = state;
-    document.querySelectorAll("figure[data-kind]").forEach((figure) => state === "yes" || drawn.has(figure) ? drawFigure(figure) : null);
-  };
-  window.addEventListener("beforeprint", redraw("yes"));
-  window.addEventListener("afterprint", redraw("no"));
+  const everyFigure = () => document.querySelectorAll("figure[data-kind]");
+  window.addEventListener("beforeprint", () => {
+    document.documentElement.dataset.printing = "yes";
+    document.querySelectorAll("details:not([open])").forEach((each) => {
+      each.dataset.closed = "yes";
+      each.open = true;
+    });
+    if (window.Plotly) everyFigure().forEach(drawFigure);
+  });
+  window.addEventListener("afterprint", () => {
+    document.documentElement.dataset.printing = "no";
+    document.querySelectorAll("details[data-closed]").forEach((each) => {
+      each.open = false;
+      delete each.dataset.closed;
+    });
+    if (window.Plotly) everyFigure().forEach((figure) => drawn.has(figure) && drawFigure(figure));
+  });
   window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redrawAll);
 }
