@@ -260,7 +260,7 @@ def test_cut_files_are_refused(whole: list[Path]) -> None:
     assert cut_everywhere(whole[-1], log(EVERY, time=STAMPED)) <= 2
 
 
-@settings(max_examples=100)
+@settings(max_examples=40)
 @given(damage=damages)
 def test_damaged_files_never_crash(whole: list[Path], damage: Damage) -> None:
     for path in whole:

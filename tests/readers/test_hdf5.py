@@ -241,7 +241,7 @@ def test_cut_files_are_refused(whole: list[Path]) -> None:
         assert cut_everywhere(path, log(EVERY, time=STAMPED), 40) == 0
 
 
-@settings(max_examples=80)
+@settings(max_examples=40)
 @given(damage=damages)
 def test_damaged_files_never_crash(whole: list[Path], damage: Damage) -> None:
     for path in whole:

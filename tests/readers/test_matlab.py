@@ -398,7 +398,7 @@ def test_cut_files_are_refused(whole: list[Path]) -> None:
     assert cut_everywhere(hdf5, log) == 0
 
 
-@settings(max_examples=120)
+@settings(max_examples=50)
 @given(damage=damages)
 def test_damaged_files_never_crash(whole: list[Path], damage: Damage) -> None:
     for path in whole:

@@ -314,7 +314,7 @@ def test_cut_files_are_refused(whole: list[tuple[Path, Any]]) -> None:
         assert cut_everywhere(path, log) == 0
 
 
-@settings(max_examples=150)
+@settings(max_examples=60)
 @given(damage=damages)
 def test_damaged_files_never_crash(whole: list[tuple[Path, Any]], damage: Damage) -> None:
     for path, log in whole:

@@ -160,7 +160,7 @@ TEXT = st.lists(
 ).map("".join)
 
 
-@settings(max_examples=400, suppress_health_check=list(HealthCheck))
+@settings(max_examples=60, suppress_health_check=list(HealthCheck))
 @given(
     TEXT,
     st.sampled_from(["utf-8", "utf-16", "latin-1"]),
@@ -190,7 +190,7 @@ def test_nothing_but_a_recording_error_comes_of_any_text(
         columns(path, log_format(channels, reader="csv", **keys))
 
 
-@settings(max_examples=150, suppress_health_check=list(HealthCheck))
+@settings(max_examples=60, suppress_health_check=list(HealthCheck))
 @given(st.binary(max_size=300), st.sampled_from([TWO, PLACED]))
 def test_nothing_but_a_recording_error_comes_of_any_bytes(
     tmp_path: Path, content: bytes, channels: dict[str, Any]

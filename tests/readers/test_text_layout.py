@@ -95,7 +95,7 @@ NUMBERS = st.lists(
 )
 
 
-@settings(max_examples=150, suppress_health_check=list(HealthCheck))
+@settings(max_examples=60, suppress_health_check=list(HealthCheck))
 @given(
     NUMBERS,
     st.sampled_from([";", "\t", ",", "|", " ", "   "]),
