@@ -24,12 +24,16 @@ _TITLES = {"gyro": "Gyroscope: published figures", "accel": "Accelerometer: publ
 _SIGNS = {"yes": "yes", "no": "no", "other convention": "other", "not looked up": "?"}
 
 
-def delta_rows(view: ChannelView, system: System) -> Iterator[dict[str, Any]]:
+def delta_rows(
+    view: ChannelView, coverage: Mapping[tuple[str, str, str], str], system: System
+) -> Iterator[dict[str, Any]]:
     """Yield each figure of the datasheet, what was measured, and the difference.
 
     Parameters
     ----------
     view : ChannelView
+    coverage : mapping
+        Whether sensor, quantity and figure are published, as the table ``coverage`` says.
     system : str
         Units of the pages.
     """
@@ -38,9 +42,11 @@ def delta_rows(view: ChannelView, system: System) -> Iterator[dict[str, Any]]:
             continue
         unit = page_unit(view.quantity, _SYMBOLS.get(row["quantity"], "B"), system)
         published = row["printed"] is not None
+        figure = {"bias_instability": "B"}.get(row["quantity"], row["quantity"])
         yield {
             "quantity": _figure_name(row),
             "published": published,
+            "coverage": coverage.get((view.sensor, view.quantity, figure), "no"),
             "printed": f"{row['printed']:g} {row['unit']}" if published else "–",
             "about": ", ".join(filter(None, (row["kind"], _read_as(row), row["condition"]))),
             "comparable": unit.text(row["comparable"]),

@@ -137,7 +137,7 @@ def _channel(
         ],
         "spectral_lines": channel.lines,
         "line_count": counted(len(channel.lines), "line"),
-        "deltas": list(delta_rows(channel, site.system)),
+        "deltas": list(delta_rows(channel, site.coverage, site.system)),
         "away": list(curve_distances(channel, site.system)),
     }
 

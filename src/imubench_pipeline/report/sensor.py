@@ -61,7 +61,7 @@ def _sensor(site: Site, sensor: str, own: Sequence[RecordingView]) -> dict[str, 
             {"view": channel, "rows": rows}
             for view in shown
             for channel in view.channels()
-            if (rows := list(delta_rows(channel, site.system)))
+            if (rows := list(delta_rows(channel, site.coverage, site.system)))
         ],
         "page": {
             "grouped": "recording",

@@ -156,6 +156,12 @@ class Site:
             self._rows[table] = self.tables[table].to_pylist()
         return self._rows[table]
 
+    @cached_property
+    def coverage(self) -> dict[tuple[str, str, str], str]:
+        """Whether sensor, quantity and figure are published."""
+        rows = self.rows("coverage")
+        return {(row["sensor"], row["quantity"], row["figure"]): row["published"] for row in rows}
+
     def changed_devices(self) -> list[dict[str, Any]]:
         """Return the recordings that show a change of their device, with what has changed."""
         found: dict[tuple[str, str], dict[str, Any]] = {}

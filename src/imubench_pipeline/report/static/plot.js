@@ -100,7 +100,7 @@ function logAxis(title, range) {
   const { tickvals, ticktext, minor } = logTicks(...range);
   return {
     type: "log", title: { text: title, standoff: 8 }, color: ink, gridcolor: grid, zeroline: false, automargin: true,
-    range, tickmode: "array", tickvals, ticktext,
+    range, tickmode: "array", tickvals, ticktext, tickangle: 0,
     minor: { tickmode: "array", tickvals: minor, showgrid: true, gridcolor: faint(grid, 0.55), ticks: "" },
   };
 }
