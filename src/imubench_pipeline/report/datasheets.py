@@ -42,7 +42,7 @@ def delta_rows(
             continue
         unit = page_unit(view.quantity, _SYMBOLS.get(row["quantity"], "B"), system)
         published = row["printed"] is not None
-        figure = {"bias_instability": "B"}.get(row["quantity"], row["quantity"])
+        figure = "B" if row["quantity"] == "bias_instability" else row["quantity"]
         yield {
             "quantity": _figure_name(row),
             "published": published,
