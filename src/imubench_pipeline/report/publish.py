@@ -207,5 +207,8 @@ def published(results: Path) -> Site:
     """
     settings = (results / "report" / _SETTINGS).read_text(encoding="utf-8")
     names = sorted(set(TABLES) - set(OF_ONE_RECORDING))
-    tables = {name: read(name, [results / f"tables/{name}.parquet"]) for name in names}
+    paths = {name: results / f"tables/{name}.parquet" for name in names}
+    for path in paths.values():
+        path.stat()  # the error of this says which file is missing, that of Parquet does not
+    tables = {name: read(name, [path]) for name, path in paths.items()}
     return site_of(tables, settings, results)

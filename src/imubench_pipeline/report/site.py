@@ -217,10 +217,10 @@ class Site:
 
 def _device_page(sensor: str, device: str, simulated: bool) -> str:
     """Return the page of a device, whose name may hold what a file name cannot."""
-    safe = _NOT_IN_NAMES.sub("_", device)[:80]
+    safe = _NOT_IN_NAMES.sub("_", device)[:60]
     if safe != device:
         safe += "-" + hashlib.sha256(device.encode()).hexdigest()[:8]
-    return f"devices/{sensor}/{safe}{'-simulated' if simulated else ''}.html"
+    return f"devices/{sensor}/{'simulated/' if simulated else ''}{safe}.html"
 
 
 def _digest(*parts: object) -> str:

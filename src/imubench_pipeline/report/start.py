@@ -66,7 +66,7 @@ def summary(views: Sequence[RecordingView], several: bool = True) -> str:
         dated = f"recorded from {started[0]} to {started[-1]}"
         if started[0] == started[-1]:
             dated = f"recorded on {started[0]}"
-        if len(started) < len(views):
+        if any(not view.row["started"] and not view.rejected for view in views):
             dated += f" ({len(started)} of {len(views)} say when)"
         parts.append(dated)
     text = ", ".join(parts) + f": {len(views) - rejected} analysed, {rejected} rejected."
@@ -74,7 +74,7 @@ def summary(views: Sequence[RecordingView], several: bool = True) -> str:
         text += (
             " All are simulated from published parameters, not measured."
             if made == len(views)
-            else f" {made} of them are simulated from published parameters, not measured."
+            else f" {made} of them {'is' if made == 1 else 'are'} simulated from published parameters, not measured."
         )
     return text
 

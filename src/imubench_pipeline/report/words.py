@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -175,6 +176,7 @@ def counted(number: int, one: str, many: str | None = None) -> str:
 
 def started_text(started: str | None) -> str:
     """Return date and time as they are read easily, without a fraction of zero."""
-    if not started:
-        return ""
-    return started.replace("T", " ", 1).removesuffix(".000").removesuffix(".000000")
+    return _ISO.sub(r"\1 \2", started or "")
+
+
+_ISO = re.compile(r"^(\d{4}-\d\d-\d\d)T(\d\d:\d\d(?::\d\d)?)(?:\.0+(?!\d))?")
