@@ -24,7 +24,7 @@ from imubench_pipeline.report.start import datasheets_page, recordings_page, sta
 from imubench_pipeline.report.static_figures.files import figure_text
 from imubench_pipeline.report.static_figures.theory import theory_figure
 from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
-from imubench_pipeline.tables import read, write_content, write_json
+from imubench_pipeline.tables import read, write_content
 
 _KEYS = "pages.json"
 _SETTINGS = "settings.json"
@@ -94,30 +94,50 @@ def publish(site: Site, folder: Path, say: Progress = lambda _: None) -> list[st
         What was written, below ``folder``.
     """
     written = []
-    before = _keys(folder / _KEYS)
-    keys: dict[str, str] = {}
     for path, content in _assets().items():
         written += _put(folder, path, content)
+    every = list(pages(site))
+    keys = {page.path: page.key for page in every}
+    before = _keys(folder / _KEYS)
+    kept = {
+        path: key
+        for path, key in before.items()
+        if keys.get(path) == key and (folder / path).is_file()
+    }
+    # A run that is killed must not leave the keys of pages that it has written anew.
+    if kept != before:
+        _put(folder, _KEYS, _text(kept))
     templates = environment(site.system)
-    for page in pages(site):
-        keys[page.path] = page.key
-        if before.get(page.path) != page.key or not (folder / page.path).is_file():
+    for page in every:
+        if page.path not in kept:
             say(page.path)
             written += _put(folder, page.path, _rendered(site, templates, page))
     for path in before.keys() - keys.keys():
         (folder / path).unlink(missing_ok=True)
-    _put(folder, _SETTINGS, json.dumps(site.settings, indent=1, sort_keys=True) + "\n")
-    write_json(keys, folder / _KEYS)
+    _put(folder, _SETTINGS, _text(site.settings))
+    _put(folder, _KEYS, _text(keys))
     return written
+
+
+def _text(data: object) -> str:
+    return json.dumps(data, indent=1, sort_keys=True, ensure_ascii=False) + "\n"
 
 
 def _keys(path: Path) -> dict[str, str]:
     """Return what the pages that are there show; nothing where that is not known."""
     try:
-        found: dict[str, str] = json.loads(path.read_text(encoding="utf-8"))
+        found = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
-    return found
+    if not isinstance(found, dict):
+        return {}
+    return {page: str(key) for page, key in found.items() if _is_ours(page)}
+
+
+def _is_ours(page: str) -> bool:
+    """Tell whether a path is that of a page: a damaged list removes no other file."""
+    parts = Path(page).parts
+    return page.endswith(".html") and ".." not in parts and not Path(page).is_absolute()
 
 
 def _put(folder: Path, path: str, content: str | bytes) -> list[str]:

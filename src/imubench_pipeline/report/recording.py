@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -71,10 +72,18 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         "budget_words": budget_words(site.settings["settings"]["error_budget"]),
         "provenance": list(_provenance(view, channels, folder)),
         "sources": _metadata(folder).get("sources", []),
-        "command": f"snakemake -c2 --forcerun ingest -- "
-        f"{site.results_name}/recordings/{view.sensor}/{view.name}/scores.parquet",
-        "figures_command": f"imubench figures {site.results_name} --sensor {view.sensor} "
-        f"--recording {view.name}",
+        "command": shlex.join(
+            [
+                *("snakemake", "-c2", "--forcerun", "ingest", "--"),
+                f"{site.results_name}/recordings/{view.sensor}/{view.name}/scores.parquet",
+            ]
+        ),
+        "figures_command": shlex.join(
+            [
+                *("imubench", "figures", site.results_name),
+                *("--sensor", view.sensor, "--recording", view.name),
+            ]
+        ),
         "page": {
             "looks": looks({view.sensor: site.looks[view.sensor]}),
             "channels": [channel_payload(one, view.row["rate"], arrays) for one in channels],

@@ -161,7 +161,11 @@ def _device(site: Site, own: Sequence[RecordingView], rows: Sequence[Row]) -> di
         "device": device,
         "views": own,
         "summary": summary(own, several=False),
-        "changes": [change_words(row) for row in rows if row["verdict"] == "changed"],
+        "changes": [
+            change_words(row, simulated=own[0].simulated)
+            for row in rows
+            if row["verdict"] == "changed"
+        ],
         "order": "The recordings stand at the time when they were started."
         if dated
         else "The logs do not all say when they were started: the recordings stand in the order "
@@ -171,7 +175,7 @@ def _device(site: Site, own: Sequence[RecordingView], rows: Sequence[Row]) -> di
     }
 
 
-def change_words(row: Row) -> str:
+def change_words(row: Row, *, simulated: bool) -> str:
     """Return a change of a device in words."""
     name = "fixed bias" if row["parameter"] == "bias" else row["parameter"]
     by = ""
@@ -179,4 +183,5 @@ def change_words(row: Row) -> str:
         by = f" by {100 * row['change']:+.0f} %".replace("-", "−")
     chance = f"{row['p_value']:.1g}" if row["p_value"] is not None else "–"
     where = row["channel"].replace("_", " ")
-    return f"{row['recording']}, {where}: {name} changed{by} (chance if it had not: {chance})."
+    recording = row["recording"] + (" (simulated)" if simulated else "")
+    return f"{recording}, {where}: {name} changed{by} (chance if it had not: {chance})."

@@ -13,7 +13,12 @@ from imubench_pipeline.report.payload import FOREST, looks
 from imubench_pipeline.report.practical import duration_text
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.view import RecordingView, Row
-from imubench_pipeline.report.words import counted, requirement_verdict, requirement_words
+from imubench_pipeline.report.words import (
+    counted,
+    listed_names,
+    requirement_verdict,
+    requirement_words,
+)
 
 _LONGEST_PART = 1 / 9
 """Part of a log that tells an error of that length."""
@@ -71,11 +76,10 @@ def summary(views: Sequence[RecordingView], several: bool = True) -> str:
         parts.append(dated)
     text = ", ".join(parts) + f": {len(views) - rejected} analysed, {rejected} rejected."
     if made:
-        text += (
-            " All are simulated from published parameters, not measured."
-            if made == len(views)
-            else f" {made} of them {'is' if made == 1 else 'are'} simulated from published parameters, not measured."
-        )
+        of_them = f"{made} of them {'is' if made == 1 else 'are'}"
+        whole = made == len(views)
+        text += f" {'All are' if whole else of_them} simulated from published parameters, "
+        text += "not measured."
     return text
 
 
@@ -109,6 +113,14 @@ def _rankings(site: Site) -> Iterator[dict[str, Any]]:
                 for group in one["groups"]
                 if group["rank"] != "–"
             ],
+            "tied": {
+                group["sensor"]: [
+                    site.names.get(name, name)
+                    for name in listed_names(group["tied_with"], site.names)
+                ]
+                for group in one["groups"]
+                if group["tied_with"]
+            },
             "undrawn": ", ".join(
                 f"{site.names[group['sensor']]} ({group['verdict']})"
                 for group in one["groups"]

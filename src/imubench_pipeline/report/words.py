@@ -103,9 +103,19 @@ def requirement_verdict(
         text += f" Not counted: {decides['reason']}."
     text += f" {basis[best['sensor']]}"
     if best["tied_with"]:
-        tied = ", ".join(names[one] for one in best["tied_with"].split(", "))
+        tied = ", ".join(names.get(one, one) for one in listed_names(best["tied_with"], names))
         text += f" It cannot be told apart from {tied}."
     return text + " " + _others([g for g in groups if g is not best], names)
+
+
+def listed_names(text: str, known: Mapping[str, str]) -> list[str]:
+    """Return the names of a list, of which each may contain commas itself."""
+    parts = text.split(", ")
+    for count in range(len(parts), 0, -1):
+        if (name := ", ".join(parts[:count])) in known:
+            rest = ", ".join(parts[count:])
+            return [name, *(listed_names(rest, known) if rest else [])]
+    return [text]
 
 
 def _others(groups: Sequence[Mapping[str, Any]], names: Mapping[str, str]) -> str:
