@@ -66,7 +66,7 @@ class Arrays:
     def texts(self) -> list[list[Any]]:
         """Kind, begin, step and base64 of each array."""
         return [
-            [kind, float(f"{low:.6g}"), float(f"{step:.6g}"), base64.b64encode(data).decode()]
+            [kind, float(f"{low:.12g}"), float(f"{step:.6g}"), base64.b64encode(data).decode()]
             for kind, low, step, data in self._places
         ]
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from decimal import Decimal
 from typing import Any, Literal
 
 from imubench_pipeline.sensor import QUANTITIES
@@ -23,9 +24,11 @@ _MOST_DIGITS = 7
 
 def number_text(value: float, digits: int = 4) -> str:
     """Return a number rounded to some digits, with a power of ten where it is small or large."""
-    rounded = float(f"{value:.{digits - 1}e}")
+    rounded = float(f"{value:.{digits - 1}e}") + 0.0  # no negative zero
     if rounded == 0.0 or _LEAST_PLAIN <= abs(rounded) < _MOST_PLAIN:
-        text = f"{rounded:.12f}".rstrip("0").rstrip(".")
+        # The shortest digits that are this number, and no power of ten.
+        text = format(Decimal(repr(rounded)), "f")
+        text = text.rstrip("0").rstrip(".") if "." in text else text
     else:
         mantissa, exponent = f"{rounded:.{digits - 1}e}".split("e")
         if "." in mantissa:

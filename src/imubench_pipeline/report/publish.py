@@ -28,6 +28,7 @@ from imubench_pipeline.tables import read, write_content
 
 _KEYS = "pages.json"
 _SETTINGS = "settings.json"
+_FOLDERS = ("recordings", "sensors", "devices")
 _STATIC = Path(__file__).with_name("static")
 _SCRIPTS = ("numbers", "terms", "tables", "plot", "overlay", "channel", "decisions", "start")
 _LIBRARIES = (
@@ -112,8 +113,8 @@ def publish(site: Site, folder: Path, say: Progress = lambda _: None) -> list[st
         if page.path not in kept:
             say(page.path)
             written += _put(folder, page.path, _rendered(site, templates, page))
-    for path in before.keys() - keys.keys():
-        (folder / path).unlink(missing_ok=True)
+    for path in _pages_there(folder) - keys.keys():
+        (folder / path).unlink()
     _put(folder, _SETTINGS, _text(site.settings))
     _put(folder, _KEYS, _text(keys))
     return written
@@ -131,13 +132,13 @@ def _keys(path: Path) -> dict[str, str]:
         return {}
     if not isinstance(found, dict):
         return {}
-    return {page: str(key) for page, key in found.items() if _is_ours(page)}
+    return {page: str(key) for page, key in found.items()}
 
 
-def _is_ours(page: str) -> bool:
-    """Tell whether a path is that of a page: a damaged list removes no other file."""
-    parts = Path(page).parts
-    return page.endswith(".html") and ".." not in parts and not Path(page).is_absolute()
+def _pages_there(folder: Path) -> set[str]:
+    """Return the pages of sensors, devices and recordings that lie in the report."""
+    found = (path for of in _FOLDERS for path in (folder / of).rglob("*.html"))
+    return {path.relative_to(folder).as_posix() for path in found}
 
 
 def _put(folder: Path, path: str, content: str | bytes) -> list[str]:

@@ -37,7 +37,8 @@ def recording_page(site: Site, view: RecordingView) -> Page:
     folder = site.results / "recordings" / view.sensor / view.name
     samples = [folder / f"{table}.parquet" for table in ("envelope", "histogram")]
     own = [path.read_bytes() for path in samples if path.is_file()]
-    key = site.key_of(view.key, view.device_page, site.looks.get(view.sensor), *own)
+    published = [row for row in site.rows("coverage") if row["sensor"] == view.sensor]
+    key = site.key_of(view.key, view.device_page, site.looks.get(view.sensor), published, *own)
     return Page(view.page, "recording.html.jinja", key, lambda: _context(site, view, folder))
 
 

@@ -29,6 +29,7 @@ def sensor_page(site: Site, sensor: str) -> Page:
         *(view.device_page for view in own),
         [row for row in site.rows("pooled") if row["sensor"] == sensor],
         [row for row in site.rows("ranking") if row["sensor"] == sensor],
+        [row for row in site.rows("coverage") if row["sensor"] == sensor],
         site.looks[sensor],
     )
     return Page(
