@@ -1,21 +1,16 @@
 import math
 from typing import Any
 
+import pytest
+
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.expected_errors import error_rows, of_requirement, standard
-from imubench_pipeline.report.meaning import budget_tables, rankings
+from imubench_pipeline.report.meaning import budget_tables, budget_words, rankings
 from imubench_pipeline.requirements import Requirement
 from imubench_pipeline.selection import ranking_rows
 from imubench_pipeline.tables import build
+from tests.report.tables import ROBOT
 
-ROBOT = {
-    "title": "a robot",
-    "static_window": "10 s",
-    "limits": [
-        {"error": "heading", "after": "100 s", "at_most": "1 deg"},
-        {"error": "position", "after": "100 s", "at_most": "10 m"},
-    ],
-}
 SIMULATED = {("good", "r"): True, ("poor", "r"): False, ("gyro", "r"): False}
 
 
@@ -65,8 +60,131 @@ def test_a_budget_names_its_sources_and_what_is_missing() -> None:
     assert tables[0]["times"] == ["60 s"]
     assert lines["heading (°)"]["lines"][0] == f"{math.degrees(1e-3 * math.sqrt(120)):.3g}"
     assert "gyro N 50 %" in lines["heading (°)"]["lines"]
-    assert lines["north, found at rest (°)"]["lines"][0] == "none"  # 1e-3 rad/s against the Earth's
+    north = lines["north, found at rest (°)"]["lines"]  # 1e-3 rad/s against the Earth's rate
+    assert north[0] == "not to be found"
     assert [line["error"] for line in tables[2]["lines"]] == [
         "heading (°)", "north, found at rest (°)",
     ]  # fmt: skip
     assert "velocity, one axis: no accelerometer in the recording" in tables[2]["missing"]
+
+
+def budget(**changes: Any) -> list[dict[str, Any]]:
+    """Rows of one error after two times, for two axes, with one source each."""
+    names = {"sensor": "s", "recording": "r", "error": "heading", "unit": "rad"}
+    sizes = {60.0: 0.01, 600.0: 0.04}
+    return [
+        names | {"axis": axis, "time": time, "source": source, "sigma": part * sigma}
+        | ({"lower": sigma / 2, "upper": 2 * sigma} if source == "total" else {}) | changes
+        for axis in ("worst", "median")
+        for time, sigma in sizes.items()
+        for source, part in (("total", 1.0), ("gyro N", 0.8), ("gyro K", 0.6))
+    ]  # fmt: skip
+
+
+def shown(rows: list[dict[str, Any]], system: Any = "practical") -> dict[str, Any]:
+    (table,) = budget_tables(build("error_budget", rows).to_pylist(), {}, system)
+    return table
+
+
+def test_one_channel_that_is_the_worst_and_the_median_stands_once() -> None:
+    table = shown(budget())
+    assert table["times"] == ["60 s", "10 min"]
+    (line,) = table["lines"]
+    assert (line["error"], line["axis"]) == ("heading (°)", "worst, median")
+    first, last = (cell["lines"] for cell in line["cells"])
+    # 0.01 rad are 0.573°; 0.8² of the variance are 64 %.
+    assert first == ["0.573", "0.286 to 1.15", "gyro N 64 %", "gyro K 36 %"]
+    assert last[0] == "2.29"
+
+
+def test_axes_that_differ_stand_in_lines_of_their_own() -> None:
+    rows = budget()
+    for row in rows:
+        if row["axis"] == "median":
+            row["sigma"] /= 2
+    assert [line["axis"] for line in shown(rows)["lines"]] == ["worst", "median"]
+
+
+def test_a_budget_has_the_units_of_the_settings() -> None:
+    (line,) = shown(budget(), "si")["lines"]
+    assert line["error"] == "heading (rad)"
+    assert line["cells"][0]["lines"][:2] == ["0.01", "0.005 to 0.02"]
+
+
+def test_an_error_of_more_than_a_right_angle_is_no_number() -> None:
+    (line,) = shown(budget(sigma=2.0))["lines"]
+    assert line["cells"][0]["lines"][0] == "over 90"
+    (line,) = shown(budget(sigma=2.0, error="north"))["lines"]
+    assert line["cells"][0]["lines"][0] == "not to be found"
+    assert not any(" to " in one for one in line["cells"][0]["lines"][1:])
+    limit = ranked(sigma=2.0, upper=9.0)
+    assert (limit["sigma"], limit["interval"]) == ("over 90", "–")
+
+
+def test_what_is_assumed_is_said_once_with_the_errors_that_it_is_about() -> None:
+    note = "K of gyro_x is not identified"
+    rows = budget(reason=note) + budget(reason=note, error="attitude")
+    rows += budget(error="position", unit="m")
+    assert shown(rows)["notes"] == [f"Heading, attitude: {note}"]
+
+
+def test_what_requirements_ask_for_is_no_part_of_a_budget() -> None:
+    rows = build("error_budget", budget(requirement="x")).to_pylist()
+    assert list(budget_tables(rows, {}, "si")) == []
+
+
+def test_words_of_a_budget_tell_the_rest_before_and_the_latitude() -> None:
+    words = budget_words({"static_window": "60 s", "latitude": "45 deg"})
+    assert "over 60 s at rest right before" in words and "a latitude of 45 deg" in words
+
+
+def ranked(**changes: Any) -> dict[str, Any]:
+    row = {"requirement": "robot", "sensor": "s", "rank": 1, "verdict": "passes", "decides": True,
+           "recording": "r", "error": "heading", "time": 100.0, "limit": 0.01, "sigma": 0.005,
+           "lower": 0.004, "upper": 0.006, "unit": "rad", "margin": 2.0, "chance": 0.987,
+           "limit_verdict": "passes", "source": "gyro N", "share": 0.75,
+           "reached_after": 7200.0}  # fmt: skip
+    rows = build("ranking", [row | changes]).to_pylist()
+    (one,) = rankings(rows, {"robot": ROBOT}, {("s", "r"): True}, "practical")
+    (group,) = one["groups"]
+    (limit,) = group["limits"]
+    return group | limit
+
+
+def test_a_limit_is_told_with_what_it_comes_of() -> None:
+    limit = ranked()
+    assert limit["limit"] == "heading, 100 s"
+    assert (limit["allowed"], limit["sigma"], limit["unit"]) == ("0.573", "0.286", "°")
+    assert limit["interval"] == "0.229 to 0.344"
+    assert (limit["margin"], limit["chance"]) == ("2", "99 %")
+    assert (limit["source"], limit["reached"]) == ("gyro N (75 %)", "2 h")
+    assert limit["simulated"] is True
+
+
+def test_a_limit_that_is_not_known_is_dashes_and_its_reason() -> None:
+    nothing = dict.fromkeys(
+        ("rank", "sigma", "lower", "upper", "margin", "chance", "source", "share", "reached_after")
+    )
+    limit = ranked(**nothing, reason="no gyro", verdict="not enough data")
+    dashes = {
+        key: limit[key] for key in ("rank", "sigma", "interval", "margin", "chance", "source")
+    }
+    assert set(dashes.values()) == {"–"} and limit["reached"] == "–"
+    assert limit["reason"] == "no gyro"
+
+
+@pytest.mark.parametrize("margins", [[3.0, 2.0, 1.0], [1.0, 3.0, 2.0]])
+def test_tied_sensors_stand_in_the_order_of_their_margins(margins: list[float]) -> None:
+    rows = [
+        {"requirement": "robot", "sensor": f"s{margin:g}", "rank": 1, "verdict": "passes",
+         "decides": True, "error": "heading", "time": 1.0, "unit": "rad", "margin": margin,
+         "limit_verdict": "passes", "limit": 1.0, "sigma": 1 / margin, "chance": 1.0}
+        for margin in margins
+    ]  # fmt: skip
+    (one,) = rankings(build("ranking", rows).to_pylist(), {"robot": ROBOT}, {}, "si")
+    assert [group["sensor"] for group in one["groups"]] == ["s3", "s2", "s1"]
+
+
+def test_a_requirement_that_nothing_answers_has_no_groups() -> None:
+    (one,) = rankings([], {"robot": ROBOT}, {}, "si")
+    assert (one["name"], one["groups"]) == ("robot", [])

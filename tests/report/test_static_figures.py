@@ -115,7 +115,7 @@ def tables_of(*several: Rows) -> dict[str, pa.Table]:
 
 
 def views_of(*several: Rows) -> list[ChannelView]:
-    return [view for one in recording_views(tables_of(*several)) for view in one.channels]
+    return [view for one in recording_views(tables_of(*several)) for view in one.channels()]
 
 
 def view_of(**values: Any) -> ChannelView:

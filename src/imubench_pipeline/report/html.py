@@ -38,9 +38,10 @@ def environment(system: System) -> jinja2.Environment:
         """
         if value is None:
             return Markup("–")
-        text = _unit(unit, system).text(value, digits)
+        kept = f"{value:.7g}"
+        text = _unit(unit, system).text(float(kept), digits)
         of = "" if inside else Markup(' data-unit="{}" data-digits="{}"').format(unit, digits)
-        return Markup('<data value="{}"{}>{}</data>').format(f"{value:.7g}", of, text)
+        return Markup('<data value="{}"{}>{}</data>').format(kept, of, text)
 
     def sign(unit: str) -> Markup:
         """Return the sign of a unit that the reader can switch."""

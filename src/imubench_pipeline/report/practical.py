@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from decimal import Decimal
+from decimal import ROUND_HALF_UP, Context, Decimal
 from typing import Any, Literal
 
 from imubench_pipeline.sensor import QUANTITIES
@@ -18,23 +18,28 @@ from imubench_pipeline.units import conversion
 System = Literal["practical", "si"]
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_LEAST_PLAIN, _MOST_PLAIN = 1e-4, 1e6
+_LEAST_PLAIN, _MOST_PLAIN = Decimal("0.0001"), 1_000_000
 _MOST_DIGITS = 7
 
 
 def number_text(value: float, digits: int = 4) -> str:
-    """Return a number rounded to some digits, with a power of ten where it is small or large."""
-    rounded = float(f"{value:.{digits - 1}e}") + 0.0  # no negative zero
-    if rounded == 0.0 or _LEAST_PLAIN <= abs(rounded) < _MOST_PLAIN:
-        # The shortest digits that are this number, and no power of ten.
-        text = format(Decimal(repr(rounded)), "f")
-        text = text.rstrip("0").rstrip(".") if "." in text else text
+    """Return a number rounded to some digits, with a power of ten where it is small or large.
+
+    A number in the middle of two is rounded away from zero, as the scripts of the pages do.
+    """
+    exact = Decimal(value)
+    rounded = Context(prec=digits, rounding=ROUND_HALF_UP).create_decimal(exact)
+    if rounded == 0 or _LEAST_PLAIN <= abs(rounded) < _MOST_PLAIN:
+        text = _without_zeros(format(abs(rounded), "f"))
     else:
-        mantissa, exponent = f"{rounded:.{digits - 1}e}".split("e")
-        if "." in mantissa:
-            mantissa = mantissa.rstrip("0").rstrip(".")
-        text = f"{mantissa}×10{str(int(exponent)).translate(_SUPERSCRIPTS)}"
-    return text.replace("-", "−")
+        mantissa, exponent = f"{abs(rounded):.{digits - 1}e}".split("e")
+        power = str(int(exponent)).translate(_SUPERSCRIPTS)
+        text = f"{_without_zeros(mantissa)}×10{power}"
+    return "−" + text if rounded < 0 else text
+
+
+def _without_zeros(text: str) -> str:
+    return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 @dataclass(frozen=True)

@@ -58,12 +58,8 @@ def _sensor(site: Site, sensor: str, own: Sequence[RecordingView]) -> dict[str, 
         },
         "budgets": list(budget_tables(budget, simulated, site.system)),
         "budget_words": budget_words(site.settings["settings"]["error_budget"]),
-        "deltas": [
-            {"view": channel, "rows": rows}
-            for view in shown
-            for channel in view.channels()
-            if (rows := list(delta_rows(channel, site.coverage, site.system)))
-        ],
+        "too_many": len(own) > _MANY,
+        "deltas": list(_deltas(site, shown)),
         "page": {
             "grouped": "recording",
             "recordings": [view.name for view in own],
@@ -73,6 +69,15 @@ def _sensor(site: Site, sensor: str, own: Sequence[RecordingView]) -> dict[str, 
             **together.page,
         },
     }
+
+
+def _deltas(site: Site, views: Sequence[RecordingView]) -> Iterator[dict[str, Any]]:
+    """Yield the comparison of each channel with the datasheet, where it prints something."""
+    for view in views:
+        for channel in view.channels():
+            rows = list(delta_rows(channel, site.coverage, site.system))
+            if any(row["published"] for row in rows):
+                yield {"view": channel, "rows": rows}
 
 
 def _about(site: Site, sensor: str) -> str:
@@ -134,7 +139,8 @@ def _device(site: Site, own: Sequence[RecordingView], rows: Sequence[Row]) -> di
         quantity, axis = channel.split("_")
         title = f"{QUANTITY_NAMES[quantity]} {axis}"
         name = "fixed bias" if parameter == "bias" else parameter
-        changes = [row["recording"] for row in series if row["verdict"] == "changed"]
+        said = " (simulated)" if own[0].simulated else ""
+        changes = [row["recording"] + said for row in series if row["verdict"] == "changed"]
         trends.setdefault(channel, []).append(
             {
                 "title": title,

@@ -1,0 +1,80 @@
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, sync_playwright
+
+from imubench_pipeline.report.publish import one_file, publish
+from tests.report.browser import made
+from tests.report.browser.made import Report
+from tests.report.browser.reader import Open, Reader, Scheme
+
+HERE = Path(__file__).parent
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    # One worker opens the browser, and makes the reports, for all of these tests.
+    for item in items:
+        if HERE in item.path.parents:
+            item.add_marker(pytest.mark.xdist_group("browser"))
+
+
+@pytest.fixture(scope="package")
+def browser() -> Iterator[Browser]:
+    path = os.environ.get("PLAYWRIGHT_CHROMIUM") or shutil.which("chromium")
+    if path is None:
+        said = "no Chromium: not on the path, and not in PLAYWRIGHT_CHROMIUM"
+        if os.environ.get("CI"):
+            pytest.fail(said)
+        pytest.skip(said)
+    # As root, Chromium does not start in its sandbox.
+    arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
+    with sync_playwright() as driver:
+        opened = driver.chromium.launch(executable_path=path, args=arguments)
+        yield opened
+        opened.close()
+
+
+@pytest.fixture(scope="package")
+def window(browser: Browser) -> Reader:
+    return Reader(browser)
+
+
+@pytest.fixture
+def read(window: Reader) -> Iterator[Open]:
+    """Open a page of a folder, anew; at the end nothing may have complained."""
+
+    def opened(
+        folder: Path,
+        path: str = "index.html",
+        *,
+        width: int = 1280,
+        height: int = 900,
+        scheme: Scheme = "light",
+        stored: Mapping[str, str] | None = None,
+    ) -> Reader:
+        window.begin(folder, width, height, scheme)
+        window.open(path, stored)
+        return window
+
+    yield opened
+    assert window.end() == []
+
+
+@pytest.fixture(scope="package")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Report:
+    results = tmp_path_factory.mktemp("bench")
+    site, rows = made.bench(results)
+    publish(site, results / "report")
+    return Report(results / "report", rows)
+
+
+@pytest.fixture(scope="package")
+def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same report as one file, in a folder of its own."""
+    site, _ = made.bench(tmp_path_factory.mktemp("of_one_file"))
+    path = tmp_path_factory.mktemp("empty") / "report.html"
+    path.write_text(one_file(site), encoding="utf-8")
+    return path

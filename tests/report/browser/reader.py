@@ -1,0 +1,117 @@
+"""A reader of the report: a window of the browser, and everything that goes wrong in it."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+from playwright.sync_api import Browser, Locator
+
+Scheme = Literal["light", "dark"]
+READY = "document.documentElement.dataset.ready === 'yes'"
+_TRACES = """canvas => canvas.data.map(({type, mode, name, x, y, width, fill, fillcolor, text,
+  line, marker, error_x, error_y}) =>
+  ({type, mode, name, x: [...x], y: [...y], width, fill, fillcolor, text, line, marker,
+    error_x, error_y}))"""
+TOO_WIDE = """() => {
+  const root = document.documentElement;
+  if (root.scrollWidth <= root.clientWidth) return [];
+  const beyond = (one) => one.getBoundingClientRect().right > root.clientWidth + 1;
+  const scrolled = (one) => one.closest(".scroll, .formula, .js-plotly-plot") !== null;
+  return [`${root.scrollWidth} > ${root.clientWidth}`, ...[...document.querySelectorAll("body *")]
+    .filter((one) => beyond(one) && !scrolled(one))
+    .map((one) => `${one.localName}.${one.className} ${one.textContent.slice(0, 40)}`)];
+}"""
+"""What is wider than the window, where one has to scroll sideways."""
+
+
+class Reader:
+    """A reader of pages, in one window: the script that draws is large, and is compiled once.
+
+    Parameters
+    ----------
+    browser : Browser
+
+    Attributes
+    ----------
+    page : Page
+    complaints : list of str
+        Errors and warnings, and what was asked for beside the files of the report.
+    """
+
+    def __init__(self, browser: Browser) -> None:
+        self.complaints: list[str] = []
+        self.folder = Path()
+        self._context = browser.new_context()
+        self._context.set_default_timeout(20_000)
+        self.page = self._context.new_page()
+        self.page.on("console", lambda said: self._complain(said.type, said.text))
+        self.page.on("pageerror", lambda error: self._complain("error", str(error)))
+        self.page.on("request", lambda asked: self._request(asked.url))
+        self.page.on("requestfailed", lambda asked: self._complain("error", f"no {asked.url}"))
+
+    def _complain(self, kind: str, text: str) -> None:
+        if kind in ("error", "warning"):
+            self.complaints.append(f"{self.page.url}: {kind}: {text}")
+
+    def _request(self, url: str) -> None:
+        if not url.startswith(("file:", "data:", "blob:")):
+            self._complain("error", f"asks for {url}")
+
+    def begin(self, folder: Path, width: int, height: int, scheme: Scheme) -> None:
+        """Begin anew with the pages of a folder: nothing is left of an earlier visit."""
+        self.complaints.clear()
+        self.folder = folder
+        self.page.set_viewport_size({"width": width, "height": height})
+        self.page.emulate_media(media="screen", color_scheme=scheme)
+
+    def end(self) -> list[str]:
+        """Leave, and forget; return the complaints."""
+        self.page.evaluate("localStorage.clear()")
+        self.page.goto("about:blank")
+        return [*self.complaints]
+
+    def open(self, path: str, stored: Mapping[str, str] | None = None) -> None:
+        """Open a page; ``stored`` is what the storage of the browser has from an earlier one."""
+        address = (self.folder / path).as_uri()
+        if stored:
+            self.page.goto(address)
+            for pair in stored.items():
+                self.page.evaluate("pair => localStorage.setItem(...pair)", pair)
+        self.page.goto(address)
+        self.page.wait_for_function(READY)
+
+    def figure(self, kind: str, **data: str) -> Locator:
+        """Return a figure, drawn."""
+        chosen = "".join(f"[data-{key}='{value}']" for key, value in data.items())
+        figure = self.page.locator(f"figure[data-kind={kind}]{chosen}").first
+        figure.scroll_into_view_if_needed()
+        figure.locator("xpath=self::*[@data-drawn]").locator("svg.main-svg").first.wait_for()
+        return figure
+
+    def draw_all(self) -> int:
+        """Bring every figure into view, one after the other; return how many there are."""
+        figures = self.page.locator("figure[data-kind]")
+        for figure in figures.all():
+            figure.scroll_into_view_if_needed()
+        self.page.wait_for_function(
+            "document.querySelectorAll('figure[data-kind]:not([data-drawn])').length === 0"
+        )
+        return figures.count()
+
+
+Open = Callable[..., Reader]
+"""The fixture ``read``."""
+
+
+def traces(figure: Locator) -> list[dict[str, Any]]:
+    """Return what is drawn, as the plotting script has it."""
+    return figure.locator(".canvas").evaluate(_TRACES)
+
+
+def axis_title(figure: Locator, axis: str) -> str:
+    return figure.locator(f".canvas svg .{axis}title").first.text_content() or ""
+
+
+def toggle(figure: Locator, label: str) -> Locator:
+    """Return the box that switches a group on and off."""
+    return figure.get_by_role("checkbox", name=label, exact=True)

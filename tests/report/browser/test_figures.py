@@ -1,0 +1,344 @@
+"""The figures show the numbers of the tables, and the reader chooses what is drawn."""
+
+import math
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.report.browser import made
+from tests.report.browser.factors import ARC, DEGREES, FACTORS, MICRO_G
+from tests.report.browser.made import Report
+from tests.report.browser.reader import Open, Reader, axis_title, toggle, traces
+
+LEVELS = 3e-4
+"""Relative error of what a page keeps in 16 bits of its logarithm."""
+
+NAMES = {name: f"{one.vendor} {one.model}" for name, one in made.SENSORS.items()}
+A, B = NAMES["alpha"], NAMES["beta"]
+NIGHT = made.NIGHT.recording
+MODEL = re.compile("Model")
+OF_NIGHT = f"recordings/alpha/{NIGHT}.html"
+CURVE = {"mode": "lines+markers"}
+
+
+def chosen(drawn: list[dict[str, Any]], **values: object) -> list[dict[str, Any]]:
+    return [one for one in drawn if all(one.get(key) == value for key, value in values.items())]
+
+
+def only(drawn: list[dict[str, Any]], **values: object) -> dict[str, Any]:
+    (one,) = chosen(drawn, **values)
+    return one
+
+
+def names(drawn: list[dict[str, Any]]) -> set[str]:
+    return {one["name"] for one in chosen(drawn, **CURVE)}
+
+
+def column(rows: list[dict[str, Any]], name: str) -> list[float]:
+    return [row[name] for row in rows]
+
+
+def test_the_curves_of_all_sensors(read: Open, bench: Report) -> None:
+    figure = read(bench.folder).figure("overlay")
+    drawn = traces(figure)
+    of_alpha = {f"{A}, {NIGHT}", f"{A} (simulated), sim_published"}
+    assert names(drawn) == of_alpha | {f"{B}, {log.recording}" for log in made.DATED}
+    assert axis_title(figure, "y") == "Allan deviation (°/h)"
+    for log in (made.NIGHT, made.DATED[-1]):
+        rows = bench.of("allan", recording=log.recording, channel="gyro_x")
+        curve = only(drawn, name=f"{NAMES[log.sensor]}, {log.recording}")
+        np.testing.assert_allclose(curve["x"], column(rows, "tau"), rtol=LEVELS)
+        expected = np.multiply(column(rows, "adev"), ARC)
+        np.testing.assert_allclose(curve["y"], expected, rtol=LEVELS)
+        # White noise alone, at the shortest time: N over the root of it, 60 degrees an hour in
+        # a degree a root of an hour.
+        assert curve["y"][0] == pytest.approx(0.3 * log.level * 60 / math.sqrt(0.1), rel=0.01)
+    bands = chosen(drawn, fill="tonexty")
+    assert len(bands) == len(names(drawn))
+    upper = bench.of("allan", recording=NIGHT, channel="gyro_x")
+    expected = np.multiply(column(upper, "upper"), ARC)
+    np.testing.assert_allclose(bands[0]["y"], expected, rtol=LEVELS)
+
+
+def test_sensors_and_layers_are_switched(read: Open, bench: Report) -> None:
+    figure = read(bench.folder).figure("overlay")
+    count = len(traces(figure))
+    toggle(figure, A).uncheck()
+    assert all(name.startswith(B) for name in names(traces(figure)))
+    assert len(traces(figure)) == count - 2 * 3
+    toggle(figure, "95 % limits").uncheck()
+    assert not chosen(traces(figure), fill="tonexty")
+    toggle(figure, "model").check()
+    assert len(chosen(traces(figure), mode="lines")) == len(made.DATED)
+    toggle(figure, "curves").uncheck()
+    assert not names(traces(figure))
+    toggle(figure, B).uncheck()
+    assert traces(figure) == []
+    for label in ("curves", "95 % limits", A, B):
+        toggle(figure, label).check()
+    toggle(figure, "model").uncheck()
+    assert len(traces(figure)) == count
+
+
+def test_lines_of_the_datasheet_among_sensors(read: Open, bench: Report) -> None:
+    figure = read(bench.folder).figure("overlay")
+    before = len(traces(figure))
+    toggle(figure, "datasheet").check()
+    added = traces(figure)[before:]
+    assert {one["line"]["dash"] for one in added} == {"dot"}
+    # 0.007 °/s/√Hz is 0.42 °/√h, or that over √2 if it is one-sided; and 8 °/h.
+    at_start = sorted(one["y"][0] for one in added)
+    noise = 0.42 * 60 / math.sqrt(0.1)
+    assert at_start == pytest.approx([8.0, noise / math.sqrt(2), noise], rel=LEVELS)
+    assert all(A in one["text"] for one in added)
+
+
+def test_axis_method_and_recordings_are_chosen(read: Open, bench: Report) -> None:
+    reader = read(bench.folder)
+    figure, page = reader.figure("overlay"), reader.page
+    page.get_by_label("gyro y", exact=True).check()
+    assert names(traces(figure)) == {f"{A}, {NIGHT}"}
+    assert toggle(figure, B).is_hidden() and toggle(figure, A).is_visible()
+    page.get_by_label("accel x", exact=True).check()
+    assert axis_title(figure, "y") == "Allan deviation (µg)"
+    rows = bench.of("allan", recording=NIGHT, channel="accel_x")
+    curve = only(traces(figure), name=f"{A}, {NIGHT}")
+    expected = np.multiply(column(rows, "adev"), MICRO_G)
+    np.testing.assert_allclose(curve["y"], expected, rtol=LEVELS)
+
+    page.get_by_label("gyro x", exact=True).check()
+    toggle(figure, "95 % limits").uncheck()
+    toggle(figure, "model").check()
+    best = chosen(traces(figure), mode="lines")[0]["y"]
+    page.get_by_role("combobox", name=MODEL).select_option("weighted")
+    other = chosen(traces(figure), mode="lines")[0]["y"]
+    assert other[0] / best[0] == pytest.approx(1 + 0.02 * made.METHODS.index("weighted"), rel=1e-3)
+
+    page.get_by_role("combobox", name="Recordings").select_option("the last of each sensor")
+    last = made.DATED[-1].recording
+    assert names(traces(figure)) == {f"{A} (simulated), sim_published", f"{B}, {last}"}
+
+
+def test_the_recordings_of_one_sensor(read: Open, bench: Report) -> None:
+    reader = read(bench.folder, "sensors/beta.html")
+    figure = reader.figure("overlay")
+    assert names(traces(figure)) == {f"{B}, {log.recording}" for log in made.DATED}
+    looks = {
+        (one["line"]["color"], one["marker"]["symbol"]) for one in chosen(traces(figure), **CURVE)
+    }
+    assert len(looks) == len(made.DATED)
+    toggle(figure, "run_2").uncheck()
+    assert f"{B}, run_2" not in names(traces(figure))
+    assert len(names(traces(figure))) == len(made.DATED) - 1
+    assert len(traces(reader.figure("forest", symbol="B"))) == len(made.DATED)
+
+
+def test_ticks_follow_the_zoom(read: Open, bench: Report) -> None:
+    figure = read(bench.folder, OF_NIGHT).figure("allan", channel="gyro_x")
+    canvas = figure.locator(".canvas")
+    ticks = "canvas => canvas.layout.xaxis.tickvals"
+    assert {0.1, 1, 10, 100} <= set(canvas.evaluate(ticks))
+    canvas.evaluate("canvas => Plotly.relayout(canvas, {'xaxis.range': [1, Math.log10(30)]})")
+    inside = canvas.evaluate(ticks)
+    assert len(inside) >= 3 and all(10 <= tick <= 30 for tick in inside)
+    shown = figure.locator(".xaxislayer-above .xtick").all_text_contents()
+    assert [float(text) for text in shown] == pytest.approx(inside)
+
+
+def test_parameters_of_all_sensors(read: Open, bench: Report) -> None:
+    reader = read(bench.folder)
+    figure = reader.figure("forest", symbol="N")
+    shown = sorted(one["x"][0] for one in traces(figure))
+    best = {"recommended": True, "channel": "gyro_x", "parameter": "N"}
+    rows = sorted(bench.of("parameters", **best), key=lambda row: row["value"])
+    assert shown == pytest.approx([row["value"] * 60 * DEGREES for row in rows], rel=1e-4)
+    assert shown[0] == pytest.approx(0.3, rel=1e-4)
+    bar = min(traces(figure), key=lambda one: one["x"][0])["error_x"]
+    assert (bar["arrayminus"], bar["array"]) == (
+        pytest.approx([0.03], rel=1e-3), pytest.approx([0.039], rel=1e-3)
+    )  # fmt: skip
+    reader.page.get_by_role("combobox", name=MODEL).select_option("likelihood_gm")
+    assert min(one["x"][0] for one in traces(figure)) == pytest.approx(0.3 * 1.02, rel=1e-4)
+
+
+def test_a_parameter_without_a_value_has_another_mark(read: Open, bench: Report) -> None:
+    reader = read(bench.folder)
+    reader.page.get_by_label("gyro y", exact=True).check()
+    absent = only(traces(reader.figure("forest", symbol="K")))
+    assert absent["marker"]["symbol"] == "triangle-left"
+    assert absent["x"] == pytest.approx([1e-7 * 60 * ARC], rel=1e-4)
+    reader.page.get_by_label("accel x", exact=True).check()
+    times = traces(reader.figure("forest", symbol="T_B"))
+    hollow = [one for one in times if one["marker"]["color"] != one["marker"]["line"]["color"]]
+    unsure = only(hollow)
+    assert unsure["x"] == pytest.approx([math.sqrt(20 * 500)])
+    assert len(times) == 2
+
+
+def test_margins_are_those_of_the_ranking(read: Open, bench: Report) -> None:
+    figure = read(bench.folder).figure("margins", requirement="rover")
+    rows = bench.of("ranking", decides=True)
+    assert sorted(row["sensor"] for row in rows) == ["alpha", "beta"]
+    for row, drawn in zip(rows, traces(figure), strict=True):
+        assert drawn["x"] == pytest.approx([row["margin"]])
+        ends = [row["limit"] / row["upper"], row["limit"] / row["lower"]]
+        bar = drawn["error_x"]
+        found = [drawn["x"][0] - bar["arrayminus"][0], drawn["x"][0] + bar["array"][0]]
+        assert found == pytest.approx(ends)
+
+
+def test_the_curve_of_a_channel_with_its_methods(read: Open, bench: Report) -> None:
+    figure = read(bench.folder, OF_NIGHT).figure("allan", channel="gyro_x")
+    drawn = traces(figure)
+    rows = bench.of("allan", recording=NIGHT, channel="gyro_x")
+    measured = only(drawn, mode="lines+markers")
+    np.testing.assert_allclose(measured["y"], np.multiply(column(rows, "adev"), ARC), rtol=LEVELS)
+    model = only(drawn, name="likelihood")
+    np.testing.assert_allclose(model["y"], measured["y"], rtol=2 * LEVELS)
+    assert not chosen(drawn, name="white noise N")
+    toggle(figure, "white noise N").check()
+    white = only(traces(figure), name="white noise N")
+    np.testing.assert_allclose(white["y"], 0.3 * 60 / np.sqrt(made.TAU), rtol=LEVELS)
+    toggle(figure, "datasheet: bias instability 8 deg/h (max)").uncheck()
+    assert not [one for one in traces(figure) if "bias instability" in str(one["name"])]
+    figure.get_by_role("button", name="all off").click()
+    assert traces(figure) == []
+    figure.get_by_role("button", name="all on").click()
+    # Every method, every term of its model, every line of the datasheet.
+    assert len({one["name"] for one in chosen(traces(figure), mode="lines")} - {None}) == 5 + 3 + 3
+
+
+def test_the_spectrum(read: Open, bench: Report) -> None:
+    figure = read(bench.folder, OF_NIGHT).figure("spectrum", channel="gyro_x")
+    drawn = traces(figure)
+    (fit,) = [one for one in chosen(drawn, mode="lines") if len(one["x"]) > 2]
+    marks = chosen(drawn, mode="markers")
+    rows = bench.of("spectrum", recording=NIGHT, channel="gyro_x")
+    for used, symbol in ((True, "circle"), (False, "x-thin-open")):
+        own = [row for row in rows if row["used"] is used]
+        points = only([one for one in marks if one["marker"]["symbol"] == symbol])
+        np.testing.assert_allclose(points["x"], column(own, "frequency"), rtol=LEVELS)
+        density = np.sqrt(column(own, "density")) * DEGREES
+        np.testing.assert_allclose(points["y"], density, rtol=LEVELS)
+    line = only(drawn, x=[2, 2])
+    assert line["text"] == "sinusoid, 2 Hz"
+    # White noise of 0.3 °/√h has a root density of 0.3/60 °/s/√Hz.
+    assert fit["y"][-1] == pytest.approx(0.005, rel=0.01)
+    toggle(figure, "line").uncheck()
+    assert len(traces(figure)) == len(drawn) - 1
+
+
+def test_samples_over_time_with_findings_and_temperature(read: Open, bench: Report) -> None:
+    figure = read(bench.folder, OF_NIGHT).figure("series", channel="gyro_x")
+    low, high, mean, warmth = traces(figure)
+    bias = 0.2  # °/s
+    assert np.mean(mean["y"]) == pytest.approx(bias, rel=0.02)
+    assert all(a <= m <= b for a, m, b in zip(low["y"], mean["y"], high["y"], strict=True))
+    minutes = made.SAMPLES / made.RATE / 60
+    assert (mean["x"][0], mean["x"][-1]) == pytest.approx((0.0, minutes), abs=minutes / 400)
+    assert axis_title(figure, "x") == "time (min)"
+    assert (warmth["y"][0], warmth["y"][-1]) == pytest.approx((20.0, 35.0), abs=0.1)
+    shapes = "canvas => (canvas.layout.shapes ?? []).map(one => [one.x0, one.x1])"
+    canvas = figure.locator(".canvas")
+    assert canvas.evaluate(shapes) == [[5.0, 7.0]]
+    numbers = canvas.evaluate("canvas => canvas.layout.annotations.map(one => one.text)")
+    table = figure.page.get_by_role("table", name="Warnings")
+    assert (
+        table.get_by_role("row").filter(has_text="was moved").locator("th").inner_text() in numbers
+    )
+    toggle(figure, "findings").uncheck()
+    assert canvas.evaluate(shapes) == []
+    toggle(figure, "temperature").uncheck()
+    assert len(traces(figure)) == 3 and figure.locator("svg .y2title").count() == 0
+
+
+def test_the_histogram(read: Open, bench: Report) -> None:
+    figure = read(bench.folder, OF_NIGHT).figure("histogram", channel="gyro_x")
+    bars, normal = traces(figure)
+    share = np.multiply(bars["y"], bars["width"])
+    assert share.sum() == pytest.approx(1.0)
+    # White noise of 0.005 °/s/√Hz, 10 samples a second.
+    spread = 0.005 * math.sqrt(10)
+    middle = np.sum(share * bars["x"])
+    assert middle == pytest.approx(0.2, rel=0.02)
+    assert np.sqrt(np.sum(share * (bars["x"] - middle) ** 2)) == pytest.approx(spread, rel=0.1)
+    assert max(normal["y"]) == pytest.approx(1 / (spread * math.sqrt(2 * math.pi)), rel=0.1)
+
+
+def test_a_device_over_time(read: Open, bench: Report) -> None:
+    reader = read(bench.folder, bench.page("devices/"))
+    reader.draw_all()
+    for number, factor, sign in ((0, 60 * DEGREES, "N (°/√h)"), (4, DEGREES, "fixed bias (°/s)")):
+        figure = reader.figure("trend", trend=str(number))
+        assert axis_title(figure, "y") == sign
+        name = {"N": "N", "f": "bias"}[sign[0]]
+        rows = bench.of("drift", parameter=name)
+        *band, values = traces(figure)
+        assert values["x"] == [log.started for log in made.DATED]
+        assert values["y"] == pytest.approx([row["value"] * factor for row in rows])
+        assert values["marker"]["symbol"] == ["circle"] * 4 + ["star"]
+        highest = rows[-1]["expected_upper"] * factor
+        assert band[1]["y"][-1] == pytest.approx(highest) and highest < values["y"][-1]
+    assert "changed in run_5" in reader.page.locator("figcaption").first.inner_text()
+
+
+def focused(reader: Reader) -> dict[str, Any]:
+    return reader.page.evaluate(
+        """() => {
+          const [one, style] = [document.activeElement, getComputedStyle(document.activeElement)];
+          const {width, height, top, bottom} = one.getBoundingClientRect();
+          return { role: one.type ?? one.localName, text: (one.closest("label") ?? one).innerText,
+            outline: style.outlineStyle === "none" ? 0 : parseFloat(style.outlineWidth),
+            seen: width > 0 && height > 0 && bottom > 0 && top < innerHeight };
+        }"""
+    )
+
+
+def tab_to(reader: Reader, pattern: str) -> None:
+    """Press the tabulator until the focus is there; it can be seen all the way."""
+    for _ in range(80):
+        reader.page.keyboard.press("Tab")
+        at = focused(reader)
+        assert at["outline"] >= 2 and at["seen"], at
+        if re.search(pattern, f"{at['role']} {at['text']}"):
+            return
+    pytest.fail(f"no focus on {pattern}")
+
+
+def test_everything_is_done_by_the_keyboard(read: Open, bench: Report) -> None:
+    reader = read(bench.folder)
+    figure, keys = reader.figure("overlay"), reader.page.keyboard
+    reader.page.evaluate("scrollTo(0, 0)")
+    tab_to(reader, "Skip to the content")
+    keys.press("Enter")
+    assert reader.page.evaluate("document.activeElement.id") == "main"
+    tab_to(reader, "radio .*gyro x")
+    keys.press("ArrowRight")
+    assert names(traces(figure)) == {f"{A}, {NIGHT}"}
+    keys.press("ArrowLeft")
+    count = len(traces(figure))
+    tab_to(reader, "select-one Model")
+    keys.press("End")
+    tab_to(reader, f"checkbox .*{A}")
+    keys.press("Space")
+    assert len(traces(figure)) == count - 2 * 3
+    keys.press("Space")
+    assert len(traces(figure)) == count
+    assert reader.page.get_by_role("combobox", name=MODEL).input_value() == made.METHODS[-1]
+
+
+def test_the_units_of_the_figures_follow_the_reader(read: Open, bench: Report) -> None:
+    reader = read(bench.folder, OF_NIGHT)
+    rows = bench.of("allan", recording=NIGHT, channel="gyro_x")
+    for choice, units in FACTORS["gyro"].items():
+        reader.page.get_by_label("Gyroscopes in").select_option(choice)
+        for kind, symbol in (("allan", "adev"), ("spectrum", "psd"), ("series", "signal")):
+            figure = reader.figure(kind, channel="gyro_x")
+            assert f"({units[symbol][0]})" in axis_title(figure, "y")
+        measured = only(traces(reader.figure("allan", channel="gyro_x")), mode="lines+markers")
+        expected = np.multiply(column(rows, "adev"), units["adev"][1])
+        np.testing.assert_allclose(measured["y"], expected, rtol=LEVELS)
+        # The unit of the other quantity stays.
+        assert "(µg)" in axis_title(reader.figure("allan", channel="accel_x"), "y")

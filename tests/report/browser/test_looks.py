@@ -1,0 +1,93 @@
+"""On a wide screen and a telephone, by night and on paper."""
+
+import io
+import re
+from typing import Any
+
+import pytest
+from PIL import Image, ImageColor
+
+from tests.report.browser import made
+from tests.report.browser.made import Report
+from tests.report.browser.reader import TOO_WIDE, Open, Reader
+
+OF_NIGHT = f"recordings/alpha/{made.NIGHT.recording}.html"
+KINDS = (
+    "index", "recordings.html", "datasheets", "theory", "made", "sensors/alpha", "sensors/gamma",
+    "devices/", "recordings/alpha/night 1", "recordings/alpha/night 2", "recordings/beta/run_1",
+)  # fmt: skip
+
+
+INK = """() => document.querySelector("figure[data-kind=allan] .canvas").data
+  .find((one) => one.mode === "lines+markers").line.color"""
+
+
+def luminance(colour: str) -> float:
+    """Return how light a colour is, from 0 to 1."""
+    red, green, blue = ImageColor.getrgb(colour)[:3]
+    return (0.2126 * red + 0.7152 * green + 0.0722 * blue) / 255
+
+
+def background(reader: Reader) -> float:
+    return luminance(reader.page.evaluate("getComputedStyle(document.body).backgroundColor"))
+
+
+def ink(reader: Reader) -> str:
+    """Return the colour of the measured curve."""
+    reader.figure("allan", channel="gyro_x")
+    return str(reader.page.evaluate(INK))
+
+
+def picture(reader: Reader, **how: Any) -> Image.Image:
+    return Image.open(io.BytesIO(reader.page.screenshot(**how))).convert("RGB")
+
+
+def test_no_page_is_wider_than_a_telephone(read: Open, bench: Report) -> None:
+    reader = read(bench.folder, width=390, height=5000)
+    wide = {}
+    for begin in KINDS:
+        reader.open(bench.page(begin))
+        reader.draw_all()
+        wide[begin] = reader.page.evaluate(TOO_WIDE)
+    assert {begin: found for begin, found in wide.items() if found} == {}
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+def test_there_is_something_to_see(width: int, read: Open, bench: Report) -> None:
+    reader = read(bench.folder, OF_NIGHT, width=width)
+    for show in (lambda: None, lambda: reader.figure("allan", channel="gyro_x")):
+        show()
+        seen = picture(reader)
+        assert seen.width == width and len(seen.getcolors(1 << 20) or []) > 50
+
+
+def test_a_page_is_dark_by_night(read: Open, bench: Report) -> None:
+    reader = read(bench.folder, OF_NIGHT)
+    light = ink(reader)
+    assert background(reader) > 0.9 and luminance(light) < 0.2
+    # It follows when the evening comes.
+    reader.page.emulate_media(color_scheme="dark")
+    reader.page.wait_for_function(f"({INK})() !== '{light}'")
+    dark = ink(reader)
+    assert background(reader) < 0.1 and luminance(dark) > 0.7
+    assert ink(read(bench.folder, OF_NIGHT, scheme="dark")) == dark
+    pixels = picture(reader).resize((64, 64)).convert("L").tobytes()
+    assert sorted(pixels)[len(pixels) // 2] < 60
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_page_is_printed_light_and_whole(scheme: str, read: Open, bench: Report) -> None:
+    reader = read(bench.folder, OF_NIGHT, scheme=scheme)
+    reader.page.wait_for_function("window.Plotly !== undefined")
+    reader.page.emulate_media(media="print", color_scheme=scheme)
+    assert background(reader) > 0.9
+    hidden = ("nav", ".units", ".skip")
+    assert not any(reader.page.locator(one).first.is_visible() for one in hidden)
+    data = reader.page.pdf()
+    assert data.startswith(b"%PDF")
+    assert len(re.findall(rb"/Type\s*/Page\b", data)) > 1
+    # Printing draws what was not in view yet, with the colours of paper.
+    canvases = reader.page.locator("figure[data-kind] .canvas").all()
+    assert all(canvas.locator("svg.main-svg").count() for canvas in canvases)
+    reader.page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert luminance(ink(reader)) < 0.2

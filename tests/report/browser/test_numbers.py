@@ -1,0 +1,145 @@
+"""Numbers in the text: those of the tables, in the units that the reader chooses."""
+
+import pytest
+
+from tests.report.browser import made
+from tests.report.browser.factors import FACTORS
+from tests.report.browser.made import Report
+from tests.report.browser.reader import Open, Reader, axis_title
+
+OF_NIGHT = f"recordings/alpha/{made.NIGHT.recording}.html"
+PAGES = ("index.html", "sensors/alpha.html", OF_NIGHT)
+SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+LABELS = {"gyro": "Gyroscopes in", "accel": "Accelerometers in"}
+
+NUMBERS = """root => [...root.querySelectorAll("data")].map(one => {
+  const cell = one.closest("td");
+  const head = cell?.closest("table").tHead.rows[0].cells[cell.cellIndex];
+  return { value: Number(one.value), text: one.textContent,
+    unit: one.dataset.unit ?? head.dataset.unit,
+    digits: Number(one.dataset.digits ?? (one.parentNode.localName === "small" ? 3 : 4)) };
+})"""
+SIGNS = """root => [...root.querySelectorAll("[data-sign]")]
+  .map(one => [one.dataset.sign, one.textContent])"""
+AS_WRITTEN = "text => new DOMParser().parseFromString(text, 'text/html')"
+
+
+def number(text: str) -> float:
+    """Read a number as the pages print it."""
+    mantissa, _, power = text.replace("−", "-").partition("×10")
+    return float(mantissa) * 10.0 ** int(power.translate(SUPERSCRIPTS) or 0)
+
+
+def show_every_row(reader: Reader) -> None:
+    for method in reader.page.get_by_role("combobox", name="Method").all():
+        method.select_option("all")
+
+
+def shown(reader: Reader) -> tuple[list[dict], list[list[str]]]:
+    return reader.page.evaluate(f"[({NUMBERS})(document), ({SIGNS})(document)]")
+
+
+def choose(reader: Reader, quantity: str, choice: str) -> None:
+    reader.page.get_by_label(LABELS[quantity]).select_option(choice)
+
+
+@pytest.mark.parametrize("path", PAGES)
+def test_the_script_prints_what_the_page_was_written_with(
+    path: str, read: Open, bench: Report
+) -> None:
+    reader = read(bench.folder, path)
+    show_every_row(reader)
+    text = (bench.folder / path).read_text(encoding="utf-8")
+    written = reader.page.evaluate(
+        f"text => {{ const page = ({AS_WRITTEN})(text);"
+        f" return [({NUMBERS})(page), ({SIGNS})(page)]; }}",
+        text,
+    )
+    assert len(written[0]) > 20 and len(written[1]) > 4
+    numbers, signs = shown(reader)
+    assert signs == written[1]
+    different = [(a, b["text"]) for a, b in zip(written[0], numbers, strict=True) if a != b]
+    assert different == []
+
+
+@pytest.mark.parametrize("path", PAGES)
+def test_numbers_and_units_follow_the_reader(path: str, read: Open, bench: Report) -> None:
+    reader = read(bench.folder, path)
+    show_every_row(reader)
+    first = shown(reader)
+    for quantity, choices in FACTORS.items():
+        options = reader.page.get_by_label(LABELS[quantity]).locator("option").all_inner_texts()
+        assert options == list(choices)
+        for choice, units in choices.items():
+            choose(reader, quantity, choice)
+            numbers, signs = shown(reader)
+            for one, before in zip(numbers, first[0], strict=True):
+                of, symbol = one["unit"].split(".")
+                if of != quantity:
+                    assert one == before  # the other quantity stays as it was
+                    continue
+                # Half of the last digit, and half of the fifth of the number in the page.
+                error = 0.5 * 10.0 ** (1 - one["digits"]) + 0.5e-4
+                expected = one["value"] * units[symbol][1]
+                assert number(one["text"]) == pytest.approx(expected, rel=error), one
+            own = {(s.split(".")[1], sign) for s, sign in signs if s.split(".")[0] == quantity}
+            assert own <= {(symbol, sign) for symbol, (sign, _) in units.items()}
+        choose(reader, quantity, next(iter(choices)))
+        assert shown(reader) == first
+
+
+def test_the_numbers_are_those_of_the_noise(read: Open, bench: Report) -> None:
+    reader = read(bench.folder, OF_NIGHT)
+    used = reader.page.get_by_role("table", name="Parameters by all methods").first.locator(
+        "tr.recommended"
+    )
+    cells = used.locator("td.number data").all_inner_texts()
+    assert cells == [
+        "0.3",
+        "0.27",
+        "0.339",
+        "10",
+        "9",
+        "11.3",
+        "100",
+        "90",
+        "113",
+        "5",
+        "4.5",
+        "5.65",
+    ]
+    choose(reader, "gyro", "SI: rad/s")
+    assert used.locator("td.number data").first.inner_text() == "8.727×10⁻⁵"
+    choose(reader, "gyro", "°/s")
+    assert used.locator("td.number data").first.inner_text() == "0.005"
+
+
+def test_a_value_that_is_not_known_says_why(read: Open, bench: Report) -> None:
+    reader = read(bench.folder, OF_NIGHT)
+    tables = reader.page.get_by_role("table", name="Parameters by all methods")
+    absent = tables.nth(1).locator("tr.recommended td.none")
+    # 1e-7 rad/s/√s are 1.24 °/h/√h.
+    assert absent.inner_text().split("\n") == ["absent", "below 1.24"]
+    unsure = tables.nth(2).locator("tr.recommended td.none")
+    assert unsure.inner_text().split("\n") == ["not identified", "20 to 500"]
+    assert "10 h would do for 10 %" in reader.page.locator("ul.untold").last.inner_text()
+
+
+def test_the_choice_lasts_from_page_to_page(read: Open, bench: Report) -> None:
+    reader = read(bench.folder)
+    choose(reader, "gyro", "°/s")
+    reader.page.get_by_role("link", name=made.NIGHT.recording).first.click()
+    figure = reader.figure("allan", channel="gyro_x")
+    assert reader.page.get_by_label(LABELS["gyro"]).input_value() == "°/s"
+    assert axis_title(figure, "y") == "Allan deviation (°/s)"
+    assert shown(reader)[1][0] == ["gyro.N", "°/s/√Hz"]
+
+
+@pytest.mark.parametrize("left", ["furlongs", ""])
+def test_a_choice_that_is_no_more_does_no_harm(left: str, read: Open, bench: Report) -> None:
+    stored = {"imubench gyro": left, "imubench accel": "SI: m/s²"}
+    reader = read(bench.folder, stored=stored)
+    assert reader.page.get_by_label(LABELS["gyro"]).input_value() == next(iter(FACTORS["gyro"]))
+    assert reader.page.get_by_label(LABELS["accel"]).input_value() == "SI: m/s²"
+    assert axis_title(reader.figure("overlay"), "y") == "Allan deviation (°/h)"
+    assert {tuple(one) for one in shown(reader)[1]} >= {("gyro.N", "°/√h"), ("accel.B", "m/s²")}

@@ -1,0 +1,99 @@
+"""The report as one file: it needs no other, and its pages are reached as in a folder."""
+
+import re
+from pathlib import Path
+
+from playwright.sync_api import Page, expect
+
+from tests.report.browser import made
+from tests.report.browser.reader import Open, Reader, toggle, traces
+
+NIGHT = made.NIGHT.recording
+OF_NIGHT = f"recordings/alpha/{NIGHT}.html"
+
+
+def head(page: Page) -> str:
+    return page.locator("main h1").inner_text()
+
+
+def test_one_file_needs_no_other(read: Open, alone: Path) -> None:
+    assert [path.name for path in alone.parent.iterdir()] == [alone.name]
+    reader = read(alone.parent, alone.name)
+    assert head(reader.page) == made.TITLE
+    assert reader.draw_all() == 6
+    figure = reader.figure("overlay")
+    toggle(figure, "Other B").uncheck()
+    assert {one["name"] for one in traces(figure) if one["name"]} == {
+        f"Vendor & Sons A-1, {NIGHT}", "Vendor & Sons A-1 (simulated), sim_published",
+    }  # fmt: skip
+    kinds = ("../tables", "figures/", "assets/")
+    links = reader.page.locator("a[href]").evaluate_all(
+        "all => all.map(a => a.getAttribute('href'))"
+    )
+    assert not [link for link in links if link.startswith(kinds)]
+
+
+def test_pages_of_one_file_are_turned(read: Open, alone: Path) -> None:
+    reader = read(alone.parent, alone.name)
+    page = reader.page
+    page.get_by_role("link", name=NIGHT).first.click()
+    expect(page.locator("main h1")).to_contain_text(NIGHT)
+    assert page.title() == f"Vendor & Sons A-1: {NIGHT}"
+    assert "#/recordings/alpha/" in page.url
+    assert traces(reader.figure("allan", channel="gyro_x"))
+    page.get_by_role("link", name="Accelerometer x").first.click()
+    expect(page.locator("h2#accel_x")).to_be_in_viewport()
+    page.get_by_role("navigation", name="Pages").get_by_role("link", name="Theory").click()
+    expect(page.locator("main h1")).to_contain_text("Theory")
+    page.get_by_role("link", name="Densities").click()
+    expect(page.locator("#sidedness")).to_be_in_viewport()
+    for expected in (r"#/theory\.html$", r"#accel_x$", r"night.*\.html$", r"report\.html$"):
+        page.go_back()
+        expect(page).to_have_url(re.compile(expected))
+    assert head(page) == made.TITLE
+    page.go_forward()
+    expect(page.locator("main h1")).to_contain_text(NIGHT)
+    assert page.locator("main h1").count() == 1
+
+
+def test_a_place_in_one_file_has_an_address(read: Open, alone: Path) -> None:
+    reader = read(alone.parent, f"{alone.name}")
+    page = reader.page
+    page.goto(alone.as_uri() + "#/theory.html#bias-instability")
+    page.reload()
+    expect(page.locator("#bias-instability")).to_be_in_viewport()
+    marked = page.locator("header nav a[aria-current]")
+    expect(marked).to_have_text(["Theory"])
+    page.goto(alone.as_uri() + "#/nothing.html")
+    page.reload()
+    assert head(page) == made.TITLE
+
+
+def test_every_link_of_one_file_leads_somewhere(read: Open, alone: Path) -> None:
+    reader = read(alone.parent, alone.name)
+    lost = reader.page.evaluate(
+        """() => {
+          const templates = [...document.querySelectorAll("template[id^='page:']")];
+          const pages = new Map(templates.map(one => [one.id.slice(5), one.content]));
+          const lost = [];
+          for (const [path, content] of pages) {
+            for (const link of content.querySelectorAll("a[href]")) {
+              const url = new URL(link.getAttribute("href"), `file:///${path}`);
+              const page = pages.get(decodeURIComponent(url.pathname.slice(1)));
+              const section = decodeURIComponent(url.hash.slice(1));
+              if (page && (!section || page.getElementById(section))) continue;
+              lost.push(`${path}: ${link.outerHTML}`);
+            }
+          }
+          return pages.size ? lost : ["no pages"];
+        }"""
+    )
+    assert lost == []
+
+
+def test_the_choice_of_units_lasts_from_page_to_page(read: Open, alone: Path) -> None:
+    reader: Reader = read(alone.parent, alone.name)
+    reader.page.get_by_label("Gyroscopes in").select_option("SI: rad/s")
+    reader.page.get_by_role("link", name=NIGHT).first.click()
+    cell = reader.page.locator("tr.recommended data").first
+    expect(cell).to_have_text("8.727×10⁻⁵")

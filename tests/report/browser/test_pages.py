@@ -1,0 +1,165 @@
+"""Every page of the report: it opens without a complaint, draws what it has, leads somewhere."""
+
+import posixpath
+import re
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import pytest
+
+from imubench_pipeline.report.publish import publish
+from imubench_pipeline.report.static_figures.files import cross_figures
+from imubench_pipeline.report.view import recording_views
+from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
+from tests.report.browser import made
+from tests.report.browser.made import Report
+from tests.report.browser.reader import TOO_WIDE, Open, Reader
+
+LOOK = f"""() => ({{
+  wide: ({TOO_WIDE})(),
+  title: document.title,
+  heads: [...document.querySelectorAll("h1")].map((head) => head.textContent),
+  ids: [...document.querySelectorAll("[id]")].map((one) => one.id),
+  links: [...document.querySelectorAll("a[href], link[href], [src]")]
+    .map((one) => one.getAttribute("href") ?? one.getAttribute("src")),
+  text: document.querySelector("main").innerText,
+  empty: [...document.querySelectorAll("figure[data-kind] .canvas")]
+    .filter((one) => !one.querySelector("svg.main-svg") || !one.data?.length)
+    .map((one) => one.getAttribute("aria-label")),
+}})"""
+
+
+@dataclass
+class Seen:
+    """What a reader found who opened every page and looked at every figure."""
+
+    pages: dict[str, dict[str, Any]]
+    figures: dict[str, int]
+    complaints: list[str]
+
+
+@pytest.fixture(scope="module")
+def seen(window: Reader, bench: Report) -> Seen:
+    window.begin(bench.folder, 1280, 900, "light")
+    pages, figures = {}, {}
+    for path in bench.pages:
+        window.open(path)
+        figures[path] = window.draw_all()
+        pages[path] = window.page.evaluate(LOOK)
+    return Seen(pages, figures, window.end())
+
+
+def test_no_page_complains_or_asks_for_anything_else(seen: Seen) -> None:
+    assert seen.complaints == []
+
+
+def test_there_is_a_page_of_everything(seen: Seen, bench: Report) -> None:
+    recordings = {
+        f"recordings/{row['sensor']}/{row['recording']}.html" for row in bench.rows["recordings"]
+    }
+    device = bench.page("devices/")
+    assert recordings | {f"sensors/{name}.html" for name in made.SENSORS} < seen.pages.keys()
+    assert seen.pages[device]["heads"] == [f"Other B: device {made.DEVICE}"]
+    assert all(len(page["heads"]) == 1 for page in seen.pages.values())
+    titles = Counter(page["title"] for page in seen.pages.values())
+    assert all(title.endswith(f" · {made.TITLE}") for title in titles)
+
+
+def test_every_figure_is_drawn(seen: Seen, bench: Report) -> None:
+    empty = {path: page["empty"] for path, page in seen.pages.items() if page["empty"]}
+    assert empty == {}
+    night = seen.figures[f"recordings/alpha/{made.NIGHT.recording}.html"]
+    assert night == 3 * len(("allan", "spectrum", "series", "histogram"))
+    forest, margins = 4, len(made.REQUIREMENTS)
+    assert seen.figures["index.html"] == 1 + forest + margins
+    assert seen.figures["sensors/gamma.html"] == seen.figures["recordings/gamma/only.html"] == 0
+    followed = {(row["channel"], row["parameter"]) for row in bench.rows["drift"]}
+    device = bench.page("devices/")
+    assert seen.figures[device] == len(followed)
+
+
+def test_every_link_leads_somewhere(seen: Seen, bench: Report) -> None:
+    views = recording_views(made.tables_of(bench.rows))
+    channels = [channel for view in views for channel in view.channels()]
+    tables = TABLES.keys() - set(OF_ONE_RECORDING)
+    beside = {f"../tables/{name}.{kind}" for name in tables for kind in ("csv", "parquet")}
+    beside |= {f"figures/{n}.{kind}" for n, _ in cross_figures(channels) for kind in ("svg", "pdf")}
+    lost = []
+    for path, page in seen.pages.items():
+        for link in page["links"]:
+            if link.startswith("data:"):
+                continue
+            target, _, section = link.partition("#")
+            file = posixpath.normpath(posixpath.join(posixpath.dirname(path), unquote(target)))
+            file = path if target == "" else file
+            if file in beside:
+                continue
+            there = (bench.folder / file).is_file()
+            if not there or (section and unquote(section) not in seen.pages[file]["ids"]):
+                lost.append(f"{path}: {link}")
+    assert lost == []
+
+
+def test_every_page_can_be_reached_from_the_first(seen: Seen) -> None:
+    reached, waiting = {"index.html"}, ["index.html"]
+    while waiting:
+        path = waiting.pop()
+        for link in seen.pages[path]["links"]:
+            target = unquote(link.partition("#")[0])
+            file = posixpath.normpath(posixpath.join(posixpath.dirname(path), target))
+            if file in seen.pages and file not in reached:
+                reached.add(file)
+                waiting.append(file)
+    assert reached == seen.pages.keys()
+
+
+def test_no_page_is_wider_than_the_window(seen: Seen) -> None:
+    assert {path: page["wide"] for path, page in seen.pages.items() if page["wide"]} == {}
+
+
+def test_no_id_stands_twice(seen: Seen) -> None:
+    twice = {
+        f"{path}: {name}"
+        for path, page in seen.pages.items()
+        for name, count in Counter(page["ids"]).items()
+        if count > 1
+    }
+    assert twice == set()
+
+
+def test_what_is_wrong_stands_in_words(seen: Seen) -> None:
+    for path in (
+        "index.html",
+        "recordings.html",
+        "sensors/gamma.html",
+        "recordings/alpha/night 2.html",
+    ):
+        assert made.REASON in seen.pages[path]["text"], path
+    start = seen.pages["index.html"]["text"]
+    assert re.search(
+        rf"changed since earlier.*{re.escape(made.DEVICE)}.*{made.CHANGED}", start, re.S
+    )
+    assert (
+        "12 samples are missing"
+        in seen.pages[f"recordings/alpha/{made.NIGHT.recording}.html"]["text"]
+    )
+    simulated = seen.pages["recordings/alpha/sim_published.html"]["text"]
+    assert "not measured" in simulated and "truth of the simulation" in simulated
+
+
+def test_a_sensor_without_a_datasheet_says_so(seen: Seen) -> None:
+    assert "No figures of a datasheet" in seen.pages["sensors/beta.html"]["text"]
+
+
+def test_a_report_of_one_recording(read: Open, tmp_path: Path) -> None:
+    publish(made.single(tmp_path), tmp_path / "report")
+    reader = read(tmp_path / "report")
+    assert reader.draw_all() == 1 + 4 + len(made.REQUIREMENTS)
+    for path in ("sensors/beta.html", "recordings/beta/alone.html"):
+        reader.open(path)
+        assert reader.draw_all() > 0
+    for path in ("recordings.html", "datasheets.html", "theory.html", "made.html"):
+        reader.open(path)

@@ -1,0 +1,166 @@
+"""Tables: sorted and filtered by the reader, and no longer than a page can bear."""
+
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Locator
+
+from tests.report.browser import made
+from tests.report.browser.made import Report
+from tests.report.browser.reader import Open, Reader
+
+SENSORS, EACH, AXES = 20, 15, 3
+PAGES = (
+    "index.html", "recordings.html", "datasheets.html", "sensors/sensor_00.html",
+    "recordings/sensor_00/run_00.html",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def many(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A report of 300 recordings of six channels each."""
+    results = tmp_path_factory.mktemp("many")
+    made.publish_some(made.many(results, SENSORS, EACH), results / "report", PAGES)
+    return results / "report"
+
+
+def table_of(reader: Reader, name: str) -> Locator:
+    return reader.page.get_by_role("table", name=name)
+
+
+def cells(table: Locator, column: int) -> list[str]:
+    return table.locator(f"tbody tr > :nth-child({column})").all_inner_texts()
+
+
+def bar_of(table: Locator) -> Locator:
+    return table.locator("xpath=../preceding-sibling::form[1]")
+
+
+def count(table: Locator) -> str:
+    return bar_of(table).locator("output").inner_text()
+
+
+def test_a_column_is_sorted_up_and_down(read: Open, bench: Report) -> None:
+    table = table_of(read(bench.folder, "recordings.html"), "All recordings")
+    before = cells(table, 2)
+    head = table.get_by_role("columnheader", name="Started")
+    assert head.get_attribute("aria-sort") is None
+    button = table.get_by_role("button", name="Sort by Started")
+    button.click()
+    assert head.get_attribute("aria-sort") == "ascending"
+    stated = sorted((log.started or "")[:10] for log in (made.NIGHT, *made.DATED))
+    dates = [text[:10] for text in cells(table, 5) if text[0].isdigit()]
+    assert dates == stated
+    button.press("Enter")
+    assert head.get_attribute("aria-sort") == "descending"
+    assert [text[:10] for text in cells(table, 5) if text[0].isdigit()] == stated[::-1]
+    table.get_by_role("button", name="Sort by Recording").click()
+    assert head.get_attribute("aria-sort") is None
+    assert sorted(cells(table, 2)) == sorted(before) != before
+
+
+@pytest.mark.parametrize("times", [1, 2])
+def test_what_is_not_known_stands_last(times: int, read: Open, bench: Report) -> None:
+    table = table_of(read(bench.folder, "recordings.html"), "All recordings")
+    for _ in range(times):
+        table.get_by_role("button", name="Sort by Temperature").click()
+    found = cells(table, 8)
+    assert found == ["20 to 35", *["–"] * (len(found) - 1)]
+    for _ in range(times):
+        table.get_by_role("button", name="Sort by Length").click()
+    assert cells(table, 6)[-2:] == ["–", "–"] and len(set(cells(table, 6)[:-2])) == 1
+
+
+def test_numbers_are_sorted_as_numbers(read: Open, bench: Report) -> None:
+    reader = read(bench.folder)
+    table = table_of(reader, "Gyroscope: parameters")
+    column = cells(table.locator("xpath=."), 6)
+    table.get_by_role("button", name="Sort by B").click()
+    sizes = [float(text.split("\n")[0]) for text in cells(table, 6)]
+    assert sizes == sorted(float(text.split("\n")[0]) for text in column)
+    # As texts, 10 would stand before 9.
+    assert sizes[0] == 10.0 and sizes[-1] == 90.0
+    table.get_by_role("button", name="Sort by K").click()
+    assert cells(table, 8)[-1].startswith("absent")
+
+
+def test_rows_are_found_and_counted(read: Open, bench: Report) -> None:
+    table = table_of(read(bench.folder, "recordings.html"), "All recordings")
+    bar = bar_of(table)
+    rows = len(bench.rows["recordings"])
+    search = bar.get_by_role("searchbox", name="Find")
+    search.fill("NIGHT")
+    assert cells(table, 2) == [made.NIGHT.recording, "night 2"]
+    assert count(table) == f"2 of {rows} rows"
+    bar.get_by_label("Status").select_option("rejected")
+    assert cells(table, 2) == ["night 2"]
+    search.fill("")
+    assert sorted(cells(table, 2)) == ["night 2", "only"]
+    bar.get_by_label("Sensor").select_option("Other C")
+    assert cells(table, 2) == ["only"] and count(table) == f"1 of {rows} rows"
+    search.fill("nothing like it")
+    assert cells(table, 2) == [] and count(table) == f"0 of {rows} rows"
+    for label in ("Status", "Sensor"):
+        bar.get_by_label(label).select_option("all")
+    search.fill("")
+    assert count(table) == f"{rows} rows" and len(cells(table, 2)) == rows
+
+
+def test_the_other_method_is_asked_for(read: Open, bench: Report) -> None:
+    table = table_of(read(bench.folder), "Gyroscope: parameters")
+    best = len(bench.of("fixed_bias", channel="gyro_x")) + 1
+    assert len(cells(table, 1)) == best
+    method = bar_of(table).get_by_label("Method")
+    method.select_option("papers' model")
+    assert len(cells(table, 1)) == best - 1  # one has it as its best
+    method.select_option("all")
+    assert count(table) == f"{2 * best - 1} rows"
+
+
+def test_a_long_table_shows_its_first_rows(read: Open, many: Path) -> None:
+    reader = read(many)
+    table = table_of(reader, "Gyroscope: parameters")
+    every = 2 * SENSORS * EACH * AXES
+    assert table.locator("tbody tr").count() == 100
+    bar = bar_of(table)
+    assert "first" in count(table)
+    last = f"model {SENSORS - 1:02d}"
+    assert table.get_by_text(last).count() == 0
+    bar.get_by_role("searchbox").fill(last)
+    assert table.get_by_text(last).count() == EACH * AXES
+    assert count(table) == f"{EACH * AXES} of {every} rows"
+    bar.get_by_role("searchbox").fill("run_00")
+    assert count(table) == f"{SENSORS * AXES} of {every} rows"
+    bar.get_by_role("searchbox").fill("")
+    found = SENSORS * EACH * AXES
+    assert count(table) == f"the first 100 of {found} of {every} rows"
+    bar.get_by_role("button", name=f"show all {found}").click()
+    assert table.locator("tbody tr").count() == found
+    assert bar.get_by_role("button").count() == 0
+    # Numbers of rows that were not in the page follow the reader too.
+    reader.page.get_by_label("Gyroscopes in").select_option("SI: rad/s")
+    assert "×10⁻⁵" in table.locator("tbody tr").last.inner_text()
+
+
+def test_a_long_table_is_sorted_whole(read: Open, many: Path) -> None:
+    table = table_of(read(many, "recordings.html"), "All recordings")
+    assert table.locator("tbody tr").count() == 100
+    table.get_by_role("button", name="Sort by Recording").click()
+    table.get_by_role("button", name="Sort by Recording").click()
+    assert set(cells(table, 2)) == {f"run_{r:02d}" for r in range(EACH - 5, EACH)}
+    assert count(table) == f"the first 100 of {SENSORS * EACH} rows"
+
+
+def test_a_report_of_many_recordings_is_drawn(read: Open, many: Path) -> None:
+    reader = read(many)
+    figure = reader.figure("overlay")
+    names = "canvas => canvas.data.filter(one => one.name).length"
+    # So many curves would be a carpet: the reader asks for them.
+    assert figure.locator(".canvas").evaluate(names) == SENSORS
+    recordings = reader.page.get_by_role("combobox", name="Recordings")
+    assert recordings.input_value() == "last"
+    recordings.select_option("all")
+    assert figure.locator(".canvas").evaluate(names) == SENSORS * EACH
+    for path in PAGES[1:]:
+        reader.open(path)
+        reader.draw_all()

@@ -1,0 +1,265 @@
+"""Small results of a run, as it leaves them: tables, settings, and the files of recordings."""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from imubench_pipeline.drift import drift_rows
+from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.expected_errors import error_rows, of_requirement, standard
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.pooled import pooled_rows
+from imubench_pipeline.recording import LogWriter
+from imubench_pipeline.report.publish import site_of
+from imubench_pipeline.report.site import Site
+from imubench_pipeline.requirements import Requirement
+from imubench_pipeline.results import Key, parameter_rows
+from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
+from imubench_pipeline.selection import ranking_rows
+from imubench_pipeline.tables import build, write, write_arrow
+
+Row = dict[str, Any]
+Rows = dict[str, list[Row]]
+Tables = dict[str, pa.Table]
+
+DEGREE = math.pi / 180
+HOUR = DEGREE / 3600  # of a degree an hour
+RATE = 100.0
+TAU = np.geomspace(0.01, 1e3, 12)
+MODEL = NoiseModel(N=20 * HOUR, B=10 * HOUR, T_B=100.0, K=0.1 * HOUR)
+KNOWN = {
+    "N": Parameter(MODEL.N, lower=0.9 * MODEL.N, upper=1.1 * MODEL.N),
+    "B": Parameter(MODEL.B, lower=0.8 * MODEL.B, upper=1.3 * MODEL.B),
+    "T_B": Parameter(MODEL.T_B, lower=80.0, upper=130.0),
+    "K": Parameter(MODEL.K, lower=0.5 * MODEL.K, upper=2.0 * MODEL.K),
+}
+WITHOUT_K = KNOWN | {"K": Parameter(None, "absent", "not there", upper=0.5 * MODEL.K)}
+ROBOT = {
+    "title": "a robot",
+    "static_window": "10 s",
+    "limits": [
+        {"error": "heading", "after": "100 s", "at_most": "1 deg"},
+        {"error": "position", "after": "100 s", "at_most": "10 m"},
+    ],
+}
+
+
+def recording_rows(
+    sensor: str = "imu",
+    recording: str = "day1",
+    channels: Sequence[str] = ("gyro_x",),
+    *,
+    parameters: Mapping[str, Parameter] = KNOWN,
+    simulated: bool = False,
+    printed: bool = True,
+    found: Sequence[float] = (),
+    findings: Sequence[Row] = (),
+    requirements: Mapping[str, Any] | None = None,
+    **about: Any,
+) -> Rows:
+    """What a run finds in one recording."""
+    names = {"sensor": sensor, "recording": recording}
+    row = {"device": recording, "kind": "static", "simulated": simulated, "status": "ok",
+           "rate": RATE, "rate_from": "stated", "duration": 7200.0, "samples": 720_000}  # fmt: skip
+    rows: Rows = {
+        "recordings": [names | row | about],
+        "findings": [
+            names | {"value": 1.0, "severity": "warning", "detail": "look"} | one
+            for one in findings
+        ],
+    }
+    for channel in channels:
+        own = _channel_rows(Key(sensor, recording, channel), parameters, simulated, printed, found)
+        for table, more in own.items():
+            rows.setdefault(table, []).extend(more)
+    questions = [*standard([60.0], 60.0, math.pi / 4, ["worst"])]
+    for name, given in (requirements or {}).items():
+        questions += of_requirement(name, Requirement.model_validate(given))
+    estimates = dict.fromkeys(channels, Estimate("likelihood", parameters))
+    rows["error_budget"] = list(error_rows(names, estimates, questions, draws=3, seed=1))
+    return rows
+
+
+def _channel_rows(
+    key: Key,
+    parameters: Mapping[str, Parameter],
+    simulated: bool,
+    printed: bool,
+    found: Sequence[float],
+) -> Rows:
+    names = {"sensor": key.sensor, "recording": key.recording, "channel": key.channel}
+    best, papers = (Estimate(method, parameters) for method in ("likelihood", "likelihood_gm"))
+    curve = Estimate("curve", {"N": KNOWN["N"]} | dict.fromkeys(("B", "T_B", "K"), _not_shown()))
+    model = best.model
+    adev = np.sqrt(model.allan_variance(TAU))
+    frequency = np.geomspace(1e-4, RATE / 2, 9)
+    density = model.sampled_spectrum(2 * np.pi * frequency / RATE, RATE) / RATE
+    method = names | {"method": "likelihood"}
+    figure = {"quantity": "N", "statistic": "N", "printed": 0.005, "unit": "deg/s/sqrt(Hz)",
+              "kind": "typ", "sidedness": "two-sided", "verdict": "as printed",
+              "comparable": 18 * HOUR, "measured": 20 * HOUR, "lower": 18 * HOUR,
+              "upper": 22 * HOUR, "delta": 1 / 9, "delta_lower": 0.0,
+              "delta_upper": 2 / 9}  # fmt: skip
+    unpublished = {"quantity": "K", "statistic": "K", "verdict": "not published"}
+    tried = {"free": 4, "log_likelihood": 0.0, "aic": 0.0, "weight": 0.5, "bins": 60}
+    judged = {"deviance": 1.03, "chance": 0.4, "verdict": "explained"}
+    return {
+        "allan": [
+            names | {"tau": t, "cluster_size": round(t * RATE), "adev": a, "lower": a / 1.2,
+                     "upper": a * 1.2, "edf": 9.0, "exponent": 0}
+            for t, a in zip(TAU, adev, strict=True)
+        ],
+        "parameters": [
+            row
+            for number, estimate in enumerate((best, papers, curve))
+            for row in parameter_rows(key, estimate, recommended=number == 0)
+        ],
+        "reconstruction": [
+            method | {"tau": t, "adev": a, "lower": a / 2, "upper": a * 2, "reconstructed": a}
+            for t, a in zip(TAU, adev, strict=True)
+        ],
+        "scores": [method | {"rms": 1e-5, "rms_log10": 0.05, "inside_band": 0.98}],
+        "datasheet": [method | figure, method | unpublished] * printed,
+        "datasheet_curve": [
+            names | {"N": 18 * HOUR, "rms": HOUR, "rms_log10": 0.05, "sidedness": "two-sided"},
+        ] * printed,
+        "spectrum": [
+            names | {"frequency": f, "lower": f, "upper": f, "ordinates": 9.0, "density": d,
+                     "fitted": d, "used": True}
+            for f, d in zip(frequency, density, strict=True)
+        ],
+        "models": [
+            names | tried | judged | {"model": model.name, "chosen": True, "bic": 10.0},
+            names | tried | judged | {"model": "N+F", "chosen": False, "bic": 13.5},
+        ],
+        "lines": [
+            names | {"kind": "sinusoid", "frequency": f, "frequency_lower": 0.98 * f,
+                     "frequency_upper": 1.02 * f, "amplitude": HOUR, "amplitude_lower": HOUR / 2,
+                     "amplitude_upper": 2 * HOUR, "ratio": 30.0, "false_alarm": 1e-6}
+            for f in found
+        ],
+        "fixed_bias": [names | {"value": 5 * HOUR, "unit": "rad/s"}],
+        "simulated_truth": [
+            names | {"parameter": "N", "value": MODEL.N, "unit": "rad/s/sqrt(Hz)",
+                     "assumed": True, "source": "a table"},
+        ] * simulated,
+    }  # fmt: skip
+
+
+def _not_shown() -> Parameter:
+    return Parameter(None, "not_shown", "the curve does not rise")
+
+
+def rejected_rows(
+    sensor: str = "imu", recording: str = "bad", reason: str = "line 3: found 'x'", **about: Any
+) -> Rows:
+    """What a run leaves of a recording that cannot be used."""
+    names = {"sensor": sensor, "recording": recording}
+    row = {"device": recording, "kind": "static", "simulated": False, "status": "rejected"}
+    finding = {"finding": "rejected", "severity": "fatal", "detail": reason, "value": 1.0}
+    return {
+        "recordings": [names | row | {"reason": reason} | about],
+        "findings": [names | finding],
+    }
+
+
+def coverage_rows(*sensors: str) -> Rows:
+    """Who publishes what: of each sensor N and no K."""
+    return {
+        "coverage": [
+            {"sensor": sensor, "vendor": "V & Co", "model": sensor, "quantity": "gyro",
+             "figure": figure, "published": published, "as_printed": printed}
+            for sensor in sensors
+            for figure, published, printed in (("N", "yes", "5 m°/s/√Hz"), ("K", "no", None))
+        ]
+    }  # fmt: skip
+
+
+def joined(*several: Rows, requirements: Mapping[str, Any] | None = None) -> Tables:
+    """The tables of a run: the rows of its recordings, and what it makes of them together."""
+    rows = {name: [row for one in several for row in one.get(name, [])] for name in TABLES}
+    made = {name: build(name, own) for name, own in rows.items()}
+    recommended = [row for row in made["parameters"].to_pylist() if row["recommended"]]
+    biases = made["fixed_bias"].to_pylist()
+    about = made["recordings"].to_pylist()
+    devices = {(row["sensor"], row["recording"]): row["device"] for row in about}
+    asked = {n: Requirement.model_validate(one) for n, one in (requirements or {}).items()}
+    sensors = {row["sensor"]: {"price_class": None} for row in about}
+    errors = made["error_budget"].to_pylist()
+    return made | {
+        "pooled": build("pooled", pooled_rows(recommended, biases, devices)),
+        "drift": build("drift", drift_rows(recommended, biases, about)),
+        "ranking": build("ranking", ranking_rows(errors, asked, sensors)),
+    }
+
+
+def settings_of(
+    tables: Mapping[str, pa.Table],
+    *,
+    requirements: Mapping[str, Any] | None = None,
+    units: str = "practical",
+    title: str = "A title",
+) -> str:
+    """What a plan says of the report."""
+    sensors = dict.fromkeys(tables["recordings"]["sensor"].to_pylist())
+    return json.dumps(
+        {
+            "report": {"title": title, "units": units},
+            "results": "results",
+            "settings": {
+                "allan": {"overlap": "octave"},
+                "error_budget": {"static_window": "60 s", "latitude": "45 deg"},
+            },
+            "sensors": {
+                name: {"vendor": "V & Co", "model": name, "price_class": "cheap"}
+                for name in sensors
+            },
+            "requirements": {
+                name: Requirement.model_validate(one).model_dump(mode="json")
+                for name, one in (requirements or {}).items()
+            },
+        },
+        sort_keys=True,
+    )
+
+
+def site(tables: Mapping[str, pa.Table], results: Path = Path("nowhere"), **given: Any) -> Site:
+    """The site of tables."""
+    return site_of(tables, settings_of(tables, **given), results)
+
+
+def put_samples(results: Path, sensor: str, recording: str, channel: str = "gyro_x") -> None:
+    """Write what the samples of a channel look like, as the ingest does."""
+    folder = results / "recordings" / sensor / recording
+    names = {"sensor": sensor, "recording": recording, "channel": channel}
+    envelope = [
+        names | {"start": 18.0 * i, "end": 18.0 * (i + 1), "samples": 1800 if i != 2 else 0}
+        | ({"low": -1e-3, "high": 1e-3 + 1e-5 * i, "mean": 1e-6 * i} if i != 2 else {})
+        for i in range(400)
+    ]  # fmt: skip
+    histogram = [
+        names | {"lower": 1e-5 * i, "upper": 1e-5 * (i + 1), "count": 7 * i} for i in range(-50, 50)
+    ]
+    counted = [row | {"count": abs(row["count"])} for row in histogram]
+    write("envelope", envelope, folder / "envelope.parquet")
+    write("histogram", counted, folder / "histogram.parquet")
+
+
+def put_log(results: Path, sensor: str, recording: str, **about: Any) -> None:
+    """Write a log as the ingest keeps it, of which the report reads the metadata alone."""
+    folder = results / "recordings" / sensor / recording
+    folder.mkdir(parents=True, exist_ok=True)
+    with LogWriter(folder / "log.parquet", {"gyro_x": pa.float64()}) as log:
+        log.write({"gyro_x": np.zeros(3)})
+        log.finish(about)
+
+
+def put_tables(tables: Mapping[str, pa.Table], results: Path) -> None:
+    """Write the joined tables, as the workflow does."""
+    for name in set(TABLES) - set(OF_ONE_RECORDING):
+        write_arrow(tables[name], results / f"tables/{name}.parquet")

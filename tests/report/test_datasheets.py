@@ -1,0 +1,190 @@
+from typing import Any
+
+import pytest
+
+from imubench_pipeline.report.datasheets import (
+    coverage_tables,
+    curve_distances,
+    delta_rows,
+    deltas_of_sensors,
+)
+from imubench_pipeline.report.view import RecordingView, recording_views
+from imubench_pipeline.tables import build
+from tests.report.tables import DEGREE, HOUR, Rows, joined, recording_rows
+
+FIGURE = {"statistic": "N", "quantity": "N", "printed": 0.3, "unit": "deg/sqrt(h)", "kind": "typ",
+          "comparable": 0.3 * DEGREE / 60, "measured": 0.33 * DEGREE / 60,
+          "lower": 0.3 * DEGREE / 60, "upper": 0.36 * DEGREE / 60,
+          "delta": 0.1, "delta_lower": 0.0, "delta_upper": 0.2,
+          "verdict": "as printed"}  # fmt: skip
+
+
+def with_figures(
+    *figures: dict[str, Any], sensor: str = "a", recording: str = "r", **given: Any
+) -> Rows:
+    rows = recording_rows(sensor, recording, **given)
+    names = {"sensor": sensor, "recording": recording, "channel": "gyro_x"}
+    rows["datasheet"] = [names | {"method": "likelihood"} | figure for figure in figures]
+    return rows
+
+
+def views(*several: Rows) -> list[RecordingView]:
+    return recording_views(joined(*several))
+
+
+def deltas(
+    *figures: dict[str, Any],
+    system: str = "practical",
+    coverage: dict[tuple[str, str, str], str] | None = None,
+) -> list[dict[str, Any]]:
+    (view,) = views(with_figures(*figures))
+    return list(delta_rows(view.channels()[0], coverage or {}, system))
+
+
+def test_a_printed_figure_stands_beside_what_was_measured() -> None:
+    (row,) = deltas(FIGURE | {"condition": "25 °C", "sidedness": "one-sided"})
+    assert row["quantity"] == "N"
+    assert row["printed"] == "0.3 deg/sqrt(h)"
+    assert row["about"] == "typ, read as one-sided, 25 °C"
+    assert (row["comparable"], row["unit"]) == ("0.3", "°/√h")
+    assert row["measured"] == ["0.33", "0.3 to 0.36"]
+    assert row["delta"] == ["+10 %", "+0 % to +20 %"]
+    assert row["verdict"] == "as printed"
+    (row,) = deltas(FIGURE, system="si")
+    assert (row["comparable"], row["unit"]) == ("8.727×10⁻⁵", "rad/s/√Hz")
+
+
+def test_less_than_printed_has_a_minus() -> None:
+    (row,) = deltas(FIGURE | {"delta": -0.257, "delta_lower": None, "delta_upper": None})
+    assert row["delta"] == ["−26 %"]
+    assert row["value"] == -0.257
+
+
+def test_an_unpublished_figure_is_told_from_one_that_cannot_be_compared() -> None:
+    nothing = dict.fromkeys(("comparable", "measured", "lower", "upper", "delta", "delta_lower",
+                             "delta_upper"))  # fmt: skip
+    missing = FIGURE | nothing | {"printed": None, "unit": None, "kind": None}
+    other = FIGURE | nothing | {"verdict": "not comparable", "reason": "another convention"}
+    unpublished, incomparable = deltas(missing | {"verdict": "not published", "reason": "x"}, other)
+    assert (unpublished["published"], unpublished["printed"]) == (False, "–")
+    assert unpublished["reason"] == ""
+    assert incomparable["published"] is True
+    assert (incomparable["comparable"], incomparable["measured"]) == ("–", ["–"])
+    assert incomparable["delta"] == ["–"]
+    assert incomparable["reason"] == "another convention"
+
+
+@pytest.mark.parametrize(
+    ("quantity", "figure"), [("N", "N"), ("bias_instability", "B"), ("K", "K"), ("T_B", "T_B")]
+)
+def test_what_nobody_looked_up_is_not_said_to_be_unpublished(quantity: str, figure: str) -> None:
+    missing = FIGURE | {"printed": None, "quantity": quantity}
+    known = {("a", "gyro", figure): "not looked up", ("a", "accel", figure): "yes"}
+    (row,) = deltas(missing, coverage=known)
+    assert row["coverage"] == "not looked up"
+    (row,) = deltas(missing, coverage={("b", "gyro", figure): "not looked up"})
+    assert row["coverage"] == "no"
+
+
+@pytest.mark.parametrize(
+    ("statistic", "quantity", "name", "unit"),
+    [
+        ("adev_minimum", "bias_instability", "bias instability (minimum)", "°/h"),
+        ("plateau", "bias_instability", "bias instability (0.664 B)", "°/h"),
+        ("K", "K", "K", "°/h/√h"),
+        ("T_B", "T_B", "T_B", "s"),
+        ("mean", "zero_rate_offset", "zero rate offset", "°/h"),
+    ],
+)
+def test_figures_have_names_and_units_of_their_own(
+    statistic: str, quantity: str, name: str, unit: str
+) -> None:
+    (row,) = deltas(FIGURE | {"statistic": statistic, "quantity": quantity})
+    assert (row["quantity"], row["unit"]) == (name, unit)
+
+
+def test_methods_that_are_not_recommended_are_left_out() -> None:
+    rows = deltas(FIGURE | {"method": "curve"}, FIGURE | {"method": "mean", "printed": 7.0})
+    assert [row["printed"] for row in rows] == ["7 deg/sqrt(h)"]
+
+
+def test_one_line_a_figure_over_all_recordings_of_a_sensor() -> None:
+    found = views(
+        with_figures(FIGURE, recording="p"),
+        with_figures(
+            FIGURE | {"measured": 0.6 * DEGREE / 60, "delta": 1.0, "verdict": "worse than typ"},
+            recording="q",
+        ),
+        with_figures(
+            FIGURE | {"measured": 0.36 * DEGREE / 60, "delta": 0.2, "verdict": "worse than typ"},
+            recording="r",
+        ),
+        with_figures(FIGURE | {"delta": None}, recording="s"),
+        with_figures(FIGURE, sensor="b", simulated=True),
+    )
+    first, second = deltas_of_sensors(found, "practical")
+    assert (first["sensor"], first["simulated"], first["channel"]) == ("a", False, "gyro_x")
+    assert first["recordings"] == 3
+    assert first["measured"] == "0.33 to 0.6"
+    assert first["difference"] == "+10 % to +100 %"
+    assert first["delta"] == 0.2
+    assert first["verdicts"] == "as printed (1), worse than typ (2)"
+    assert (first["printed"], first["about"]) == ("0.3 deg/sqrt(h)", "typ")
+    assert (second["sensor"], second["simulated"]) == ("b", True)
+    assert (second["measured"], second["difference"]) == ("0.33", "+10 %")
+    assert second["verdicts"] == "as printed"
+
+
+def test_both_readings_of_a_density_have_lines_of_their_own() -> None:
+    found = views(
+        with_figures(FIGURE | {"sidedness": "one-sided"}, FIGURE | {"sidedness": "two-sided"})
+    )
+    assert [row["about"] for row in deltas_of_sensors(found, "practical")] == [
+        "typ, read as one-sided",
+        "typ, read as two-sided",
+    ]
+
+
+def test_distances_of_the_curve_are_told_in_words() -> None:
+    rows = recording_rows()
+    rows["datasheet_curve"] = [
+        rows["datasheet_curve"][0]
+        | {"rms": 2.5 * HOUR, "rms_log10": 0.0456, "sidedness": sidedness}
+        for sidedness in ("two-sided", None)
+    ]
+    (view,) = views(rows)
+    assert list(curve_distances(view.channels()[0], "practical")) == [
+        "2.5 °/h, 0.046 decades, density read as two-sided",
+        "2.5 °/h, 0.046 decades",
+    ]
+
+
+def covered(sensor: str, published: dict[str, str], **given: Any) -> list[dict[str, Any]]:
+    about = {"sensor": sensor, "vendor": "V", "model": sensor.upper(), "quantity": "gyro"}
+    return [
+        about | {"figure": figure, "published": state, "document": "D-1"} | given
+        for figure, state in published.items()
+    ]
+
+
+def test_who_publishes_what_is_counted() -> None:
+    rows = [
+        *covered("b", {"N": "yes", "temperature_coefficient": "not looked up"}),
+        *covered("a", {"N": "yes", "temperature_coefficient": "other convention"}, document=None),
+        *covered("c", {"N": "no", "temperature_coefficient": "yes"}, as_printed="7 ppm/K"),
+        *covered("c", {"N": "no", "offset": "no"}, quantity="accel"),
+    ]
+    gyro, accel = coverage_tables(build("coverage", rows).to_pylist())
+    assert gyro["figures"] == ["N", "temperature coefficient"]
+    assert gyro["counts"] == ["2 of 3", "1 of 3"]
+    assert [line["name"] for line in gyro["lines"]] == ["V A", "V B", "V C"]
+    assert [[cell["text"] for cell in line["cells"]] for line in gyro["lines"]] == [
+        ["yes", "other"],
+        ["yes", "?"],
+        ["no", "yes"],
+    ]
+    assert [line["document"] for line in gyro["lines"]] == ["–", "D-1", "D-1"]
+    assert gyro["lines"][2]["cells"][1]["note"] == "7 ppm/K"
+    assert [cell["class"] for cell in gyro["lines"][0]["cells"]] == ["", "none"]
+    assert (accel["figures"], accel["counts"]) == (["N", "offset"], ["0 of 1", "0 of 1"])
+    assert list(coverage_tables([])) == []

@@ -1,0 +1,221 @@
+import math
+import re
+from decimal import ROUND_HALF_EVEN, Decimal
+
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from imubench_pipeline.report.practical import (
+    PageUnit,
+    duration_text,
+    first_choices,
+    interval_text,
+    limit_digits,
+    number_text,
+    page_unit,
+    unit_of,
+    units_of_pages,
+)
+
+ASCII = str.maketrans("−⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "--0123456789")
+SYMBOLS = {"Q", "N", "B", "T_B", "K", "R", "adev", "psd", "signal"}
+
+
+def rounded(value: float, digits: int) -> Decimal:
+    """Decimal's own rounding of the exact value of a float, half to even."""
+    exact = Decimal(value)
+    if not exact:
+        return exact
+    return exact.quantize(Decimal((0, (1,), exact.adjusted() - digits + 1)), ROUND_HALF_EVEN)
+
+
+def number_of(text: str) -> Decimal:
+    mantissa, _, power = text.partition("×10")
+    return Decimal(mantissa.translate(ASCII)).scaleb(int(power.translate(ASCII) or 0))
+
+
+magnitudes = st.builds(
+    lambda sign, mantissa, power: sign * mantissa * 10.0**power,
+    st.sampled_from([-1.0, 1.0]),
+    st.floats(1.0, 9.999999999999),
+    st.integers(-30, 30),
+)
+
+
+@given(magnitudes, st.integers(1, 7))
+@example(999.95, 4)
+@example(9.9995e-5, 4)
+@example(999_999.5, 6)
+@example(0.5, 1)
+@example(12345.67, 7)
+@example(8210.3, 5)
+def test_a_number_is_rounded_as_decimal_arithmetic_rounds_it(value: float, digits: int) -> None:
+    text = number_text(value, digits)
+    assert number_of(text) == rounded(value, digits)
+    plain = abs(rounded(value, digits))
+    assert ("×10" in text) == (not Decimal("1e-4") <= plain < 10**6)
+    mantissa = text.partition("×10")[0].lstrip("−")
+    assert re.fullmatch(r"[0-9]+(\.[0-9]*[1-9])?", mantissa)
+    assert text.startswith("−") == (value < 0)
+    assert "-" not in text
+    if "×10" in text:
+        assert 1 <= Decimal(mantissa) < 10
+        assert re.search(r"×10⁻?[¹²³⁴⁵⁶⁷⁸⁹][⁰¹²³⁴⁵⁶⁷⁸⁹]*$", text)
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "text"),
+    [
+        (0.0, 4, "0"),
+        (-0.0, 4, "0"),
+        (1.0, 4, "1"),
+        (-1.5, 4, "−1.5"),
+        (0.00012345, 3, "0.000123"),
+        (0.0001, 4, "0.0001"),
+        (0.00009999, 4, "9.999×10⁻⁵"),
+        (0.000099999, 4, "0.0001"),
+        (999_949.0, 4, "999900"),
+        (999_951.0, 4, "1×10⁶"),
+        (-1.2345e-12, 3, "−1.23×10⁻¹²"),
+        (6.02214e23, 2, "6×10²³"),
+    ],
+)
+def test_numbers_as_they_are_printed(value: float, digits: int, text: str) -> None:
+    assert number_text(value, digits) == text
+
+
+@pytest.mark.parametrize(
+    ("quantity", "symbol", "choice", "sign", "per_si"),
+    [
+        # 180 / pi = 57.29578°; 3600 s in an hour, 60 √s in √h; 1 g = 9.80665 m/s².
+        ("gyro", "B", 0, "°/h", 206264.806),
+        ("gyro", "adev", 0, "°/h", 206264.806),
+        ("gyro", "N", 0, "°/√h", 3437.74677),
+        ("gyro", "K", 0, "°/h/√h", 206264.806 * 60),
+        ("gyro", "R", 0, "°/h/h", 206264.806 * 3600),
+        ("gyro", "Q", 0, "°", 57.2957795),
+        ("gyro", "psd", 0, "°/s/√Hz", 57.2957795),
+        ("gyro", "signal", 0, "°/s", 57.2957795),
+        ("gyro", "T_B", 0, "s", 1.0),
+        ("gyro", "N", 1, "°/s/√Hz", 57.2957795),
+        ("gyro", "K", 1, "°/s/√s", 57.2957795),
+        ("gyro", "R", 1, "°/s/s", 57.2957795),
+        ("accel", "B", 0, "µg", 101971.6213),
+        ("accel", "N", 0, "µg/√Hz", 101971.6213),
+        ("accel", "psd", 0, "µg/√Hz", 101971.6213),
+        ("accel", "K", 0, "µg/√h", 101971.6213 * 60),
+        ("accel", "R", 0, "µg/h", 101971.6213 * 3600),
+        ("accel", "Q", 0, "m/s", 1.0),
+        ("accel", "signal", 0, "mg", 101.9716213),
+        ("accel", "N", 1, "m/s/√h", 60.0),
+        ("accel", "B", 1, "mg", 101.9716213),
+        ("accel", "K", 1, "mg/√h", 101.9716213 * 60),
+        ("accel", "R", 1, "mg/h", 101.9716213 * 3600),
+    ],
+)
+def test_units_of_pages_are_worth_what_books_say(
+    quantity: str, symbol: str, choice: int, sign: str, per_si: float
+) -> None:
+    unit = list(units_of_pages()[quantity].values())[choice][symbol]
+    assert unit.sign == sign
+    assert unit.per_si == pytest.approx(per_si, rel=2e-9)
+
+
+def test_every_choice_has_every_symbol_and_the_last_is_si() -> None:
+    for quantity, choices in units_of_pages().items():
+        for name, units in choices.items():
+            assert set(units) == SYMBOLS, (quantity, name)
+        last = list(choices.values())[-1]
+        assert all(unit.per_si == pytest.approx(1.0, rel=1e-12) for unit in last.values())
+        assert not any(mark in unit.sign for unit in last.values() for mark in "°gh")
+
+
+@pytest.mark.parametrize(("system", "place"), [("practical", 0), ("si", -1)])
+def test_a_page_opens_in_the_units_of_the_settings(system: str, place: int) -> None:
+    for quantity, choices in units_of_pages().items():
+        assert first_choices(system)[quantity] == list(choices)[place]
+        for symbol, unit in list(choices.values())[place].items():
+            assert page_unit(quantity, symbol, system) == unit
+
+
+@pytest.mark.parametrize(
+    ("dimension", "system", "sign", "per_si"),
+    [
+        ("angle", "practical", "°", 57.2957795),
+        ("angle", "si", "rad", 1.0),
+        ("velocity", "practical", "m/s", 1.0),
+        ("length", "si", "m", 1.0),
+    ],
+)
+def test_units_of_errors(dimension: str, system: str, sign: str, per_si: float) -> None:
+    unit = unit_of(dimension, system)
+    assert unit.sign == sign
+    assert unit.per_si == pytest.approx(per_si, rel=2e-9)
+
+
+def test_a_value_has_the_unit_of_engineers_and_none_is_a_dash() -> None:
+    degree_an_hour = math.pi / 180 / 3600
+    unit = page_unit("gyro", "B", "practical")
+    assert unit.text(degree_an_hour) == "1"
+    assert unit.text(12.3456 * degree_an_hour, 3) == "12.3"
+    assert unit.text(None) == "–"
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (0.5, "0.5 s"),
+        (119.0, "119 s"),
+        (120.0, "2 min"),
+        (7199.0, "120 min"),
+        (7200.0, "2 h"),
+        (36 * 3600.0, "36 h"),
+        (172_799.0, "48 h"),
+        (172_800.0, "2 days"),
+        (1e9, "11600 days"),
+    ],
+)
+def test_times_are_told_in_the_unit_in_which_they_are_easily_read(
+    seconds: float, text: str
+) -> None:
+    assert duration_text(seconds) == text
+
+
+def test_an_interval_needs_both_ends() -> None:
+    unit = PageUnit("x", 10.0)
+    assert interval_text({"lower": 0.1234, "upper": 2.0}, unit) == "1.23 to 20"
+    assert interval_text({"lower": 0.1234, "upper": 2.0}, unit, 2) == "1.2 to 20"
+    for row in ({"lower": None, "upper": 2.0}, {"lower": 0.1, "upper": None}):
+        assert interval_text(row, unit) == "–"
+
+
+@given(magnitudes, st.floats(1e-4, 1.0), st.integers(2, 4))
+def test_the_ends_of_an_interval_are_seen_to_differ(lower: float, width: float, least: int) -> None:
+    upper = lower + abs(lower) * width
+    row = {"lower": lower, "upper": upper}
+    begin, _, end = interval_text(row, PageUnit("x", 1.0), least).partition(" to ")
+    assert number_of(begin) < number_of(end)
+    digits = limit_digits(lower, upper, least)
+    assert least <= digits <= 7
+    # No more digits than needed: with one less, a tenth of the width could not be told.
+    if digits > least:
+        assert 10.0 ** (1 - digits) * max(abs(lower), abs(upper)) > 0.0099 * (upper - lower)
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "digits"),
+    [
+        (None, 1.0, 3),
+        (1.0, None, 3),
+        (1.0, 1.0, 3),
+        (0.9, 1.1, 3),
+        (0.9999, 1.0001, 5),
+        (1.0, 1.0 + 1e-12, 7),
+        (0.0, 1.0, 3),
+    ],
+)
+def test_limits_have_as_many_digits_as_tell_them_apart(
+    lower: float | None, upper: float | None, digits: int
+) -> None:
+    assert limit_digits(lower, upper) == digits
