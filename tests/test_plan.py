@@ -1,12 +1,17 @@
 import json
+import re
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
 
-from imubench_pipeline.plan import Plan
+from imubench_pipeline.plan import STEPS, Plan
+from imubench_pipeline.report.publish import pages, site_of
+from imubench_pipeline.schemas import TABLES
+from imubench_pipeline.tables import build
 from imubench_pipeline.validation import ConfigError
+from tests.conftest import PROJECT
 from tests.test_configuration import SENSOR
 
 
@@ -116,5 +121,48 @@ def test_a_log_of_another_size_is_another_log(project: dict[str, Any]) -> None:
 
 
 def test_code_is_known_by_its_content() -> None:
-    digests = {step: Plan.code(step) for step in ("ingest", "allan", "estimate", "report")}
-    assert len(set(digests.values())) == 4
+    digests = {step: Plan.code(step) for step in STEPS}
+    assert len(set(digests.values())) == len(STEPS)
+
+
+def test_every_step_of_the_workflow_has_its_code() -> None:
+    rules = set(
+        re.findall(r"^rule (\w+):", (PROJECT / "Snakefile").read_text(), flags=re.MULTILINE)
+    )
+    assert rules - {"all"} == set(STEPS)
+    scripts = {path.stem for path in (PROJECT / "workflow/scripts").glob("*.py")}
+    assert scripts == set(STEPS)
+
+
+REQUIREMENT = {
+    "title": "a robot",
+    "static_window": "10 s",
+    "limits": [{"error": "heading", "after": "100 s", "at_most": "1 deg"}],
+}
+
+
+def test_a_report_is_given_what_its_pages_show(project: dict[str, Any], tmp_path: Path) -> None:
+    (tmp_path / "requirements").mkdir()
+    (tmp_path / "requirements/robot.yaml").write_text(yaml.safe_dump(REQUIREMENT))
+    (tmp_path / "sensors/unused.yaml").write_text(yaml.safe_dump(SENSOR))
+    put(project, "a.csv")
+    put(project, "../t/a.csv")
+    plan = Plan(project | {"requirements": str(tmp_path / "requirements")})
+    settings = json.loads(plan.report_settings())
+    assert settings["results"] == project["results"]
+    assert set(settings["report"]) >= {"title", "units"}
+    # Sensors with recordings; of one without a file nothing is known.
+    assert list(settings["sensors"]) == ["s"]
+    assert set(settings["sensors"]["s"]) == {"vendor", "model", "price_class"}
+    assert settings["requirements"]["robot"]["title"] == "a robot"
+    assert {"static_window", "latitude"} <= set(settings["settings"]["error_budget"])
+    site = site_of({name: build(name, []) for name in TABLES}, plan.report_settings(), tmp_path)
+    assert site.title == settings["report"]["title"]
+    assert len(list(pages(site))) == 5
+
+
+def test_a_new_log_does_not_change_the_settings_of_the_report(project: dict[str, Any]) -> None:
+    put(project, "a.csv")
+    before = Plan(project).report_settings()
+    put(project, "b.csv")
+    assert Plan(project).report_settings() == before

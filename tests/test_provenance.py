@@ -1,3 +1,4 @@
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -6,19 +7,78 @@ from imubench_pipeline import provenance
 from imubench_pipeline.provenance import source_digest
 
 
-def test_a_digest_follows_imports(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "sub").mkdir()
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A package of which `a` uses `b` and the package `sub`, and `c` nothing."""
+    (tmp_path / "sub/texts").mkdir(parents=True)
     (tmp_path / "a.py").write_text("from pack.b import f\nfrom pack import sub\n")
     (tmp_path / "b.py").write_text("import numpy\n")
     (tmp_path / "c.py").write_text("x = 1\n")
     (tmp_path / "sub/__init__.py").write_text("from pack.sub.d import g\n")
     (tmp_path / "sub/d.py").write_text("g = 1\n")
+    (tmp_path / "sub/unused.py").write_text("h = 1\n")
+    (tmp_path / "sub/texts/page.html").write_text("<p>")
+    (tmp_path / "beside.txt").write_text("1")
     monkeypatch.setattr(provenance, "_PACKAGE", tmp_path)
     monkeypatch.setattr(provenance, "_NAME", "pack")
+    yield tmp_path
+    provenance._data_files.cache_clear()
+    provenance._imports.cache_clear()
+
+
+def test_a_digest_follows_imports(package: Path) -> None:
     before = source_digest("a")
-    (tmp_path / "c.py").write_text("x = 2\n")
+    (package / "c.py").write_text("x = 2\n")
+    (package / "sub/unused.py").write_text("h = 2\n")
     assert source_digest("a") == before
-    (tmp_path / "sub/d.py").write_text("g = 2\n")
+    (package / "sub/d.py").write_text("g = 2\n")
     assert source_digest("a") != before
     with pytest.raises(ValueError, match="no module 'e'"):
         source_digest("e")
+
+
+def test_a_digest_knows_the_other_files_of_a_package_that_is_used(package: Path) -> None:
+    of_a, of_c = source_digest("a"), source_digest("c")
+    (package / "sub/texts/page.html").write_text("<br>")
+    assert source_digest("a") != of_a
+    assert source_digest("c") == of_c
+
+
+def test_files_beside_the_modules_of_the_package_itself_are_not_its_code(package: Path) -> None:
+    before = source_digest("a")
+    (package / "beside.txt").write_text("2")
+    assert source_digest("a") == before
+
+
+def test_what_python_and_numba_leave_is_not_code(package: Path) -> None:
+    before = source_digest("a")
+    (package / "sub/__pycache__").mkdir()
+    (package / "sub/__pycache__/d.cpython-311.pyc").write_bytes(b"x")
+    provenance._data_files.cache_clear()
+    assert source_digest("a") == before
+
+
+def test_a_digest_is_the_same_wherever_the_package_lies(
+    package: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = source_digest("a", "c")
+    moved = tmp_path_factory.mktemp("elsewhere") / "pack"
+    package.rename(moved)
+    monkeypatch.setattr(provenance, "_PACKAGE", moved)
+    assert source_digest("c", "a") == before
+
+
+@pytest.mark.parametrize(
+    "file",
+    ["templates/index.html.jinja", "static/report.css", "static/plot.js", "glossary.yaml"],
+)
+def test_the_report_is_made_again_when_its_texts_change(
+    file: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = provenance._PACKAGE / "report" / file
+    assert path in provenance._data_files(provenance._PACKAGE / "report")
+    before = source_digest("report.publish"), source_digest("allan")
+    whole = Path.read_bytes
+    monkeypatch.setattr(Path, "read_bytes", lambda one: whole(one) + b" " * (one == path))
+    assert source_digest("report.publish") != before[0]
+    assert source_digest("allan") == before[1]

@@ -1,10 +1,20 @@
+import json
 from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
 
-from imubench_pipeline import tables
-from imubench_pipeline.tables import TableError, build, read, replacing, write
+from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
+from imubench_pipeline.tables import (
+    TableError,
+    build,
+    read,
+    replacing,
+    write,
+    write_arrow,
+    write_content,
+    write_json,
+)
 
 SCORE = {"sensor": "s", "recording": "r", "channel": "gyro_x", "method": "curve", "rms": 1.0}
 
@@ -28,11 +38,43 @@ def test_columns_carry_unit_and_meaning(tmp_path: Path) -> None:
     assert field.metadata == {b"unit": b"s", b"meaning": b"cluster length, cluster_size / rate"}
 
 
-@pytest.mark.parametrize("table", tables.TABLES)
+@pytest.mark.parametrize("table", TABLES)
 def test_every_column_of_every_table_is_explained(table: str) -> None:
-    for column in tables.TABLES[table]:
+    for column in TABLES[table]:
         assert column.meaning and column.unit, column
     assert read(table, []).num_rows == 0
+
+
+def test_tables_of_one_recording_are_tables() -> None:
+    assert set(OF_ONE_RECORDING) < set(TABLES)
+
+
+def test_names_of_columns_stand_once_in_a_table() -> None:
+    for name, columns in TABLES.items():
+        assert len({column.name for column in columns}) == len(columns), name
+
+
+def test_a_table_is_written_as_parquet_or_csv(tmp_path: Path) -> None:
+    made = build("scores", [SCORE])
+    for kind in ("parquet", "csv"):
+        write_arrow(made, tmp_path / f"new/scores.{kind}")
+    assert read("scores", [tmp_path / "new/scores.parquet"]).equals(made)
+    head, row = (tmp_path / "new/scores.csv").read_text().splitlines()
+    assert head.startswith('"sensor","recording","channel","method","rms"')
+    assert row.startswith('"s","r","gyro_x","curve",1')
+
+
+def test_texts_and_json_are_written_as_they_are(tmp_path: Path) -> None:
+    write_content("µ\n", tmp_path / "a.txt")
+    write_content(b"\x00\r\n", tmp_path / "a.bin")
+    write_json({"a": [1, None]}, tmp_path / "a.json")
+    assert (tmp_path / "a.txt").read_bytes() == b"\xc2\xb5\n"
+    assert (tmp_path / "a.bin").read_bytes() == b"\x00\r\n"
+    assert json.loads((tmp_path / "a.json").read_text()) == {"a": [1, None]}
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        write_json({"a": float("nan")}, tmp_path / "a.json")
+    assert json.loads((tmp_path / "a.json").read_text()) == {"a": [1, None]}
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.bin", "a.json", "a.txt"]
 
 
 def test_joining_refuses_another_table(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """Real runs of Snakemake on a small project of real files."""
 
 import gzip
+import html
 import re
 import subprocess
 import sys
@@ -26,7 +27,7 @@ DATASHEET = {"gyro": {"noise_density": {"value": 0.01, "unit": "deg/s/sqrt(Hz)"}
 STEPS_OF_A_RECORDING = dict.fromkeys(
     ("ingest", "allan", "estimate", "reconstruct", "datasheet", "error_budget"), 1
 )
-GLOBAL_STEPS = dict.fromkeys(("tables", "ranking", "exports", "report"), 1)
+GLOBAL_STEPS = dict.fromkeys(("tables", "ranking", "exports", "figures", "report"), 1)
 
 
 @dataclass
@@ -52,6 +53,14 @@ class Project:
 
     def table(self, name: str) -> list[dict]:
         return pq.read_table(self.results / f"tables/{name}.parquet").to_pylist()
+
+    def pages(self) -> dict[str, int]:
+        """When each page of the report was written."""
+        report = self.results / "report"
+        return {
+            path.relative_to(report).as_posix(): path.stat().st_mtime_ns
+            for path in report.rglob("*.html")
+        }
 
 
 def put_log(path: Path, seed: int, samples: int = 20_000) -> None:
@@ -117,7 +126,33 @@ def test_a_run_leaves_tables_and_a_report(project: Project) -> None:
         assert (project.results / f"tables/{name}.csv").is_file()
     page = (project.results / "report/index.html").read_text()
     assert "3 recordings of 2 sensors" in page
+    assert set(project.pages()) == {
+        "index.html",
+        "recordings.html",
+        "datasheets.html",
+        "theory.html",
+        "made.html",
+        "sensors/one.html",
+        "sensors/two.html",
+        "recordings/one/a.html",
+        "recordings/one/b.html",
+        "recordings/two/a.html",
+    }
+    figures = {path.name for path in (project.results / "report/figures").iterdir()}
+    assert {"allan_gyro_x.svg", "allan_accel_x.pdf"} <= figures
     assert not list(project.results.rglob("*.part"))
+
+
+def test_what_the_samples_look_like_is_kept_with_each_recording(project: Project) -> None:
+    folder = project.results / "recordings/one/a"
+    for name in ("envelope", "histogram"):
+        rows = pq.read_table(folder / f"{name}.parquet").to_pylist()
+        assert {row["channel"] for row in rows} == set(CHANNELS)
+        assert not (project.results / f"tables/{name}.parquet").exists()
+    counted = sum(row["count"] for row in rows if row["channel"] == "gyro_x")
+    assert counted == 20_000
+    page = (project.results / "report/recordings/one/a.html").read_text()
+    assert 'data-kind="series"' in page and 'data-kind="histogram"' in page
 
 
 def test_a_second_run_has_nothing_to_do(project: Project) -> None:
@@ -145,8 +180,14 @@ def test_an_edit_of_a_datasheet_runs_its_deltas_and_the_global_steps(project: Pr
 def test_one_more_log_runs_its_own_steps_and_the_global_ones(project: Project) -> None:
     put_log(project.folder / "logs/two/b.csv", 4)
     assert project.jobs() == STEPS_OF_A_RECORDING | GLOBAL_STEPS
+    before = project.pages()
     assert project.run().returncode == 0
     assert len(project.table("recordings")) == 4
+    after = project.pages()
+    assert set(after) - set(before) == {"recordings/two/b.html"}
+    same = {path for path in before if after[path] == before[path]}
+    of_others = {"sensors/one.html", "recordings/one/a.html", "recordings/one/b.html"}
+    assert same >= of_others | {"recordings/two/a.html", "theory.html", "made.html"}
 
 
 def test_a_removed_log_runs_the_global_steps(project: Project) -> None:
@@ -154,6 +195,7 @@ def test_a_removed_log_runs_the_global_steps(project: Project) -> None:
     assert project.jobs() == GLOBAL_STEPS
     assert project.run().returncode == 0
     assert len(project.table("recordings")) == 3
+    assert "recordings/two/b.html" not in project.pages()
 
 
 def test_bad_logs_are_rejected_and_stop_nothing_else(project: Project) -> None:
@@ -180,8 +222,11 @@ def test_bad_logs_are_rejected_and_stop_nothing_else(project: Project) -> None:
     assert "3 recordings analysed, 6 rejected" in done.stdout + done.stderr
     page = (project.results / "report/index.html").read_text()
     assert "6 rejected" in page
-    for name in reasons:
-        assert 0 < page.index(f"two / {name}<") < page.index('id="comparison"')
+    for name, text in reasons.items():
+        (line,) = (line for line in page.splitlines() if f">{name}</a>:" in line)
+        assert line.startswith("<li>V two, <a ") and text in html.unescape(line)
+        assert page.index(line) < page.index('id="comparison"')
+        assert f"recordings/two/{name}.html" in project.pages()
     assert project.jobs() == {}
 
 

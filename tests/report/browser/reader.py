@@ -8,6 +8,9 @@ from playwright.sync_api import Browser, Locator
 
 Scheme = Literal["light", "dark"]
 READY = "document.documentElement.dataset.ready === 'yes'"
+SETTLED = """() => [...document.querySelectorAll("figure[data-kind]:not([data-drawn])")]
+  .every((one) => one.getBoundingClientRect().top > innerHeight + 250
+    || one.getBoundingClientRect().bottom < -250)"""
 _TRACES = """canvas => canvas.data.map(({type, mode, name, x, y, width, fill, fillcolor, text,
   line, marker, error_x, error_y}) =>
   ({type, mode, name, x: [...x], y: [...y], width, fill, fillcolor, text, line, marker,
@@ -80,11 +83,17 @@ class Reader:
         self.page.goto(address)
         self.page.wait_for_function(READY)
 
+    def show(self, one: Locator) -> Locator:
+        """Bring something into view, and wait until no figure beside it changes its height."""
+        one.scroll_into_view_if_needed()
+        self.page.wait_for_function(SETTLED)
+        one.scroll_into_view_if_needed()
+        return one
+
     def figure(self, kind: str, **data: str) -> Locator:
         """Return a figure, drawn."""
         chosen = "".join(f"[data-{key}='{value}']" for key, value in data.items())
-        figure = self.page.locator(f"figure[data-kind={kind}]{chosen}").first
-        figure.scroll_into_view_if_needed()
+        figure = self.show(self.page.locator(f"figure[data-kind={kind}]{chosen}").first)
         figure.locator("xpath=self::*[@data-drawn]").locator("svg.main-svg").first.wait_for()
         return figure
 

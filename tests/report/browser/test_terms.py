@@ -16,9 +16,8 @@ def tip(reader: Reader) -> Locator:
 def test_a_term_explains_itself_under_the_pointer(read: Open, bench: Report) -> None:
     reader = read(bench.folder)
     term = reader.page.locator("main [data-term=allan_deviation]").first
-    term.scroll_into_view_if_needed()
     expect(tip(reader)).to_have_count(0)
-    term.hover()
+    reader.show(term).hover()
     expect(tip(reader)).to_have_text(glossary()["allan_deviation"].short)
     assert term.get_attribute("aria-describedby") == "tip"
     assert tip(reader).get_attribute("id") == "tip"
@@ -72,7 +71,7 @@ def test_every_term_leads_to_the_theory(read: Open, bench: Report) -> None:
             found.add(key)
     assert {"missing_samples", "N", "not_identified", "absent", "likelihood", "tau"} <= found
     reader.open("index.html")
-    reader.page.locator("main [data-term=missing_samples]").first.click()
+    reader.show(reader.page.locator("main a[data-term=missing_samples]").first).click()
     row = reader.page.locator("tr#missing_samples, tr:target").first
     expect(row).to_be_in_viewport()
     expect(row).to_contain_text(glossary()["missing_samples"].short)
