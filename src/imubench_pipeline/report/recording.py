@@ -38,7 +38,9 @@ def recording_page(site: Site, view: RecordingView) -> Page:
     samples = [folder / f"{table}.parquet" for table in ("envelope", "histogram")]
     own = [path.read_bytes() for path in samples if path.is_file()]
     published = [row for row in site.rows("coverage") if row["sensor"] == view.sensor]
-    key = site.key_of(view.key, view.device_page, site.looks.get(view.sensor), published, *own)
+    key = site.key_of(
+        view.key, view.device_page, site.looks.get(view.sensor), published, _metadata(folder), *own
+    )
     return Page(view.page, "recording.html.jinja", key, lambda: _context(site, view, folder))
 
 

@@ -175,7 +175,11 @@ class Site:
             )
             name = "fixed bias" if row["parameter"] == "bias" else row["parameter"]
             one["what"].append(f"{name} of {row['channel'].replace('_', ' ')}")
-        return [one | {"channels": ", ".join(one["what"])} for one in found.values()]
+        simulated = {(view.sensor, view.name): view.simulated for view in self.views}
+        return [
+            one | {"channels": ", ".join(one["what"]), "simulated": simulated[key]}
+            for key, one in found.items()
+        ]
 
     @cached_property
     def common(self) -> str:
