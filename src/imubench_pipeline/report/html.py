@@ -81,10 +81,10 @@ def _term(context: Context, key: str, text: str | None = None) -> Markup:
     )
 
 
-def _hint(key: str) -> Markup:
+def _hint(key: str, text: str | None = None) -> Markup:
     """Return a term with its explanation alone, for tables of many rows."""
     one = term(key)
-    return Markup('<i data-term="{}">{}</i>').format(one.key, one.name)
+    return Markup('<i data-term="{}">{}</i>').format(one.key, escape(text or one.name))
 
 
 def _action(key: str) -> str:

@@ -213,11 +213,14 @@ def _spectrum(
     spectrum = view.spectrum
     frequency = spectrum["frequency"]
     smooth = np.geomspace(frequency[0], frequency[-1], _SMOOTH)
+    # The bins are denser than what a line between them shows.
+    some = np.unique(np.linspace(0, len(frequency) - 1, _SMOOTH).round().astype(int))
     return {
         "frequency": arrays.log(frequency),
         "density": arrays.log(np.sqrt(spectrum["density"])),
-        "fitted": arrays.log(np.sqrt(spectrum["fitted"])),
-        "used": arrays.even(spectrum["used"]),
+        "left": np.flatnonzero(spectrum["used"] == 0).tolist(),
+        "fit_frequency": arrays.log(np.take(frequency, some)),
+        "fitted": arrays.log(np.sqrt(np.take(spectrum["fitted"], some))),
         "model": next((row["model"] for row in view.models if row["chosen"]), ""),
         "smooth": arrays.log(smooth),
         "terms": [

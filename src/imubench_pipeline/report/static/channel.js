@@ -84,10 +84,10 @@ kinds.spectrum = (figure) => {
   const unit = unitOf(quantityOf(one.channel), "psd");
   const f = array(found.frequency);
   const density = scaled(found.density, unit.factor);
-  const used = array(found.used);
+  const left = new Set(found.left);
   const look = pageData.looks.methods.likelihood;
   const points = (keep, key, colour, symbol) => {
-    const chosen = f.map((_, i) => i).filter((i) => (used[i] > 0) === keep);
+    const chosen = f.map((_, i) => i).filter((i) => left.has(i) !== keep);
     return {
       group: key, type: "scatter", mode: "markers", x: chosen.map((i) => f[i]), y: chosen.map((i) => density[i]),
       marker: { color: colour, size: keep ? 4 : 5, symbol },
@@ -98,9 +98,9 @@ kinds.spectrum = (figure) => {
   const traces = [points(false, "left", inks().soft, "x-thin-open"), points(true, "used", inks().ink, "circle")];
   const groups = [
     { key: "used", label: "bins used", on: true, look: { ...black(), line: false, marker: "circle" } },
-    { key: "left", label: "bins left out", on: true, look: { light: inks().soft, dark: inks().soft, line: false, marker: "x" }, absent: used.every((is) => is > 0) },
+    { key: "left", label: "bins left out", on: true, look: { light: inks().soft, dark: inks().soft, line: false, marker: "x" }, absent: left.size === 0 },
   ];
-  traces.push(line(f, scaled(found.fitted, unit.factor), { ...look, width: 2.2 }, { group: "fit" }));
+  traces.push(line(array(found.fit_frequency), scaled(found.fitted, unit.factor), { ...look, width: 2.2 }, { group: "fit" }));
   groups.push({ key: "fit", label: `fit ${found.model}`, on: true, look: { ...look, marker: undefined } });
   found.terms.forEach((term, place) => {
     traces.push(line(array(found.smooth), scaled(term.density, unit.factor), termLook(place), { group: `term ${place}`, hoverinfo: "name", name: term.name }));
