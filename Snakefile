@@ -2,6 +2,7 @@
 
 from imubench_pipeline.plan import Plan
 from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
+from imubench_pipeline.steps import Steps
 from imubench_pipeline.validation import ConfigError
 
 
@@ -13,6 +14,7 @@ try:
 except ConfigError as error:
     raise WorkflowError(str(error)) from None
 
+steps = Steps(Path(workflow.basedir) / "workflow/scripts")
 RESULTS = str(plan.run.results)
 FOLDER = RESULTS + "/recordings/{sensor}/{recording}"
 JOINED = sorted(set(TABLES) - set(OF_ONE_RECORDING))
@@ -49,8 +51,8 @@ rule simulate:
     params:
         settings=lambda w: plan.simulated_settings(w.sensor, w.recording),
         code=plan.code("simulate"),
-    script:
-        "workflow/scripts/simulate.py"
+    run:
+        steps.run("simulate", input, output, params, wildcards)
 
 
 rule ingest:
@@ -64,8 +66,8 @@ rule ingest:
         source=lambda w: str(plan.recordings[w.sensor, w.recording].path),
         settings=lambda w: plan.ingest_settings(w.sensor, w.recording),
         code=plan.code("ingest"),
-    script:
-        "workflow/scripts/ingest.py"
+    run:
+        steps.run("ingest", input, output, params, wildcards)
 
 
 rule allan:
@@ -76,8 +78,8 @@ rule allan:
     params:
         settings=plan.settings("allan"),
         code=plan.code("allan"),
-    script:
-        "workflow/scripts/allan.py"
+    run:
+        steps.run("allan", input, output, params, wildcards)
 
 
 rule estimate:
@@ -89,8 +91,8 @@ rule estimate:
     params:
         settings=lambda w: plan.estimate_settings(w.sensor, w.recording),
         code=plan.code("estimate"),
-    script:
-        "workflow/scripts/estimate.py"
+    run:
+        steps.run("estimate", input, output, params, wildcards)
 
 
 rule reconstruct:
@@ -104,8 +106,8 @@ rule reconstruct:
     params:
         settings=plan.settings("reconstruction"),
         code=plan.code("reconstruct"),
-    script:
-        "workflow/scripts/reconstruct.py"
+    run:
+        steps.run("reconstruct", input, output, params, wildcards)
 
 
 rule datasheet:
@@ -120,8 +122,8 @@ rule datasheet:
     params:
         settings=lambda w: plan.datasheet_settings(w.sensor),
         code=plan.code("datasheet"),
-    script:
-        "workflow/scripts/datasheet.py"
+    run:
+        steps.run("datasheet", input, output, params, wildcards)
 
 
 rule error_budget:
@@ -132,8 +134,8 @@ rule error_budget:
     params:
         settings=plan.error_budget_settings(),
         code=plan.code("error_budget"),
-    script:
-        "workflow/scripts/error_budget.py"
+    run:
+        steps.run("error_budget", input, output, params, wildcards)
 
 
 rule tables:
@@ -155,8 +157,8 @@ rule tables:
         truths=plan.truths(),
         catalogue=plan.catalogue(),
         code=plan.code("tables"),
-    script:
-        "workflow/scripts/tables.py"
+    run:
+        steps.run("tables", input, output, params, wildcards)
 
 
 rule ranking:
@@ -167,8 +169,8 @@ rule ranking:
     params:
         settings=plan.ranking_settings(),
         code=plan.code("ranking"),
-    script:
-        "workflow/scripts/ranking.py"
+    run:
+        steps.run("ranking", input, output, params, wildcards)
 
 
 rule coverage:
@@ -177,8 +179,8 @@ rule coverage:
     params:
         catalogue=plan.catalogue(),
         code=plan.code("coverage"),
-    script:
-        "workflow/scripts/coverage.py"
+    run:
+        steps.run("coverage", input, output, params, wildcards)
 
 
 rule exports:
@@ -192,8 +194,8 @@ rule exports:
     params:
         settings=plan.settings("exports"),
         code=plan.code("exports"),
-    script:
-        "workflow/scripts/exports.py"
+    run:
+        steps.run("exports", input, output, params, wildcards)
 
 
 rule figures:
@@ -204,8 +206,8 @@ rule figures:
     params:
         settings=plan.report_settings(),
         code=plan.code("figures"),
-    script:
-        "workflow/scripts/figures.py"
+    run:
+        steps.run("figures", input, output, params, wildcards)
 
 
 rule report:
@@ -221,8 +223,8 @@ rule report:
     params:
         settings=plan.report_settings(),
         code=plan.code("report"),
-    script:
-        "workflow/scripts/report.py"
+    run:
+        steps.run("report", input, output, params, wildcards)
 
 
 onstart:

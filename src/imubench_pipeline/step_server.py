@@ -1,0 +1,109 @@
+"""The process that forks for each step of the workflow; started by `imubench_pipeline.steps`."""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import importlib
+import os
+import pickle
+import runpy
+import signal
+import socket
+import sys
+import traceback
+from collections.abc import Mapping
+from contextlib import suppress
+from types import FrameType, SimpleNamespace
+from typing import Any
+
+from numba import njit
+
+from imubench_pipeline.steps import DONE, FAILED
+
+_PR_SET_PDEATHSIG = 1
+
+
+def serve(requests: socket.socket) -> None:
+    """Fork for each connection that comes through a socket, until the other end is closed.
+
+    Parameters
+    ----------
+    requests : socket
+        Brings a connection for each step: through it come the path of the script and the
+        attributes of the object ``snakemake``, and it is told how the step ended.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the forks end, and that the run ends is seen
+    signal.signal(signal.SIGCHLD, _reap)
+    ready: set[str] = set()
+    while True:
+        _, descriptors, _, _ = socket.recv_fds(requests, 1, 1)
+        if not descriptors:
+            return
+        with socket.socket(fileno=descriptors[0]) as connection:
+            with connection.makefile("rb") as stream:
+                size = int.from_bytes(stream.read(8), "big")
+                script, given = pickle.loads(stream.read(size))
+            if script not in ready:
+                _import_what_it_needs(script)
+                ready.add(script)
+            if os.fork() == 0:
+                requests.close()
+                _run(connection, script, given)
+
+
+def _reap(signal_number: int, frame: FrameType | None) -> None:
+    with suppress(ChildProcessError):
+        while os.waitpid(-1, os.WNOHANG)[0]:
+            pass
+
+
+def _import_what_it_needs(script: str) -> None:
+    try:
+        runpy.run_path(script, run_name="imports")
+        # What two libraries put off until they are first used: half of what imports cost.
+        importlib.import_module("pyarrow.dataset")
+        _nothing()
+    except (Exception, SystemExit):
+        return  # the fork meets the same error, and says it
+    gc.collect()
+    gc.freeze()  # what the forks share stays shared
+
+
+@njit(cache=True)
+def _nothing() -> None:
+    """Make numba load what every function needs that it has compiled before."""
+
+
+def _run(connection: socket.socket, script: str, given: Mapping[str, Any]) -> None:
+    """Run a script in this fork, say how it ended, and end."""
+    answer = FAILED
+    try:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+        if sys.platform == "linux":
+            ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        runpy.run_path(
+            script, init_globals={"snakemake": SimpleNamespace(**given)}, run_name="__main__"
+        )
+        answer = DONE
+    except BaseException as error:
+        _say(error, script)
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        connection.sendall(answer)
+        os._exit(answer != DONE)
+
+
+def _say(error: BaseException, script: str) -> None:
+    """Print where the script failed, without how it was started."""
+    trace = error.__traceback__
+    while trace is not None and trace.tb_frame.f_code.co_filename != script:
+        trace = trace.tb_next
+    traceback.print_exception(error.with_traceback(trace or error.__traceback__))
+
+
+if __name__ == "__main__":
+    with socket.socket(fileno=int(sys.argv[1])) as given_requests:
+        serve(given_requests)

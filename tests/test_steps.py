@@ -1,0 +1,151 @@
+"""Scripts of the workflow, each run in a fork of a process that has their imports."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import psutil
+import pytest
+
+from imubench_pipeline.steps import StepError, Steps
+
+
+@pytest.fixture
+def steps(tmp_path: Path) -> Iterator[Steps]:
+    made = Steps(tmp_path)
+    yield made
+    made.close()
+
+
+def put(folder: Path, name: str, text: str) -> None:
+    (folder / f"{name}.py").write_text(text)
+
+
+def run(steps: Steps, name: str, output: Path, **params: object) -> None:
+    steps.run(name, input=["in"], output=[str(output)], params=params, wildcards={"sensor": "s"})
+
+
+SAY = """
+import os
+from pathlib import Path
+here = snakemake
+if __name__ == "__main__":
+    said = (here.input, here.params["size"], here.wildcards["sensor"], os.getppid(), os.getpid())
+    Path(here.output[0]).write_text(repr(said))
+"""
+
+
+def test_a_script_sees_what_it_is_given_in_a_process_of_its_own(
+    steps: Steps, tmp_path: Path
+) -> None:
+    put(tmp_path, "say", SAY.replace("here = snakemake", "here = globals().get('snakemake')"))
+    seen = []
+    for size in (3, 10**6):
+        run(steps, "say", tmp_path / "out", size="x" * size)
+        source, text, sensor, parent, own = eval((tmp_path / "out").read_text())
+        assert (source, len(text), sensor) == (["in"], size, "s")
+        seen.append((parent, own))
+    (first, one), (second, other) = seen
+    assert first == second != os.getpid() and one != other
+
+
+def test_imports_are_shared_and_what_a_step_leaves_is_not(steps: Steps, tmp_path: Path) -> None:
+    put(
+        tmp_path,
+        "count",
+        """
+import sys, os
+from pathlib import Path
+with open(Path(__file__).with_name("imported"), "a") as file:
+    file.write(f"{__name__} ")
+if __name__ == "__main__":
+    Path(snakemake.output[0]).write_text(str(hasattr(sys, "left_behind")))
+    sys.left_behind = True
+""",
+    )
+    for _ in range(3):
+        run(steps, "count", tmp_path / "out")
+        assert (tmp_path / "out").read_text() == "False"
+    assert (tmp_path / "imported").read_text().split() == ["imports"] + ["__main__"] * 3
+
+
+def test_a_script_that_fails_says_where(
+    steps: Steps, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    put(tmp_path, "bad", "def turn():\n    raise ValueError('upside down')\nturn()\n")
+    with pytest.raises(StepError, match=r"^bad.py failed$"):
+        run(steps, "bad", tmp_path / "out")
+    said = capfd.readouterr().err
+    assert said.startswith(f'Traceback (most recent call last):\n  File "{tmp_path / "bad.py"}"')
+    assert said.endswith("ValueError: upside down\n") and "runpy" not in said
+    put(tmp_path, "exits", "import sys\nsys.exit('no')")
+    with pytest.raises(StepError, match=r"^exits.py failed$"):
+        run(steps, "exits", tmp_path / "out")
+    with pytest.raises(StepError, match=r"^missing.py failed$"):
+        run(steps, "missing", tmp_path / "out")
+    assert "No such file" in capfd.readouterr().err
+
+
+def test_a_script_that_is_killed_harms_no_other(steps: Steps, tmp_path: Path) -> None:
+    put(tmp_path, "dies", "import os\nif __name__ == '__main__': os.kill(os.getpid(), 9)\n")
+    put(tmp_path, "say", SAY.replace("here = snakemake", "here = globals().get('snakemake')"))
+    with pytest.raises(StepError, match=r"^dies.py was killed$"):
+        run(steps, "dies", tmp_path / "out")
+    run(steps, "say", tmp_path / "out", size="x")
+    parent = eval((tmp_path / "out").read_text())[3]
+    os.kill(parent, signal.SIGKILL)
+    psutil.wait_procs([psutil.Process(parent)] if psutil.pid_exists(parent) else [], timeout=10)
+    run(steps, "say", tmp_path / "out", size="x")
+    assert eval((tmp_path / "out").read_text())[3] != parent
+
+
+def test_threads_run_scripts_at_the_same_time(steps: Steps, tmp_path: Path) -> None:
+    put(
+        tmp_path,
+        "meet",
+        """
+import time
+from pathlib import Path
+if __name__ == "__main__":
+    Path(snakemake.output[0]).touch()
+    while len(list(Path(snakemake.output[0]).parent.glob("here*"))) < 4:
+        time.sleep(0.01)
+""",
+    )
+    with ThreadPoolExecutor(4) as pool:
+        outputs = [tmp_path / f"here{k}" for k in range(4)]
+        list(pool.map(lambda output: run(steps, "meet", output), outputs, timeout=60))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a fork learns of it on Linux alone")
+def test_scripts_end_with_the_run_that_started_them(tmp_path: Path) -> None:
+    put(
+        tmp_path,
+        "waits",
+        """
+import os, time
+from pathlib import Path
+if __name__ == "__main__":
+    Path(snakemake.output[0]).write_text(f"{os.getppid()} {os.getpid()}")
+    time.sleep(600)
+""",
+    )
+    text = (
+        "from pathlib import Path; from imubench_pipeline.steps import Steps;"
+        f"Steps(Path({str(tmp_path)!r})).run('waits', [], [{str(tmp_path / 'out')!r}], [], [])"
+    )
+    process = subprocess.Popen([sys.executable, "-c", text])
+    deadline = time.monotonic() + 60
+    while not (tmp_path / "out").is_file() or len((tmp_path / "out").read_text().split()) < 2:
+        assert time.monotonic() < deadline and process.poll() is None
+        time.sleep(0.05)
+    started = [psutil.Process(int(number)) for number in (tmp_path / "out").read_text().split()]
+    process.kill()
+    process.wait()
+    _, alive = psutil.wait_procs(started, timeout=20)
+    assert not alive
