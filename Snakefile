@@ -1,7 +1,7 @@
 """From static logs of inertial sensors to a cross-IMU report: `snakemake -c2`."""
 
 from imubench_pipeline.plan import Plan
-from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
+from imubench_pipeline.schemas import BY_RECORDING, OF_ONE_RECORDING, TABLES
 from imubench_pipeline.steps import Steps
 from imubench_pipeline.validation import ConfigError
 
@@ -57,7 +57,7 @@ rule simulate:
 
 rule ingest:
     input:
-        lambda w: plan.recordings[w.sensor, w.recording].files,
+        lambda w: plan.recordings[w.sensor, w.recording].inputs,
     output:
         quality=FOLDER + "/quality.json",
         envelope=FOLDER + "/envelope.parquet",
@@ -200,11 +200,11 @@ rule exports:
 
 rule figures:
     input:
-        [f"{RESULTS}/tables/{table}.parquet" for table in JOINED],
+        [f"{RESULTS}/tables/{table}.parquet" for table in BY_RECORDING],
     output:
         directory(RESULTS + "/report/figures"),
     params:
-        settings=plan.report_settings(),
+        settings=plan.figures_settings(),
         code=plan.code("figures"),
     run:
         steps.run("figures", input, output, params, wildcards)

@@ -9,21 +9,24 @@ from imubench_pipeline.provenance import source_digest
 
 @pytest.fixture
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A package of which `a` uses `b` and the package `sub`, and `c` nothing."""
+    """A package of which `a` uses `b` and the package `sub`, and `c` nothing.
+
+    `sub.d` has texts, and imports `late` by its name.
+    """
     (tmp_path / "sub/texts").mkdir(parents=True)
     (tmp_path / "a.py").write_text("from pack.b import f\nfrom pack import sub\n")
     (tmp_path / "b.py").write_text("import numpy\n")
     (tmp_path / "c.py").write_text("x = 1\n")
     (tmp_path / "sub/__init__.py").write_text("from pack.sub.d import g\n")
-    (tmp_path / "sub/d.py").write_text("g = 1\n")
+    (tmp_path / "sub/d.py").write_text("g = 1, 'texts', 'pack.late'\n")
+    (tmp_path / "late.py").write_text("y = 1\n")
     (tmp_path / "sub/unused.py").write_text("h = 1\n")
     (tmp_path / "sub/texts/page.html").write_text("<p>")
     (tmp_path / "beside.txt").write_text("1")
     monkeypatch.setattr(provenance, "_PACKAGE", tmp_path)
     monkeypatch.setattr(provenance, "_NAME", "pack")
     yield tmp_path
-    provenance._data_files.cache_clear()
-    provenance._imports.cache_clear()
+    provenance._used.cache_clear()
 
 
 def test_a_digest_follows_imports(package: Path) -> None:
@@ -37,25 +40,15 @@ def test_a_digest_follows_imports(package: Path) -> None:
         source_digest("e")
 
 
-def test_a_digest_knows_the_other_files_of_a_package_that_is_used(package: Path) -> None:
+@pytest.mark.parametrize(("file", "known"), [("sub/texts/page.html", True), ("late.py", True),
+                                             ("beside.txt", False)])  # fmt: skip
+def test_a_digest_knows_what_the_texts_of_a_module_name(
+    package: Path, file: str, known: bool
+) -> None:
     of_a, of_c = source_digest("a"), source_digest("c")
-    (package / "sub/texts/page.html").write_text("<br>")
-    assert source_digest("a") != of_a
+    (package / file).write_text("z = 1")
+    assert (source_digest("a") != of_a) == known
     assert source_digest("c") == of_c
-
-
-def test_files_beside_the_modules_of_the_package_itself_are_not_its_code(package: Path) -> None:
-    before = source_digest("a")
-    (package / "beside.txt").write_text("2")
-    assert source_digest("a") == before
-
-
-def test_what_python_and_numba_leave_is_not_code(package: Path) -> None:
-    before = source_digest("a")
-    (package / "sub/__pycache__").mkdir()
-    (package / "sub/__pycache__/d.cpython-311.pyc").write_bytes(b"x")
-    provenance._data_files.cache_clear()
-    assert source_digest("a") == before
 
 
 def test_a_digest_is_the_same_wherever_the_package_lies(
@@ -76,9 +69,9 @@ def test_the_report_is_made_again_when_its_texts_change(
     file: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = provenance._PACKAGE / "report" / file
-    assert path in provenance._data_files(provenance._PACKAGE / "report")
-    before = source_digest("report.publish"), source_digest("allan")
+    of_figures = "report.static_figures.of_run"
+    before = source_digest("report.publish"), source_digest("allan", of_figures)
     whole = Path.read_bytes
     monkeypatch.setattr(Path, "read_bytes", lambda one: whole(one) + b" " * (one == path))
     assert source_digest("report.publish") != before[0]
-    assert source_digest("allan") == before[1]
+    assert source_digest("allan", of_figures) == before[1]

@@ -14,6 +14,7 @@ from pydantic import BaseModel
 
 from imubench_pipeline import show
 from imubench_pipeline.config import Run, Simulated
+from imubench_pipeline.nightly import command as nightly
 from imubench_pipeline.report import command as report
 from imubench_pipeline.report.static_figures import command as figures
 from imubench_pipeline.sensor import RecordingNotes, Sensor
@@ -74,6 +75,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     figures.add_arguments(
         commands.add_parser("figures", help="draw the figures of channels for print")
+    )
+    nightly.add_arguments(
+        commands.add_parser(
+            "nightly", help="run on the logs that are complete, and say what is new: for timers"
+        )
     )
     given = parser.parse_args(arguments)
     try:
@@ -236,4 +242,5 @@ _COMMANDS = {
     "show": show.run,
     "report": report.run,
     "figures": figures.run,
+    "nightly": nightly.run,
 }

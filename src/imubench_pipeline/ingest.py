@@ -40,6 +40,7 @@ class Ingested:
     summary: dict[str, Any]
     findings: list[Finding]
     channels: dict[str, dict[str, Any]] = field(default_factory=dict)
+    samples: str | None = None
 
     def quality(self, names: dict[str, Any]) -> Quality:
         """Return what ``quality.json`` says, with the names of the recording."""
@@ -49,6 +50,7 @@ class Ingested:
             names | {"status": status} | self.summary,
             [dict(finding.row(sensor, recording)) for finding in self.findings],
             self.channels,
+            self.samples,
         )
 
 
@@ -197,7 +199,7 @@ def _ingest(
         f if f.start is None else replace(f, start=f.start + begin, end=(f.end or 0.0) + begin)
         for f in findings
     ]
-    return Ingested(summary, findings, channels)
+    return Ingested(summary, findings, channels, _digest(folder))
 
 
 def _knock_findings(
@@ -265,6 +267,15 @@ def _summary(
         "temperature_min": temperature.low if known else None,
         "temperature_max": temperature.high if known else None,
     }
+
+
+def _digest(folder: Path) -> str:
+    """Return a digest of the samples that are kept in a folder."""
+    found = hashlib.sha256()
+    for path in log_paths(folder):
+        with path.open("rb") as file:
+            found.update(hashlib.file_digest(file, "sha256").digest())
+    return found.hexdigest()
 
 
 def _identified(source: Path) -> list[dict[str, Any]]:

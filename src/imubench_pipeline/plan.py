@@ -7,30 +7,22 @@ of what the rule depends on, so that an edit runs again what it touches and noth
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import chain
-from pathlib import Path
 
 from pydantic import BaseModel
 
 from imubench_pipeline.config import Run, read_run, read_simulated
+from imubench_pipeline.drop_zone import Recording, fingerprints, found_logs
 from imubench_pipeline.provenance import source_digest
-from imubench_pipeline.readers import log_files
 from imubench_pipeline.requirements import Requirement, read_requirements
-from imubench_pipeline.sensor import RecordingNotes, Sensor, merged_log, read_sensors
+from imubench_pipeline.sensor import LogFormat, RecordingNotes, Sensor, merged_log, read_sensors
 from imubench_pipeline.units import quantity_to_si
 from imubench_pipeline.validation import ConfigError, parse, read_yaml
 
-PARTIAL = frozenset({".part", ".tmp", ".filepart", ".crdownload"})
-"""How the names of files end that are still being transferred."""
-
-_NOT_LOGS = {".yaml", ".yml", ".md"} | PARTIAL
 _OF_INGEST = ("quality.json", "envelope.parquet", "histogram.parquet")
-_COMPRESSED = {".gz", ".zst", ".xz", ".bz2", ".zip"}
-_UNUSABLE_IN_NAMES = re.compile(r"[^\w .+()-]")
-_LONGEST_NAME = 120
+_ANY_LOG = {"rate": "1 Hz", "channels": {"gyro_x": {"column": 1, "unit": "rad/s"}}}
+"""Stands for the layout of a sensor's logs where that does not matter."""
 
 STEPS: Mapping[str, tuple[str, ...]] = {
     "simulate": ("simulated_logs",),
@@ -48,45 +40,6 @@ STEPS: Mapping[str, tuple[str, ...]] = {
     "report": ("report.publish",),
 }
 """The modules that each step runs: their edit runs the step again."""
-
-
-@dataclass(frozen=True)
-class Recording:
-    """One recording that was found, or is to be simulated.
-
-    Attributes
-    ----------
-    sensor, name : str
-    path : Path
-        The log file, or the folder of a recording that has several.
-    notes : Path or None
-        The file of notes beside it.
-    simulated : bool
-    error : str or None
-        Why the file cannot be used, where its name or its place says so already.
-    held_back : bool
-        The log is not read in this run: the results that are there stay.
-    """
-
-    sensor: str
-    name: str
-    path: Path
-    notes: Path | None
-    simulated: bool
-    error: str | None = None
-    held_back: bool = False
-
-    @property
-    def files(self) -> list[Path]:
-        """What the recording depends on."""
-        if self.held_back:
-            # No such file, but what would be made of it is there: Snakemake takes that as it is,
-            # whatever became of the log, the settings or the code since.
-            return [self.path / "held back"]
-        if self.error:
-            return []
-        logs = [self.path] if self.simulated else log_files(self.path)
-        return logs + ([self.notes] if self.notes else [])
 
 
 class Plan:
@@ -107,6 +60,7 @@ class Plan:
             (entry.sensor, entry.recording): entry
             for entry in read_simulated(self.run.simulated, self.sensors)
         }
+        self._of_ingest: dict[tuple[str, str], str] = {}
         self.recordings: dict[tuple[str, str], Recording] = {}
         for found in [*self._found_logs(), *self._to_simulate()]:
             other = self.recordings.setdefault((found.sensor, found.name), found)
@@ -140,7 +94,9 @@ class Plan:
         ):
             return []
         path = logs[0].path if logs else self.run.logs / sensor / name
-        return [Recording(sensor, name, path, None, simulated=False, held_back=True)]
+        notes = logs[0].notes if logs else path.with_name(f"{name}.yaml")
+        there = notes if notes and notes.is_file() else None
+        return [Recording(sensor, name, path, there, simulated=False, held_back=True)]
 
     def _to_simulate(self) -> list[Recording]:
         return [
@@ -151,36 +107,52 @@ class Plan:
         ]
 
     def ingest_settings(self, sensor: str, name: str) -> str:
-        """Return what the ingest of a recording depends on, its error where it cannot be read."""
-        recording = self.recordings[sensor, name]
+        """Return what the ingest of a recording depends on, its error where it cannot be read.
+
+        The log is known by its `fingerprint`, which is taken once a run.
+        """
+        key = (sensor, name)
+        if key not in self._of_ingest:
+            self._of_ingest[key] = _text(self._ingest(self.recordings[key]))
+        return self._of_ingest[key]
+
+    def _ingest(self, recording: Recording) -> dict[str, object]:
         settings: dict[str, object] = {
             "simulated": recording.simulated,
             "quality": self.run.quality.model_dump(mode="json"),
-            "sizes": [path.stat().st_size for path in recording.files if path.is_file()],
         }
         try:
-            if recording.error:
-                raise ConfigError(recording.error)
-            notes = RecordingNotes()
-            if recording.notes:
-                notes = parse(
-                    RecordingNotes, read_yaml(recording.notes) or {}, str(recording.notes)
-                )
-            if sensor not in self.sensors:
-                expected = self.run.sensors / f"{sensor}.yaml"
-                raise ConfigError(
-                    f"no sensor file {expected} for the logs in {self.run.logs / sensor}; write "
-                    "one, or move the logs to the folder of their sensor"
-                )
-            log = merged_log(self.sensors[sensor], notes, str(recording.notes or sensor))
-            layout = log.model_dump(mode="json")
+            log, notes = self._written(recording)
+            layout = log.model_dump(mode="json", exclude={"bandwidth"})
             if recording.simulated:
-                made = self._simulated[sensor, name].channels
+                made = self._simulated[recording.sensor, recording.name].channels
                 layout["channels"] = {channel: layout["channels"][channel] for channel in made}
-            settings |= {"notes": notes.model_dump(mode="json"), "log": layout}
+            said = notes.model_dump(mode="json", exclude={"log"})
+            return settings | {"notes": said, "log": layout, "files": fingerprints(recording)}
         except ConfigError as error:
-            settings["error"] = str(error)
-        return _text(settings)
+            return settings | {"error": str(error)}
+
+    def _written(self, recording: Recording) -> tuple[LogFormat, RecordingNotes]:
+        """Return how the log of a recording is written, and the notes beside it.
+
+        Raises
+        ------
+        ConfigError
+            If it cannot be used.
+        """
+        if recording.error:
+            raise ConfigError(recording.error)
+        notes = RecordingNotes()
+        if recording.notes:
+            notes = parse(RecordingNotes, read_yaml(recording.notes) or {}, str(recording.notes))
+        if recording.sensor not in self.sensors:
+            expected = self.run.sensors / f"{recording.sensor}.yaml"
+            raise ConfigError(
+                f"no sensor file {expected} for the logs in {self.run.logs / recording.sensor}; "
+                "write one, or move the logs to the folder of their sensor"
+            )
+        sensor = self.sensors[recording.sensor]
+        return merged_log(sensor, notes, str(recording.notes or recording.sensor)), notes
 
     def estimate_settings(self, sensor: str, name: str) -> str:
         """Return what the estimates of a recording depend on."""
@@ -193,8 +165,10 @@ class Plan:
 
     def bandwidth(self, sensor: str, name: str) -> float | None:
         """Return the stated cut-off of the sensor's own filter, Hz."""
-        log = json.loads(self.ingest_settings(sensor, name)).get("log") or {}
-        stated = log.get("bandwidth")
+        try:
+            stated = self._written(self.recordings[sensor, name])[0].bandwidth
+        except ConfigError:
+            return None
         return quantity_to_si(stated, "frequency") if stated else None
 
     def simulated_settings(self, sensor: str, name: str) -> str:
@@ -202,7 +176,7 @@ class Plan:
         return _text(
             {
                 "recording": self._simulated[sensor, name].model_dump(mode="json"),
-                "log": self.sensors[sensor].log.model_dump(mode="json"),
+                "log": self.sensors[sensor].log.model_dump(mode="json", exclude={"bandwidth"}),
             }
         )
 
@@ -227,21 +201,25 @@ class Plan:
         return _text(
             {
                 "error_budget": self.run.error_budget.model_dump(mode="json"),
-                "requirements": self._requirements(),
+                "requirements": self._requirements("title", "note", "example", "price_class"),
             }
         )
 
     def ranking_settings(self) -> str:
-        """Return what the ranking depends on: requirements, and what is said of the sensors."""
+        """Return what the ranking depends on: requirements, and prices of the sensors."""
         return _text(
             {
-                "requirements": self._requirements(),
-                "sensors": self._described("vendor", "model", "price_class"),
+                "requirements": self._requirements("title", "note", "example"),
+                "sensors": self._described("price_class"),
             }
         )
 
-    def _requirements(self) -> dict[str, object]:
-        return {name: one.model_dump(mode="json") for name, one in self.requirements.items()}
+    def _requirements(self, *unused: str) -> dict[str, object]:
+        """Return what applications need, without what a step does not use of it."""
+        return {
+            name: {"title": name} | one.model_dump(mode="json", exclude=set(unused))
+            for name, one in self.requirements.items()
+        }
 
     def _described(self, *keys: str) -> dict[str, object]:
         """Return what the files of the sensors that have recordings say."""
@@ -274,10 +252,18 @@ class Plan:
             }
         )
 
+    def figures_settings(self) -> str:
+        """Return what the figures of all sensors show beside the tables."""
+        return _text({"report": {"units": self.run.report.units}})
+
     def catalogue(self) -> str:
-        """Return all sensor files."""
+        """Return the datasheets of all sensor files, with vendor and model."""
         return _text(
-            {name: sensor.model_dump(mode="json") for name, sensor in self.sensors.items()}
+            {
+                name: sensor.model_dump(mode="json", include={"vendor", "model", "datasheet"})
+                | {"log": _ANY_LOG}
+                for name, sensor in self.sensors.items()
+            }
         )
 
     def truths(self) -> str:
@@ -301,67 +287,6 @@ class Plan:
     def code(step: str) -> str:
         """Return the digest of the code that a step runs."""
         return source_digest(*STEPS[step])
-
-
-def found_logs(logs: Path) -> list[Recording]:
-    """Return the recordings of a drop zone, in order; two logs of one name are there twice."""
-    found = []
-    for folder in sorted(path for path in logs.iterdir() if path.is_dir()):
-        for path in sorted(folder.iterdir()):
-            if path.name.startswith(".") or path.name.endswith("~"):
-                continue
-            if path.is_file() and path.suffix.lower() in _NOT_LOGS:
-                continue
-            name = path.name if path.is_dir() else _stem(path)
-            notes = folder / f"{name}.yaml"
-            found.append(
-                Recording(
-                    folder.name,
-                    _usable(name),
-                    path,
-                    notes if notes.is_file() else None,
-                    simulated=False,
-                    error=_fault(path, name),
-                )
-            )
-    return found
-
-
-def name_of(file: str) -> str:
-    """Return the name of the recording whose log has this file name."""
-    return _usable(_stem(Path(file)))
-
-
-def _usable(name: str) -> str:
-    return _UNUSABLE_IN_NAMES.sub("_", name)[:_LONGEST_NAME]
-
-
-def _fault(path: Path, name: str) -> str | None:
-    """Return why a file of the drop zone cannot be used, if its name or place says so."""
-    shown = ascii(path.name)
-    if _UNUSABLE_IN_NAMES.search(name) or len(name) > _LONGEST_NAME:
-        return (
-            f"the file name {shown} cannot be used; expected at most {_LONGEST_NAME} letters, "
-            "digits, spaces and . _ - + ( ) in it: rename the file"
-        )
-    try:
-        if not log_files(path):
-            return f"the folder {shown} has no files"
-        for file in log_files(path):
-            file.stat()
-            with file.open("rb"):
-                pass
-    except OSError as error:
-        return f"{shown} cannot be read ({error.strerror})"
-    return None
-
-
-def _stem(path: Path) -> str:
-    name = path.name
-    for suffix in path.suffixes[::-1]:
-        if suffix.lower() in _COMPRESSED:
-            name = name[: -len(suffix)]
-    return name.rsplit(".", maxsplit=1)[0] if "." in name else name
 
 
 def _text(value: object) -> str:

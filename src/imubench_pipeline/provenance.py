@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import ast
 import hashlib
+import re
+from collections.abc import Iterator
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 
@@ -12,9 +15,10 @@ _NAME = _PACKAGE.name
 
 
 def source_digest(*modules: str) -> str:
-    """Return a digest of modules of this package and of all that they import from it.
+    """Return a digest of modules of this package and of all that they use of it.
 
-    Of a package of which a module is used, its other files count too: templates, texts.
+    That is what they import, and what their texts name: another module in full, since some are
+    imported by name when they are needed, or a file or folder beside the module, such as templates.
 
     Parameters
     ----------
@@ -31,9 +35,7 @@ def source_digest(*modules: str) -> str:
         path = todo.pop()
         if path not in seen:
             seen.add(path)
-            todo += _imports(path)
-    folders = {path.parent for path in seen} - {_PACKAGE}
-    seen |= {path for folder in folders for path in _data_files(folder)}
+            todo += _used(path) if path.suffix == ".py" else ()
     digest = hashlib.sha256()
     for path in sorted(seen):
         digest.update(str(path.relative_to(_PACKAGE)).encode() + b"\0" + path.read_bytes())
@@ -48,25 +50,31 @@ def _path(module: str) -> Path:
     raise ValueError(f"no module {module!r} in {_NAME}")
 
 
-@lru_cache(maxsize=64)
-def _data_files(folder: Path) -> tuple[Path, ...]:
-    """Return the files of a package that are no modules."""
-    files = (path for path in folder.rglob("*") if path.is_file())
-    return tuple(path for path in files if path.suffix != ".py" and "__pycache__" not in path.parts)
-
-
 @lru_cache(maxsize=256)
-def _imports(path: Path) -> tuple[Path, ...]:
-    found = []
+def _used(path: Path) -> tuple[Path, ...]:
+    """Return the files of the package that a module uses by itself."""
+    found: list[Path] = []
     for node in ast.walk(ast.parse(path.read_bytes())):
-        if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == _NAME:
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            found += _named(node.value, path.parent)
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == _NAME:
             base = ".".join((node.module or "").split(".")[1:])
             if base:
                 found.append(_path(base))
             for alias in node.names:
-                name = f"{base}.{alias.name}".lstrip(".")
-                try:
-                    found.append(_path(name))
-                except ValueError:
-                    continue
+                with suppress(ValueError):
+                    found.append(_path(f"{base}.{alias.name}".lstrip(".")))
     return tuple(found)
+
+
+def _named(text: str, folder: Path) -> Iterator[Path]:
+    """Yield the modules, or the files in the folder of a module, that a text is the name of."""
+    if text.startswith(_NAME + "."):
+        with suppress(ValueError):
+            yield _path(text.removeprefix(_NAME + "."))
+    elif re.fullmatch(r"\w[\w.]*", text, re.ASCII):
+        beside = folder / text
+        if beside.is_file():
+            yield beside
+        elif beside.is_dir() and not (beside / "__init__.py").exists():
+            yield from (path for path in beside.rglob("*") if path.is_file())

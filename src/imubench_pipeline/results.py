@@ -37,11 +37,16 @@ class Key:
 
 @dataclass(frozen=True)
 class Quality:
-    """``quality.json``: what the ingest found, and the channels that go on."""
+    """``quality.json``: what the ingest found, and the channels that go on.
+
+    With the digest of the samples that were kept, the file is another one whenever they are: what
+    stands on them is made again, even if the run that read them was stopped in between.
+    """
 
     recording: dict[str, Any]
     findings: list[dict[str, Any]]
     channels: dict[str, dict[str, Any]]
+    samples: str | None
 
     @classmethod
     def read(cls, path: Path) -> Quality:

@@ -320,3 +320,21 @@ TABLES: dict[str, tuple[Column, ...]] = {
 
 OF_ONE_RECORDING = ("envelope", "histogram")
 """The tables that are kept with each recording and not joined."""
+
+BY_RECORDING = (
+    "recordings",
+    "findings",
+    "allan",
+    "parameters",
+    "reconstruction",
+    "scores",
+    "models",
+    "lines",
+    "datasheet",
+    "datasheet_curve",
+    "spectrum",
+    "fixed_bias",
+    "simulated_truth",
+    "error_budget",
+)
+"""The joined tables in which a recording has rows of its own."""

@@ -16,7 +16,7 @@ import zstandard
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from imubench_pipeline.plan import _stem
+from imubench_pipeline.drop_zone import _stem
 from imubench_pipeline.readers import RecordingError, compressed, log_files, read
 from tests.readers.text_logs import columns, log_format, written
 

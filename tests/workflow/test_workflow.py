@@ -1,82 +1,20 @@
 """Real runs of Snakemake on a small project of real files."""
 
-import gzip
 import html
-import re
-import subprocess
-import sys
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-import yaml
 
-from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.simulate import simulate
-from tests.conftest import PROJECT
+from tests.workflow.project import CHANNELS, Project, put_log, put_sensor
 
 pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("workflow")]
 
-CHANNELS = {
-    "gyro_x": {"column": "wx", "unit": "deg/s"},
-    "accel_x": {"column": "ax", "unit": "m/s^2"},
-}
-DATASHEET = {"gyro": {"noise_density": {"value": 0.01, "unit": "deg/s/sqrt(Hz)"}}}
 STEPS_OF_A_RECORDING = dict.fromkeys(
     ("ingest", "allan", "estimate", "reconstruct", "datasheet", "error_budget"), 1
 )
 GLOBAL_STEPS = dict.fromkeys(("tables", "ranking", "exports", "figures", "report"), 1)
-
-
-@dataclass
-class Project:
-    folder: Path
-    results: Path
-
-    def run(self, *flags: str, cores: int = 2) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-m", "snakemake", f"-c{cores}", *flags, "--config",
-                   f"logs={self.folder / 'logs'}", f"sensors={self.folder / 'sensors'}",
-                   f"results={self.results}", "simulated=false"]  # fmt: skip
-        return subprocess.run(
-            command, cwd=PROJECT, capture_output=True, text=True, check=False, timeout=600
-        )
-
-    def jobs(self) -> dict[str, int]:
-        """What a run would do now."""
-        done = self.run("-n")
-        assert done.returncode == 0, done.stderr
-        stats = done.stdout.partition("Job stats:")[2].partition("\n\n")[0]
-        counts = dict(re.findall(r"^(\w+) +(\d+)$", stats, flags=re.MULTILINE))
-        return {rule: int(count) for rule, count in counts.items() if rule not in ("all", "total")}
-
-    def table(self, name: str) -> list[dict]:
-        return pq.read_table(self.results / f"tables/{name}.parquet").to_pylist()
-
-    def pages(self) -> dict[str, int]:
-        """When each page of the report was written."""
-        report = self.results / "report"
-        return {
-            path.relative_to(report).as_posix(): path.stat().st_mtime_ns
-            for path in report.rglob("*.html")
-        }
-
-
-def put_log(path: Path, seed: int, samples: int = 20_000) -> None:
-    rng = np.random.default_rng(seed)
-    wx = np.degrees(simulate(NoiseModel(N=1e-4, B=1e-4, T_B=5.0), 100.0, samples, rng))
-    ax = 9.81 + simulate(NoiseModel(N=1e-3, K=1e-3), 100.0, samples, rng)
-    rows = "".join(f"{w:.9g},{a:.9g}\n" for w, a in zip(wx, ax, strict=True))
-    path.parent.mkdir(parents=True, exist_ok=True)
-    text = ("wx,ax\n" + rows).encode()
-    path.write_bytes(gzip.compress(text) if path.suffix == ".gz" else text)
-
-
-def put_sensor(path: Path, **changes: object) -> None:
-    sensor = {"vendor": "V", "model": path.stem, "log": {"rate": "100 Hz", "channels": CHANNELS}}
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(yaml.safe_dump(sensor | {"datasheet": DATASHEET} | changes))
 
 
 def put_bad_logs(folder: Path) -> dict[str, str]:

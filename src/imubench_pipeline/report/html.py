@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
@@ -24,7 +25,7 @@ from imubench_pipeline.report.words import started_text
 def environment(system: System) -> jinja2.Environment:
     """Return the templates, with the units in which the pages open."""
     made = jinja2.Environment(
-        loader=jinja2.PackageLoader("imubench_pipeline.report"),
+        loader=jinja2.FileSystemLoader(Path(__file__).with_name("templates")),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,

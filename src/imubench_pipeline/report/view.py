@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.results import estimate_of
+from imubench_pipeline.schemas import BY_RECORDING
 
 Row = Mapping[str, Any]
 METHOD_NAMES = {
@@ -172,28 +173,9 @@ class RecordingView:
         return _channels(self)
 
 
-_OF_RECORDINGS = (
-    "recordings",
-    "findings",
-    "allan",
-    "parameters",
-    "reconstruction",
-    "scores",
-    "models",
-    "lines",
-    "datasheet",
-    "datasheet_curve",
-    "spectrum",
-    "fixed_bias",
-    "simulated_truth",
-    "error_budget",
-)
-"""The tables of which a recording has rows of its own."""
-
-
 def recording_views(tables: Mapping[str, pa.Table]) -> list[RecordingView]:
     """Gather the tables by recording, in the order of the table ``recordings``."""
-    divided = {name: _by(tables[name], "sensor", "recording") for name in _OF_RECORDINGS}
+    divided = {name: _by(tables[name], "sensor", "recording") for name in BY_RECORDING}
     views = []
     for row in tables["recordings"].to_pylist():
         name = (row["sensor"], row["recording"])

@@ -201,6 +201,10 @@ def test_the_curve_of_a_channel_with_its_methods(read: Open, bench: Report) -> N
     toggle(figure, "white noise N").check()
     white = only(traces(figure), name="white noise N")
     np.testing.assert_allclose(white["y"], 0.3 * 60 / np.sqrt(made.TAU), rtol=LEVELS)
+    printed = [one for one in drawn if "noise density" in str(one["name"])]
+    assert len(printed) == 2
+    for one, noise in zip(printed, (0.42 / math.sqrt(2), 0.42), strict=True):
+        np.testing.assert_allclose(one["y"], noise * 60 / np.sqrt(made.TAU), rtol=2 * LEVELS)
     toggle(figure, "datasheet: bias instability 8 deg/h (max)").uncheck()
     assert not [one for one in traces(figure) if "bias instability" in str(one["name"])]
     figure.get_by_role("button", name="all off").click()

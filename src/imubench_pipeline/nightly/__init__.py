@@ -1,0 +1,1 @@
+"""`imubench nightly`: what a timer calls, while loggers write."""

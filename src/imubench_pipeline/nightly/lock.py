@@ -1,0 +1,150 @@
+"""One nightly run at a time, whatever became of the one before."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import platform
+import time
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import psutil
+
+_PAUSE = 0.5  # s between two attempts
+
+
+class TakenError(RuntimeError):
+    """Another run goes on; the text says which, and since when."""
+
+
+class Lock:
+    """A lock on a folder of results, that the system takes back from a process that was killed.
+
+    It is held by whatever has ``descriptor`` open: given to Snakemake too, it stays as long as one
+    of the two lives. While it is held, the file has a note of who holds it; one that is still there
+    when the lock is free comes from a run that did not reach its end.
+
+    Parameters
+    ----------
+    path : Path
+        The file; its folder is made.
+
+    Attributes
+    ----------
+    descriptor : int
+    since : float
+        When it was taken, s since 1970.
+    left_over : mapping
+        The note of a run that did not reach its end; empty where it did. Who has put right what
+        that run left makes it empty: until then, it is left to the next run again.
+    """
+
+    def __init__(self, path: Path) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self.path = path
+        self.descriptor = -1
+        self.since = 0.0
+        self.left_over: Mapping[str, Any] = {}
+
+    def acquire(self, wait: float = 0.0) -> None:
+        """Take the lock.
+
+        Parameters
+        ----------
+        wait : float
+            How long to wait for a run that goes on, s.
+
+        Raises
+        ------
+        TakenError
+            If another run still holds it then.
+        """
+        self.descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        until = time.monotonic() + wait
+        while not self._taken():
+            if time.monotonic() >= until:
+                note = read_note(self.path)
+                self._close()
+                raise TakenError(f"another nightly run goes on: {_holder(note)}")
+            time.sleep(min(_PAUSE, max(until - time.monotonic(), 0.0)))
+        self.since = time.time()
+        self.left_over = read_note(self.path)
+        self.note()
+
+    def note(self, **more: object) -> None:
+        """Write who holds the lock, and what else a later run should know."""
+        about = {
+            "process": os.getpid(),
+            "host": platform.node(),
+            "since": datetime.fromtimestamp(self.since, UTC).isoformat(timespec="seconds"),
+        }
+        self._write(json.dumps(about | more) + "\n")
+
+    def release(self) -> None:
+        """Give the lock back; the note goes, unless that of an earlier run is still needed."""
+        if self.descriptor >= 0:
+            self._write(json.dumps(self.left_over) + "\n" if self.left_over else "")
+            # For all that have it open: a step that outlives Snakemake must not keep it.
+            fcntl.flock(self.descriptor, fcntl.LOCK_UN)
+            self._close()
+
+    def __enter__(self) -> Lock:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.release()
+
+    def _taken(self) -> bool:
+        try:
+            fcntl.flock(self.descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return False
+        return True
+
+    def _write(self, text: str) -> None:
+        try:
+            os.ftruncate(self.descriptor, 0)
+            os.pwrite(self.descriptor, text.encode(), 0)
+        except OSError:
+            return  # a full disk: the lock holds without its note
+
+    def _close(self) -> None:
+        os.close(self.descriptor)
+        self.descriptor = -1
+
+
+def read_note(path: Path) -> Mapping[str, Any]:
+    """Return what stands in the file of a lock; nothing where that cannot be read.
+
+    Parameters
+    ----------
+    path : Path
+        The file of the lock.
+    """
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _holder(note: Mapping[str, Any]) -> str:
+    """Return who holds a lock, in words."""
+    if not isinstance(process := note.get("process"), int):
+        return "who holds it is not known"
+    since = f"since {note.get('since')}"
+    if note.get("host") != platform.node():
+        return f"process {process} on {note.get('host')}, {since}"
+    if psutil.pid_exists(process):
+        return f"process {process}, {since}"
+    return f"process {process} is gone, but Snakemake ({note.get('snakemake')}) goes on, {since}"

@@ -1,0 +1,115 @@
+"""Small projects of real files, for real runs of Snakemake."""
+
+from __future__ import annotations
+
+import gzip
+import re
+import subprocess
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import yaml
+
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.simulate import simulate
+from tests.conftest import PROJECT
+
+CHANNELS = {
+    "gyro_x": {"column": "wx", "unit": "deg/s"},
+    "accel_x": {"column": "ax", "unit": "m/s^2"},
+}
+DATASHEET = {"gyro": {"noise_density": {"value": 0.01, "unit": "deg/s/sqrt(Hz)"}}}
+
+Job = tuple[str, str]
+"""A rule, and the recording (sensor and name) that a job of it is for."""
+
+_JOB = re.compile(r"^(?:local)?rule (\w+):\n((?: .*\n)*)", re.MULTILINE)
+_WILDCARDS = re.compile(r"wildcards: sensor=(.+), recording=(.+)")
+
+
+@dataclass
+class Project:
+    """Logs and sensor files in a folder, and the results of their runs.
+
+    ``place`` is the folder to run in, that of the Snakefile unless `linked` made another one;
+    ``settings`` go to the command line, as ``key=value``; ``environment`` is that of the run.
+    """
+
+    folder: Path
+    results: Path
+    place: Path = PROJECT
+    settings: list[str] = field(default_factory=list)
+    environment: dict[str, str] | None = None
+
+    def command(self, *flags: str, cores: int = 2) -> list[str]:
+        return [sys.executable, "-m", "snakemake", f"-c{cores}", *flags, "--config",
+                f"logs={self.folder / 'logs'}", f"sensors={self.folder / 'sensors'}",
+                f"results={self.results}", "simulated=false", *self.settings]  # fmt: skip
+
+    def run(self, *flags: str, cores: int = 2) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            self.command(*flags, cores=cores),
+            cwd=self.place,
+            env=self.environment,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=600,
+        )
+
+    def jobs(self) -> dict[str, int]:
+        """How many jobs of each rule a run would do now."""
+        counts: dict[str, int] = {}
+        for rule, _ in self.job_list():
+            counts[rule] = counts.get(rule, 0) + 1
+        return counts
+
+    def job_list(self) -> set[Job]:
+        """What a run would do now."""
+        done = self.run("-n")
+        assert done.returncode == 0, done.stdout + done.stderr
+        jobs = set()
+        for rule, about in _JOB.findall(done.stdout):
+            of = _WILDCARDS.search(about)
+            jobs.add((rule, "/".join(of.groups()) if of else ""))
+        stated = re.search(r"^total +(\d+)$", done.stdout, re.MULTILINE)
+        assert len(jobs) == (int(stated[1]) if stated else 0), done.stdout
+        return jobs - {("all", "")}
+
+    def pages(self) -> dict[str, int]:
+        """When each page of the report was written."""
+        report = self.results / "report"
+        return {
+            path.relative_to(report).as_posix(): path.stat().st_mtime_ns
+            for path in report.rglob("*.html")
+        }
+
+    def table(self, name: str) -> list[dict]:
+        return pq.read_table(self.results / f"tables/{name}.parquet").to_pylist()
+
+
+def linked(folder: Path) -> Path:
+    """Make a folder to run in, with notes and locks of Snakemake of its own."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in ("Snakefile", "config", "profiles", "workflow"):
+        (folder / name).symlink_to(PROJECT / name)
+    return folder
+
+
+def put_log(path: Path, seed: int, samples: int = 20_000) -> None:
+    rng = np.random.default_rng(seed)
+    wx = np.degrees(simulate(NoiseModel(N=1e-4, B=1e-4, T_B=5.0), 100.0, samples, rng))
+    ax = 9.81 + simulate(NoiseModel(N=1e-3, K=1e-3), 100.0, samples, rng)
+    rows = "".join(f"{w:.9g},{a:.9g}\n" for w, a in zip(wx, ax, strict=True))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    text = ("wx,ax\n" + rows).encode()
+    path.write_bytes(gzip.compress(text) if path.suffix == ".gz" else text)
+
+
+def put_sensor(path: Path, **changes: object) -> None:
+    sensor = {"vendor": "V", "model": path.stem, "log": {"rate": "100 Hz", "channels": CHANNELS}}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(yaml.safe_dump(sensor | {"datasheet": DATASHEET} | changes))

@@ -1,0 +1,250 @@
+"""What runs again after a change, and that nothing else does: Snakemake's own list of jobs."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import yaml
+
+import imubench_pipeline
+from tests.workflow.project import CHANNELS, Job, Project, linked, put_log, put_sensor
+
+pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("workflow")]
+
+STEPS = ("ingest", "allan", "estimate", "reconstruct", "datasheet", "error_budget")
+TOGETHER = {(rule, "") for rule in ("tables", "ranking", "exports", "figures", "report")}
+ONE = ("one/a", "one/big")
+ALL = (*ONE, "two/f")
+BIG = 60_000  # samples, of a log above 1 MB
+IN_FILES = {
+    name: {**source, "file": f"{name}.csv", "column": 1} for name, source in CHANNELS.items()
+}
+REQUIREMENT = {
+    "title": "Robot",
+    "static_window": "30 s",
+    "limits": [{"error": "heading", "after": "60 s", "at_most": "1 deg"}],
+}
+INPUTS = ("logs", "sensors", "requirements")
+
+
+def steps_of(*recordings: str, since: str = "ingest") -> set[Job]:
+    return {(step, of) for step in STEPS[STEPS.index(since) :] for of in recordings}
+
+
+def put_requirement(folder: Path, **changes: object) -> None:
+    path = folder / "requirements/robot.yaml"
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(yaml.safe_dump(REQUIREMENT | changes))
+
+
+def put_two(folder: Path, **changes: object) -> None:
+    layout = {"rate": "100 Hz", "channels": IN_FILES, "header": True}
+    put_sensor(folder / "sensors/two.yaml", log=layout | changes)
+
+
+def put_parts(folder: Path, seed: int) -> None:
+    """Write a recording of two files, one a channel."""
+    put_log(folder / "whole", seed)
+    lines = (folder / "whole").read_text().splitlines()
+    (folder / "whole").unlink()
+    for column, name in enumerate(CHANNELS):
+        text = "".join(line.split(",")[column] + "\n" for line in lines)
+        (folder / f"{name}.csv").write_text(text)
+
+
+def replace(path: Path, old: str, new: str, count: int = 1) -> None:
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, count))
+
+
+def exchange_lines(path: Path, first: int) -> None:
+    """Exchange two lines: the same size, other content."""
+    lines = path.read_text().splitlines(keepends=True)
+    lines[first : first + 2] = lines[first + 1], lines[first]
+    assert path.write_text("".join(lines)) == sum(map(len, lines))
+
+
+def project_in(folder: Path) -> Project:
+    """A project that runs in a folder of its own, and names everything relative to it."""
+    linked(folder)
+    settings = ["logs=logs", "sensors=sensors", "results=results", "requirements=requirements",
+                'estimate={"methods": ["weighted"]}']  # fmt: skip
+    return Project(folder, folder / "results", folder, settings)
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> Project:
+    """A project whose run is complete."""
+    made = project_in(tmp_path_factory.mktemp("incremental"))
+    put_sensor(made.folder / "sensors/one.yaml")
+    put_two(made.folder)
+    put_requirement(made.folder)
+    put_log(made.folder / "logs/one/a.csv", 1)
+    put_log(made.folder / "logs/one/big.csv", 2, samples=BIG)
+    put_parts(made.folder / "logs/two/f", 3)
+    assert (made.folder / "logs/one/big.csv").stat().st_size > 1 << 20
+    ran = made.run()
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    return made
+
+
+@pytest.fixture
+def project(done: Project, tmp_path: Path) -> Iterator[Project]:
+    """The same before every test: a dry run leaves the results as they are."""
+    for name in INPUTS:
+        shutil.copytree(done.folder / name, tmp_path / name)
+    settings = list(done.settings)
+    yield done
+    done.settings, done.environment = settings, None
+    for name in INPUTS:
+        shutil.rmtree(done.folder / name)
+        shutil.copytree(tmp_path / name, done.folder / name)
+
+
+@pytest.fixture
+def code(project: Project, tmp_path: Path) -> Path:
+    """A copy of the package that the project runs with."""
+    package = Path(imubench_pipeline.__file__).parent
+    ignored = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(package, tmp_path / package.name, ignore=ignored)
+    project.environment = os.environ | {"PYTHONPATH": str(tmp_path)}
+    return tmp_path / package.name
+
+
+def test_nothing_runs_again_when_dates_and_comments_alone_change(project: Project) -> None:
+    logs = project.folder / "logs"
+    now = time.time()
+    dates = {"a.csv": now, "big.csv": 2e9, "../two/f/gyro_x.csv": now, "../two/f/accel_x.csv": 1e9}
+    for name, date in dates.items():
+        os.utime(logs / "one" / name, (date, date))
+    (logs / "one/a.yaml").write_text("# a log of nothing in particular\n")
+    for path in project.folder.glob("sensors/*.yaml"):
+        path.write_text("# a comment\n" + path.read_text())
+    assert project.job_list() == set()
+
+
+def test_a_new_log_runs_its_own_steps(project: Project) -> None:
+    put_log(project.folder / "logs/one/new.csv.gz", 4)
+    assert project.job_list() == steps_of("one/new") | TOGETHER
+
+
+def test_a_replaced_log_runs_its_own_steps(project: Project) -> None:
+    put_log(project.folder / "logs/one/a.csv", 5)
+    assert project.job_list() == steps_of("one/a") | TOGETHER
+
+
+def test_logs_replaced_by_older_ones_of_their_size_run_their_own_steps(project: Project) -> None:
+    logs = project.folder / "logs"
+    exchange_lines(logs / "one/big.csv", 1)
+    exchange_lines(logs / "two/f/accel_x.csv", 10_000)
+    for path in (logs / "one/big.csv", logs / "two/f/accel_x.csv"):
+        os.utime(path, (1e9, 1e9))
+    assert project.job_list() == steps_of("one/big", "two/f") | TOGETHER
+
+
+def test_a_removed_log_runs_what_joins_the_others(project: Project) -> None:
+    (project.folder / "logs/one/a.csv").unlink()
+    assert project.job_list() == TOGETHER
+
+
+def test_a_renamed_log_is_a_new_one(project: Project) -> None:
+    logs = project.folder / "logs/one"
+    (logs / "a.csv").rename(logs / "c.csv")
+    assert project.job_list() == steps_of("one/c") | TOGETHER
+
+
+def test_notes_run_the_steps_of_their_log(project: Project) -> None:
+    (project.folder / "logs/one/a.yaml").write_text("device: serial 7\n")
+    assert project.job_list() == steps_of("one/a") | TOGETHER
+
+
+def test_an_edit_of_a_layout_runs_the_logs_of_its_sensor(project: Project) -> None:
+    put_two(project.folder, rate="101 Hz")
+    assert project.job_list() == steps_of("two/f") | TOGETHER
+
+
+def test_an_edit_of_a_bandwidth_runs_the_estimates_of_its_sensor(project: Project) -> None:
+    put_two(project.folder, bandwidth="40 Hz")
+    assert project.job_list() == steps_of("two/f", since="estimate") | TOGETHER
+
+
+def test_an_edit_of_a_datasheet_runs_its_comparison(project: Project) -> None:
+    density = {"value": 0.02, "unit": "deg/s/sqrt(Hz)"}
+    put_sensor(project.folder / "sensors/one.yaml", datasheet={"gyro": {"noise_density": density}})
+    compared = {("datasheet", of) for of in ONE}
+    assert project.job_list() == compared | {("coverage", "")} | TOGETHER
+
+
+def test_an_edit_of_a_price_class_runs_the_ranking(project: Project) -> None:
+    put_sensor(project.folder / "sensors/one.yaml", price_class="consumer")
+    assert project.job_list() == {("ranking", ""), ("report", "")}
+
+
+def test_an_edit_of_a_threshold_runs_every_log(project: Project) -> None:
+    project.settings.append('quality={"step": 13}')
+    assert project.job_list() == steps_of(*ALL) | TOGETHER
+
+
+def test_an_edit_of_the_tolerance_runs_every_comparison(project: Project) -> None:
+    project.settings.append('datasheet={"tolerance": 0.2}')
+    assert project.job_list() == {("datasheet", of) for of in ALL} | TOGETHER
+
+
+def test_an_edit_of_a_requirement_runs_every_error_budget(project: Project) -> None:
+    put_requirement(project.folder, limits=[REQUIREMENT["limits"][0] | {"at_most": "2 deg"}])
+    assert project.job_list() == steps_of(*ALL, since="error_budget") | TOGETHER
+
+
+def test_edits_of_titles_run_the_report(project: Project) -> None:
+    put_requirement(project.folder, title="Rover", note="of no consequence")
+    project.settings.append('report={"title": "Sensors"}')
+    assert project.job_list() == {("report", "")}
+
+
+def test_an_edit_of_a_reader_runs_every_log(project: Project, code: Path) -> None:
+    replace(code / "readers/csv.py", '"""', '"""Again. ')
+    assert project.job_list() == steps_of(*ALL) | TOGETHER
+
+
+def test_an_edit_of_the_overbound_runs_the_exports(project: Project, code: Path) -> None:
+    replace(code / "overbound.py", '"""', '"""Again. ')
+    assert project.job_list() == {("exports", "")}
+
+
+def test_an_edit_of_a_template_runs_the_report(project: Project, code: Path) -> None:
+    replace(code / "report/templates/index.html.jinja", "<h2", '<h2 class="again"')
+    assert project.job_list() == {("report", "")}
+
+
+def test_an_interrupted_run_ends_as_a_fresh_one(done: Project, tmp_path: Path) -> None:
+    # The last of this file: it runs, and leaves another project.
+    logs = done.folder / "logs"
+    quality = "results/recordings/one/a/quality.json"
+    exchange_lines(logs / "one/a.csv", 2)
+    os.utime(logs / "one/a.csv", (1e9, 1e9))
+    (logs / "one/big.csv").unlink()
+    (logs / "two/f").rename(logs / "two/g")
+    put_two(done.folder, bandwidth="40 Hz")
+
+    assert done.run(quality).returncode == 0
+    assert done.job_list() == (steps_of("one/a", since="allan") | steps_of("two/g") | TOGETHER)
+
+    ran = done.run()
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    assert done.job_list() == set()
+    fresh = project_in(tmp_path)
+    for name in INPUTS:
+        shutil.copytree(done.folder / name, fresh.folder / name)
+    ran = fresh.run("results/tables/ranking.parquet")
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    tables = sorted(fresh.results.glob("tables/*"))
+    assert len(tables) > 30
+    for path in (*tables, *fresh.results.glob("recordings/*/*/*")):
+        same = done.results / path.relative_to(fresh.results)
+        assert same.read_bytes() == path.read_bytes(), same
