@@ -5,8 +5,10 @@ from __future__ import annotations
 import ctypes
 import gc
 import importlib
+import json
 import os
 import pickle
+import resource
 import runpy
 import signal
 import socket
@@ -92,7 +94,9 @@ def _run(connection: socket.socket, script: str, given: Mapping[str, Any]) -> No
     finally:
         sys.stdout.flush()
         sys.stderr.flush()
-        connection.sendall(answer)
+        used = resource.getrusage(resource.RUSAGE_SELF)
+        cost = {"cpu": used.ru_utime + used.ru_stime, "memory": used.ru_maxrss / 1000}
+        connection.sendall(answer + json.dumps(cost).encode())
         os._exit(answer != DONE)
 
 

@@ -8,6 +8,7 @@ them, and forks for each: `imubench_pipeline.step_server`.
 from __future__ import annotations
 
 import atexit
+import json
 import os
 import pickle
 import socket
@@ -18,7 +19,11 @@ from pathlib import Path
 from typing import Any
 
 DONE, FAILED = b"d", b"f"
-"""What is said of a step that ends by itself."""
+"""What is said of a step that ends by itself, and then what it has cost, as JSON."""
+
+COSTS = "IMUBENCH_COSTS"
+"""The environment variable with the file to which what each step has cost is appended, a line of
+JSON each: CPU time in s, peak of memory in MB."""
 
 _ONE_THREAD = {
     f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM")
@@ -73,8 +78,12 @@ class Steps:
                 stream.write(len(request).to_bytes(8, "big") + request)
                 stream.flush()
                 said = stream.read()
-        if said != DONE:
-            raise StepError(f"{name}.py failed" if said == FAILED else f"{name}.py was killed")
+        if said[:1] != DONE:
+            raise StepError(f"{name}.py failed" if said[:1] == FAILED else f"{name}.py was killed")
+        if COSTS in os.environ:
+            about = {"step": name, "of": "/".join(map(str, wildcards))} | json.loads(said[1:])
+            with self._lock, Path(os.environ[COSTS]).open("a", encoding="utf-8") as file:
+                file.write(json.dumps(about) + "\n")
 
     def close(self) -> None:
         """End the process that forks, and with it the scripts that run."""
