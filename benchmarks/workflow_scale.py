@@ -116,7 +116,9 @@ class Lab:
 
     def computation(self, numbers: Sequence[int]) -> float:
         """Return the CPU time that a recording's steps compute, in s: the mean of some."""
-        plan = Plan({**read_yaml(PROJECT / "config/config.yaml"), **_parsed(self.settings)})
+        config = read_yaml(PROJECT / "config/config.yaml")
+        assert isinstance(config, dict)
+        plan = Plan(config | _parsed(self.settings))
         times = []
         for number in (numbers[0], *numbers):
             start = time.process_time()

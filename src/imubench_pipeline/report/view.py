@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property, partial
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
+from pandas.util import hash_pandas_object
 
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.results import estimate_of
 from imubench_pipeline.schemas import BY_RECORDING
 
 Row = Mapping[str, Any]
+Name = tuple[str, str]
+"""Sensor and recording."""
+
 METHOD_NAMES = {
     "likelihood": "likelihood",
     "likelihood_gm": "likelihood, papers' model",
@@ -106,6 +110,8 @@ class RecordingView:
         Of the table ``recordings``.
     parts : mapping of str to pyarrow.Table
         Its rows of each table.
+    keys : callable
+        Returns the digests of all recordings, by sensor and name.
     page : str
         Its page.
     device_page : str or None
@@ -114,6 +120,7 @@ class RecordingView:
 
     row: Row
     parts: Mapping[str, pa.Table]
+    keys: Callable[[], Mapping[Name, str]]
     page: str = ""
     device_page: str | None = None
 
@@ -137,10 +144,10 @@ class RecordingView:
         """Whether it could not be used."""
         return bool(self.row["status"] == "rejected")
 
-    @cached_property
+    @property
     def key(self) -> str:
         """Digest of all that the tables say of it."""
-        return _digest(self.parts)
+        return self.keys()[self.sensor, self.name]
 
     @cached_property
     def findings(self) -> list[Row]:
@@ -176,6 +183,7 @@ class RecordingView:
 def recording_views(tables: Mapping[str, pa.Table]) -> list[RecordingView]:
     """Gather the tables by recording, in the order of the table ``recordings``."""
     divided = {name: _by(tables[name], "sensor", "recording") for name in BY_RECORDING}
+    keys = cache(partial(_keys, tables))
     views = []
     for row in tables["recordings"].to_pylist():
         name = (row["sensor"], row["recording"])
@@ -183,7 +191,7 @@ def recording_views(tables: Mapping[str, pa.Table]) -> list[RecordingView]:
             table: found[name] if name in found else tables[table].slice(0, 0)
             for table, found in divided.items()
         }
-        views.append(RecordingView(row, parts))
+        views.append(RecordingView(row, parts, keys))
     return views
 
 
@@ -231,20 +239,22 @@ def _channels(view: RecordingView) -> list[ChannelView]:
     return list(channels.values())
 
 
-def _digest(parts: Mapping[str, pa.Table]) -> str:
-    """Return a digest of the values: how Arrow keeps them depends on what stands before."""
-    digest = hashlib.sha256()
-    for name, part in parts.items():
-        digest.update(f"{name} {part.num_rows}".encode())
-        for column in part.columns:
-            if pa.types.is_floating(column.type):
-                digest.update(column.to_numpy().tobytes())
-            else:
-                encoded = column.combine_chunks().dictionary_encode()
-                digest.update(repr(encoded.dictionary.to_pylist()).encode())
-                codes = encoded.indices.to_numpy(zero_copy_only=False)
-                digest.update(np.asarray(codes, dtype=np.float64).tobytes())
-    return digest.hexdigest()
+def _keys(tables: Mapping[str, pa.Table]) -> dict[Name, str]:
+    """Return a digest of all that the tables say of each recording."""
+    digests: dict[Name, hashlib._Hash] = {}
+    for table in BY_RECORDING:
+        # Whether another recording lacks a number must not change how this one's are kept.
+        types = [
+            pa.field(f.name, f.type if pa.types.is_string(f.type) else pa.float64())
+            for f in tables[table].schema
+        ]
+        frame = tables[table].cast(pa.schema(types)).to_pandas(strings_to_categorical=True)
+        values = pa.array(hash_pandas_object(frame, index=False))
+        named = tables[table].select(["sensor", "recording"]).append_column("values", values)
+        for (sensor, recording), part in _by(named, "sensor", "recording").items():
+            digest = digests.setdefault((sensor, recording), hashlib.sha256())
+            digest.update(f"{table} {part.num_rows}".encode() + part["values"].to_numpy().tobytes())
+    return {name: digest.hexdigest() for name, digest in digests.items()}
 
 
 def _floats(part: pa.Table, column: str) -> NDArray[np.float64]:
