@@ -34,7 +34,8 @@ class Steps:
     """Runs scripts in forks of one process, which begins with the first of them.
 
     It ends with the process that has this object, even where that is killed; so do the forks, on
-    Linux.
+    Linux, where each also has the name of its script. A fork does not need the process that made
+    it any more.
 
     Parameters
     ----------
@@ -69,10 +70,7 @@ class Steps:
         with ours:
             with theirs:
                 self._hand_over(theirs)
-            with ours.makefile("rwb") as stream:
-                stream.write(len(request).to_bytes(8, "big") + request)
-                stream.flush()
-                said = stream.read()
+            said = _answer(ours, len(request).to_bytes(8, "big") + request)
         if said != DONE:
             raise StepError(f"{name}.py failed" if said == FAILED else f"{name}.py was killed")
 
@@ -98,6 +96,15 @@ class Steps:
                     requests.close()
                     process.wait()
         raise StepError("the process that starts the steps ends at once; what it says stands above")
+
+
+def _answer(connection: socket.socket, request: bytes) -> bytes:
+    """Return what is said of a step that ends by itself; nothing of one that is killed."""
+    try:
+        connection.sendall(request)
+        return connection.recv(1)
+    except OSError:
+        return b""  # so is the process that was to start it
 
 
 def _started() -> tuple[subprocess.Popen[bytes], socket.socket]:
