@@ -294,21 +294,23 @@ def test_old_temporary_files_of_ours_are_removed(tmp_path: Path) -> None:
         stamp(tmp_path / "tables" / names[0], OLD),
         stamp(tmp_path / "recordings/s/r/.ingest.abcd_123.part/x", OLD).parent,
         stamp(tmp_path / "simulated/s/.sim_r.abcd_123.part/log/x", OLD).parents[1],
+        stamp(tmp_path / ".exports.abcd_123.part/exports/x", OLD).parents[1],
     ]
     kept = [
         stamp(tmp_path / "tables/.b.csv.abcd_123.part", taken - 5.0),
         stamp(tmp_path / "recordings/s/r/.ingest.abcd_124.part/x", taken),
         stamp(tmp_path / "recordings/s/r/run.csv.part", OLD),
         stamp(tmp_path / "recordings/s/r/.run.csv.part", OLD),
+        stamp(tmp_path / ".mine.abcd_123.part/x", OLD),
         stamp(tmp_path / "mine/.b.csv.abcd_123.part", OLD),
         stamp(tmp_path / "elsewhere/x", OLD),
     ]
     link = tmp_path / "tables/.c.csv.abcd_123.part"
     link.symlink_to(tmp_path / "elsewhere")
-    for folder in (gone[1], gone[2] / "log", gone[2]):
+    for folder in (gone[1], gone[2] / "log", gone[2], gone[3] / "exports", gone[3]):
         os.utime(folder, (OLD, OLD))
     number, size = recovery.remove_temporary(tmp_path, taken)
-    assert number == 3 and size >= 3
+    assert number == 4 and size >= 4
     assert not any(path.exists() for path in gone)
     assert all(path.exists() for path in (*kept, link))
 

@@ -104,6 +104,21 @@ def test_a_script_that_is_killed_harms_no_other(steps: Steps, tmp_path: Path) ->
     assert eval((tmp_path / "out").read_text())[3] != parent
 
 
+def test_a_request_that_dies_with_the_server_is_a_step_that_was_killed(
+    steps: Steps, tmp_path: Path
+) -> None:
+    put(tmp_path, "say", SAY.replace("here = snakemake", "here = globals().get('snakemake')"))
+    run(steps, "say", tmp_path / "out", size="x")
+    parent = eval((tmp_path / "out").read_text())[3]
+    os.kill(parent, signal.SIGSTOP)
+    with ThreadPoolExecutor(1) as pool:
+        asked = pool.submit(run, steps, "say", tmp_path / "out", size="x" * 10**6)
+        time.sleep(0.2)
+        os.kill(parent, signal.SIGKILL)
+        with pytest.raises(StepError, match=r"^say.py was killed$"):
+            asked.result(timeout=10)
+
+
 def test_threads_run_scripts_at_the_same_time(steps: Steps, tmp_path: Path) -> None:
     put(
         tmp_path,
@@ -122,30 +137,73 @@ if __name__ == "__main__":
         list(pool.map(lambda output: run(steps, "meet", output), outputs, timeout=60))
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="a fork learns of it on Linux alone")
-def test_scripts_end_with_the_run_that_started_them(tmp_path: Path) -> None:
-    put(
-        tmp_path,
-        "waits",
-        """
+WAIT = """
 import os, time
 from pathlib import Path
 if __name__ == "__main__":
-    Path(snakemake.output[0]).write_text(f"{os.getppid()} {os.getpid()}")
+    Path(snakemake.output[0]).write_text(f"{os.getppid()} {os.getpid()} ")
     time.sleep(600)
-""",
-    )
-    text = (
-        "from pathlib import Path; from imubench_pipeline.steps import Steps;"
-        f"Steps(Path({str(tmp_path)!r})).run('waits', [], [{str(tmp_path / 'out')!r}], [], [])"
-    )
-    process = subprocess.Popen([sys.executable, "-c", text])
+"""
+
+IMPORTS_LONG = """
+import time
+from pathlib import Path
+if __name__ == "imports":
+    Path(__file__).with_name("importing").touch()
+    time.sleep(3)
+else:
+    Path(__file__).with_name("ran").touch()
+"""
+
+RUN_BOTH = """
+import sys, threading
+from pathlib import Path
+from imubench_pipeline.steps import Steps
+folder = Path(sys.argv[1])
+steps = Steps(folder)
+threading.Thread(target=steps.run, args=("wait", [], [folder / "out"], [], [])).start()
+while not (folder / "out").is_file():
+    pass
+steps.run("imports_long", [], [], [], [])
+"""
+
+
+def until_there(process: subprocess.Popen[bytes], path: Path, words: int = 0) -> list[str]:
     deadline = time.monotonic() + 60
-    while not (tmp_path / "out").is_file() or len((tmp_path / "out").read_text().split()) < 2:
+    while not path.is_file() or len(path.read_text().split()) < words:
         assert time.monotonic() < deadline and process.poll() is None
         time.sleep(0.05)
-    started = [psutil.Process(int(number)) for number in (tmp_path / "out").read_text().split()]
+    return path.read_text().split()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a fork learns of it on Linux alone")
+def test_scripts_end_at_once_with_the_run_that_started_them(tmp_path: Path) -> None:
+    put(tmp_path, "wait", WAIT)
+    put(tmp_path, "imports_long", IMPORTS_LONG)
+    process = subprocess.Popen([sys.executable, "-c", RUN_BOTH, str(tmp_path)])
+    numbers = until_there(process, tmp_path / "out", 2)
+    server, script = (psutil.Process(int(number)) for number in numbers)
+    until_there(process, tmp_path / "importing")
     process.kill()
     process.wait()
-    _, alive = psutil.wait_procs(started, timeout=20)
-    assert not alive
+    # A next run may have begun before the server has imported what the other script needs.
+    script.wait(timeout=2)
+    assert server.is_running()
+    server.wait(timeout=30)
+    time.sleep(0.5)
+    assert not (tmp_path / "ran").exists()
+
+
+@pytest.mark.skipif(not Path("/proc/self/comm").is_file(), reason="names are set on Linux alone")
+def test_a_script_can_be_told_by_its_name_and_outlives_the_process_that_forked_it(
+    steps: Steps, tmp_path: Path
+) -> None:
+    put(tmp_path, "wait", WAIT.replace("600", "1"))
+    with ThreadPoolExecutor(1) as pool:
+        running = pool.submit(run, steps, "wait", tmp_path / "out")
+        while not (tmp_path / "out").is_file() or not (tmp_path / "out").read_text().endswith(" "):
+            time.sleep(0.05)
+        server, script = map(int, (tmp_path / "out").read_text().split())
+        assert psutil.Process(script).name() == "wait"
+        os.kill(server, signal.SIGKILL)
+        running.result(timeout=10)

@@ -8,6 +8,7 @@ from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
 from imubench_pipeline.tables import (
     TableError,
     build,
+    making,
     read,
     replacing,
     write,
@@ -92,3 +93,16 @@ def test_a_write_that_fails_leaves_what_was_there(tmp_path: Path) -> None:
         raise RuntimeError
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_folder_appears_with_all_that_is_in_it(tmp_path: Path) -> None:
+    folder = tmp_path / "new/made"
+    with making(folder) as inside:
+        write_content("a", inside / "of/a.txt")
+        assert not folder.exists()
+    assert [path.name for path in folder.rglob("*")] == ["of", "a.txt"]
+    assert folder.stat().st_mode == folder.parent.stat().st_mode
+    with pytest.raises(RuntimeError), making(tmp_path / "new/other") as inside:
+        write_content("a", inside / "a.txt")
+        raise RuntimeError
+    assert list(folder.parent.iterdir()) == [folder]

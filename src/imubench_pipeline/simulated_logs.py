@@ -50,7 +50,7 @@ def write_simulated(recording: SimulatedRecording, log: LogFormat, folder: Path)
     for channel in recording.channels:
         source = log.channels[channel]
         files.setdefault(source.file or "log.txt", {})[channel] = source
-    folder.mkdir(parents=True)
+    folder.mkdir(parents=True, exist_ok=True)
     with ExitStack() as stack:
         writers = [
             stack.enter_context(_Writer(folder / name, log, columns, recording))

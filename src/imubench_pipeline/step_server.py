@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import ctypes
+import fcntl
 import gc
 import importlib
 import json
@@ -10,20 +10,20 @@ import os
 import pickle
 import resource
 import runpy
+import select
 import signal
 import socket
 import sys
 import traceback
 from collections.abc import Mapping
 from contextlib import suppress
+from pathlib import Path
 from types import FrameType, SimpleNamespace
 from typing import Any
 
 from numba import njit
 
 from imubench_pipeline.steps import DONE, FAILED
-
-_PR_SET_PDEATHSIG = 1
 
 
 def serve(requests: socket.socket) -> None:
@@ -84,7 +84,8 @@ def _run(connection: socket.socket, script: str, given: Mapping[str, Any]) -> No
         signal.signal(signal.SIGINT, signal.SIG_DFL)
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)
         if sys.platform == "linux":
-            ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+            _end_with_who_asked(connection)
+            Path("/proc/self/comm").write_text(Path(script).stem)  # for ps and top
         runpy.run_path(
             script, init_globals={"snakemake": SimpleNamespace(**given)}, run_name="__main__"
         )
@@ -98,6 +99,19 @@ def _run(connection: socket.socket, script: str, given: Mapping[str, Any]) -> No
         cost = {"cpu": used.ru_utime + used.ru_stime, "memory": used.ru_maxrss / 1000}
         connection.sendall(answer + json.dumps(cost).encode())
         os._exit(answer != DONE)
+
+
+def _end_with_who_asked(connection: socket.socket) -> None:
+    """Have the system end this process as soon as the other end of a connection is closed.
+
+    That the server ends would tell later: it may be importing what another step needs, while the
+    next run begins.
+    """
+    signal.signal(signal.SIGIO, signal.SIG_DFL)
+    fcntl.fcntl(connection, fcntl.F_SETOWN, os.getpid())
+    fcntl.fcntl(connection, fcntl.F_SETFL, fcntl.fcntl(connection, fcntl.F_GETFL) | os.O_ASYNC)
+    if select.select([connection], [], [], 0.0)[0]:  # closed before; nothing more is ever sent
+        os._exit(1)
 
 
 def _say(error: BaseException, script: str) -> None:

@@ -39,7 +39,8 @@ class Steps:
     """Runs scripts in forks of one process, which begins with the first of them.
 
     It ends with the process that has this object, even where that is killed; so do the forks, on
-    Linux.
+    Linux, where each also has the name of its script. A fork does not need the process that made
+    it any more.
 
     Parameters
     ----------
@@ -74,10 +75,7 @@ class Steps:
         with ours:
             with theirs:
                 self._hand_over(theirs)
-            with ours.makefile("rwb") as stream:
-                stream.write(len(request).to_bytes(8, "big") + request)
-                stream.flush()
-                said = stream.read()
+            said = _answer(ours, len(request).to_bytes(8, "big") + request)
         if said[:1] != DONE:
             raise StepError(f"{name}.py failed" if said[:1] == FAILED else f"{name}.py was killed")
         if COSTS in os.environ:
@@ -107,6 +105,16 @@ class Steps:
                     requests.close()
                     process.wait()
         raise StepError("the process that starts the steps ends at once; what it says stands above")
+
+
+def _answer(connection: socket.socket, request: bytes) -> bytes:
+    """Return what is said of a step that ends by itself; nothing of one that is killed."""
+    try:
+        connection.sendall(request)
+        with connection.makefile("rb") as stream:
+            return stream.read()
+    except OSError:
+        return b""  # so is the process that was to start it
 
 
 def _started() -> tuple[subprocess.Popen[bytes], socket.socket]:

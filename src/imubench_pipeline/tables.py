@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -84,6 +85,26 @@ def replacing(path: Path) -> Iterator[Path]:
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def making(folder: Path) -> Iterator[Path]:
+    """Give the name of a folder to fill, renamed to ``folder`` when the block ends without error.
+
+    Parameters
+    ----------
+    folder : Path
+        It may not be there yet, or be empty.
+    """
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=".part", dir=folder.parent))
+    try:
+        inside = scratch / folder.name
+        inside.mkdir()  # beside what mkdtemp makes private
+        yield inside
+        inside.rename(folder)
+    finally:
+        shutil.rmtree(scratch)
 
 
 def write(table: str, rows: Iterable[Mapping[str, Any]], path: Path) -> None:

@@ -6,15 +6,15 @@ from pathlib import Path
 from imubench_pipeline.config import ExportSettings
 from imubench_pipeline.export.of_run import exports
 from imubench_pipeline.export.request import load
-from imubench_pipeline.tables import write_content
+from imubench_pipeline.tables import making, write_content
 
 
 def main(tables: Path, settings: str, folder: Path) -> None:
-    """Write a folder a sensor, with a file a program."""
-    folder.mkdir(parents=True)
+    """Write a folder a sensor, with a file a program; all appear together."""
     how = ExportSettings.model_validate(json.loads(settings))
-    for place, content in exports(load(tables), how):
-        write_content(content, folder / place)
+    with making(folder) as made:
+        for place, content in exports(load(tables), how):
+            write_content(content, made / place)
 
 
 if __name__ == "__main__":

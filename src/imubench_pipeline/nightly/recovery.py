@@ -24,7 +24,7 @@ _FOLDERS = ("recordings", "tables", "simulated", "report", "exports", "nightly")
 """What a run writes to, below the results: nothing else is touched."""
 
 _TEMPORARY = re.compile(r"\..+\.[a-z0-9_]{8}\.part")
-"""Names that `tables.replacing`, the ingest and the simulation give to what is not complete yet."""
+"""Names that `tables.replacing`, `tables.making` and the ingest give to what is not complete."""
 
 _STILL_WRITTEN = (
     60.0  # s; what has changed so shortly before the lock may be a command's of someone
@@ -219,5 +219,6 @@ def _remove(path: Path) -> None:
 def _below(results: Path) -> Iterator[Path]:
     """Yield files and folders that a run wrote; links to elsewhere are not followed."""
     for folder in _FOLDERS:
+        yield from results.glob(f".{folder}.*.part")  # the folder itself, while it is made
         for place, folders, files in os.walk(results / folder):
             yield from (Path(place, name) for name in (*folders, *files))
