@@ -1,5 +1,7 @@
 """From static logs of inertial sensors to a cross-IMU report: `snakemake -c2`."""
 
+from itertools import chain
+
 from imubench_pipeline.plan import Plan
 from imubench_pipeline.schemas import BY_RECORDING, OF_ONE_RECORDING, TABLES
 from imubench_pipeline.steps import Steps
@@ -20,7 +22,25 @@ FOLDER = RESULTS + "/recordings/{sensor}/{recording}"
 JOINED = sorted(set(TABLES) - set(OF_ONE_RECORDING))
 RANKED = {"ranking", "coverage", "coverage_by_vendor"}
 ESTIMATED = ("parameters", "models", "lines", "spectrum", "fixed_bias")
-FOLDERS = [FOLDER.format(sensor=s, recording=r) for s, r in plan.recordings]
+ANALYSED = [table for table in JOINED if table not in RANKED]
+PARTS = (
+    "allan",
+    *ESTIMATED,
+    "reconstruction",
+    "scores",
+    "datasheet",
+    "datasheet_curve",
+    "error_budget",
+)
+FOLDERS = {}
+for sensor, recording in plan.recordings:
+    FOLDERS.setdefault(sensor, []).append(
+        FOLDER.format(sensor=sensor, recording=recording)
+    )
+
+
+def of_sensor(file):
+    return lambda w: [f"{folder}/{file}" for folder in FOLDERS[w.sensor]]
 
 
 def as_files(*tables):
@@ -138,24 +158,31 @@ rule error_budget:
         steps.run("error_budget", input, output, params, wildcards)
 
 
+rule sensor_tables:
+    input:
+        **{table: of_sensor(f"{table}.parquet") for table in PARTS},
+        quality=of_sensor("quality.json"),
+    output:
+        [f"{RESULTS}/sensors/{{sensor}}/{table}.parquet" for table in ANALYSED],
+    params:
+        truths=lambda w: plan.truths(w.sensor),
+        catalogue=plan.catalogue(),
+        code=plan.code("sensor_tables"),
+    run:
+        steps.run("sensor_tables", input, output, params, wildcards)
+
+
 rule tables:
     input:
         **{
-            table: [f"{folder}/{table}.parquet" for folder in FOLDERS]
-            for table in ESTIMATED
+            table: [
+                f"{RESULTS}/sensors/{sensor}/{table}.parquet" for sensor in FOLDERS
+            ]
+            for table in ANALYSED
         },
-        quality=[f"{folder}/quality.json" for folder in FOLDERS],
-        allan=[f"{folder}/allan.parquet" for folder in FOLDERS],
-        reconstruction=[f"{folder}/reconstruction.parquet" for folder in FOLDERS],
-        scores=[f"{folder}/scores.parquet" for folder in FOLDERS],
-        datasheet=[f"{folder}/datasheet.parquet" for folder in FOLDERS],
-        datasheet_curve=[f"{folder}/datasheet_curve.parquet" for folder in FOLDERS],
-        error_budget=[f"{folder}/error_budget.parquet" for folder in FOLDERS],
     output:
-        as_files(*(table for table in JOINED if table not in RANKED)),
+        as_files(*ANALYSED),
     params:
-        truths=plan.truths(),
-        catalogue=plan.catalogue(),
         code=plan.code("tables"),
     run:
         steps.run("tables", input, output, params, wildcards)
@@ -214,7 +241,7 @@ rule report:
     input:
         [
             f"{folder}/{table}.parquet"
-            for folder in FOLDERS
+            for folder in chain.from_iterable(FOLDERS.values())
             for table in OF_ONE_RECORDING
         ],
         tables=[f"{RESULTS}/tables/{table}.parquet" for table in JOINED],

@@ -35,7 +35,8 @@ STEPS: Mapping[str, tuple[str, ...]] = {
     "ranking": ("selection", "results"),
     "coverage": ("coverage", "results"),
     "exports": ("export.of_run",),
-    "tables": ("results",),
+    "sensor_tables": ("results",),
+    "tables": ("tables",),
     "figures": ("report.static_figures.of_run",),
     "report": ("report.publish",),
 }
@@ -266,9 +267,10 @@ class Plan:
             }
         )
 
-    def truths(self) -> str:
-        """Return the true parameters of the simulated recordings."""
-        return _text([entry.model_dump(mode="json") for entry in self._simulated.values()])
+    def truths(self, sensor: str) -> str:
+        """Return the true parameters of the simulated recordings of a sensor."""
+        entries = (entry for (of, _), entry in self._simulated.items() if of == sensor)
+        return _text([entry.model_dump(mode="json") for entry in entries])
 
     def summary(self) -> str:
         """Return what a finished run says."""

@@ -152,14 +152,14 @@ def _by(table: pa.Table, *names: str) -> dict[tuple[str, ...], pa.Table]:
 def joined_tables(
     parts: Mapping[str, list[Path]], truths: str, catalogue: str
 ) -> dict[str, pa.Table]:
-    """Join the results of all recordings.
+    """Join the results of the recordings of a sensor.
 
     Parameters
     ----------
     parts : mapping of str to list of Path
         Files of each table, in the order of the recordings; ``quality`` for the JSON files.
     truths : str
-        The simulated recordings, as the plan wrote them.
+        Those that are simulated, as the plan wrote them.
     catalogue : str
         The sensor files, likewise.
 

@@ -24,10 +24,10 @@ CHANNELS = {
 DATASHEET = {"gyro": {"noise_density": {"value": 0.01, "unit": "deg/s/sqrt(Hz)"}}}
 
 Job = tuple[str, str]
-"""A rule, and the recording (sensor and name) that a job of it is for."""
+"""A rule, and what a job of it is for: a recording (sensor and name), a sensor, or all."""
 
 _JOB = re.compile(r"^(?:local)?rule (\w+):\n((?: .*\n)*)", re.MULTILINE)
-_WILDCARDS = re.compile(r"wildcards: sensor=(.+), recording=(.+)")
+_WILDCARDS = re.compile(r"wildcards: sensor=(.+?)(?:, recording=(.+))?$", re.MULTILINE)
 
 
 @dataclass
@@ -74,7 +74,7 @@ class Project:
         jobs = set()
         for rule, about in _JOB.findall(done.stdout):
             of = _WILDCARDS.search(about)
-            jobs.add((rule, "/".join(of.groups()) if of else ""))
+            jobs.add((rule, "/".join(filter(None, of.groups())) if of else ""))
         stated = re.search(r"^total +(\d+)$", done.stdout, re.MULTILINE)
         assert len(jobs) == (int(stated[1]) if stated else 0), done.stdout
         return jobs - {("all", "")}

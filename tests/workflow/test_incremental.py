@@ -33,7 +33,13 @@ INPUTS = ("logs", "sensors", "requirements")
 
 
 def steps_of(*recordings: str, since: str = "ingest") -> set[Job]:
-    return {(step, of) for step in STEPS[STEPS.index(since) :] for of in recordings}
+    """The steps of recordings, and what joins them."""
+    steps = {(step, of) for step in STEPS[STEPS.index(since) :] for of in recordings}
+    return steps | joined(*recordings)
+
+
+def joined(*recordings: str) -> set[Job]:
+    return {("sensor_tables", of.partition("/")[0]) for of in recordings} | TOGETHER
 
 
 def put_requirement(folder: Path, **changes: object) -> None:
@@ -131,12 +137,12 @@ def test_nothing_runs_again_when_dates_and_comments_alone_change(project: Projec
 
 def test_a_new_log_runs_its_own_steps(project: Project) -> None:
     put_log(project.folder / "logs/one/new.csv.gz", 4)
-    assert project.job_list() == steps_of("one/new") | TOGETHER
+    assert project.job_list() == steps_of("one/new")
 
 
 def test_a_replaced_log_runs_its_own_steps(project: Project) -> None:
     put_log(project.folder / "logs/one/a.csv", 5)
-    assert project.job_list() == steps_of("one/a") | TOGETHER
+    assert project.job_list() == steps_of("one/a")
 
 
 def test_logs_replaced_by_older_ones_of_their_size_run_their_own_steps(project: Project) -> None:
@@ -145,40 +151,40 @@ def test_logs_replaced_by_older_ones_of_their_size_run_their_own_steps(project: 
     exchange_lines(logs / "two/f/accel_x.csv", 10_000)
     for path in (logs / "one/big.csv", logs / "two/f/accel_x.csv"):
         os.utime(path, (1e9, 1e9))
-    assert project.job_list() == steps_of("one/big", "two/f") | TOGETHER
+    assert project.job_list() == steps_of("one/big", "two/f")
 
 
 def test_a_removed_log_runs_what_joins_the_others(project: Project) -> None:
     (project.folder / "logs/one/a.csv").unlink()
-    assert project.job_list() == TOGETHER
+    assert project.job_list() == joined(*ONE)
 
 
 def test_a_renamed_log_is_a_new_one(project: Project) -> None:
     logs = project.folder / "logs/one"
     (logs / "a.csv").rename(logs / "c.csv")
-    assert project.job_list() == steps_of("one/c") | TOGETHER
+    assert project.job_list() == steps_of("one/c")
 
 
 def test_notes_run_the_steps_of_their_log(project: Project) -> None:
     (project.folder / "logs/one/a.yaml").write_text("device: serial 7\n")
-    assert project.job_list() == steps_of("one/a") | TOGETHER
+    assert project.job_list() == steps_of("one/a")
 
 
 def test_an_edit_of_a_layout_runs_the_logs_of_its_sensor(project: Project) -> None:
     put_two(project.folder, rate="101 Hz")
-    assert project.job_list() == steps_of("two/f") | TOGETHER
+    assert project.job_list() == steps_of("two/f")
 
 
 def test_an_edit_of_a_bandwidth_runs_the_estimates_of_its_sensor(project: Project) -> None:
     put_two(project.folder, bandwidth="40 Hz")
-    assert project.job_list() == steps_of("two/f", since="estimate") | TOGETHER
+    assert project.job_list() == steps_of("two/f", since="estimate")
 
 
 def test_an_edit_of_a_datasheet_runs_its_comparison(project: Project) -> None:
     density = {"value": 0.02, "unit": "deg/s/sqrt(Hz)"}
     put_sensor(project.folder / "sensors/one.yaml", datasheet={"gyro": {"noise_density": density}})
-    compared = {("datasheet", of) for of in ONE}
-    assert project.job_list() == compared | {("coverage", "")} | TOGETHER
+    compared = {("datasheet", of) for of in ONE} | {("coverage", "")}
+    assert project.job_list() == compared | joined(*ALL)
 
 
 def test_an_edit_of_a_price_class_runs_the_ranking(project: Project) -> None:
@@ -188,17 +194,17 @@ def test_an_edit_of_a_price_class_runs_the_ranking(project: Project) -> None:
 
 def test_an_edit_of_a_threshold_runs_every_log(project: Project) -> None:
     project.settings.append('quality={"step": 13}')
-    assert project.job_list() == steps_of(*ALL) | TOGETHER
+    assert project.job_list() == steps_of(*ALL)
 
 
 def test_an_edit_of_the_tolerance_runs_every_comparison(project: Project) -> None:
     project.settings.append('datasheet={"tolerance": 0.2}')
-    assert project.job_list() == {("datasheet", of) for of in ALL} | TOGETHER
+    assert project.job_list() == {("datasheet", of) for of in ALL} | joined(*ALL)
 
 
 def test_an_edit_of_a_requirement_runs_every_error_budget(project: Project) -> None:
     put_requirement(project.folder, limits=[REQUIREMENT["limits"][0] | {"at_most": "2 deg"}])
-    assert project.job_list() == steps_of(*ALL, since="error_budget") | TOGETHER
+    assert project.job_list() == steps_of(*ALL, since="error_budget")
 
 
 def test_edits_of_titles_run_the_report(project: Project) -> None:
@@ -209,7 +215,7 @@ def test_edits_of_titles_run_the_report(project: Project) -> None:
 
 def test_an_edit_of_a_reader_runs_every_log(project: Project, code: Path) -> None:
     replace(code / "readers/csv.py", '"""', '"""Again. ')
-    assert project.job_list() == steps_of(*ALL) | TOGETHER
+    assert project.job_list() == steps_of(*ALL)
 
 
 def test_an_edit_of_the_overbound_runs_the_exports(project: Project, code: Path) -> None:
@@ -233,7 +239,7 @@ def test_an_interrupted_run_ends_as_a_fresh_one(done: Project, tmp_path: Path) -
     put_two(done.folder, bandwidth="40 Hz")
 
     assert done.run(quality).returncode == 0
-    assert done.job_list() == (steps_of("one/a", since="allan") | steps_of("two/g") | TOGETHER)
+    assert done.job_list() == (steps_of("one/a", since="allan") | steps_of("two/g"))
 
     ran = done.run()
     assert ran.returncode == 0, ran.stdout + ran.stderr

@@ -14,7 +14,9 @@ pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("workflow")]
 STEPS_OF_A_RECORDING = dict.fromkeys(
     ("ingest", "allan", "estimate", "reconstruct", "datasheet", "error_budget"), 1
 )
-GLOBAL_STEPS = dict.fromkeys(("tables", "ranking", "exports", "figures", "report"), 1)
+GLOBAL_STEPS = dict.fromkeys(
+    ("sensor_tables", "tables", "ranking", "exports", "figures", "report"), 1
+)
 
 
 def put_bad_logs(folder: Path) -> dict[str, str]:
@@ -107,7 +109,8 @@ def test_one_core_and_two_give_the_same_tables(project: Project, tmp_path: Path)
 def test_an_edit_of_a_datasheet_runs_its_deltas_and_the_global_steps(project: Project) -> None:
     density = {"value": 0.02, "unit": "deg/s/sqrt(Hz)"}
     put_sensor(project.folder / "sensors/one.yaml", datasheet={"gyro": {"noise_density": density}})
-    assert project.jobs() == {"datasheet": 2, "coverage": 1} | GLOBAL_STEPS
+    steps = {"datasheet": 2, "coverage": 1, "sensor_tables": 2}
+    assert project.jobs() == GLOBAL_STEPS | steps
     assert project.run().returncode == 0
     printed = {
         row["sensor"]: row["printed"] for row in project.table("datasheet") if row["printed"]

@@ -1,12 +1,12 @@
-"""Join the results of all recordings into one table each, as Parquet and CSV."""
+"""Join the tables of all sensors, as Parquet and CSV."""
 
 from pathlib import Path
 
-from imubench_pipeline.results import joined_tables
-from imubench_pipeline.tables import write_arrow
+from imubench_pipeline.tables import read, write_arrow
 
 if __name__ == "__main__":
-    parts = {name: [Path(path) for path in paths] for name, paths in snakemake.input.items()}
-    tables = joined_tables(parts, snakemake.params.truths, snakemake.params.catalogue)
+    joined = {
+        name: read(name, [Path(path) for path in paths]) for name, paths in snakemake.input.items()
+    }
     for output in map(Path, snakemake.output):
-        write_arrow(tables[output.stem], output)
+        write_arrow(joined[output.stem], output)

@@ -1,0 +1,12 @@
+"""Join the results of the recordings of a sensor into one file a table."""
+
+from pathlib import Path
+
+from imubench_pipeline.results import joined_tables
+from imubench_pipeline.tables import write_arrow
+
+if __name__ == "__main__":
+    parts = {name: [Path(path) for path in paths] for name, paths in snakemake.input.items()}
+    tables = joined_tables(parts, snakemake.params.truths, snakemake.params.catalogue)
+    for output in map(Path, snakemake.output):
+        write_arrow(tables[output.stem], output)
