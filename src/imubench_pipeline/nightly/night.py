@@ -17,7 +17,7 @@ import yaml
 from imubench_pipeline.config import Run, read_run
 from imubench_pipeline.nightly import recovery
 from imubench_pipeline.nightly.lock import Lock, TakenError
-from imubench_pipeline.nightly.running import last_lines, run_snakemake
+from imubench_pipeline.nightly.running import errors, last_lines, run_snakemake
 from imubench_pipeline.nightly.settling import Found, Skip, look, moved, settled
 from imubench_pipeline.nightly.state import State, load_tables, read_state, state_of
 from imubench_pipeline.nightly.summary import Skipped, Summary, compared, in_words
@@ -29,6 +29,7 @@ __all__ = ["Night", "TakenError"]
 _PATHS = ("logs", "results", "held_back")
 _OWN_FLAGS = {"--config", "-C", "--configfile", "--configfiles"}
 _LITTLE = 200e6  # bytes
+_MOST_ERRORS = 5
 _PAUSE = 5.0  # s between two looks at a Snakemake that somebody else runs
 _WRITTEN_TO = "it was written to while it was read: what the results say is of a part of it"
 
@@ -151,8 +152,9 @@ class Night:
         status = run_snakemake(arguments, self.project, self._log, lock)
         if status == 0:
             return []
+        said = [f"a step said: {error}" for error in errors(self._log)[:_MOST_ERRORS]]
         why = f"Snakemake ended with exit status {status}; the last lines of its log:"
-        return [why, *last_lines(self._log)]
+        return [*said, why, *last_lines(self._log)]
 
     def _held_back(self, skips: Sequence[Skip]) -> list[str]:
         """Return the flags that hold logs back."""

@@ -19,6 +19,7 @@ from imubench_pipeline.nightly.recovery import end_group
 
 _PATIENCE = 60.0  # s; for Snakemake to stop its steps
 _SHOWN = 20  # last lines
+_ERROR = re.compile(r"^Traceback \(most recent call last\):\n(?:[ \t].*\n)*(\S.*)", re.MULTILINE)
 _REDRAWN = re.compile(rb".*\x1b\[2K", re.DOTALL)
 _WIPES = b"\x1b[1A\x1b[2K"
 _SIGNS = re.compile(rb"\x1b\[[0-9;?]*[A-Za-z]|\r")
@@ -115,6 +116,17 @@ class _Terminal:
         self._last = text if text or not _REDRAWN.match(line) else None
 
 
+def errors(path: Path) -> list[str]:
+    """Return the errors of the steps that failed in a run, each once.
+
+    Parameters
+    ----------
+    path : Path
+        File of what it said.
+    """
+    return list(dict.fromkeys(_ERROR.findall(_text(path))))
+
+
 def last_lines(path: Path) -> list[str]:
     """Return the last lines that a run said, without empty ones.
 
@@ -123,8 +135,11 @@ def last_lines(path: Path) -> list[str]:
     path : Path
         File of what it said.
     """
+    return [line.rstrip() for line in _text(path).splitlines() if line.strip()][-_SHOWN:]
+
+
+def _text(path: Path) -> str:
     try:
-        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+        return path.read_text(encoding="utf-8", errors="replace")
     except OSError:
-        return []
-    return [line.rstrip() for line in lines if line.strip()][-_SHOWN:]
+        return ""
