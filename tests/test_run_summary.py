@@ -151,7 +151,7 @@ def test_a_failed_run_says_what_failed_and_how_to_go_on(tmp_path: Path) -> None:
 @pytest.mark.workflow
 @pytest.mark.xdist_group("workflow")
 def test_an_interrupted_run_says_how_to_go_on(tmp_path: Path) -> None:
-    lines = snakemake(tmp_path, "kill -INT $PPID; sleep 2; exit 3")
+    lines = snakemake(tmp_path, "sleep 1; kill -INT $PPID; sleep 3; exit 3")
     assert lines[0].startswith("stopped before its end; to go on, run the same command again")
     assert len(lines) == 2
 
