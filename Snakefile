@@ -2,7 +2,8 @@
 
 from itertools import chain
 
-from imubench_pipeline.plan import Plan
+from imubench_pipeline.plan import STEPS, Plan
+from imubench_pipeline.resources import asked
 from imubench_pipeline.schemas import BY_RECORDING, OF_ONE_RECORDING, TABLES
 from imubench_pipeline.steps import Steps
 from imubench_pipeline.validation import ConfigError
@@ -17,6 +18,7 @@ except ConfigError as error:
     raise WorkflowError(str(error)) from None
 
 steps = Steps(Path(workflow.basedir) / "workflow/scripts")
+ASKED = asked(plan)  # memory and time on a cluster
 RESULTS = str(plan.run.results)
 FOLDER = RESULTS + "/recordings/{sensor}/{recording}"
 JOINED = sorted(set(TABLES) - set(OF_ONE_RECORDING))
@@ -68,6 +70,10 @@ rule all:
 rule simulate:
     output:
         directory(RESULTS + "/simulated/{sensor}/{recording}"),
+    group:
+        "recording"
+    resources:
+        **ASKED,
     params:
         settings=lambda w: plan.simulated_settings(w.sensor, w.recording),
         code=plan.code("simulate"),
@@ -82,6 +88,10 @@ rule ingest:
         quality=FOLDER + "/quality.json",
         envelope=FOLDER + "/envelope.parquet",
         histogram=FOLDER + "/histogram.parquet",
+    group:
+        "recording"
+    resources:
+        **ASKED,
     params:
         source=lambda w: str(plan.recordings[w.sensor, w.recording].path),
         settings=lambda w: plan.ingest_settings(w.sensor, w.recording),
@@ -95,6 +105,10 @@ rule allan:
         quality=FOLDER + "/quality.json",
     output:
         FOLDER + "/allan.parquet",
+    group:
+        "recording"
+    resources:
+        **ASKED,
     params:
         settings=plan.settings("allan"),
         code=plan.code("allan"),
@@ -108,6 +122,10 @@ rule estimate:
         allan=FOLDER + "/allan.parquet",
     output:
         **{table: f"{FOLDER}/{table}.parquet" for table in ESTIMATED},
+    group:
+        "recording"
+    resources:
+        **ASKED,
     params:
         settings=lambda w: plan.estimate_settings(w.sensor, w.recording),
         code=plan.code("estimate"),
@@ -123,6 +141,10 @@ rule reconstruct:
     output:
         reconstruction=FOLDER + "/reconstruction.parquet",
         scores=FOLDER + "/scores.parquet",
+    group:
+        "recording"
+    resources:
+        **ASKED,
     params:
         settings=plan.settings("reconstruction"),
         code=plan.code("reconstruct"),
@@ -139,6 +161,10 @@ rule datasheet:
     output:
         datasheet=FOLDER + "/datasheet.parquet",
         datasheet_curve=FOLDER + "/datasheet_curve.parquet",
+    group:
+        "recording"
+    resources:
+        **ASKED,
     params:
         settings=lambda w: plan.datasheet_settings(w.sensor),
         code=plan.code("datasheet"),
@@ -151,6 +177,10 @@ rule error_budget:
         parameters=FOLDER + "/parameters.parquet",
     output:
         FOLDER + "/error_budget.parquet",
+    group:
+        "recording"
+    resources:
+        **ASKED,
     params:
         settings=plan.error_budget_settings(),
         code=plan.code("error_budget"),
@@ -164,6 +194,10 @@ rule sensor_tables:
         quality=of_sensor("quality.json"),
     output:
         [f"{RESULTS}/sensors/{{sensor}}/{table}.parquet" for table in ANALYSED],
+    group:
+        "comparison"
+    resources:
+        **ASKED,
     params:
         truths=lambda w: plan.truths(w.sensor),
         catalogue=plan.catalogue(),
@@ -182,6 +216,10 @@ rule tables:
         },
     output:
         as_files(*ANALYSED),
+    group:
+        "comparison"
+    resources:
+        **ASKED,
     params:
         code=plan.code("tables"),
     run:
@@ -193,6 +231,10 @@ rule ranking:
         RESULTS + "/tables/error_budget.parquet",
     output:
         as_files("ranking"),
+    group:
+        "comparison"
+    resources:
+        **ASKED,
     params:
         settings=plan.ranking_settings(),
         code=plan.code("ranking"),
@@ -203,6 +245,10 @@ rule ranking:
 rule coverage:
     output:
         as_files("coverage", "coverage_by_vendor"),
+    group:
+        "comparison"
+    resources:
+        **ASKED,
     params:
         catalogue=plan.catalogue(),
         code=plan.code("coverage"),
@@ -218,6 +264,8 @@ rule exports:
         ],
     output:
         directory(RESULTS + "/exports"),
+    resources:
+        **ASKED,
     params:
         settings=plan.settings("exports"),
         code=plan.code("exports"),
@@ -230,6 +278,8 @@ rule figures:
         [f"{RESULTS}/tables/{table}.parquet" for table in BY_RECORDING],
     output:
         directory(RESULTS + "/report/figures"),
+    resources:
+        **ASKED,
     params:
         settings=plan.figures_settings(),
         code=plan.code("figures"),
@@ -247,11 +297,22 @@ rule report:
         tables=[f"{RESULTS}/tables/{table}.parquet" for table in JOINED],
     output:
         report(RESULTS + "/report/index.html", category="Comparison"),
+    group:
+        "comparison"
+    resources:
+        **ASKED,
     params:
         settings=plan.report_settings(),
         code=plan.code("report"),
     run:
         steps.run("report", input, output, params, wildcards)
+
+
+if workflow.remote_exec:
+    # For each `run:` of a group, Snakemake on a node starts one more Snakemake, with a server of
+    # its own: six times 5 s a recording. It runs scripts in its threads, and these are such.
+    for step in STEPS:
+        workflow.get_rule(step).script = f"workflow/scripts/{step}.py"
 
 
 onstart:

@@ -164,6 +164,25 @@ def test_a_step_that_was_tried_again_is_named_once(tmp_path: Path) -> None:
     )
     lines = failure([str(log)], Path("out")).splitlines()
     assert lines[:2] == ["1 step failed; why stands above", "  allan of a, b/r (1)"]
+    with log.open("a") as file:
+        file.write("Finished jobid: 4 (Rule: allan)\n")
+    assert failure([str(log)], Path("out")).startswith("a step failed; why stands above\n")
+
+
+def test_a_job_of_several_steps_is_named_with_its_last_log(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    log.write_text(
+        "".join(
+            f"    message: Error in group comparison\n    log: {one}.log (check log file(s))\n"
+            "    jobs:\n"
+            "        rule ranking:\n            jobid: 4\n            output: out/tables/a.csv\n"
+            "        rule report:\n            jobid: 5\n            output: out/report/a.html\n"
+            "    [Mon]\n    Error in rule ranking:\n        jobid: 4\n"
+            for one in (1, 2)
+        )
+    )
+    lines = failure([str(log)], Path("out")).splitlines()
+    assert lines[:2] == ["1 step failed; why stands above", "  ranking or report (2.log)"]
 
 
 def test_a_plan_says_both(tmp_path: Path) -> None:

@@ -14,8 +14,10 @@ from imubench_pipeline.validation import ConfigError
 PARTIAL = frozenset({".part", ".tmp", ".filepart", ".crdownload"})
 """How the names of files end that are still being transferred."""
 
+COMPRESSED = frozenset({".gz", ".zst", ".xz", ".bz2", ".zip"})
+"""How the names of files end that are compressed."""
+
 _NOT_LOGS = {".yaml", ".yml", ".md"} | PARTIAL
-_COMPRESSED = {".gz", ".zst", ".xz", ".bz2", ".zip"}
 _UNUSABLE_IN_NAMES = re.compile(r"[^\w .+()-]")
 _LONGEST_NAME = 120
 _READ_WHOLE = 1 << 20  # bytes; of a larger file, blocks are read
@@ -169,6 +171,6 @@ def fingerprints(recording: Recording) -> dict[str, str]:
 def _stem(path: Path) -> str:
     name = path.name
     for suffix in path.suffixes[::-1]:
-        if suffix.lower() in _COMPRESSED:
+        if suffix.lower() in COMPRESSED:
             name = name[: -len(suffix)]
     return name.rsplit(".", maxsplit=1)[0] if "." in name else name

@@ -16,11 +16,19 @@ _NEEDED = ("recordings", "findings", "ranking")
 _MOST_LINES = 10
 _MOST_LETTERS = 200
 
-_FAILED = re.compile(
-    r"^Error in rule (\w+):\n(?:    (?!output:).*\n)*(?:    output: (.*))?", re.MULTILINE
-)
+_FAILED = re.compile(r"^Error in rule (\w+):\n((?:    .*\n)*)", re.MULTILINE)
 """A step that failed, as Snakemake writes it into its log."""
 
+_FAILED_GROUP = re.compile(
+    r"^    message: Error in group .*\n(?:    log: (.+) \(check .*\n)?    jobs:\n((?: {8}.*\n)*)",
+    re.MULTILINE,
+)
+"""Steps that are one job of a cluster, which failed: its log says which of them did."""
+
+_JOB = re.compile(r"^ +jobid: (\d+)$", re.MULTILINE)
+_OUTPUT = re.compile(r"^ +output: (.+)$", re.MULTILINE)
+_RULE = re.compile(r"^ +rule (\w+):$", re.MULTILINE)
+_DONE = re.compile(r"^Finished jobid: (\d+) ", re.MULTILINE)
 _INTERRUPTED = "Terminating processes on user request"
 
 
@@ -81,11 +89,25 @@ def failure(logs: Sequence[str], results: Path) -> str:
 
 
 def _failed_steps(log: str, results: Path) -> Iterator[str]:
-    """Yield step and recording of each failure that a log of Snakemake tells."""
+    """Yield step and recording of what failed, by a log of Snakemake, each time it was tried."""
     of_one = re.compile(rf"{re.escape(str(results))}/(?:recordings|simulated)/([^/]+/[^/,]+)")
-    for rule, output in _FAILED.findall(log):
-        recording = of_one.match(output)
-        yield f"{rule} of {recording[1]}" if recording else rule
+    done = set(_DONE.findall(log))
+
+    def recording(about: str) -> str | None:
+        named = map(of_one.match, _OUTPUT.findall(about))
+        return next((match[1] for match in named if match), None)
+
+    for rule, about in _FAILED.findall(log):
+        if done.isdisjoint(_JOB.findall(about)):
+            of = recording(about)
+            yield f"{rule} of {of}" if of else rule
+    last: dict[str, str] = {}
+    for cluster_log, about in _FAILED_GROUP.findall(log):
+        if done.isdisjoint(_JOB.findall(about)):
+            of = recording(about)
+            last[f"a step of {of}" if of else " or ".join(_RULE.findall(about))] = cluster_log
+    for what, cluster_log in last.items():
+        yield what + f" ({cluster_log})" * bool(cluster_log)
 
 
 def rejections(recordings: Iterable[Row]) -> Iterator[str]:

@@ -26,7 +26,7 @@ DATASHEET = {"gyro": {"noise_density": {"value": 0.01, "unit": "deg/s/sqrt(Hz)"}
 Job = tuple[str, str]
 """A rule, and what a job of it is for: a recording (sensor and name), a sensor, or all."""
 
-_JOB = re.compile(r"^(?:local)?rule (\w+):\n((?: .*\n)*)", re.MULTILINE)
+_JOB = re.compile(r"^( *)(?:local)?rule (\w+):\n((?:\1 .*\n)*)", re.MULTILINE)
 _WILDCARDS = re.compile(r"wildcards: sensor=(.+?)(?:, recording=(.+))?$", re.MULTILINE)
 
 
@@ -72,7 +72,7 @@ class Project:
         done = self.run("-n")
         assert done.returncode == 0, done.stdout + done.stderr
         jobs = set()
-        for rule, about in _JOB.findall(done.stdout):
+        for _, rule, about in _JOB.findall(done.stdout):
             of = _WILDCARDS.search(about)
             jobs.add((rule, "/".join(filter(None, of.groups())) if of else ""))
         stated = re.search(r"^total +(\d+)$", done.stdout, re.MULTILINE)

@@ -1,0 +1,138 @@
+"""A run on a Slurm of one node, which lives in a temporary folder, against a run without it."""
+
+import importlib.util
+import os
+import shutil
+import subprocess
+import tempfile
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import psutil
+import pytest
+
+from imubench_pipeline.resources import Extent, resources_of
+from tests.workflow.project import Project, linked, put_log, put_sensor
+from tests.workflow.test_workflow import STEPS_OF_A_RECORDING
+
+pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("workflow")]
+
+SCRIPTS = Path(__file__).parent
+PROGRAMS = ("slurmctld", "slurmd", "munged", "sbatch", "srun", "squeue")
+PLUGIN = "snakemake_executor_plugin_slurm"
+ENOUGH = resources_of("estimate", Extent())["mem_mb"]
+TOO_LITTLE = 100  # MB; Snakemake alone takes 180: it is killed within 3 s
+MEMORY = f"{TOO_LITTLE} if attempt == 1 or wildcards.recording == 'doomed' else {ENOUGH}"
+FLAGS = [
+    "report",  # all tables are made for it
+    "--workflow-profile", "profiles/slurm",
+    "--set-resources", *(f"{rule}:mem_mb={MEMORY}" for rule in STEPS_OF_A_RECORDING),
+    "--slurm-status-command", "squeue",  # there is no accounting
+]  # fmt: skip
+
+
+def flags(seconds: int) -> list[str]:
+    """Flags of a run that asks for the state of jobs after so many s, and then ever more rarely."""
+    return [*FLAGS, "--slurm-init-seconds-before-status-checks", str(seconds)]
+
+
+@pytest.fixture(scope="module")
+def slurm() -> Iterator[dict[str, str]]:
+    """The environment that talks to a Slurm which was started for this module."""
+    path = os.environ["PATH"] + ":/usr/sbin:/sbin"
+    missing = [name for name in PROGRAMS if not shutil.which(name, path=path)]
+    missing += [PLUGIN] if importlib.util.find_spec(PLUGIN) is None else []
+    if missing:
+        said = f"not installed: {', '.join(missing)}"
+        if os.environ.get("CI") == "true":
+            pytest.fail(said)
+        pytest.skip(said)
+    # Not in pytest's folder, which is closed to others: munge refuses to put its socket there.
+    folder = Path(tempfile.mkdtemp(prefix="imubench.slurm."))
+    try:
+        subprocess.run([SCRIPTS / "start_slurm.sh", folder], check=True, timeout=60)
+        bin_first = f"{folder / 'bin'}:{os.environ['PATH']}"
+        yield os.environ | {"SLURM_CONF": str(folder / "slurm.conf"), "PATH": bin_first}
+    finally:
+        subprocess.run([SCRIPTS / "stop_slurm.sh", folder], check=False, timeout=60)
+    assert not folder.exists()
+
+
+@pytest.fixture(scope="module")
+def project(slurm: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> Project:
+    folder = tmp_path_factory.mktemp("cluster")
+    put_sensor(folder / "sensors/one.yaml")
+    for seed, name in enumerate(("hungry (1)", "doomed")):
+        put_log(folder / f"logs/one/{name}.csv", seed, samples=2_000)
+    settings = ['reconstruction={"seed": 7}']
+    return Project(folder, folder / "results", linked(folder / "place"), settings, slurm)
+
+
+def submitted(environment: dict[str, str] | None) -> list[tuple[str, ...]]:
+    """State, memory and processors of all jobs, in order."""
+    listed = subprocess.run(
+        ["squeue", "--noheader", "--states=all", "--sort=i", "--format=%T %m %C"],
+        env=environment, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    return [tuple(line.split()) for line in listed.stdout.splitlines()]
+
+
+@contextmanager
+def watched(folder: Path) -> Iterator[set[str]]:
+    """Collect what is called meanwhile to run one step of a group alone."""
+    seen: set[str] = set()
+    ended = threading.Event()
+
+    def watch() -> None:
+        while not ended.wait(0.3):
+            for process in psutil.process_iter(["cmdline"]):
+                command = " ".join(process.info["cmdline"] or [])
+                if str(folder) in command and "--mode subprocess" in command:
+                    seen.add(command)
+
+    watching = threading.Thread(target=watch)
+    watching.start()
+    try:
+        yield seen
+    finally:
+        ended.set()
+        watching.join()
+
+
+def test_a_job_that_is_killed_is_named_and_the_rest_is_done(project: Project) -> None:
+    with watched(project.folder) as alone:
+        done = project.run(*flags(4), cores=1)
+    said = done.stdout + done.stderr
+    assert done.returncode == 1, said
+    # A job a recording; what is killed is tried again, with more for one of them.
+    jobs = [("COMPLETED", f"{ENOUGH}M", "1")] + [("FAILED", f"{TOO_LITTLE}M", "1")] * 3
+    assert sorted(submitted(project.environment)) == jobs, said
+    assert alone == set()
+    (named,) = (line for line in said.splitlines() if line.startswith("  a step of "))
+    assert named.startswith("  a step of one/doomed (")
+    assert "exceeded memory limit" in Path(named.partition("(")[2].rstrip(")")).read_text()
+    folder = project.results / "recordings/one"
+    assert (folder / "hungry (1)/scores.parquet").is_file()
+    assert not (folder / "doomed/scores.parquet").exists()
+    assert not (project.results / "tables").exists()
+
+
+def test_the_tables_are_those_of_a_local_run(project: Project, tmp_path: Path) -> None:
+    (project.folder / "logs/one/doomed.csv").unlink()
+    before = len(submitted(project.environment))
+    done = project.run(*flags(1), cores=1)
+    assert done.returncode == 0, done.stdout + done.stderr
+    # The tables, and what is made of them: no recording is analysed again.
+    states = [state for state, *_ in submitted(project.environment)[before:]]
+    assert states == ["COMPLETED"] * 2
+    assert (project.results / "report/index.html").is_file()
+    local = Project(project.folder, tmp_path / "results", settings=project.settings)
+    assert local.run("tables", "ranking", "coverage").returncode == 0
+    made = sorted(path.name for path in (local.results / "tables").iterdir())
+    assert made == sorted(path.name for path in (project.results / "tables").iterdir())
+    for name in made:
+        of_slurm = (project.results / "tables" / name).read_bytes()
+        assert (local.results / "tables" / name).read_bytes() == of_slurm, name
+    assert {row["recording"] for row in project.table("scores")} == {"hungry (1)"}
