@@ -1,5 +1,8 @@
 """From static logs of inertial sensors to a cross-IMU report: `snakemake -c2`."""
 
+import atexit
+import gc
+import os
 from itertools import chain
 
 from imubench_pipeline.plan import STEPS, Plan
@@ -11,6 +14,11 @@ from imubench_pipeline.validation import ConfigError
 
 configfile: "config/config.yaml"
 
+
+# The graph of a thousand recordings is millions of objects, which live as long as the run: to look
+# for garbage among them as often as Python does, and at the end, takes a fourth of the time.
+gc.set_threshold(100_000, 20, 100)
+atexit.register(gc.freeze)
 
 try:
     plan = Plan(config)
@@ -34,6 +42,7 @@ PARTS = (
     "datasheet_curve",
     "error_budget",
 )
+OF_RECORDING = ["quality.json", *(f"{t}.parquet" for t in (*OF_ONE_RECORDING, *PARTS))]
 FOLDERS = {}
 for sensor, recording in plan.recordings:
     FOLDERS.setdefault(sensor, []).append(
@@ -51,6 +60,21 @@ def as_files(*tables):
     ]
 
 
+def missing():
+    made = [
+        *as_files(*JOINED),
+        *(f"{RESULTS}/sensors/{s}/{t}.parquet" for s in FOLDERS for t in ANALYSED),
+        *(
+            f"{FOLDER.format(sensor=s, recording=r)}/{file}"
+            for (s, r), found in plan.recordings.items()
+            for file in OF_RECORDING
+            if not found.held_back
+        ),
+        *(str(found.path) for found in plan.recordings.values() if found.simulated),
+    ]
+    return [file for file in made if not os.path.exists(file)]
+
+
 wildcard_constraints:
     sensor="[^/]+",
     recording="[^/]+",
@@ -60,11 +84,14 @@ localrules:
     all,
 
 
+# What is missing is asked for by name: Snakemake takes away what a failed step left, and else makes
+# a file again only for a step that is run again itself.
 rule all:
     input:
         RESULTS + "/report/index.html",
         RESULTS + "/report/figures",
         RESULTS + "/exports",
+        missing(),
 
 
 rule simulate:

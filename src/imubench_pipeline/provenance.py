@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import hashlib
 import re
 from collections.abc import Iterator
@@ -12,6 +11,11 @@ from pathlib import Path
 
 _PACKAGE = Path(__file__).parent
 _NAME = _PACKAGE.name
+
+# A whole tree of each module's syntax would take as long to read as all logs of a run.
+_IMPORT = re.compile(r"^ *from (\w+)((?:\.\w+)*) import (\([^)]*\)|.*)$", re.MULTILINE)
+_IMPORTED = re.compile(r"(\w+)(?: as \w+)?")
+_TEXT = re.compile(r"""["'](\w[\w.]*)["']""", re.ASCII)
 
 
 def source_digest(*modules: str) -> str:
@@ -53,17 +57,18 @@ def _path(module: str) -> Path:
 @lru_cache(maxsize=256)
 def _used(path: Path) -> tuple[Path, ...]:
     """Return the files of the package that a module uses by itself."""
+    text = path.read_text("utf-8")
     found: list[Path] = []
-    for node in ast.walk(ast.parse(path.read_bytes())):
-        if isinstance(node, ast.Constant) and isinstance(node.value, str):
-            found += _named(node.value, path.parent)
-        elif isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == _NAME:
-            base = ".".join((node.module or "").split(".")[1:])
-            if base:
-                found.append(_path(base))
-            for alias in node.names:
-                with suppress(ValueError):
-                    found.append(_path(f"{base}.{alias.name}".lstrip(".")))
+    for package, base, names in _IMPORT.findall(text):
+        if package != _NAME:
+            continue
+        if base:
+            found.append(_path(base[1:]))
+        for name in _IMPORTED.findall(names):
+            with suppress(ValueError):
+                found.append(_path(f"{base}.{name}"[1:]))
+    for name in dict.fromkeys(_TEXT.findall(text)):
+        found += _named(name, path.parent)
     return tuple(found)
 
 
@@ -72,7 +77,7 @@ def _named(text: str, folder: Path) -> Iterator[Path]:
     if text.startswith(_NAME + "."):
         with suppress(ValueError):
             yield _path(text.removeprefix(_NAME + "."))
-    elif re.fullmatch(r"\w[\w.]*", text, re.ASCII):
+    else:
         beside = folder / text
         if beside.is_file():
             yield beside

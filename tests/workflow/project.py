@@ -45,8 +45,16 @@ class Project:
     environment: dict[str, str] | None = None
 
     def command(self, *flags: str, cores: int = 2) -> list[str]:
-        return [sys.executable, "-m", "snakemake", f"-c{cores}", *flags, "--config",
-                f"logs={self.folder / 'logs'}", f"sensors={self.folder / 'sensors'}",
+        return [sys.executable, "-m", "snakemake", f"-c{cores}", *flags, "--config", *self.config()]
+
+    def nightly_command(self, *flags: str, cores: int = 2) -> list[str]:
+        """`imubench nightly`, which takes logs as they are."""
+        command = "import sys; from imubench_pipeline.cli import main; sys.exit(main())"
+        return [sys.executable, "-c", command, "nightly", "--project", str(self.place),
+                f"-c{cores}", "--settle", "0", *flags, "--config", *self.config()]  # fmt: skip
+
+    def config(self) -> list[str]:
+        return [f"logs={self.folder / 'logs'}", f"sensors={self.folder / 'sensors'}",
                 f"results={self.results}", "simulated=false", *self.settings]  # fmt: skip
 
     def run(self, *flags: str, cores: int = 2) -> subprocess.CompletedProcess[str]:

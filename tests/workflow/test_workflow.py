@@ -1,11 +1,15 @@
 """Real runs of Snakemake on a small project of real files."""
 
+import contextlib
 import html
+import subprocess
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pyarrow.parquet as pq
 import pytest
+import yaml
 
 from tests.workflow.project import CHANNELS, Project, put_log, put_sensor
 
@@ -178,3 +182,28 @@ def test_a_wrong_setting_stops_the_run_before_it_begins(project: Project) -> Non
     assert done.returncode != 0
     assert "three.yaml: vendr: unknown key; did you mean 'vendor'?" in done.stdout + done.stderr
     assert "Traceback" not in done.stdout + done.stderr
+
+
+def test_steps_that_were_killed_after_an_edit_are_run_again(project: Project) -> None:
+    sensor = project.folder / "sensors/one.yaml"
+    written = yaml.safe_load(sensor.read_text())
+    written["log"]["bandwidth"] = "20 Hz"
+    sensor.write_text(yaml.safe_dump(written))
+    to_do = project.job_list()
+    edited = {job for job in to_do if job[0] == "estimate"}
+    assert edited == {("estimate", "one/a"), ("estimate", "one/b")}
+    with subprocess.Popen(project.command(), cwd=project.place) as process:
+        killed = set()
+        while process.poll() is None:
+            for step in steps_of(process.pid, "estimate"):
+                step.kill()
+                killed.add(step.pid)
+    assert process.returncode == 1 and len(killed) == 2
+    # Snakemake has noted the new settings for them, and has taken away what they had left.
+    assert project.job_list() == to_do
+
+
+def steps_of(run: int, name: str) -> list[psutil.Process]:
+    with contextlib.suppress(psutil.NoSuchProcess):
+        return [one for one in psutil.Process(run).children(recursive=True) if one.name() == name]
+    return []

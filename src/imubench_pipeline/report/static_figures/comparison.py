@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -105,8 +106,17 @@ def _draw(
     if len(views) > _FEW:
         middle = _middle(views)
         marked = [views[middle]]
-        for view in views:
-            axes.plot(view.tau, view.adev * scale, **lines, linewidth=_THIN, alpha=_PALE)
+        curves = [np.column_stack((view.tau, view.adev * scale)) for view in views]
+        axes.add_collection(
+            LineCollection(
+                curves,
+                colors=lines["color"],
+                linestyles=lines["linestyle"],
+                linewidths=_THIN,
+                alpha=_PALE,
+            ),
+            autolim=False,
+        )
     for number, view in enumerate(marked):
         if bands:
             axes.fill_between(
