@@ -7,7 +7,7 @@ from itertools import chain
 
 from imubench_pipeline.plan import STEPS, Plan
 from imubench_pipeline.resources import asked
-from imubench_pipeline.schemas import BY_RECORDING, OF_ONE_RECORDING, TABLES
+from imubench_pipeline.schemas import COMPARED, OF_ONE_RECORDING, TABLES
 from imubench_pipeline.steps import Steps
 from imubench_pipeline.validation import ConfigError
 
@@ -302,7 +302,7 @@ rule exports:
 
 rule figures:
     input:
-        [f"{RESULTS}/tables/{table}.parquet" for table in BY_RECORDING],
+        [f"{RESULTS}/tables/{table}.parquet" for table in COMPARED],
     output:
         directory(RESULTS + "/report/figures"),
     resources:

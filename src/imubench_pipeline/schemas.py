@@ -338,3 +338,6 @@ BY_RECORDING = (
     "error_budget",
 )
 """The joined tables in which a recording has rows of its own."""
+
+COMPARED = ("recordings", "allan", "parameters", "simulated_truth")
+"""The joined tables from which the figures of all sensors are drawn."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from statistics import NormalDist
@@ -106,9 +107,11 @@ def ranking_rows(
     mapping
         One a requirement, sensor and limit.
     """
-    asked = [row for row in errors if row["requirement"] is not None]
+    by_requirement = defaultdict(list)
+    for row in errors:
+        by_requirement[row["requirement"]].append(row)
     for name, requirement in requirements.items():
-        standings = _standings([row for row in asked if row["requirement"] == name], requirement)
+        standings = _standings(by_requirement[name], requirement)
         deciding = {sensor: _deciding(found) for sensor, found in standings.items()}
         ranked = {
             sensor: one

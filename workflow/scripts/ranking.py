@@ -3,6 +3,8 @@
 import json
 from pathlib import Path
 
+import pyarrow.compute as pc
+
 from imubench_pipeline.requirements import Requirement
 from imubench_pipeline.selection import ranking_rows
 from imubench_pipeline.tables import build, read, write_arrow
@@ -14,8 +16,8 @@ def main(errors: Path, settings: str, outputs: list[Path]) -> None:
     requirements = {
         name: Requirement.model_validate(one) for name, one in given["requirements"].items()
     }
-    rows = read("error_budget", [errors]).to_pylist()
-    table = build("ranking", ranking_rows(rows, requirements, given["sensors"]))
+    asked = read("error_budget", [errors]).filter(pc.field("requirement").is_valid())
+    table = build("ranking", ranking_rows(asked.to_pylist(), requirements, given["sensors"]))
     for output in outputs:
         write_arrow(table, output)
 

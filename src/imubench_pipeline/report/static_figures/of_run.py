@@ -10,6 +10,8 @@ import pyarrow as pa
 from imubench_pipeline.report.practical import System
 from imubench_pipeline.report.static_figures.files import cross_figures, save
 from imubench_pipeline.report.view import recording_views
+from imubench_pipeline.schemas import BY_RECORDING
+from imubench_pipeline.tables import schema
 
 
 def draw_comparison(tables: Mapping[str, pa.Table], system: System, folder: Path) -> None:
@@ -18,12 +20,14 @@ def draw_comparison(tables: Mapping[str, pa.Table], system: System, folder: Path
     Parameters
     ----------
     tables : mapping of str to pyarrow.Table
+        Those of `COMPARED`.
     system : str
         Units: ``practical`` or ``si``.
     folder : Path
     """
     folder.mkdir(parents=True, exist_ok=True)
-    views = recording_views(tables)
+    unused = {name: schema(name).empty_table() for name in BY_RECORDING}
+    views = recording_views(unused | dict(tables))
     channels = [channel for view in views for channel in view.channels()]
     sensors = sorted({view.sensor for view in views})
     for name, make in cross_figures(channels, system, sensors=sensors):
