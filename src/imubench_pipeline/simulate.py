@@ -24,7 +24,7 @@ from imubench_pipeline.variance_covariance import variance_covariance
 Array = NDArray[np.float64]
 
 _BLOCK = 1 << 20
-_SUMS = 1 << 14
+_SUMS = 1 << 12
 """Blocks that a member of the ensemble is made of, at most."""
 
 _BLOCKS_IN_CLUSTER = 16
