@@ -124,9 +124,9 @@ def test_the_tables_are_those_of_a_local_run(project: Project, tmp_path: Path) -
     before = len(submitted(project.environment))
     done = project.run(*flags(1), cores=1)
     assert done.returncode == 0, done.stdout + done.stderr
-    # The tables, and what is made of them: no recording is analysed again.
+    # The tables and the report are one job: no recording is analysed again.
     states = [state for state, *_ in submitted(project.environment)[before:]]
-    assert states == ["COMPLETED"] * 2
+    assert states == ["COMPLETED"]
     assert (project.results / "report/index.html").is_file()
     local = Project(project.folder, tmp_path / "results", settings=project.settings)
     assert local.run("tables", "ranking", "coverage").returncode == 0
