@@ -302,10 +302,22 @@ def quantity_to_si(text: str, dimension: str) -> float:
     UnitError
         If there is no number, no unit, or a unit of another dimension.
     """
+    number, unit = _number_and_unit(text, dimension)
+    return to_si(number, unit, dimension)
+
+
+def difference_to_si(text: str, dimension: str) -> float:
+    """Read a difference with its unit into SI: 5 degC are 5 K, not 278 (see `quantity_to_si`)."""
+    number, unit = _number_and_unit(text, dimension)
+    factor, _ = conversion(unit, dimension)
+    return factor * number
+
+
+def _number_and_unit(text: str, dimension: str) -> tuple[float, str]:
     match = _QUANTITY.match(str(text))
     if not match:
         raise UnitError(
             f"{text!r} is not a number with its unit; {_expected(dimension)}, "
             f"written like '100 {SI_UNITS[dimension]}'"
         )
-    return to_si(float(match[1]), match[2], dimension)
+    return float(match[1]), match[2]

@@ -137,11 +137,11 @@ def _integrated(system: Array, impulse: Array, interval: float) -> tuple[Array, 
     times = step * (nodes + 1.0) / 2.0
     responses = np.stack([(expm(system * time) @ impulse[..., None])[..., 0] for time in times], 1)
     rows = responses * np.sqrt(step / 2.0 * weights)[:, None]
-    factor = np.linalg.qr(rows, mode="r")
+    factor: Array = np.asarray(np.linalg.qr(rows, mode="r"))
     transition = np.asarray(expm(system * step))
     for _ in range(doublings):
         later = factor @ transition.swapaxes(1, 2)
-        factor = np.linalg.qr(np.concatenate([later, factor], axis=1), mode="r")
+        factor = np.asarray(np.linalg.qr(np.concatenate([later, factor], axis=1), mode="r"))
         transition = transition @ transition
     return transition, factor
 

@@ -2,9 +2,9 @@
 
 `imubench_pipeline.flicker.bank` has the Allan variance of flicker noise that is sampled without a
 filter. Before a filter whose cut-off may lie above Nyquist, the density B^2 / (2 pi f) itself is
-needed, far beyond the cut-off. Processes of equal variance (ln r / pi) B^2 whose correlation times
-have the ratio r make up that density: the ripple is 4 e^(-pi^2 / ln r), below 1e-4 for five in two
-decades.
+needed, far beyond the cut-off. Processes of equal variance (ln r / pi) B^2 whose correlation
+times have the ratio r make up that density: the ripple is 4 e^(-pi^2 / ln r), below 1e-3 for two
+a decade.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ ABOVE = 30.0
 """How far above the cut-off frequency the density is followed: there, a filter of first order has
 taken away 99.9 % of the power."""
 
-_MEMBERS_A_DECADE = 2.5
+_MEMBERS_A_DECADE = 2.0
 _POINTS_A_DECADE = 20
 _BEYOND = 4.0
 """How far the correlation times go beyond both ends of the band, in 1 / (2 pi f)."""

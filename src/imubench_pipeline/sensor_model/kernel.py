@@ -12,7 +12,8 @@ STARTED, INPUT, TEMPERATURE, LAG = range(4)
 """Places in the memory of a recursion: has it begun, and what it had at the sample before."""
 
 
-@njit(cache=True, nogil=True)
+# Sums may be taken in another order: with many slow states that is twice as fast.
+@njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})
 def run(
     log: Array,
     given: Array,
@@ -49,7 +50,7 @@ def run(
         Normal deviates. The first row ever is not used by the states.
     memory, x, e : ndarray, shapes (4,), (n,), (m,)
         The states, changed in place.
-    decay, own, coupling, shared : ndarray, shapes (n,), (n,), (n, m), (n, m)
+    decay, own, coupling, shared : ndarray, shapes (n,), (n,), (m, n), (m, n)
         Of the slow states.
     transition, factor, output : ndarray, shapes (m, m), (m, m), (m,)
         Of the filter; its own noise is normal @ factor.
@@ -80,17 +81,16 @@ def run(
         if memory[STARTED] > 0.0:
             change = u - memory[INPUT]
             for a in range(m):
-                before[a] = (
-                    step[a] * change
-                    + drift[0] * (lag_coupling[a] * behind + lagged_step[a] * change_of_temperature)
+                gained = step[a] * change + drift[0] * (
+                    lag_coupling[a] * behind + lagged_step[a] * change_of_temperature
                 )
+                for j in range(n):
+                    gained += coupling[a, j] * x[j] + shared[a, j] * normal[i, j]
                 for b in range(m):
-                    before[a] += transition[a, b] * e[b] + factor[b, a] * normal[i, n + b]
+                    gained += transition[a, b] * e[b] + factor[b, a] * normal[i, n + b]
+                before[a] = gained
             for j in range(n):
-                noise = normal[i, j]
-                for a in range(m):
-                    before[a] += coupling[j, a] * x[j] + shared[j, a] * noise
-                x[j] = decay[j] * x[j] + own[j] * noise
+                x[j] = decay[j] * x[j] + own[j] * normal[i, j]
             for a in range(m):
                 e[a] = before[a]
         memory[LAG] = ahead

@@ -176,7 +176,7 @@ class _Axis:
         m = low_pass.order
         parts = (slow.residual * scale[:, None, None]).reshape(-1, m)
         white_part = math.sqrt(self._white) * white_factor(low_pass, interval)
-        factor = np.linalg.qr(np.concatenate([parts, white_part]), mode="r")
+        factor = np.asarray(np.linalg.qr(np.concatenate([parts, white_part]), mode="r"))
         transition = filter_transition(low_pass, interval)
         return _Discrete(driven, transition, factor, low_pass.output, 0.0, held)
 
@@ -222,8 +222,8 @@ class _Axis:
             self._e,
             discrete.slow.decay,
             discrete.slow.own,
-            discrete.slow.coupling,
-            discrete.slow.shared,
+            np.ascontiguousarray(discrete.slow.coupling.T),
+            np.ascontiguousarray(discrete.slow.shared.T),
             discrete.transition,
             discrete.factor,
             discrete.output,
@@ -247,9 +247,7 @@ class _Axis:
         # Whole turns are taken away first: they would cost digits after 10^9 samples.
         turns = np.arange(start, stop) * (line.frequency / self._rate) % 1.0
         shift = phase + np.angle(response)
-        return np.asarray(
-            line.amplitude * abs(response) * np.cos(2.0 * math.pi * turns + shift)
-        )
+        return np.asarray(line.amplitude * abs(response) * np.cos(2.0 * math.pi * turns + shift))
 
 
 def _registered(log: Array, model: SensorModel) -> Array:
