@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 _YAML = (".yaml", ".yml")
 _MOST = 1 << 36
+_WORTH_SAYING = 1.02
 _PATIENCE = 3.0
 """Seconds between two lines of progress where there is no terminal."""
 
@@ -86,21 +88,26 @@ def _run(given: argparse.Namespace) -> None:
     origin, sensor = _origin(given)
     log = None if sensor is None else sensor.log
     rate = _rate(given.rate, log)
-    duration = given.hours * 3600.0 if given.hours else quantity_to_si(given.duration, "time")
-    samples = round(duration * rate)
+    duration = (
+        quantity_to_si(given.duration, "time") if given.hours is None else 3600.0 * given.hours
+    )
+    samples = round(duration * rate) if math.isfinite(duration) else 0
     if not 1 <= samples <= _MOST:
-        raise ConfigError(f"{duration:g} s at {rate:g} Hz are {samples} samples; expected some")
+        raise ConfigError(
+            f"{duration:g} s at {rate:g} Hz are {samples} samples; expected 1 to {_MOST}"
+        )
     motion, temperature = _profiles(given, origin)
     columns = [*origin.imu.axes, *([TEMPERATURE] if temperature is not None else [])]
     form = layout(given.out, columns, rate, log)
     notes_path(given.out)
     if temperature is None and any(axis.drift for axis in origin.imu.axes.values()):
         origin.assumed.append("no drift with temperature: none is given (--temperature)")
+    origin.assumed += [*_ended(duration, motion, temperature), *_folded(origin, rate)]
     if not motion:
         origin.assumed.append("at rest, and no gravity (--motion)")
     remarks = [MARK, f"from {origin.said}"]
     remarks += [f"{name}: {line}" for name, lines in origin.figures.items() for line in lines]
-    remarks += [f"assumed: {line}" for line in origin.assumed]
+    remarks += [f"assumed: {line}" for line in _short(origin.assumed)]
     print(f"{remarks[0]}: {samples:,} samples of {', '.join(columns)} at {rate:g} Hz")
     print("\n".join(_short(remarks[1:])), flush=True)
     name = given.out.stem
@@ -152,6 +159,7 @@ def _origin(given: argparse.Namespace) -> tuple[Origin, Any]:
     """Return the model, and the sensor file where there is one."""
     from imubench_pipeline.sensor import CHANNELS, Sensor
     from imubench_pipeline.sensor_model import sources
+    from imubench_pipeline.sensor_model.imu import ImuModel
 
     asked = [name.strip() for name in given.channels.split(",")] if given.channels else None
     if unknown := [name for name in asked or [] if name not in CHANNELS]:
@@ -176,7 +184,7 @@ def _origin(given: argparse.Namespace) -> tuple[Origin, Any]:
         except ConfigError:
             if not given.results:
                 raise
-            origin = sources.Origin(sources.ImuModel(axes={}), "", sensor=given.sensor)
+            origin = sources.Origin(ImuModel(axes={}), "", sensor=given.sensor)
         if given.results:
             origin = sources.with_estimates(origin, given.results, given.sensor, given.recording)
     if asked:
@@ -230,12 +238,43 @@ def _profiles(
     return motion, temperature
 
 
+def _ended(
+    duration: float, motion: Mapping[str, Profile], temperature: Profile | None
+) -> list[str]:
+    """Say which files end before the log."""
+    from imubench_pipeline.sensor_model.profiles import FileColumn
+
+    profiles = [*motion.values(), *([] if temperature is None else [temperature])]
+    series = dict.fromkeys(one.series for one in profiles if isinstance(one, FileColumn))
+    spans = {one.path: one.span() for one in series}
+    return [
+        f"{path} is from {first:g} to {last:g} s: its ends are held before and after"
+        for path, (first, last) in spans.items()
+        if first > 0 or last < 0.999 * duration
+    ]
+
+
+def _folded(origin: Origin, rate: float) -> list[str]:
+    """Say how much of the white noise beyond Nyquist sampling folds into the log."""
+    from imubench_pipeline.sensor_model.sources import folding
+
+    found = []
+    for channel, axis in origin.imu.axes.items():
+        more = folding(axis, rate)
+        if more > _WORTH_SAYING:
+            found.append(
+                f"{channel}: N is the density before the low-pass; sampled at {rate:g} Hz the log "
+                f"shows {math.sqrt(more):.3g} N, for noise beyond {rate / 2:g} Hz is folded into it"
+            )
+    return found
+
+
 def _short(lines: list[str]) -> list[str]:
     """Say once what holds for several channels."""
     found: dict[str, list[str]] = {}
     for line in lines:
         name, colon, rest = line.partition(": ")
-        if colon and name.startswith(("gyro_", "accel_")):
+        if colon and name.startswith(("gyro_", "accel_")) and " " not in name:
             found.setdefault(rest, []).append(name)
         else:
             found[line] = []

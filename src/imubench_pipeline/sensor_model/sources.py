@@ -28,6 +28,9 @@ from imubench_pipeline.tables import read
 from imubench_pipeline.units import dimension_of, to_si
 from imubench_pipeline.validation import ConfigError, parse, read_yaml
 
+_LOW = 1e-4
+"""rad a sample, far below every cut-off."""
+
 _REGISTER = 1 << 15
 """Steps of a register of 16 bits on each side of 0."""
 
@@ -371,10 +374,21 @@ def before_the_filter(model: SensorModel, noise: NoiseModel, rate: float) -> Noi
     rate : float
         Of the log, Hz.
     """
-    unit = replace(model, noise=NoiseModel(N=1.0), resolution=0.0)
-    folded = float(unit.sampled_spectrum(np.array([1e-4]), rate)[0]) / rate
     left = max(noise.N**2 - model.resolution**2 / (12.0 * rate), 0.0)
-    return replace(noise, N=math.sqrt(left / folded))
+    return replace(noise, N=math.sqrt(left / folding(model, rate)))
+
+
+def folding(model: SensorModel, rate: float) -> float:
+    """Return how many times N^2 the density of the samples is at low frequencies.
+
+    Parameters
+    ----------
+    model : SensorModel
+    rate : float
+        Hz.
+    """
+    unit = replace(model, noise=NoiseModel(N=1.0), resolution=0.0)
+    return float(unit.sampled_spectrum(np.array([_LOW]), rate)[0]) / rate
 
 
 def _of(rows: Iterable[Mapping[str, Any]], sensor: str, recording: str) -> list[Mapping[str, Any]]:

@@ -12,6 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pacsv
 import yaml
@@ -26,6 +27,7 @@ from imubench_pipeline.validation import ConfigError
 
 MARK = "SIMULATED, not measured"
 FORMATS = (".parquet", ".csv")
+_DECIMALS = 12
 
 Blocks = Iterable[Mapping[str, Array]]
 
@@ -163,7 +165,7 @@ def _has_names(sensor: LogFormat, channels: Mapping[str, ColumnSource]) -> bool:
     if sensor.temperature is not None:
         sources.append(sensor.temperature)
     named = all(s is not None and isinstance(s.column, str) and not s.file for s in sources)
-    return named and sensor.reader in (None, "csv") and sensor.delimiter != "#"
+    return named and sensor.reader in (None, "csv")
 
 
 def _si_source(name: str) -> ColumnSource:
@@ -220,5 +222,6 @@ class _CsvWriter:
             dimension = "temperature" if name == TEMPERATURE else QUANTITIES[quantity_of(name)]
             factor, zero = conversion(source.unit, dimension)
             raw = (block[name] - zero) / (factor * source.scale) + source.offset
-            columns[name] = raw
+            # The last digits are of the arithmetic, and twice the size of the file.
+            columns[name] = np.round(raw, _DECIMALS)
         pacsv.write_csv(pa.table(columns), self._file, self._options)
