@@ -130,10 +130,8 @@ def test_a_file_of_models_with_motion_and_temperature(tmp_path: Path) -> None:
     x = np.degrees(table["gyro_x"].to_numpy())
     parts = [x[:900].mean(), x[2000:2900].mean(), x[3500:].mean()]
     drift = 0.1 * 4.4 + 0.01 * 4.4**2
-    np.testing.assert_allclose(parts, [-5.4, -5.4 + drift, -5.4 + drift + 10.0], atol=0.01)
-    assert set(table["temperature"].to_numpy()) == {22.0, 24.0, 26.0} or set(
-        table["temperature"].to_numpy()
-    ) == {22.0, 26.0}
+    np.testing.assert_allclose(parts, [-5.4, -5.4 + drift, -5.4 + drift + 10.0], atol=0.03)
+    assert set(table["temperature"].to_numpy()) == {22.0, 26.0}
     assert ingested(path, "bno055", tmp_path / "kept")["gyro_x"].shape == (6000,)
 
 

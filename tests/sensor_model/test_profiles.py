@@ -1,3 +1,4 @@
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -96,7 +97,7 @@ def test_a_file_is_interpolated_in_blocks_of_any_size(
     motion, _ = profiles({"motion": {"gyro_x": {"form": "file", "file": path.name}}}, path.parent)
     times = np.cumsum(rng.uniform(0, 2, sum(sizes)))
     ends = np.cumsum([0, *sizes])
-    parts = [motion["gyro_x"].at(times[a:b]) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    parts = [motion["gyro_x"].at(times[a:b]) for a, b in pairwise(ends)]
     wanted = np.interp(times, t, np.radians(v))
     np.testing.assert_allclose(np.concatenate(parts), wanted, atol=1e-11)
     np.testing.assert_allclose(motion["gyro_x"].at(times[:3]), wanted[:3], atol=1e-11)  # back
