@@ -13,6 +13,7 @@ from imubench_pipeline.cli import main
 from imubench_pipeline.config import QualitySettings
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.ingest import ingest
+from imubench_pipeline.readers import read
 from imubench_pipeline.recording import channel_logs, read_metadata
 from imubench_pipeline.results import Key, parameter_rows
 from imubench_pipeline.sensor import RecordingNotes, merged_log, read_sensors
@@ -216,3 +217,23 @@ def test_a_wrong_file_of_models_names_the_key(change: dict, said: str, tmp_path,
     out = tmp_path / "log.csv"
     assert simulate(tmp_path / "model.yaml", "--hours", "1", "--rate", "1 Hz", "--out", out) == 2
     assert said in capsys.readouterr().err
+
+
+def test_a_log_of_every_sensor_file_is_read(tmp_path: Path) -> None:
+    """Whatever a sensor file says of its logs, the notes say what is otherwise."""
+    for name, sensor in read_sensors(SENSORS).items():
+        axes = {str(channel): {"bias": "0.25 rad/s" if "gyro" in channel else "0.25 m/s^2"}
+                for channel in sensor.log.channels}  # fmt: skip
+        model = tmp_path / f"{name}.model.yaml"
+        model.write_text(yaml.safe_dump({"sensor": name, "axes": axes}))
+        for suffix in ("csv", "parquet"):
+            path = tmp_path / f"{name}.{suffix}"
+            given = ["--duration", "5 s", "--rate", "100 Hz", "--temperature", "30 degC"]
+            assert simulate(model, *given, "--out", path) == 0
+            notes = parse(RecordingNotes, read_yaml(path.with_suffix(".yaml")), "notes")
+            log = merged_log(sensor, notes, "notes")
+            found = [batch for file in read(path, log) for batch in file.batches()]
+            assert log.rate_hz == 100.0 and sum(map(len, found)) == 500
+            assert set(found[0].columns) == {*axes, "temperature"}
+            for column, values in found[0].columns.items():
+                np.testing.assert_allclose(values, 30.0 if column == "temperature" else 0.25)

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from mpmath import mp, mpf, workdps
 
 from imubench_pipeline.noise import NoiseModel, RandomWalk, WhiteNoise
@@ -184,3 +186,42 @@ def test_sources_are_what_has_a_density() -> None:
     found = sources_of(terms)
     assert (found.white, found.flicker) == (5.0, 4.0)
     assert found.times.tolist() == [np.inf] and found.densities.tolist() == [9.0]
+
+
+positive = st.floats(-3.0, 1.0).map(lambda power: 10.0**power)
+
+
+@settings(max_examples=25)
+@given(
+    N=positive,
+    B=positive,
+    T_B=st.floats(-3.0, 5.0).map(lambda power: 10.0**power),
+    K=positive,
+    flicker=st.booleans(),
+    cutoff=st.floats(-1.0, 3.0).map(lambda power: 10.0**power),
+    order=st.integers(1, 8),
+)
+def test_any_model_has_the_folded_spectrum_and_its_allan_variance(
+    N: float, B: float, T_B: float, K: float, flicker: bool, cutoff: float, order: int
+) -> None:
+    noise = NoiseModel(N=N, B=B, T_B=None if flicker else T_B, K=K)
+    model = SensorModel(noise=noise, low_pass=LowPass(cutoff, order))
+
+    def density(f: np.ndarray) -> np.ndarray:
+        slow = B**2 / (2 * np.pi * f) if flicker else theory.gauss_markov(f, B, T_B)
+        before = N**2 + slow + K**2 / (2 * np.pi * f) ** 2
+        return before * theory.butterworth(f, cutoff, order)
+
+    f = np.geomspace(1e-3, 49.9, 12)
+    found = model.sampled_spectrum(2 * np.pi * f / RATE, RATE) / RATE
+    wanted = theory.folded(density, f, RATE)
+    # What a filter of high order leaves far beyond its cut-off is lost beside what it lets pass.
+    np.testing.assert_allclose(found, wanted, rtol=1e-4, atol=1e-12 * wanted.max())
+    # The Allan variance of single samples is half the mean square of their differences.
+    theta = np.linspace(0.0, np.pi, 4001)[1:]
+    spectrum = model.sampled_spectrum(theta, RATE)
+    single = 2 * spectrum * np.sin(theta / 2) ** 2 / np.pi
+    # Near zero frequency the walk is (1 / theta^2) theta^2: flat.
+    total = np.trapezoid(single, theta) + single[0] * theta[0]
+    if cutoff > 1.0 and T_B < 10.0:
+        assert model.allan_variance(0.01, RATE) == pytest.approx(total, rel=5e-3)
