@@ -237,3 +237,17 @@ def test_a_log_of_every_sensor_file_is_read(tmp_path: Path) -> None:
             assert set(found[0].columns) == {*axes, "temperature"}
             for column, values in found[0].columns.items():
                 np.testing.assert_allclose(values, 30.0 if column == "temperature" else 0.25)
+
+
+def test_nothing_is_left_of_a_log_that_could_not_be_finished(
+    tmp_path: Path, monkeypatch, capsys
+) -> None:
+    from imubench_pipeline.recording import LogWriter
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(LogWriter, "write", full)
+    assert simulate("bno055", "--duration", "5 s", "--out", tmp_path / "log.parquet") == 2
+    assert "No space left on device" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())

@@ -29,6 +29,9 @@ Array = NDArray[np.float64]
 _NODES = 14
 """Quadrature nodes of a step that is short beside all time constants."""
 
+_SERIES = 20
+"""Terms of the exponential over such a step: 1 / 21! is left out."""
+
 
 @dataclass(frozen=True)
 class SlowSources:
@@ -134,11 +137,18 @@ def _integrated(system: Array, impulse: Array, interval: float) -> tuple[Array, 
     doublings = max(0, math.ceil(math.log2(max(fastest, 1.0))))
     step = interval / 2.0**doublings
     nodes, weights = np.polynomial.legendre.leggauss(_NODES)
-    times = step * (nodes + 1.0) / 2.0
-    responses = np.stack([(expm(system * time) @ impulse[..., None])[..., 0] for time in times], 1)
+    # (system step)^k / k!, and the same of the impulse: over a short step their sums converge at
+    # once and lose no digit, and they are far cheaper than an exponential a node.
+    transition = np.broadcast_to(np.eye(system.shape[1]), system.shape)
+    part, response = transition, impulse
+    responses = np.repeat(impulse[:, None, :], _NODES, axis=1)
+    for k in range(1, _SERIES + 1):
+        part = part @ system * (step / k)
+        transition = transition + part
+        response = np.einsum("nij,nj->ni", system, response) * (step / k)
+        responses = responses + ((nodes + 1.0) / 2.0)[:, None] ** k * response[:, None, :]
     rows = responses * np.sqrt(step / 2.0 * weights)[:, None]
     factor: Array = np.asarray(np.linalg.qr(rows, mode="r"))
-    transition = np.asarray(expm(system * step))
     for _ in range(doublings):
         later = factor @ transition.swapaxes(1, 2)
         factor = np.asarray(np.linalg.qr(np.concatenate([later, factor], axis=1), mode="r"))
