@@ -16,7 +16,10 @@ PUBLIC = ["allan", "confidence", "noise", "simulate", "score", "datasheet", "uni
           "drift", "tables", "provenance", "report/practical", "report/words", "report/meaning",
           "report/view", "report/palette", "report/payload", "report/parameters",
           "report/comparison", "report/datasheets", "report/html", "report/site",
-          "report/publish"]  # fmt: skip
+          "report/publish", "sensor_model/discretisation", "sensor_model/flicker_band",
+          "sensor_model/imu", "sensor_model/kernel", "sensor_model/model",
+          "sensor_model/profiles", "sensor_model/simulation", "sensor_model/sources",
+          "sensor_model/spectra", "sensor_model/writing"]  # fmt: skip
 
 
 def functions(path: Path) -> list[ast.FunctionDef]:

@@ -18,6 +18,7 @@ from imubench_pipeline.nightly import command as nightly
 from imubench_pipeline.report import command as report
 from imubench_pipeline.report.static_figures import command as figures
 from imubench_pipeline.sensor import RecordingNotes, Sensor
+from imubench_pipeline.sensor_model import command as simulation
 from imubench_pipeline.tables import replacing, write_content, write_json
 from imubench_pipeline.units import UnitError, quantity_to_si
 from imubench_pipeline.validation import ConfigError, read_yaml
@@ -75,6 +76,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     figures.add_arguments(
         commands.add_parser("figures", help="draw the figures of channels for print")
+    )
+    simulation.add_arguments(
+        commands.add_parser(
+            "simulate", help="write a simulated log of a sensor, to test filters on"
+        )
     )
     nightly.add_arguments(
         commands.add_parser(
@@ -242,5 +248,6 @@ _COMMANDS = {
     "show": show.run,
     "report": report.run,
     "figures": figures.run,
+    "simulate": simulation.run,
     "nightly": nightly.run,
 }

@@ -37,6 +37,8 @@ SI_UNITS: dict[str, str] = {
     "accel_ramp": "m/s^3",
     "gyro_temperature_coefficient": "rad/s/K",
     "accel_temperature_coefficient": "m/s^2/K",
+    "gyro_temperature_curvature": "rad/s/K^2",
+    "accel_temperature_curvature": "m/s^2/K^2",
     "gyro_acceleration_coefficient": "rad/s/(m/s^2)",
     "gyro_step": "rad/s/LSB",
     "accel_step": "m/s^2/LSB",
@@ -66,6 +68,8 @@ _EXAMPLES: dict[str, str] = {
     "accel_ramp": "ug/h or m/s^3",
     "gyro_temperature_coefficient": "deg/s/K",
     "accel_temperature_coefficient": "mg/K",
+    "gyro_temperature_curvature": "deg/s/K^2",
+    "accel_temperature_curvature": "mg/K^2",
     "gyro_acceleration_coefficient": "deg/s/g or deg/h/g",
     "gyro_step": "mdps/LSB or deg/s/LSB",
     "accel_step": "mg/LSB or m/s^2/LSB",
@@ -302,10 +306,22 @@ def quantity_to_si(text: str, dimension: str) -> float:
     UnitError
         If there is no number, no unit, or a unit of another dimension.
     """
+    number, unit = _number_and_unit(text, dimension)
+    return to_si(number, unit, dimension)
+
+
+def difference_to_si(text: str, dimension: str) -> float:
+    """Read a difference with its unit into SI: 5 degC are 5 K, not 278 (see `quantity_to_si`)."""
+    number, unit = _number_and_unit(text, dimension)
+    factor, _ = conversion(unit, dimension)
+    return factor * number
+
+
+def _number_and_unit(text: str, dimension: str) -> tuple[float, str]:
     match = _QUANTITY.match(str(text))
     if not match:
         raise UnitError(
             f"{text!r} is not a number with its unit; {_expected(dimension)}, "
             f"written like '100 {SI_UNITS[dimension]}'"
         )
-    return to_si(float(match[1]), match[2], dimension)
+    return float(match[1]), match[2]

@@ -1,0 +1,1 @@
+"""The model of a sensor, and logs simulated from it."""

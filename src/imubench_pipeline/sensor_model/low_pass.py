@@ -1,0 +1,114 @@
+"""The low-pass filter of a sensor, in continuous time: first order, or Butterworth of order n."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import block_diag
+
+Array = NDArray[np.float64]
+
+_HIGHEST_ORDER = 10
+
+
+@dataclass(frozen=True)
+class LowPass:
+    """A low-pass filter of unit gain at rest: v' = F v + b u, y = c v.
+
+    It is a chain of sections of first and second order, so that its states have the size of the
+    signal, whatever the cut-off frequency.
+
+    Parameters
+    ----------
+    cutoff : float
+        Frequency at which the power is halved (-3 dB), Hz.
+    order : int
+        1, or the order of the Butterworth filter.
+
+    Raises
+    ------
+    ValueError
+        If the cut-off is not above 0, or the order not from 1 to 10.
+    """
+
+    cutoff: float
+    order: int = 1
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.cutoff) and self.cutoff > 0):
+            raise ValueError(f"the cut-off is {self.cutoff}, expected a frequency above 0")
+        if not 1 <= self.order <= _HIGHEST_ORDER:
+            raise ValueError(f"the order is {self.order}, expected 1 to {_HIGHEST_ORDER}")
+
+    @property
+    def speed(self) -> float:
+        """Angular cut-off frequency, rad/s."""
+        return 2.0 * math.pi * self.cutoff
+
+    @property
+    def transition(self) -> Array:
+        """F, shape (order, order), 1/s."""
+        sections, _ = self._sections()
+        matrix = np.asarray(block_diag(*sections), dtype=np.float64)
+        begin = 0
+        for section, following in pairwise(sections):
+            # The first state of a section is its output, and the last one takes its input.
+            matrix[begin + len(section) + len(following) - 1, begin] = 1.0
+            begin += len(section)
+        return self.speed * matrix
+
+    @property
+    def input(self) -> Array:
+        """Column b, shape (order,), 1/s."""
+        sections, _ = self._sections()
+        column = np.zeros(self.order)
+        column[len(sections[0]) - 1] = self.speed
+        return column
+
+    @property
+    def output(self) -> Array:
+        """Row c, shape (order,)."""
+        sections, _ = self._sections()
+        row = np.zeros(self.order)
+        row[self.order - len(sections[-1])] = 1.0
+        return row
+
+    @property
+    def rest(self) -> Array:
+        """States at rest under a unit input, -F^-1 b, shape (order,)."""
+        _, rest = self._sections()
+        return rest
+
+    @property
+    def delay(self) -> float:
+        """Delay of slow signals, s: how long a ramp comes late."""
+        return float(self.output @ np.linalg.solve(-self.transition, self.rest))
+
+    def power(self, frequency: ArrayLike) -> Array:
+        """Return |H|^2 = 1 / (1 + (f / cutoff)^(2 order)) at frequencies in Hz."""
+        ratio = np.asarray(frequency, dtype=np.float64) / self.cutoff
+        return np.asarray(1.0 / (1.0 + ratio ** (2 * self.order)))
+
+    def response(self, frequency: float) -> complex:
+        """Return H at a frequency in Hz: gain and phase of a sinusoid."""
+        s = 1j * frequency / self.cutoff
+        poles = np.exp(
+            1j * math.pi * (2 * np.arange(1, self.order + 1) + self.order - 1) / (2 * self.order)
+        )
+        return complex(1.0 / np.prod((s - poles) / -poles))
+
+    def _sections(self) -> tuple[list[Array], Array]:
+        """Return the matrices of the sections at a cut-off of 1 rad/s, and the states at rest."""
+        damping = [
+            math.sin(math.pi * (2 * j - 1) / (2 * self.order))
+            for j in range(1, self.order // 2 + 1)
+        ]
+        sections = [np.array([[0.0, 1.0], [-1.0, -2.0 * zeta]]) for zeta in damping]
+        if self.order % 2:
+            sections.append(np.array([[-1.0]]))
+        rest = np.concatenate([np.eye(len(section))[0] for section in sections])
+        return sections, rest

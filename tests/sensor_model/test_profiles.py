@@ -1,0 +1,142 @@
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from imubench_pipeline.sensor_model.profile_files import FileSeries
+from imubench_pipeline.sensor_model.profiles import Surroundings
+from imubench_pipeline.units import UnitError, difference_to_si
+from imubench_pipeline.validation import ConfigError, parse
+
+
+def profiles(settings: dict, folder: Path = Path()):
+    return parse(Surroundings, settings, "board.yaml").profiles(folder)
+
+
+def test_formulas_are_what_they_say_in_si() -> None:
+    t = np.array([0.0, 59.0, 60.0, 3600.0, 21600.0])
+    motion, _ = profiles(
+        {
+            "motion": {
+                "gyro_z": {
+                    "form": "steps",
+                    "times": ["0 s", "1 min"],
+                    "values": ["0 deg/s", "180 deg/s"],
+                },
+                "accel_z": "1 g",
+            }
+        }
+    )
+    np.testing.assert_allclose(motion["gyro_z"].at(t), [0, 0, np.pi, np.pi, np.pi])
+    np.testing.assert_allclose(motion["accel_z"].at(t), 9.80665)
+    _, day = profiles(
+        {
+            "temperature": {
+                "form": "day_cycle", "mean": "20 degC", "amplitude": "5 degC", "highest": "6 h"
+            }
+        }
+    )  # fmt: skip
+    np.testing.assert_allclose(day.at(t)[[0, 4]], [20.0, 25.0])
+    warm = {"form": "warm_up", "start": "293.15 K", "end": "40 degC", "time_constant": "1 h"}
+    _, warming = profiles({"temperature": warm | {"begin": "60 s"}})
+    found = warming.at(t)
+    np.testing.assert_allclose(found[:3], 20.0)
+    assert found[3] == pytest.approx(40 - 20 * np.exp(-3540 / 3600))
+
+
+def test_a_difference_of_temperatures_has_no_zero() -> None:
+    assert difference_to_si("5 degC", "temperature") == pytest.approx(5.0)
+    assert difference_to_si("5 K", "temperature") == pytest.approx(5.0)
+    with pytest.raises(UnitError, match="no unit of temperature"):
+        difference_to_si("5 m", "temperature")
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"temperature": "20 m"}, "temperature"),
+        ({"temperature": {"form": "wave"}}, "temperature"),
+        ({"motion": {"gyro_w": "1 deg/s"}}, "gyro_w"),
+        (
+            {"temperature": {"form": "steps", "times": ["1 s", "1 s"], "values": ["1 K", "2 K"]}},
+            "ascend",
+        ),
+        ({"temperature": {"form": "steps", "times": ["1 s"], "values": ["1 K", "2 K"]}}, "as many"),
+        (
+            {
+                "temperature": {
+                    "form": "warm_up", "start": "1 K", "end": "2 K", "time_constant": "0 s"
+                }
+            },
+            "time_constant",
+        ),
+    ],
+)  # fmt: skip
+def test_a_profile_that_makes_no_sense_is_refused(settings: dict, said: str) -> None:
+    with pytest.raises((ConfigError, UnitError), match=said):
+        profiles(settings)
+
+
+@given(
+    st.integers(2, 400),
+    st.lists(st.integers(1, 90), min_size=1, max_size=30),
+    st.integers(0, 2**32 - 1),
+)
+def test_a_file_is_interpolated_in_blocks_of_any_size(
+    tmp_path_factory, rows: int, sizes: list[int], seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    path = tmp_path_factory.mktemp("series") / "warm.parquet"
+    t, v = np.cumsum(rng.uniform(0.01, 3, rows)) - 2, rng.standard_normal(rows)
+    pq.write_table(pa.table({"time [min]": t / 60, "gyro_x [deg/s]": v}), path, row_group_size=7)
+    motion, _ = profiles({"motion": {"gyro_x": {"form": "file", "file": path.name}}}, path.parent)
+    times = np.cumsum(rng.uniform(0, 2, sum(sizes)))
+    ends = np.cumsum([0, *sizes])
+    parts = [motion["gyro_x"].at(times[a:b]) for a, b in pairwise(ends)]
+    wanted = np.interp(times, t, np.radians(v))
+    np.testing.assert_allclose(np.concatenate(parts), wanted, atol=1e-11)
+    np.testing.assert_allclose(motion["gyro_x"].at(times[:3]), wanted[:3], atol=1e-11)  # back
+
+
+def test_a_long_csv_file_is_read_as_a_stream(tmp_path: Path) -> None:
+    path = tmp_path / "long.csv"
+    rows = 300_000
+    t = np.arange(rows) / 100
+    lines = "\n".join(f"{a:.2f},{b:.6f}" for a, b in zip(t, np.sin(t), strict=True))
+    path.write_text(f"time,temperature\n{lines}\n")
+    series = FileSeries(path)
+    series.take("temperature", "temperature")
+    most = 0
+    for begin in range(0, 3000, 100):
+        times = begin + np.arange(0, 100, 0.005)
+        found = series.at("temperature", times)
+        np.testing.assert_allclose(found, np.interp(times, t, np.sin(t)), atol=1e-6)
+        most = max(most, len(series._window["time"]))
+    assert most < 150_000  # of 300,000
+    assert series.span() == (0.0, t[-1])
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("t,temperature\n0,1\n", "no column 'time'"),
+        ("time,warmth\n0,1\n", "no column 'temperature'"),
+        ("time,temperature [m]\n0,1\n", "no unit of temperature"),
+        ("time,temperature\n0,1\n0,2\n", "ascend"),
+        ("time,temperature\n0,1\n1,\n", "missing"),
+        ("time,temperature\n0,1\n1,x\n", "cannot be read"),
+        ("time,temperature\n", "no rows"),
+        ("", "cannot be read"),
+    ],
+)
+def test_a_file_that_cannot_be_used_is_refused(tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "warm.csv").write_text(text)
+    settings = {"temperature": {"form": "file", "file": "warm.csv"}}
+    with pytest.raises(ConfigError, match=said):
+        _, warm = profiles(settings, tmp_path)
+        warm.at(np.array([0.0, 5.0]))
