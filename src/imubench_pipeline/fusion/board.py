@@ -211,9 +211,7 @@ def divided(model: NoiseModel, correlation: Mapping[str, float]) -> tuple[NoiseM
     """
     for name, value in correlation.items():
         if name not in _AMPLITUDES or not 0.0 <= value <= 1.0:
-            raise ValueError(
-                f"correlation of {name} is {value}; expected 0 to 1, of N, B, K or R"
-            )
+            raise ValueError(f"correlation of {name} is {value}; expected 0 to 1, of N, B, K or R")
     parts = []
     for common in (False, True):
         share = {
@@ -267,5 +265,3 @@ def block_mean_spectrum(model: NoiseModel, omega: Array, rate: float, size: int)
 def stochastic(model: NoiseModel) -> NoiseModel:
     """Return a model without its ramp and its lines, which have no spectrum."""
     return replace(model, R=0.0, sinusoids=())
-
-
