@@ -31,12 +31,11 @@ def of_block_means(space: StateSpace, size: int) -> StateSpace:
     """
     m = len(space.output)
     if size == 1 or m == 0:
-        noise = space.measurement_noise / size
         return StateSpace(
             space.transition,
             space.process_noise,
             space.output,
-            noise,
+            space.measurement_noise / size,
             space.initial_mean,
             space.initial_variance,
         )

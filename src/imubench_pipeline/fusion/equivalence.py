@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -98,36 +98,37 @@ class Candidate:
 
 def _alone(name: str, group: Mapping[str, Parameter], tau: float) -> float:
     """Return the Allan variance that a parameter may stand for at most, by what is known of it."""
-    largest = group[name].in_model if group[name].upper is None else group[name].upper
+    size = {key: one.in_model if one.upper is None else one.upper for key, one in group.items()}
     if name in ("B", "T_B"):
-        level, time = group["B"], group["T_B"].in_model if "T_B" in group else None
-        B = level.in_model if level.upper is None else level.upper
-        return float(NoiseModel(B=B or 0.0, T_B=time or None).allan_variance(tau))
-    return float(NoiseModel(**{name: largest or 0.0}).allan_variance(tau))
+        time = group["T_B"].in_model if "T_B" in group else None
+        model = NoiseModel(B=size["B"] or 0.0, T_B=time or None)
+    else:
+        model = replace(NoiseModel(), **{name: size[name] or 0.0})
+    return float(model.allan_variance(tau))
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What a sensor has at one tau, or why it is not known.
+    """What a sensor has at one tau.
 
     Attributes
     ----------
-    candidate : Candidate or None
+    candidate : Candidate
         The channel that answers.
     own, common : float
         Allan variance of one specimen without the common part, and this, SI.
     drawn_own, drawn_common : ndarray, shape (draws,)
         The same of models drawn from the limits of the parameters.
-    reason : str or None
-        Why there is no answer, or no plain number.
+    unknown : str or None
+        The parameters that matter and are not known: there is no plain number.
     """
 
-    candidate: Candidate | None
-    own: float = math.nan
-    common: float = math.nan
-    drawn_own: Array = np.empty(0)
-    drawn_common: Array = np.empty(0)
-    reason: str | None = None
+    candidate: Candidate
+    own: float
+    common: float
+    drawn_own: Array
+    drawn_common: Array
+    unknown: str | None
 
 
 def answer(
@@ -139,8 +140,8 @@ def answer(
     longest: float,
     draws: int,
     seed: int,
-) -> Answer:
-    """Return the Allan variance of a sensor at a tau: that of its median channel.
+) -> Answer | str:
+    """Return the Allan variance of a sensor at a tau, that of its median channel; or why not.
 
     Parameters
     ----------
@@ -161,14 +162,14 @@ def answer(
     """
     measured = [one for one in candidates if not one.simulated] or list(candidates)
     if not measured:
-        return Answer(None, reason=f"no such channel of {sensor}")
+        return f"no such channel of {sensor}"
     long = [one for one in measured if tau <= longest * one.duration]
     if not long:
         most = longest * max(one.duration for one in measured)
-        return Answer(None, reason=f"the logs of {sensor} tell tau up to {most:.3g} s alone")
+        return f"the logs of {sensor} tell tau up to {most:.3g} s alone"
     noisy = sorted((one for one in long if one.model.terms), key=lambda one: one.variance(tau))
     if not noisy:
-        return Answer(None, reason=f"no noise model of {sensor}")
+        return f"no noise model of {sensor}"
     chosen = noisy[len(noisy) // 2]
     stream = channel_rng(seed, chosen.sensor, chosen.recording, chosen.channel, "fusion")
     own, common = _parts([chosen.model], correlation, tau)
@@ -235,24 +236,29 @@ def equivalence_rows(
                         yield names | _pair(answers[a], answers[b], tau)
 
 
-def _pair(a: Answer, b: Answer, tau: float) -> Row:
+def _pair(a: Answer | str, b: Answer | str, tau: float) -> dict[str, Any]:
     row: dict[str, Any] = {}
+    reasons: list[str] = []
     for prefix, one in (("", a), ("other_", b)):
-        if one.candidate is not None:
-            row |= {
-                f"{prefix}recording": one.candidate.recording,
-                f"{prefix}channel": one.candidate.channel,
-                f"{prefix}simulated": one.candidate.simulated,
-                f"{prefix}adev": math.sqrt(one.own + one.common),
-            }
-    reasons = [one.reason for one in (a, b) if one.reason]
-    if a.candidate is None or b.candidate is None:
+        if isinstance(one, str):
+            reasons.append(one)
+            continue
+        if one.unknown:
+            reasons.append(one.unknown)
+        row |= {
+            f"{prefix}recording": one.candidate.recording,
+            f"{prefix}channel": one.candidate.channel,
+            f"{prefix}simulated": one.candidate.simulated,
+            f"{prefix}adev": math.sqrt(one.own + one.common),
+        }
+    plain = not reasons
+    if not isinstance(a, str):
+        row |= {"floor": math.sqrt(a.common), "common_share": a.common / (a.own + a.common)}
+    if isinstance(a, str) or isinstance(b, str):
         return row | {"reason": "; ".join(reasons)}
-    row["floor"] = math.sqrt(a.common)
-    row["common_share"] = a.common / (a.own + a.common)
     number = float(number_needed(a.own, a.common, b.own + b.common))
     drawn = number_needed(a.drawn_own, a.drawn_common, b.drawn_own + b.drawn_common)
-    # Infinite ones are the largest; between two of them there is nothing to interpolate.
+    # Between infinite ones there is nothing to interpolate.
     low, high = np.quantile(drawn, [_TAIL, 1.0 - _TAIL], method="inverted_cdf")
     # The draws of what is absent lie above it: the value itself is inside.
     low, high = min(float(low), number), max(float(high), number)
@@ -260,9 +266,8 @@ def _pair(a: Answer, b: Answer, tau: float) -> Row:
         reasons.append(f"no number of them reaches it at {tau:g} s: the common part is a floor")
     elif math.isinf(high):
         reasons.append("within the limits of the parameters, no number may reach it")
-    plain = math.isfinite(number) and not (a.reason or b.reason)
     return row | {
-        "n": number if plain else None,
+        "n": number if plain and math.isfinite(number) else None,
         "lower": low if math.isfinite(low) else None,
         "upper": high if math.isfinite(high) else None,
         "reachable": math.isfinite(number),

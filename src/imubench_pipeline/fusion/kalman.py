@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
@@ -15,7 +15,6 @@ from imubench_pipeline.fusion.block_means import of_block_means
 from imubench_pipeline.fusion.board import Board, stochastic
 from imubench_pipeline.fusion.riccati import steady_covariance
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, bias_instability
-from imubench_pipeline.state_space import StateSpace
 
 Array = NDArray[np.float64]
 
@@ -140,36 +139,34 @@ class KalmanFusion:
             yield fused
 
 
+@dataclass(frozen=True)
 class _Space:
     """The states of all sensors of a board, and of what they share."""
 
-    def __init__(self, spaces: Sequence[StateSpace], outputs: Sequence[Array], white: Array):
-        self.transition = np.asarray(block_diag(*(space.transition for space in spaces)))
-        self.process_noise = np.asarray(block_diag(*(space.process_noise for space in spaces)))
-        self.output = np.concatenate(
-            [np.outer(gains, s.output) for gains, s in zip(outputs, spaces, strict=True)], axis=1
-        )
-        self.white = white
-        states = self.output.shape[1]
-        # block_diag gives a row to a block of no states at all.
-        self.transition = self.transition.reshape(states, states)
-        self.process_noise = self.process_noise.reshape(states, states)
+    transition: Array
+    process_noise: Array
+    output: Array
+    white: Array
 
 
 def _space(board: Board, longest: float) -> _Space:
     spaces, outputs = [], []
     white = np.zeros((board.sensors, board.sensors))
-    unit = np.eye(board.sensors)
     members = [
-        *zip(board.models, board.rates, board.blocks, unit, strict=True),
+        *zip(board.models, board.rates, board.blocks, np.eye(board.sensors), strict=True),
         *((one.model, board.rate, 1, np.asarray(one.sensitivity)) for one in board.shared),
     ]
     for model, rate, size, gains in members:
         space = of_block_means(_steady(model, longest).state_space(rate, longest), size)
         spaces.append(space)
-        outputs.append(gains)
+        outputs.append(np.outer(gains, space.output))
         white += space.measurement_noise * np.outer(gains, gains)
-    return _Space(spaces, outputs, white)
+    return _Space(
+        np.asarray(block_diag(*(space.transition for space in spaces))),
+        np.asarray(block_diag(*(space.process_noise for space in spaces))),
+        np.concatenate(outputs, axis=1),
+        white,
+    )
 
 
 def _steady(model: NoiseModel, longest: float) -> NoiseModel:

@@ -59,7 +59,7 @@ def steady_covariance(transition: Array, process_noise: Array, information: Arra
         g = g + a.T @ seen @ a
         a = through @ a
         grown, g = (grown + grown.T) / 2.0, (g + g.T) / 2.0
-        change = np.max(np.abs(grown - p)) / np.max(np.abs(grown), initial=1e-300)
+        change = np.max(np.abs(grown - p), initial=0.0) / np.max(np.abs(grown), initial=1e-300)
         p = grown
         if change < _CONVERGED:
             return np.asarray(p * scale**2)
