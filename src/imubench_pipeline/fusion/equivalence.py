@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -103,7 +103,8 @@ def _alone(name: str, group: Mapping[str, Parameter], tau: float) -> float:
         time = group["T_B"].in_model if "T_B" in group else None
         model = NoiseModel(B=size["B"] or 0.0, T_B=time or None)
     else:
-        model = replace(NoiseModel(), **{name: size[name] or 0.0})
+        of = {key: (size[name] or 0.0) * (key == name) for key in ("Q", "N", "K", "R")}
+        model = NoiseModel(Q=of["Q"], N=of["N"], K=of["K"], R=of["R"])
     return float(model.allan_variance(tau))
 
 
