@@ -62,25 +62,27 @@ def test_what_is_alone_and_what_is_common_add_up(shares: list[float]) -> None:
 
 
 def test_only_what_can_be_common_has_a_correlation() -> None:
-    with pytest.raises(ValueError, match="correlation of T_B is 0.5"):
+    with pytest.raises(ValueError, match="correlation of T_B is"):
         divided(MODEL, {"T_B": 0.5})
-    with pytest.raises(ValueError, match="correlation of N is 1.5"):
+    with pytest.raises(ValueError, match="correlation of N is"):
         divided(MODEL, {"N": 1.5})
 
 
 def test_a_common_process_keeps_its_signs() -> None:
     shared = Shared(NoiseModel(K=2.0), [1e-3, -2e-3])
     board = Board([MODEL, MODEL], [100.0, 200.0], [shared])
-    own, common = board.allan_matrices([1.0, 10.0])
-    walk = 4.0 * NoiseModel(K=1.0).allan_variance(np.array([1.0, 10.0]), 100.0)
-    assert common[:, 0, 1] == pytest.approx(-2e-6 * walk)
-    assert common[:, 1, 1] == pytest.approx(4e-6 * walk)
-    assert np.all(own[:, 0, 1] == 0.0)
-    spectra = board.spectral_matrices([0.1])
-    assert spectra[1][0, 0, 1] < 0.0
-    assert spectra[0][0, 1, 1] == pytest.approx(
-        block_mean_spectrum(MODEL, np.array([0.1]), 200.0, 2)[0]
+    tau = np.array([1.0, 10.0])
+    walk = 4.0 * NoiseModel(K=1.0).allan_variance(tau, 100.0)
+    w = np.array([0.7, 0.3])
+    alone, common = board.allan_parts(tau).of_sum(np.tile(w, (2, 1))).T
+    assert common == pytest.approx((0.7e-3 - 0.6e-3) ** 2 * walk)
+    assert alone == pytest.approx(
+        0.49 * MODEL.allan_variance(tau, 100.0) + 0.09 * MODEL.allan_variance(tau, 200.0)
     )
+    spectra = board.spectral_parts([0.1])
+    assert spectra.own[0, 1] == block_mean_spectrum(MODEL, np.array([0.1]), 200.0, 2)[0]
+    delayed = spectra.of_sum(np.array([[1.0, 0.5j]]))
+    assert delayed[0, 1] == pytest.approx(spectra.shared[0, 0] * 2e-6)
 
 
 def test_a_board_that_cannot_be_is_refused() -> None:

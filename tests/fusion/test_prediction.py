@@ -133,7 +133,9 @@ def test_the_limits_of_the_curve_hold_the_prediction_as_often_as_they_say() -> N
 
 def test_a_smoother_by_frequency_has_the_predicted_variance() -> None:
     # The weights applied to the Fourier transform of logs: an independent way to fuse.
-    board = Board([NoiseModel(N=1.0, B=2.0, T_B=3.0), NoiseModel(N=3.0, B=0.5, T_B=30.0)], [10.0] * 2)
+    board = Board(
+        [NoiseModel(N=1.0, B=2.0, T_B=3.0), NoiseModel(N=3.0, B=0.5, T_B=30.0)], [10.0] * 2
+    )
     length = 1 << 16
     given = np.fft.rfft(np.column_stack(logs(board, length, 4)), axis=0)
     omega = 2 * np.pi * np.arange(1, length // 2 + 1) / length

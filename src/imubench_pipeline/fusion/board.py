@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -38,6 +39,45 @@ class Shared:
 
     model: NoiseModel
     sensitivity: Sequence[float]
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Variances of the sensors of a board at several frequencies or tau.
+
+    The covariance of the sensors is diag(own) + sum over s of shared_s g_s g_s^T. It is kept in
+    these parts: where what is common is far the largest, the sum would have lost the rest.
+
+    Attributes
+    ----------
+    own : ndarray, shape (m, n)
+        Of what each sensor has alone, SI^2.
+    shared : ndarray, shape (m, s)
+        Of the shared processes, in their squared units.
+    sensitivities : ndarray, shape (s, n)
+        g: SI per these units.
+    """
+
+    own: Array
+    shared: Array
+    sensitivities: Array
+
+    def of_sum(self, weights: NDArray[Any]) -> Array:
+        """Return the variances of weighed sums, alone and in common.
+
+        Parameters
+        ----------
+        weights : ndarray, shape (m, n)
+            Real or complex.
+
+        Returns
+        -------
+        ndarray, shape (m, 2)
+            SI^2.
+        """
+        alone = np.sum(self.own * np.abs(weights) ** 2, axis=1)
+        common = np.sum(self.shared * np.abs(weights @ self.sensitivities.T) ** 2, axis=1)
+        return np.column_stack((alone, common))
 
 
 @dataclass(frozen=True)
@@ -134,59 +174,47 @@ class Board:
         """Samples of each sensor in one of the fused rate."""
         return [round(rate / self.rate) for rate in self.rates]
 
-    def allan_matrices(self, tau: ArrayLike) -> tuple[Array, Array]:
-        """Return the Allan covariances of what the sensors have alone and in common.
+    @property
+    def sensitivities(self) -> Array:
+        """Those of all shared processes, shape (s, n)."""
+        return np.array([one.sensitivity for one in self.shared], dtype=np.float64).reshape(
+            len(self.shared), self.sensors
+        )
 
-        The Allan variance of a sum with constant weights w is w^T (alone + common) w.
+    def allan_parts(self, tau: ArrayLike) -> Parts:
+        """Return the Allan variances of what the sensors have alone and in common.
 
         Parameters
         ----------
         tau : array_like, shape (m,)
             s; taken to the next whole number of fused samples.
-
-        Returns
-        -------
-        (ndarray, ndarray), shapes (m, n, n)
-            (rad/s)^2 or (m/s^2)^2; the first is diagonal.
         """
         t = np.atleast_1d(np.asarray(tau, dtype=np.float64))
         t = np.rint(t * self.rate) / self.rate
         own = [m.allan_variance(t, r) for m, r in zip(self.models, self.rates, strict=True)]
         common = [one.model.allan_variance(t, self.rate) for one in self.shared]
-        return self._matrices(own, common, len(t))
+        return self._parts(own, common, len(t))
 
-    def spectral_matrices(self, omega: ArrayLike) -> tuple[Array, Array]:
-        """Return the spectra of the fused samples, of what the sensors have alone and in common.
+    def spectral_parts(self, omega: ArrayLike) -> Parts:
+        """Return the spectra of the fused samples; ramps and lines have none.
 
         Parameters
         ----------
         omega : array_like, shape (m,)
             rad a fused sample, above 0.
-
-        Returns
-        -------
-        (ndarray, ndarray), shapes (m, n, n)
-            SI^2; the first is diagonal. Ramps and lines have none.
         """
         w = np.atleast_1d(np.asarray(omega, dtype=np.float64))
-        own: dict[tuple[int, int], Array] = {}  # specimens of one sensor have one spectrum
+        found: dict[tuple[int, int], Array] = {}  # specimens of one sensor have one spectrum
         keys = [(id(m), size) for m, size in zip(self.models, self.blocks, strict=True)]
         for key, model, rate in zip(keys, self.models, self.rates, strict=True):
-            if key not in own:
-                own[key] = block_mean_spectrum(model, w, rate, key[1])
+            if key not in found:
+                found[key] = block_mean_spectrum(model, w, rate, key[1])
         common = [one.model.sampled_spectrum(w, self.rate) for one in self.shared]
-        return self._matrices([own[key] for key in keys], common, len(w))
+        return self._parts([found[key] for key in keys], common, len(w))
 
-    def _matrices(
-        self, own: Sequence[Array], common: Sequence[Array], points: int
-    ) -> tuple[Array, Array]:
-        alone = np.zeros((points, self.sensors, self.sensors))
-        for i, values in enumerate(own):
-            alone[:, i, i] = values
-        together = np.zeros_like(alone)
-        for one, values in zip(self.shared, common, strict=True):
-            together += values[:, None, None] * np.outer(one.sensitivity, one.sensitivity)
-        return alone, together
+    def _parts(self, own: Sequence[Array], common: Sequence[Array], points: int) -> Parts:
+        shared = np.array(common).reshape(len(self.shared), points)
+        return Parts(np.column_stack(own), shared.T, self.sensitivities)
 
 
 def divided(model: NoiseModel, correlation: Mapping[str, float]) -> tuple[NoiseModel, NoiseModel]:

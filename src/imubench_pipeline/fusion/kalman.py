@@ -74,6 +74,8 @@ class KalmanFusion:
         gain = covariance @ space.output.T @ _without_common(of_output)
         self._output = space.output
         self._transition = space.transition
+        # That the signal is not seen must hold to the last digit.
+        gain -= np.outer(gain.sum(axis=1), self.weights)
         self._gain = space.transition @ gain
         self._seen = self.weights @ space.output
         closed = space.transition - self._gain @ space.output

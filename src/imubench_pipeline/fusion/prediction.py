@@ -75,8 +75,8 @@ def fused_psd(board: Board, weights: Weights, frequency: ArrayLike) -> tuple[Arr
 def fused_allan(board: Board, weights: Weights, tau: ArrayLike) -> FusedCurve:
     """Return the Allan variance of a virtual sensor.
 
-    With constant weights it is w^T A w, A the matrix of Allan covariances: the sum of w_i^2 AV_i
-    where nothing is shared. With weights that change with the frequency it is the integral of the
+    With constant weights it is the sum of w_i^2 AV_i and, of each shared process, of
+    (w^T g)^2 AV. With weights that change with the frequency it is the integral of the
     fused spectrum (`quadrature.nodes`; relative error below 1e-7). A ramp passes with the weights
     at frequency 0, a line with those at its own; ramps of several sensors are taken as
     independent, of either sign.
@@ -94,8 +94,7 @@ def fused_allan(board: Board, weights: Weights, tau: ArrayLike) -> FusedCurve:
     sizes = np.maximum(np.rint(np.atleast_1d(np.asarray(tau)) * board.rate).astype(np.int64), 1)
     tau = sizes / board.rate
     if isinstance(weights, Constant):
-        w = weights.values
-        parts = np.stack([np.einsum("i,kij,j->k", w, a, w) for a in board.allan_matrices(tau)], 1)
+        parts = board.allan_parts(tau).of_sum(np.tile(weights.values, (len(tau), 1)))
     else:
         parts = allan_of_spectrum(lambda omega: _spectra(board, weights, omega), sizes)
         parts = parts + _of_deterministic(board, weights, tau)
@@ -104,12 +103,7 @@ def fused_allan(board: Board, weights: Weights, tau: ArrayLike) -> FusedCurve:
 
 def _spectra(board: Board, weights: Weights, omega: Array) -> Array:
     """Return the fused spectra of what is alone and what is common, SI^2, shape (m, 2)."""
-    w = weights.response(omega)
-    found = [
-        np.einsum("ki,kij,kj->k", w.conj(), matrix, w).real
-        for matrix in board.spectral_matrices(omega)
-    ]
-    return np.stack(found, axis=1)
+    return board.spectral_parts(omega).of_sum(weights.response(omega))
 
 
 def _of_deterministic(board: Board, weights: Weights, tau: Array) -> Array:

@@ -8,9 +8,12 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.fusion.board import Board
+from imubench_pipeline.fusion.board import Board, Parts
 
 Array = NDArray[np.float64]
+
+_NEARLY = 1e-14
+"""Variance of a perfect sensor over that of the poorest beside it."""
 
 
 class Weights(Protocol):
@@ -63,8 +66,7 @@ class ByFrequency:
 
     def response(self, omega: Array) -> Array:
         """Return the weights, real: no delay."""
-        alone, common = self.board.spectral_matrices(omega)
-        return _least(alone + common)
+        return least(self.board.spectral_parts(omega))
 
 
 def equal(sensors: int) -> Constant:
@@ -96,21 +98,46 @@ def best_constant(board: Board, tau: float | None = None) -> Constant:
         If a sensor has no noise to weigh it by.
     """
     if tau is None:
-        matrix = np.diag([model.N**2 for model in board.models])
-        for one in board.shared:
-            matrix += one.model.N**2 * np.outer(one.sensitivity, one.sensitivity)
+        own = np.array([[model.N**2 for model in board.models]])
+        shared = np.array([one.model.N**2 for one in board.shared]).reshape(1, -1)
+        parts = Parts(own, shared, board.sensitivities)
     else:
-        alone, common = board.allan_matrices([tau])
-        matrix = (alone + common)[0]
-    if not np.all(np.diag(matrix) > 0.0):
-        raise ValueError("a sensor without noise cannot be weighed by its noise")
-    return Constant(_least(matrix[None])[0])
+        parts = board.allan_parts([tau])
+    if not np.all(parts.own + parts.shared @ parts.sensitivities**2 > 0.0):
+        raise ValueError("a sensor without noise cannot be weighed by it")
+    return Constant(least(parts)[0])
 
 
-def _least(matrices: Array) -> Array:
-    """Return the weights of least w^T S w with a sum of 1, shape (m, n)."""
-    # Matrices of SI units are tiny: solve them scaled to a diagonal of 1.
-    scale = np.sqrt(np.einsum("kii->ki", matrices))
-    unit = matrices / (scale[:, :, None] * scale[:, None, :])
-    solved = np.linalg.solve(unit, (1.0 / scale)[:, :, None])[:, :, 0] / scale
-    return np.asarray(solved / solved.sum(axis=1, keepdims=True))
+def least(parts: Parts) -> Array:
+    """Return the weights of least variance with a sum of 1.
+
+    The sensors are y = 1 x + G c + e, with x not known at all, and c of unit variance the shared
+    processes. Their best estimates follow from normal equations that stay well conditioned
+    however large c is, if what c has in common with x (the mean of G) is set apart.
+
+    Parameters
+    ----------
+    parts : Parts
+
+    Returns
+    -------
+    ndarray, shape (m, n)
+    """
+    # What has nothing of its own is nearly perfect; where none has, all are alike.
+    largest = parts.own.max(axis=1, keepdims=True)
+    own = np.where(parts.own > 0.0, parts.own, np.where(largest > 0.0, _NEARLY * largest, 1.0))
+    root = np.sqrt(parts.shared)
+    mean = parts.sensitivities.mean(axis=1)
+    across = parts.sensitivities - mean[:, None]
+    seen = np.ones((len(own), 1 + len(mean), own.shape[1]))
+    seen[:, 1:] = root[:, :, None] * across
+    # Variances of SI units are tiny: the best of each point is the unit.
+    unit = own.min(axis=1)[:, None, None]
+    seen[:, 1:] /= np.sqrt(unit)
+    weighed = seen * (unit / own[:, None, :])
+    normal = weighed @ seen.transpose(0, 2, 1)
+    normal[:, range(1, 1 + len(mean)), range(1, 1 + len(mean))] += 1.0
+    rows = np.linalg.solve(normal, weighed)
+    lever = root * mean / np.sqrt(unit[:, 0])
+    found = rows[:, 0] - np.einsum("ks,ksn->kn", lever, rows[:, 1:])
+    return np.asarray(found / found.sum(axis=1, keepdims=True))
