@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from imubench_pipeline.report.practical import duration_text, number_text
+from imubench_pipeline.report.practical import number_text
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.view import QUANTITY_NAMES, Row
 
@@ -79,7 +79,7 @@ def equal_numbers(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
             "symbol": f"{row['quantity']}.adev",
             "simulated": bool(row["simulated"]),
             "other_simulated": bool(row["other_simulated"]),
-            "tau": duration_text(row["tau"]),
+            "tau": f"{number_text(row['tau'])} s",
             "seconds": row["tau"],
             "adev": row["adev"],
             "other_adev": row["other_adev"],

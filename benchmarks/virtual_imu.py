@@ -1,6 +1,6 @@
 """Closed form of a virtual IMU against simulated boards of 2 to 8 sensors.
 
-    python benchmarks/fusion.py [--logs 20] [--hours 1]
+    python benchmarks/virtual_imu.py [--logs 20] [--hours 1]
 
 A line a board and way of fusing: the predicted Allan deviation over the measured one (mean of the
 logs) at some tau, and how often the 95 % limits of the measured curve hold the prediction. Below:
