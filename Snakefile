@@ -30,7 +30,7 @@ ASKED = asked(plan)  # memory and time on a cluster
 RESULTS = str(plan.run.results)
 FOLDER = RESULTS + "/recordings/{sensor}/{recording}"
 JOINED = sorted(set(TABLES) - set(OF_ONE_RECORDING))
-RANKED = {"ranking", "coverage", "coverage_by_vendor"}
+RANKED = {"ranking", "fusion", "coverage", "coverage_by_vendor"}
 ESTIMATED = ("parameters", "models", "lines", "spectrum", "fixed_bias")
 ANALYSED = [table for table in JOINED if table not in RANKED]
 PARTS = (
@@ -267,6 +267,23 @@ rule ranking:
         code=plan.code("ranking"),
     run:
         steps.run("ranking", input, output, params, wildcards)
+
+
+rule fusion:
+    input:
+        recordings=RESULTS + "/tables/recordings.parquet",
+        parameters=RESULTS + "/tables/parameters.parquet",
+    output:
+        as_files("fusion"),
+    group:
+        "comparison"
+    resources:
+        **ASKED,
+    params:
+        settings=plan.settings("fusion"),
+        code=plan.code("fusion"),
+    run:
+        steps.run("fusion", input, output, params, wildcards)
 
 
 rule coverage:

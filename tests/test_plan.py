@@ -155,10 +155,11 @@ def test_a_report_is_given_what_its_pages_show(project: dict[str, Any], tmp_path
     assert list(settings["sensors"]) == ["s"]
     assert set(settings["sensors"]["s"]) == {"vendor", "model", "price_class"}
     assert settings["requirements"]["robot"]["title"] == "a robot"
+    assert {"tau", "common"} <= set(settings["settings"]["fusion"])
     assert {"static_window", "latitude"} <= set(settings["settings"]["error_budget"])
     site = site_of({name: build(name, []) for name in TABLES}, plan.report_settings(), tmp_path)
     assert site.title == settings["report"]["title"]
-    assert len(list(pages(site))) == 5
+    assert len(list(pages(site))) == 6
 
 
 def test_a_new_log_does_not_change_the_settings_of_the_report(project: dict[str, Any]) -> None:

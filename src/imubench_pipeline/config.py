@@ -229,6 +229,31 @@ class ExportSettings(Strict):
     )
 
 
+class CommonSettings(Strict):
+    """Part of the variance that specimens of one sensor have in common, 0 to 1."""
+
+    N: float = Field(0.0, ge=0, le=1, description="of the white noise, such as of a shared supply")
+    B: float = Field(0.0, ge=0, le=1, description="of flicker noise and Gauss-Markov processes")
+    K: float = Field(0.0, ge=0, le=1, description="of the random walk, such as of temperature")
+    R: float = Field(0.0, ge=0, le=1, description="of the ramp, such as of ageing")
+
+
+class FusionSettings(Strict):
+    """How many of one sensor equal one of another."""
+
+    tau: tuple[Time, ...] = Field(
+        ("1 s", "10 s", "100 s", "1000 s"), min_length=1, description="where they are compared"
+    )
+    common: CommonSettings = Field(
+        CommonSettings(), description="part of the variance that specimens share: not averaged away"
+    )
+    longest: FractionOfLog = Field(
+        1 / 9, description="longest tau that a log tells, as a part of it"
+    )
+    draws: int = Field(200, ge=100, description="noise models that give the interval of a number")
+    seed: int = Field(20260101, ge=0)
+
+
 class ReportSettings(Strict):
     """The report."""
 
@@ -266,6 +291,7 @@ class Run(Strict):
     datasheet: DatasheetSettings = DatasheetSettings()
     error_budget: ErrorBudgetSettings = ErrorBudgetSettings()
     exports: ExportSettings = ExportSettings()
+    fusion: FusionSettings = FusionSettings()
     report: ReportSettings = ReportSettings()
 
 

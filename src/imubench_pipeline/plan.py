@@ -33,6 +33,7 @@ STEPS: Mapping[str, tuple[str, ...]] = {
     "datasheet": ("datasheet", "results"),
     "error_budget": ("expected_errors", "results"),
     "ranking": ("selection", "results"),
+    "fusion": ("fusion.of_run",),
     "coverage": ("coverage", "results"),
     "exports": ("export.of_run",),
     "sensor_tables": ("results",),
@@ -246,6 +247,7 @@ class Plan:
                         "quality",
                         "datasheet",
                         "error_budget",
+                        "fusion",
                     )
                 },
                 "sensors": self._described("vendor", "model", "price_class"),

@@ -85,6 +85,7 @@ _OF_ALL: Mapping[str, tuple[float, float, float, float]] = {
     "sensor_tables": (300, 2, 1, 0.03),
     "tables": (300, 0.5, 1, 0.005),
     "ranking": (300, 0.1, 1, 0.01),
+    "fusion": (300, 0.2, 6, 0.01),
     "coverage": (300, 0, 1, 0),
     "exports": (300, 0.5, 1, 0.05),
     "figures": (350, 3, 12, 0.06),

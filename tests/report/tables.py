@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from imubench_pipeline.config import FusionSettings
 from imubench_pipeline.drift import drift_rows
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.expected_errors import error_rows, of_requirement, standard
+from imubench_pipeline.fusion.of_run import fusion_rows
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.pooled import pooled_rows
 from imubench_pipeline.recording import LogWriter
@@ -39,6 +41,7 @@ KNOWN = {
     "K": Parameter(MODEL.K, lower=0.5 * MODEL.K, upper=2.0 * MODEL.K),
 }
 WITHOUT_K = KNOWN | {"K": Parameter(None, "absent", "not there", upper=0.5 * MODEL.K)}
+FUSION = FusionSettings(draws=100)
 ROBOT = {
     "title": "a robot",
     "static_window": "10 s",
@@ -195,6 +198,7 @@ def joined(*several: Rows, requirements: Mapping[str, Any] | None = None) -> Tab
         "pooled": build("pooled", pooled_rows(recommended, biases, devices)),
         "drift": build("drift", drift_rows(recommended, biases, about)),
         "ranking": build("ranking", ranking_rows(errors, asked, sensors)),
+        "fusion": build("fusion", fusion_rows(made["recordings"], made["parameters"], FUSION)),
     }
 
 
@@ -214,6 +218,7 @@ def settings_of(
             "settings": {
                 "allan": {"overlap": "octave"},
                 "error_budget": {"static_window": "60 s", "latitude": "45 deg"},
+                "fusion": FUSION.model_dump(mode="json"),
             },
             "sensors": {
                 name: {"vendor": "V & Co", "model": name, "price_class": "cheap"}

@@ -39,7 +39,7 @@ from tests.report.tables import (
 )
 
 ASSETS = {"assets/report.css", "assets/report.js", "assets/plotly.min.js"}
-OF_ALL = {"index.html", "recordings.html", "datasheets.html"}
+OF_ALL = {"index.html", "recordings.html", "datasheets.html", "fusion.html"}
 KEPT = {"pages.json", "settings.json"}
 ASKED = {"robot": ROBOT}
 THEORY_FIGURE = "data:image/svg+xml;base64,PHN2Zy8+"
@@ -551,7 +551,7 @@ def test_a_changed_score_rewrites_its_page_alone(old: Path) -> None:
     written, seen = republished(old, *after)
     assert written == {"recordings/one/day1.html"}
     # These show the tables of the recording, but not this column.
-    assert seen == OF_ALL | {"sensors/one.html"}
+    assert seen == OF_ALL - {"fusion.html"} | {"sensors/one.html"}
 
 
 def test_a_changed_parameter_rewrites_its_page_and_those_that_compare(old: Path) -> None:
@@ -596,8 +596,9 @@ def test_a_new_recording_leaves_the_pages_of_other_sensors_alone(old: Path) -> N
     after = some()
     after.insert(0, recording_rows("one", "day0", ("gyro_x", "gyro_y", "gyro_z"), found=[0.2]))
     written, seen = republished(old, *after)
-    assert written == OF_ALL | {"recordings/one/day0.html", "sensors/one.html"}
-    assert seen == set()
+    # What answers for the sensor is the same as before.
+    assert written == OF_ALL - {"fusion.html"} | {"recordings/one/day0.html", "sensors/one.html"}
+    assert seen == {"fusion.html"}
 
 
 def test_what_is_found_out_about_a_datasheet_reaches_all_pages_that_say_so(old: Path) -> None:

@@ -17,7 +17,7 @@ from tests.workflow.project import CHANNELS, Job, Project, linked, put_log, put_
 pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("workflow")]
 
 STEPS = ("ingest", "allan", "estimate", "reconstruct", "datasheet", "error_budget")
-TOGETHER = {(rule, "") for rule in ("tables", "ranking", "exports", "figures", "report")}
+TOGETHER = {(rule, "") for rule in ("tables", "ranking", "fusion", "exports", "figures", "report")}
 ONE = ("one/a", "one/big")
 ALL = (*ONE, "two/f")
 BIG = 60_000  # samples, of a log above 1 MB

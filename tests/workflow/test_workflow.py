@@ -19,7 +19,7 @@ STEPS_OF_A_RECORDING = dict.fromkeys(
     ("ingest", "allan", "estimate", "reconstruct", "datasheet", "error_budget"), 1
 )
 GLOBAL_STEPS = dict.fromkeys(
-    ("sensor_tables", "tables", "ranking", "exports", "figures", "report"), 1
+    ("sensor_tables", "tables", "ranking", "fusion", "exports", "figures", "report"), 1
 )
 
 
@@ -74,6 +74,7 @@ def test_a_run_leaves_tables_and_a_report(project: Project) -> None:
         "index.html",
         "recordings.html",
         "datasheets.html",
+        "fusion.html",
         "theory.html",
         "made.html",
         "sensors/one.html",

@@ -14,6 +14,7 @@ import pyarrow as pa
 from plotly.offline import get_plotlyjs
 
 from imubench_pipeline.provenance import source_digest
+from imubench_pipeline.report.fusion import fusion_page
 from imubench_pipeline.report.glossary import glossary
 from imubench_pipeline.report.html import environment
 from imubench_pipeline.report.practical import units_of_pages
@@ -56,6 +57,7 @@ def pages(site: Site) -> Iterator[Page]:
             yield device_page(site, path)
     yield recordings_page(site)
     yield datasheets_page(site)
+    yield fusion_page(site)
     yield Page(
         "theory.html",
         "theory.html.jinja",

@@ -23,6 +23,7 @@ NAVIGATION = (
     ("index.html", "Comparison"),
     ("recordings.html", "Recordings"),
     ("datasheets.html", "Datasheets"),
+    ("fusion.html", "Fusion"),
     ("theory.html", "Theory"),
     ("made.html", "How this was made"),
 )

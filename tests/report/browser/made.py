@@ -17,13 +17,14 @@ import numpy as np
 import pyarrow as pa
 
 from imubench_pipeline.comparable import comparables
-from imubench_pipeline.config import Run
+from imubench_pipeline.config import FusionSettings, Run
 from imubench_pipeline.coverage import by_vendor, coverage
 from imubench_pipeline.datasheet import bias_deltas, curve_rms, deltas
 from imubench_pipeline.drift import drift_rows
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.expected_errors import error_rows, of_requirement, standard
 from imubench_pipeline.findings import Finding
+from imubench_pipeline.fusion.of_run import fusion_rows
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.overview import overview
 from imubench_pipeline.pooled import pooled_rows
@@ -277,6 +278,8 @@ def rows_of(logs: Sequence[Log], rejected: Sequence[tuple[str, str]] = ()) -> Ro
     prices = {name: {"price_class": one.price_class} for name, one in SENSORS.items()}
     errors = build("error_budget", rows["error_budget"]).to_pylist()
     rows["ranking"] = [*ranking_rows(errors, REQUIREMENTS, prices)]
+    tables = [build(name, rows[name]) for name in ("recordings", "parameters")]
+    rows["fusion"] = [*fusion_rows(*tables, FusionSettings(draws=100))]
     covered = coverage(SENSORS)
     rows["coverage"] = [asdict(one) for one in covered]
     rows["coverage_by_vendor"] = [asdict(one) for one in by_vendor(covered)]
@@ -310,7 +313,9 @@ def write_samples(log: Log, results: Path) -> None:
 
 def settings_of(sensors: Mapping[str, Sensor], requirements: Mapping[str, Requirement]) -> str:
     run = Run()
-    sections = ("allan", "estimate", "reconstruction", "quality", "datasheet", "error_budget")
+    sections = (
+        "allan", "estimate", "reconstruction", "quality", "datasheet", "error_budget", "fusion",
+    )  # fmt: skip
     return json.dumps(
         {
             "report": {"title": TITLE, "units": "practical"},
@@ -374,7 +379,7 @@ def single(results: Path) -> Site:
     return site_of(tables_of(rows_of([log])), settings, results)
 
 
-OF_SENSORS = ("ranking", "coverage", "coverage_by_vendor", "pooled", "drift")
+OF_SENSORS = ("ranking", "fusion", "coverage", "coverage_by_vendor", "pooled", "drift")
 
 
 def many(results: Path, sensors: int, each: int) -> Site:

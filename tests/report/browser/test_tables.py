@@ -1,5 +1,6 @@
 """Tables: sorted and filtered by the reader, and no longer than a page can bear."""
 
+import math
 from pathlib import Path
 
 import pytest
@@ -38,6 +39,19 @@ def bar_of(table: Locator) -> Locator:
 
 def count(table: Locator) -> str:
     return bar_of(table).locator("output").inner_text()
+
+
+def test_how_many_equal_one_is_asked_for_one_averaging_time(read: Open, bench: Report) -> None:
+    table = table_of(read(bench.folder, "fusion.html"), "Numbers rounded up")
+    worse = {
+        tau: [row for row in bench.of("fusion", tau=tau) if row["adev"] > row["other_adev"]]
+        for tau in (1.0, 10.0)
+    }
+    assert worse[1.0] and worse[10.0]
+    for tau, rows in worse.items():
+        bar_of(table).get_by_label("Tau").select_option(f"{tau:.0f} s")
+        shown = cells(table, 5)
+        assert [text.split("\n")[0] for text in shown] == [str(math.ceil(r["n"])) for r in rows]
 
 
 def test_a_column_is_sorted_up_and_down(read: Open, bench: Report) -> None:

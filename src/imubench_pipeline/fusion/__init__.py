@@ -1,0 +1,1 @@
+"""Several sensors on one board as one virtual sensor: weights, what they give, and the filter."""

@@ -1,0 +1,112 @@
+"""What the pages say of fusion: how many of one sensor equal one of another."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from imubench_pipeline.report.practical import number_text
+from imubench_pipeline.report.site import Page, Site
+from imubench_pipeline.report.view import QUANTITY_NAMES, Row
+
+_PARAMETERS = {"N": "white noise", "B": "bias instability", "K": "random walk", "R": "ramp"}
+
+
+def fusion_page(site: Site) -> Page:
+    """Return the page that says how many of one sensor equal one of another."""
+    key = site.key_of(site.rows("fusion"))
+    return Page("fusion.html", "fusion.html.jinja", key, lambda: _context(site))
+
+
+def _context(site: Site) -> dict[str, Any]:
+    lines = list(equal_numbers(site.rows("fusion")))
+    price_classes = {
+        name: site.settings["sensors"].get(name, {}).get("price_class") for name in site.sensors
+    }
+    filters = {
+        "tau": list(dict.fromkeys(line["tau"] for line in lines)),
+        "quantity": list(dict.fromkeys(line["quantity"] for line in lines)),
+        "wanted": list(dict.fromkeys(site.names[line["other"]] for line in lines)),
+        "sensor": list(dict.fromkeys(site.names[line["sensor"]] for line in lines)),
+    }
+    return {
+        "lines": lines,
+        "filters": filters,
+        "shared": shared_words(site.settings["settings"]["fusion"]["common"]),
+        "price_classes": price_classes,
+    }
+
+
+def shared_words(common: Mapping[str, float]) -> str:
+    """Return what specimens of one sensor are taken to have in common, in words.
+
+    Parameters
+    ----------
+    common : mapping of str to float
+        Part of the variance of N, B, K and R.
+    """
+    named = [
+        f"{number_text(100.0 * share, 3)} % of the variance of the {_PARAMETERS[name]} ({name})"
+        for name, share in common.items()
+        if share > 0.0
+    ]
+    if not named:
+        return (
+            "Nothing is taken to be common: the noise of each specimen is independent. "
+            "What they follow together (temperature, supply, motion) makes the numbers too small."
+        )
+    return f"Specimens of one sensor are taken to have in common {', '.join(named)}."
+
+
+def equal_numbers(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
+    """Yield the lines of the table: pairs of which the first is the worse one, or not known.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        The table ``fusion``.
+    """
+    for row in rows:
+        if row["adev"] is not None and row["other_adev"] is not None:
+            if row["adev"] <= row["other_adev"]:
+                continue
+        elif row["sensor"] > row["other"]:
+            continue  # what is not known of a pair is said once
+        yield {
+            **{name: row[name] for name in ("sensor", "other", "n", "reason")},
+            "quantity": QUANTITY_NAMES[row["quantity"]],
+            "symbol": f"{row['quantity']}.adev",
+            "simulated": bool(row["simulated"]),
+            "other_simulated": bool(row["other_simulated"]),
+            "tau": f"{number_text(row['tau'])} s",
+            "seconds": row["tau"],
+            "adev": row["adev"],
+            "other_adev": row["other_adev"],
+            "number": _number(row),
+            "limits": _limits(row),
+            "common": "–"
+            if row["common_share"] is None
+            else f"{number_text(100.0 * row['common_share'], 3)} %",
+        }
+
+
+def _number(row: Row) -> str:
+    """Return the least whole number of sensors that is enough."""
+    if row["reachable"] is False:
+        return "no number"
+    return "–" if row["n"] is None else _whole(row["n"])
+
+
+def _limits(row: Row) -> str:
+    if row["lower"] is None:
+        return ""
+    if row["upper"] is None:
+        return f"{_whole(row['lower'])} or more"
+    lower, upper = _whole(row["lower"]), _whole(row["upper"])
+    return lower if lower == upper else f"{lower} to {upper}"
+
+
+def _whole(number: float) -> str:
+    # A number that rounding alone puts above a whole one is that one.
+    return number_text(max(math.ceil(number * (1.0 - 1e-9)), 1), 4)

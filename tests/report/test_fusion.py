@@ -1,0 +1,70 @@
+from pathlib import Path
+from typing import Any
+
+from imubench_pipeline.report.fusion import equal_numbers, fusion_page, shared_words
+from imubench_pipeline.tables import build
+from tests.report.tables import joined, recording_rows, site
+
+ROW = {"quantity": "gyro", "tau": 10.0, "sensor": "a", "recording": "r", "channel": "gyro_x",
+       "simulated": True, "adev": 3e-5, "floor": 1e-6, "common_share": 0.125, "other": "b",
+       "other_recording": "q", "other_channel": "gyro_z", "other_simulated": False,
+       "other_adev": 1e-5, "n": 10.2, "lower": 8.0, "upper": 12.9,
+       "reachable": True}  # fmt: skip
+
+
+def line(**changes: Any) -> dict[str, Any]:
+    (found,) = equal_numbers(build("fusion", [ROW | changes]).to_pylist())
+    return found
+
+
+def test_numbers_are_rounded_up() -> None:
+    found = line()
+    assert (found["number"], found["limits"]) == ("11", "8 to 13")
+    assert (found["tau"], found["common"], found["quantity"]) == ("10 s", "12.5 %", "Gyroscope")
+    assert (found["simulated"], found["other_simulated"]) == (True, False)
+    assert line(n=9.000000000001)["number"] == "9"
+    assert line(n=1.2, lower=0.4, upper=2.0)["limits"] == "1 to 2"
+    assert line(n=9.5, lower=9.1, upper=9.9)["limits"] == "10"
+
+
+def test_what_no_number_reaches_is_said() -> None:
+    found = line(n=None, lower=None, upper=None, reachable=False, reason="a floor")
+    assert (found["number"], found["limits"], found["reason"]) == ("no number", "", "a floor")
+    assert line(upper=None)["limits"] == "8 or more"
+    assert line(n=None)["number"] == "–"
+
+
+def test_only_the_worse_of_two_is_multiplied() -> None:
+    rows = build("fusion", [ROW | {"adev": 1e-5, "other_adev": 3e-5, "n": 0.1}]).to_pylist()
+    assert list(equal_numbers(rows)) == []
+
+
+def test_what_is_not_known_of_a_pair_is_said_once() -> None:
+    nothing = dict.fromkeys(("adev", "floor", "common_share", "n", "lower", "upper", "reachable"))
+    one = ROW | nothing | {"reason": "too short"}
+    two = one | {"sensor": "b", "other": "a", "adev": 1e-5, "other_adev": None}
+    (found,) = equal_numbers(build("fusion", [one, two]).to_pylist())
+    assert (found["sensor"], found["number"], found["common"]) == ("a", "–", "–")
+
+
+def test_the_page_says_what_it_assumes() -> None:
+    assert "independent" in shared_words({"N": 0.0, "B": 0.0, "K": 0.0, "R": 0.0})
+    assert shared_words({"N": 0.125, "B": 0.0, "K": 1.0, "R": 0.0}) == (
+        "Specimens of one sensor are taken to have in common 12.5 % of the variance of the white "
+        "noise (N), 100 % of the variance of the random walk (K)."
+    )
+
+
+def test_sensors_that_are_alike_have_no_line_and_one_where_nothing_is_known(
+    tmp_path: Path,
+) -> None:
+    made = site(joined(*(recording_rows(name) for name in ("one", "two"))), tmp_path)
+    (found,) = fusion_page(made).context()["lines"]
+    assert (found["tau"], found["number"]) == ("1000 s", "–")
+    assert found["reason"].startswith("the logs of one tell tau up to 800 s alone")
+
+
+def test_a_single_sensor_is_not_compared(tmp_path: Path) -> None:
+    found = fusion_page(site(joined(recording_rows("one")), tmp_path)).context()
+    assert found["lines"] == []
+    assert set(found["price_classes"]) == {"one"}
