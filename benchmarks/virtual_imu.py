@@ -21,7 +21,7 @@ from imubench_pipeline.fusion.board import Board, Shared
 from imubench_pipeline.fusion.kalman import KalmanFusion
 from imubench_pipeline.fusion.prediction import fused_allan
 from imubench_pipeline.fusion.samples import fuse
-from imubench_pipeline.fusion.weights import ByFrequency, best_constant, equal
+from imubench_pipeline.fusion.weights import ByFrequency, Constant, best_constant, equal
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.simulate import simulate
 
@@ -75,7 +75,11 @@ def main() -> None:
     hits, points = 0.0, 0
     for name, board in boards():
         kalman = KalmanFusion(board)
-        ways = {"equal": equal(board.sensors), "10 s": best_constant(board, 10.0), "Kalman": kalman}
+        ways: dict[str, Constant | KalmanFusion] = {
+            "equal": equal(board.sensors),
+            "10 s": best_constant(board, 10.0),
+            "Kalman": kalman,
+        }
         best = fused_allan(board, ByFrequency(board), sizes / RATE).deviation
         losses.append((name, fused_allan(board, kalman, sizes / RATE).deviation / best))
         variances = {way: np.zeros(len(sizes)) for way in ways}
