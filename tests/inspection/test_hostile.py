@@ -73,9 +73,9 @@ def test_what_is_no_log_is_refused(tmp_path: Path, name: str) -> None:
 def test_hostile_texts(tmp_path: Path) -> None:
     for name, make in FILES.items():
         path = saved(tmp_path, make(), name)
-        begin = time.monotonic()
+        begin = time.process_time()
         survives(path)
-        assert time.monotonic() - begin < 12, name
+        assert time.process_time() - begin < 12, name
 
 
 HOSTILE_NAMES = [
@@ -89,9 +89,9 @@ HOSTILE_NAMES = [
 def test_hostile_names(tmp_path: Path) -> None:
     rows = np.random.default_rng(3).standard_normal((len(HOSTILE_NAMES), 20)).tolist()
     path = saved(tmp_path, text(HOSTILE_NAMES, rows))
-    begin = time.monotonic()
+    begin = time.process_time()
     survives(path)
-    assert time.monotonic() - begin < 12
+    assert time.process_time() - begin < 12
     pq.write_table(pa.table(rows, names=HOSTILE_NAMES), tmp_path / "b")
     survives(tmp_path / "b")
     pq.write_table(
@@ -152,16 +152,17 @@ def test_a_long_log_is_not_read_to_its_end(tmp_path: Path, si: Columns) -> None:
         for _ in range(400_000_000 // len(body)):
             file.write(body)
     code = (
-        "import sys; from pathlib import Path; from imubench_pipeline.inspection import inspect; "
+        "import sys, time; from pathlib import Path; "
+        "from imubench_pipeline.inspection import inspect; "
         "inspect(Path(sys.argv[1])); status = Path('/proc/self/status').read_text(); "
-        "print(status.partition('VmHWM:')[2].split()[0])"
+        "print(status.partition('VmHWM:')[2].split()[0], time.process_time())"
     )
-    begin = time.monotonic()
     done = subprocess.run(
         [sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True
     )
-    assert time.monotonic() - begin < 15
-    assert int(done.stdout) < 400_000
+    memory, seconds = done.stdout.split()
+    assert float(seconds) < 15
+    assert int(memory) < 400_000
 
 
 def test_a_zip_of_many_files_is_bounded(tmp_path: Path) -> None:
