@@ -1,6 +1,6 @@
 import math
 import re
-from decimal import ROUND_HALF_EVEN, Decimal
+from decimal import ROUND_HALF_UP, Decimal
 
 import pytest
 from hypothesis import example, given
@@ -23,11 +23,11 @@ SYMBOLS = {"Q", "N", "B", "T_B", "K", "R", "adev", "psd", "signal"}
 
 
 def rounded(value: float, digits: int) -> Decimal:
-    """Decimal's own rounding of the exact value of a float, half to even."""
+    """Decimal's own rounding of the exact value of a float, half away from zero."""
     exact = Decimal(value)
     if not exact:
         return exact
-    return exact.quantize(Decimal((0, (1,), exact.adjusted() - digits + 1)), ROUND_HALF_EVEN)
+    return exact.quantize(Decimal((0, (1,), exact.adjusted() - digits + 1)), ROUND_HALF_UP)
 
 
 def number_of(text: str) -> Decimal:
@@ -46,6 +46,7 @@ magnitudes = st.builds(
 @given(magnitudes, st.integers(1, 7))
 @example(999.95, 4)
 @example(9.9995e-5, 4)
+@example(-2.5, 1)
 @example(999_999.5, 6)
 @example(0.5, 1)
 @example(12345.67, 7)
