@@ -1,0 +1,392 @@
+"""Temperature and noise of a log, estimated together: sensitivity, lag, bias, and what is left.
+
+y(t) = bias + s (T_L(t) - T_0) + q (T_L(t) - T_0)^2 + noise, with T_L behind a first-order lag L and
+T_0 the mean temperature of the log (a convention: it sets what `bias` means). For given noise the
+rest is generalised least squares on the DCT coefficients; for given s, q and L the noise is a
+Whittle fit of what they leave; in turn until they settle.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.estimators import likelihood
+from imubench_pipeline.estimators.estimate import Parameter
+from imubench_pipeline.estimators.likelihood import Likelihood
+from imubench_pipeline.estimators.model_choice import Candidate, compare
+from imubench_pipeline.estimators.whittle import Whittle, whittle_of
+from imubench_pipeline.missing import block_means, divided, filled, slow_part
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.spectrum import LineSpectrum, Spectrum, block_of, spectra
+from imubench_pipeline.thermal.path import TemperaturePath
+from imubench_pipeline.thermal.products import BlockSeries, Coefficients
+from imubench_pipeline.thermal.regression import Regression, Regressors
+from imubench_pipeline.thermal.uncertainty import Verdict, judge
+
+Array = NDArray[np.float64]
+Span = tuple[int, int]
+
+_MOST_ROUNDS = 10
+_SETTLED = 0.02
+_QUANTIZATION_BAND = 1 / 10
+_SQUARE = 4.0
+"""Log likelihood by which the square of the temperature must be the better, beyond BIC."""
+
+_FEWEST_BINS = 24
+
+
+@dataclass(frozen=True)
+class ThermalFit:
+    """What temperature does to a channel.
+
+    Attributes
+    ----------
+    reference : float
+        T_0, the mean temperature, °C.
+    sensitivity, quadratic : Parameter
+        s and q, SI per K and per K²; q has status ``absent`` where it is not in the model.
+    lag : Parameter
+        L, s.
+    bias : Parameter
+        Mean of the log, at T_0, SI.
+    compensated : bool
+        Temperature is taken out of the noise: the interval of s (or q) excludes 0, and BIC
+        favours it.
+    reason : str
+        Why it is, or is not.
+    plain, without_temperature : Likelihood
+        The noise of the log as it is, and of what temperature leaves of it; the same where
+        nothing is taken out.
+    effect : ndarray, shape (k,)
+        What temperature adds to the log at the knots of the path, SI; zeros where nothing is
+        taken out.
+    sample : ndarray, shape (k,)
+        Those knots, on the grid of the log.
+    """
+
+    reference: float
+    sensitivity: Parameter
+    quadratic: Parameter
+    lag: Parameter
+    bias: Parameter
+    compensated: bool
+    reason: str
+    plain: Likelihood
+    without_temperature: Likelihood
+    effect: Array
+    sample: Array
+
+    def compensate(self, blocks: Iterable[Array]) -> Iterator[Array]:
+        """Yield the blocks of the log less what temperature adds to it."""
+        reached = 0
+        for values in blocks:
+            points = np.arange(reached, reached + len(values))
+            yield values - np.interp(points, self.sample, self.effect)
+            reached += len(values)
+
+
+def fit_temperature(
+    blocks: Callable[[], Iterable[Array]],
+    samples: int,
+    rate: float,
+    path: TemperaturePath,
+    *,
+    holes: bool = False,
+    band: float | None = None,
+    bandwidth: float | None = None,
+    quadratic: bool | None = None,
+    longest_lag: float | None = None,
+    rng: np.random.Generator,
+) -> ThermalFit:
+    """Estimate what temperature does to a channel, together with its noise.
+
+    Parameters
+    ----------
+    blocks : callable
+        Gives the log in order, in SI, as often as it is called; NaN where a sample is missing.
+    samples : int
+        L, the length of all blocks together.
+    rate : float
+        Hz.
+    path : TemperaturePath
+        Temperature of the log; its segments are those of the log.
+    holes : bool
+        Samples may be missing.
+    band, bandwidth : float, optional
+        As in `imubench_pipeline.estimators.likelihood.fit`.
+    quadratic : bool, optional
+        Whether the square of the temperature is in the model; by default where the log favours
+        it.
+    longest_lag : float, optional
+        s; by default a tenth of the log, at most an hour. 0: no lag.
+    rng : numpy.random.Generator
+
+    Raises
+    ------
+    ValueError
+        If the log has fewer than 16 samples.
+
+    References
+    ----------
+    A. C. Aitken, "On least squares and linear combinations of observations", Proc. R. Soc.
+    Edinburgh 55, 1935; H. D. Patterson and R. Thompson, "Recovery of inter-block information
+    when block sizes are unequal", Biometrika 58, 1971.
+    """
+    spans = path.segments
+    if holes:
+        means = block_means(blocks(), spans)
+        spans = divided(means, spans)
+        plain = likelihood.fit_blocks(
+            blocks,
+            samples,
+            rate,
+            holes=True,
+            segments=path.segments,
+            band=band,
+            bandwidth=bandwidth,
+            rng=rng,
+        )
+        model, effect = plain.estimates[0].model, np.zeros(len(path.value))
+        for _ in range(2):
+            complete = _complete(blocks, spans, model, path, effect, rate, rng)
+            fit = _Fit(complete, samples, rate, spans, path, band, bandwidth, longest_lag)
+            if not fit.possible:
+                break
+            found = fit.settle(quadratic)
+            model, effect = _model_of(found), found.regressors.effect(found.regression)
+    else:
+        fit = _Fit(blocks(), samples, rate, spans, path, band, bandwidth, longest_lag)
+        plain = likelihood.fit_spectrum(
+            fit.spectrum, fit.lines, band=band, bandwidth=bandwidth, rng=rng
+        )
+    if not fit.possible:
+        return _nothing(plain, path, fit, "too short a log")
+    if not path.range > 0.0 or path.range < 2.0 * float(np.median(path.deviation)):
+        return _nothing(plain, path, fit, f"the temperature changes by {path.range:.2g} K only")
+    found = fit.settle(quadratic)
+    verdict = judge(
+        found.regressors,
+        found.regression,
+        found.whittle,
+        found.candidates,
+        fit.lags,
+        plain_bic=compare(fit.whittle, quantization=fit.quantization)[0].bic,
+        rng=rng,
+    )
+    return _described(fit, found, verdict, plain, path, band, bandwidth, rng)
+
+
+@dataclass(frozen=True)
+class _Found:
+    """Where the fit has settled."""
+
+    regressors: Regressors
+    regression: Regression
+    whittle: Whittle
+    candidates: Sequence[Candidate]
+    cost: float
+
+
+class _Fit:
+    """The spectrum of a complete log, and its products with the temperature."""
+
+    def __init__(
+        self,
+        blocks: Iterable[Array],
+        samples: int,
+        rate: float,
+        spans: Sequence[Span],
+        path: TemperaturePath,
+        band: float | None,
+        bandwidth: float | None,
+        longest_lag: float | None,
+    ) -> None:
+        series = BlockSeries(spans, block_of(spans))
+        self.spectrum: Spectrum
+        self.lines: list[LineSpectrum]
+        self.spectrum, self.lines = spectra(series.watch(blocks), samples, rate, spans)
+        self.series = series
+        _, self.used, limit = likelihood.lines_and_band(self.spectrum, self.lines, band, bandwidth)
+        self.possible = bool(self.used.sum() >= _FEWEST_BINS)
+        if not self.possible:
+            return
+        self.chosen = self.spectrum.taken(self.used)
+        self.whittle = whittle_of(self.chosen, limit.highest)
+        self.quantization = limit.highest >= _QUANTIZATION_BAND * rate
+        self.regressors = Regressors(
+            Coefficients(self.spectrum, series), path, rate, path.mean, self.used
+        )
+        self.lags = self.regressors.lags(longest_lag)
+
+    def settle(self, quadratic: bool | None) -> _Found:
+        """Return the joint fit; the square is tried where nothing is said of it."""
+        found = self._best(self.regressors.also(quadratic=bool(quadratic)))
+        if quadratic is None:
+            squared = self._best(self.regressors.also(quadratic=True))
+            if squared.cost < found.cost - 0.5 * math.log(len(self.chosen.density)) - _SQUARE:
+                found = squared
+        return found
+
+    def _best(self, regressors: Regressors) -> _Found:
+        """Settle from the noise of the log as it is, and from that of ordinary least squares."""
+        flat = self.chosen.ordinates * np.ones(len(self.chosen.density))
+        starts = [self._weights(self.whittle, self.chosen)[0]]
+        rough = regressors.at(0.0, flat)
+        left = regressors.without(self.chosen, rough, flat)
+        starts.append(self._weights(self.whittle.of(left), self.chosen)[0])
+        return min((self._settle(regressors, start) for start in starts), key=lambda f: f.cost)
+
+    def _weights(
+        self, whittle: Whittle, spectrum: Spectrum
+    ) -> tuple[Array, Sequence[Candidate]]:
+        candidates = compare(whittle, quantization=self.quantization)
+        return spectrum.ordinates / whittle.density(candidates[0].found), candidates
+
+    def _settle(self, regressors: Regressors, weights: Array) -> _Found:
+        before: Regression | None = None
+        for _ in range(_MOST_ROUNDS):
+            found = regressors.best(weights, self.lags)
+            left = regressors.without(self.chosen, found, weights)
+            whittle = self.whittle.of(left)
+            weights, candidates = self._weights(whittle, self.chosen)
+            ramp = candidates[0].found.terms.ramp
+            if ramp != regressors.ramp:
+                regressors = regressors.also(ramp=ramp)
+                before = None
+                continue
+            if before is not None:
+                spread = math.sqrt(found.covariance[0, 0])
+                if abs(found.beta[0] - before.beta[0]) < _SETTLED * spread:
+                    break
+            before = found
+        best = candidates[0]
+        density = whittle.density(best.found)
+        plain = self.chosen.ordinates
+        # With the ordinates of the log: those that the fit takes are counted as its parameters.
+        data = whittle.data(best.found) * whittle.spectrum.ordinates / plain
+        cost = 0.5 * float(np.sum(plain * (np.log(density) + data / density)))
+        free = best.found.terms.parameters + len(found.beta) - ramp + (found.lag > 0.0)
+        cost += 0.5 * free * math.log(len(density))
+        return _Found(regressors, found, whittle, candidates, cost)
+
+
+def _model_of(found: _Found) -> NoiseModel:
+    return likelihood.model_of(found.candidates[0].found)
+
+
+def _complete(
+    blocks: Callable[[], Iterable[Array]],
+    spans: Sequence[Span],
+    model: NoiseModel,
+    path: TemperaturePath,
+    effect: Array,
+    rate: float,
+    rng: np.random.Generator,
+) -> Iterator[Array]:
+    """Yield the log with its missing samples drawn: temperature's effect, and noise."""
+
+    def shifted(values: Iterable[Array], sign: float) -> Iterator[Array]:
+        reached = 0
+        for part in values:
+            points = np.arange(reached, reached + len(part))
+            yield part + sign * np.interp(points, path.sample, effect)
+            reached += len(part)
+
+    means = block_means(shifted(blocks(), -1.0), spans)
+    slow = slow_part(means, spans, model, rate, rng)
+    return shifted(filled(shifted(blocks(), -1.0), slow, model, rate, rng), 1.0)
+
+
+def _described(
+    fit: _Fit,
+    found: _Found,
+    verdict: Verdict,
+    plain: Likelihood,
+    path: TemperaturePath,
+    band: float | None,
+    bandwidth: float | None,
+    rng: np.random.Generator,
+) -> ThermalFit:
+    """Return the fit as it is told, with the noise that temperature leaves."""
+    without, effect = plain, np.zeros(len(path.value))
+    mean = fit.spectrum.mean
+    if verdict.compensated:
+        everything = np.ones(len(fit.used), dtype=np.bool_)
+        regressors = Regressors(
+            found.regressors.coefficients,
+            path,
+            fit.spectrum.rate,
+            path.mean,
+            everything,
+            quadratic=found.regressors.quadratic,
+            ramp=found.regressors.ramp,
+        )
+        weights = np.zeros(len(fit.used))
+        weights[fit.used] = fit.chosen.ordinates / found.whittle.density(
+            found.candidates[0].found
+        )
+        left = regressors.without(fit.spectrum, found.regression, weights)
+        without = likelihood.fit_spectrum(left, fit.lines, band=band, bandwidth=bandwidth, rng=rng)
+        effect = regressors.effect(found.regression)
+    at_centres = [np.interp(centres, path.sample, effect) for centres in fit.series.centres]
+    shift = float(np.concatenate(at_centres).mean())
+    spread = math.hypot(
+        _mean_error(without.estimates[0].model, fit.spectrum), verdict.temperature_error
+    )
+    bias = Parameter(
+        mean - shift, lower=mean - shift - 1.96 * spread, upper=mean - shift + 1.96 * spread
+    )
+    return ThermalFit(
+        path.mean,
+        verdict.sensitivity,
+        verdict.quadratic,
+        verdict.lag,
+        bias,
+        verdict.compensated,
+        verdict.reason,
+        plain,
+        without,
+        effect,
+        path.sample,
+    )
+
+
+def _nothing(
+    plain: Likelihood, path: TemperaturePath, fit: _Fit, reason: str
+) -> ThermalFit:
+    unknown = Parameter(None, "not_identified", reason)
+    mean, spread = fit.spectrum.mean, _mean_error(plain.estimates[0].model, fit.spectrum)
+    return ThermalFit(
+        path.mean,
+        unknown,
+        unknown,
+        unknown,
+        Parameter(mean, lower=mean - 1.96 * spread, upper=mean + 1.96 * spread),
+        False,
+        reason,
+        plain,
+        plain,
+        np.zeros(len(path.value)),
+        path.sample,
+    )
+
+
+def _mean_error(model: NoiseModel, spectrum: Spectrum) -> float:
+    """Return the standard deviation of the mean of a log about the bias at its beginning.
+
+    A random walk counts from 0 at the beginning of the log.
+    """
+    T, whole = 1.0 / spectrum.rate, spectrum.duration
+    total = model.N**2 / whole + model.K**2 * whole / 3.0
+    for term in model.realised(T, whole):
+        T_B = getattr(term, "T_B", None)
+        if T_B is not None:
+            variance = float(term.state_space(T).initial_variance[0, 0])
+            x = whole / T_B
+            total += 2.0 * variance / x * (1.0 + math.expm1(-x) / x)
+    return math.sqrt(total)
