@@ -175,7 +175,7 @@ def fit_temperature(
         found.whittle,
         found.candidates,
         fit.lags,
-        plain_bic=compare(fit.whittle, quantization=fit.quantization)[0].bic,
+        gained=2.0 * (fit.plain() - found.cost),
         rng=rng,
     )
     return _described(fit, found, verdict, plain, path, band, bandwidth, rng)
@@ -264,15 +264,24 @@ class _Fit:
                 if abs(found.beta[0] - before.beta[0]) < _SETTLED * spread:
                     break
             before = found
-        best = candidates[0]
-        density = whittle.density(best.found)
-        plain = self.chosen.ordinates
-        # With the ordinates of the log: those that the fit takes are counted as its parameters.
-        data = whittle.data(best.found) * whittle.spectrum.ordinates / plain
-        cost = 0.5 * float(np.sum(plain * (np.log(density) + data / density)))
-        free = best.found.terms.parameters + len(found.beta) - ramp + (found.lag > 0.0)
-        cost += 0.5 * free * math.log(len(density))
-        return _Found(regressors, found, whittle, candidates, cost)
+        free = candidates[0].found.terms.parameters + len(found.beta) - ramp + (found.lag > 0.0)
+        return _Found(regressors, found, whittle, candidates, self._cost(whittle, candidates, free))
+
+    def _cost(self, whittle: Whittle, candidates: Sequence[Candidate], free: int) -> float:
+        """Return half the BIC, with the ordinates of the log.
+
+        Those that a fit takes are counted as its parameters.
+        """
+        found, ordinates = candidates[0].found, self.chosen.ordinates
+        density = whittle.density(found)
+        data = whittle.data(found) * whittle.spectrum.ordinates / ordinates
+        cost = 0.5 * float(np.sum(ordinates * (np.log(density) + data / density)))
+        return cost + 0.5 * free * math.log(len(density))
+
+    def plain(self) -> float:
+        """Return half the BIC of the best noise without temperature."""
+        candidates = compare(self.whittle, quantization=self.quantization)
+        return self._cost(self.whittle, candidates, candidates[0].found.terms.parameters)
 
 
 def _model_of(found: _Found) -> NoiseModel:

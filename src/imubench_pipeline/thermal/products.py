@@ -105,6 +105,7 @@ class Coefficients:
         self._kept = kept[np.argsort(f[kept], kind="stable")]
         self._edges = np.concatenate(([0], np.cumsum(counts)[:-1]))
         self._counts = counts
+        self.ordinates = spectrum.ordinates
         self.log = self._of(series.means)
 
     def _of(self, parts: Sequence[Array]) -> Array:

@@ -85,6 +85,7 @@ class Regressors:
         self.quadratic, self.ramp = quadratic, ramp
         self._known: dict[float, Products] = {}
         self._time = coefficients.of_time(rate)
+        self.ordinates = coefficients.ordinates[used]
 
     def also(self, *, quadratic: bool | None = None, ramp: bool | None = None) -> Regressors:
         """Return the regressors with or without the square, and time."""
