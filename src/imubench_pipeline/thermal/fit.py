@@ -34,8 +34,11 @@ Span = tuple[int, int]
 _MOST_ROUNDS = 10
 _SETTLED = 0.02
 _QUANTIZATION_BAND = 1 / 10
-_SQUARE = 4.0
-"""Log likelihood by which the square of the temperature must be the better, beyond BIC."""
+_SETTLING = (1 / 64, 1 / 32, 1 / 16)
+"""Parts of the log at its beginning in which a sensor may settle."""
+
+_BEYOND = 4.0
+"""Log likelihood by which the square, or a beginning apart, must be the better beyond BIC."""
 
 _FEWEST_BINS = 24
 
@@ -224,13 +227,32 @@ class _Fit:
         self.lags = self.regressors.lags(longest_lag)
 
     def settle(self, quadratic: bool | None) -> _Found:
-        """Return the joint fit; the square is tried where nothing is said of it."""
+        """Return the joint fit; the square is tried where nothing is said of it.
+
+        So is another sensitivity at the beginning, where a sensor settles.
+        """
+        needed = 0.5 * math.log(len(self.chosen.density)) + _BEYOND
         found = self._best(self.regressors.also(quadratic=bool(quadratic)))
-        if quadratic is None:
-            squared = self._best(self.regressors.also(quadratic=True))
-            if squared.cost < found.cost - 0.5 * math.log(len(self.chosen.density)) - _SQUARE:
-                found = squared
+        duration = self.spectrum.duration
+        for _ in range(2):
+            tried = [found.regressors.also(settling=part * duration) for part in _SETTLING]
+            tried = [] if found.regressors.settling else tried
+            if quadratic is None and not found.regressors.quadratic:
+                tried.append(found.regressors.also(quadratic=True))
+            gains = [self._gained(found, regressors) for regressors in tried]
+            if not gains or max(gains) < needed:
+                break
+            wider = self._best(tried[int(np.argmax(gains))])
+            if wider.cost > found.cost - _BEYOND:
+                break
+            found = wider
         return found
+
+    def _gained(self, found: _Found, regressors: Regressors) -> float:
+        """Return the log likelihood that more regressors gain, for the noise as it is fitted."""
+        density = found.whittle.density(found.candidates[0].found)
+        wider = regressors.at(found.regression.lag, self.chosen.ordinates / density)
+        return wider.gain - found.regression.gain
 
     def _best(self, regressors: Regressors) -> _Found:
         """Settle from the noise of the log as it is, and from that of ordinary least squares."""
@@ -325,16 +347,7 @@ def _described(
     without, effect = plain, np.zeros(len(path.value))
     mean = fit.spectrum.mean
     if verdict.compensated:
-        everything = np.ones(len(fit.used), dtype=np.bool_)
-        regressors = Regressors(
-            found.regressors.coefficients,
-            path,
-            fit.spectrum.rate,
-            path.mean,
-            everything,
-            quadratic=found.regressors.quadratic,
-            ramp=found.regressors.ramp,
-        )
+        regressors = found.regressors.also(used=np.ones(len(fit.used), dtype=np.bool_))
         weights = np.zeros(len(fit.used))
         weights[fit.used] = fit.chosen.ordinates / found.whittle.density(
             found.candidates[0].found

@@ -31,7 +31,8 @@ class Regression:
     Attributes
     ----------
     beta : ndarray, shape (p,)
-        s, then q where it is asked for, then R where there is a ramp; SI per K, K² and s.
+        s, then q and what the beginning adds to s where they are in the model, then R where there
+        is a ramp; SI per K, K², K and s.
     information : ndarray, shape (p, p)
         Inverse of their covariance.
     lag : float
@@ -67,6 +68,9 @@ class Regressors:
         Bins to use.
     quadratic, ramp : bool
         Whether the square of the temperature, and time, are regressors too.
+    settling : float
+        s from the beginning of the log in which a sensor that settles may follow the temperature
+        otherwise; 0: none.
     """
 
     def __init__(
@@ -79,25 +83,39 @@ class Regressors:
         *,
         quadratic: bool = False,
         ramp: bool = False,
+        settling: float = 0.0,
     ) -> None:
         self.coefficients, self.path, self.rate = coefficients, path, rate
         self.reference, self.used = reference, used
-        self.quadratic, self.ramp = quadratic, ramp
+        self.quadratic, self.ramp, self.settling = quadratic, ramp, settling
         self._known: dict[float, Products] = {}
         self._time = coefficients.of_time(rate)
         self.ordinates = coefficients.ordinates[used]
 
-    def also(self, *, quadratic: bool | None = None, ramp: bool | None = None) -> Regressors:
-        """Return the regressors with or without the square, and time."""
+    def also(
+        self,
+        *,
+        quadratic: bool | None = None,
+        ramp: bool | None = None,
+        settling: float | None = None,
+        used: NDArray[np.bool_] | None = None,
+    ) -> Regressors:
+        """Return the regressors with other terms, or in other bins."""
         return Regressors(
             self.coefficients,
             self.path,
             self.rate,
             self.reference,
-            self.used,
+            self.used if used is None else used,
             quadratic=self.quadratic if quadratic is None else quadratic,
             ramp=self.ramp if ramp is None else ramp,
+            settling=self.settling if settling is None else settling,
         )
+
+    @property
+    def thermal(self) -> int:
+        """Number of regressors that temperature has."""
+        return 1 + self.quadratic + (self.settling > 0.0)
 
     def knots(self, lag: float) -> Array:
         """Return T_lag - T_0 at the knots of the path, K."""
@@ -105,14 +123,27 @@ class Regressors:
 
     def effect(self, found: Regression) -> Array:
         """Return what temperature adds to the log, at the knots of the path, SI."""
-        knots = self.knots(found.lag)
-        return found.beta[0] * knots + (found.beta[1] * knots**2 if self.quadratic else 0.0)
+        of_knots = self._of(self.knots(found.lag))
+        return np.asarray(np.einsum("i,ik->k", found.beta[: self.thermal], np.array(of_knots)))
+
+    def _of(self, knots: Array) -> list[Array]:
+        """Return the regressors of temperature at the knots."""
+        terms = [knots, knots**2] if self.quadratic else [knots]
+        if self.settling > 0.0:
+            begin = self.path.sample[0] + self.settling * self.rate
+            end = int(np.searchsorted(self.path.sample, begin))
+            settled = knots[min(end, len(knots) - 1)]
+            terms.append(np.where(np.arange(len(knots)) < end, knots - settled, 0.0))
+        return terms
+
+    def means(self, lag: float) -> Array:
+        """Return the mean over the log of each regressor of temperature."""
+        return np.array([float(term.mean()) for term in self._of(self.knots(lag))])
 
     def columns(self, lag: float) -> list[Array]:
         """Return the coefficients of the regressors."""
-        knots = self.knots(lag)
-        powers = [knots, knots**2] if self.quadratic else [knots]
-        columns = [self.coefficients.of_knots(self.path.sample, power) for power in powers]
+        terms = self._of(self.knots(lag))
+        columns = [self.coefficients.of_knots(self.path.sample, term) for term in terms]
         return columns + [self._time] * self.ramp
 
     def products(self, lag: float) -> Products:
@@ -152,7 +183,7 @@ class Regressors:
         that the density keeps its mean.
         """
         products = self.products(found.lag)
-        p = 2 if self.quadratic else 1
+        p = self.thermal
         beta, cross, gram = found.beta[:p], products.cross[:, :p], products.gram[:, :p, :p]
         left = spectrum.density - 2.0 * cross @ beta + np.einsum("i,bij,j->b", beta, gram, beta)
         taken = weights * np.einsum("bij,ij->b", gram, np.linalg.inv(found.information[:p, :p]))

@@ -88,7 +88,7 @@ def judge(
     rng : numpy.random.Generator
     """
     weights = whittle.spectrum.ordinates / whittle.density(candidates[0].found)
-    p = 2 if regressors.quadratic else 1
+    p = regressors.thermal
     shift = _path_errors(regressors, found, weights)
     fine = _fine(regressors, weights, lags)
     betas, drawn_lags = _drawn(regressors, whittle, candidates, fine, rng)
@@ -96,14 +96,20 @@ def judge(
     betas, drawn_lags = betas[:, :p] + extra[:, :p], np.maximum(drawn_lags + extra[:, p], 0.0)
     lower, upper = np.quantile(betas, [0.025, 0.975], axis=0)
     lower, upper = np.minimum(lower, found.beta[:p]), np.maximum(upper, found.beta[:p])
-    at_mean = np.array([np.mean(regressors.knots(found.lag) ** (i + 1)) for i in range(p)])
-    excluded = any(lower[i] > 0.0 or upper[i] < 0.0 for i in range(p))
+    at_mean = regressors.means(found.lag)
+    excluded = any(lower[i] > 0.0 or upper[i] < 0.0 for i in range(1 + regressors.quadratic))
     confused = _confused(regressors, found, weights, excluded)
     compensated = excluded and confused is None and gained > 0.0
     reason = confused or _reason(excluded, gained)
+    if regressors.settling > 0.0:
+        early = found.beta[0] + found.beta[p - 1]
+        reason += (
+            f"; the first {regressors.settling:.0f} s follow it otherwise ({early:.3g} SI per K) and "
+            "do not count for the sensitivity"
+        )
     s = _parameter(float(found.beta[0]), float(lower[0]), float(upper[0]), confused)
     q = Parameter(None, "absent", "the data do not ask for it")
-    if p == 2:
+    if regressors.quadratic:
         q = _parameter(float(found.beta[1]), float(lower[1]), float(upper[1]), confused)
     return Verdict(
         s,
@@ -254,9 +260,9 @@ def _densities(
 
 def _path_errors(regressors: Regressors, found: Regression, weights: Array) -> Array:
     """Return how the drawn paths move s, q and the lag, shape (d, p + 1)."""
-    path, p = regressors.path, 2 if regressors.quadratic else 1
+    path, p = regressors.path, regressors.thermal
     knots = regressors.knots(found.lag)
-    slope = found.beta[0] + (2.0 * found.beta[1] * knots if p == 2 else 0.0)
+    slope = found.beta[0] + (2.0 * found.beta[1] * knots if regressors.quadratic else 0.0)
     step = max(0.05 * found.lag, 0.5 * float(np.median(np.diff(path.sample))) / regressors.rate)
     by_lag = slope * (regressors.knots(found.lag + step) - knots) / step
     columns = regressors.columns(found.lag)
