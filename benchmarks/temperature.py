@@ -136,7 +136,8 @@ def of_log(number: int) -> dict[str, object]:
         "status": s.status,
         "compensated": fit.compensated,
         "error": math.nan if value is None else (value - made.sensitivity) / made.bound,
-        "inside": s.lower is not None and s.upper is not None
+        "inside": s.lower is not None
+        and s.upper is not None
         and s.lower <= made.sensitivity <= s.upper,
         "width": math.nan
         if s.lower is None or s.upper is None
@@ -145,9 +146,11 @@ def of_log(number: int) -> dict[str, object]:
         "lag_status": lag.status,
         "lag_found": lag.in_model,
         "lag_bound": made.lag_bound,
-        "lag_inside": lag.lower is not None and lag.upper is not None
+        "lag_inside": lag.lower is not None
+        and lag.upper is not None
         and lag.lower <= made.lag <= lag.upper,
-        "bias_inside": bias.lower is not None and bias.upper is not None
+        "bias_inside": bias.lower is not None
+        and bias.upper is not None
         and bias.lower <= made.bias <= bias.upper,
         "reason": fit.reason,
     }
@@ -198,7 +201,9 @@ def real(path: Path) -> None:
             size = np.array([n])
             before = allan_variance(values, 1.0, cluster_sizes=size).deviation[0]
             after = allan_variance(left, 1.0, cluster_sizes=size).deviation[0]
-            print(f"    {n:6d} s: {1e6 * before:8.2f} -> {1e6 * after:8.2f} urad/s, {before / after:.2f} times less")
+            print(
+                f"    {n:6d} s: {1e6 * before:8.2f} -> {1e6 * after:8.2f} urad/s, {before / after:.2f} times less"
+            )
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 _POINTS = 6
 _FOLDS = 64
-_SCAN = 48
+_SCAN = 32
 _LOWEST, _HIGHEST = 1 / 500, 4.0
 """Cut-offs that are looked for, parts of the rate."""
 
@@ -112,9 +112,7 @@ def folded_low_pass(frequency: ArrayLike, cutoff: float, rate: float, order: int
     total = low_pass(f[..., None] + k, cutoff, order).sum(axis=-1)
     # Folds beyond: the integral of (f / f_c)^(-2 n) on both sides.
     rest = (folds + 0.5) * rate / cutoff
-    return np.asarray(
-        total + 2.0 * cutoff / rate * rest ** (1 - 2 * order) / (2 * order - 1)
-    )
+    return np.asarray(total + 2.0 * cutoff / rate * rest ** (1 - 2 * order) / (2 * order - 1))
 
 
 def find_cutoff(
@@ -149,7 +147,7 @@ def find_cutoff(
         return Cutoff(unknown, None, unknown, 0.0, 0.0)
     fits = _Fits(spectrum.taken(used))
     penalty = 0.5 * math.log(used.sum())
-    without = fits.unfiltered()
+    powers, without = fits.unfiltered()
     best: tuple[float, int, bool, float] | None = None
     for order in orders:
         for floor in (False, True):
@@ -161,9 +159,8 @@ def find_cutoff(
     score, order, floor, cutoff = best
     gained = 2.0 * (without - score)
     if gained < _BEYOND_BIC:
-        N = fits.density(fits.highest, 1, False)[0]
         absent = Parameter(None, "absent", "the spectrum shows no low-pass below Nyquist")
-        return Cutoff(absent, None, Parameter(N), 0.0, gained)
+        return Cutoff(absent, None, Parameter(math.sqrt(powers[0])), 0.0, gained)
     lower, upper = fits.limits(cutoff, order, floor)
     N, after = fits.density(cutoff, order, floor)
     ends = sorted(fits.density(end, order, floor)[0] for end in (lower, upper))
@@ -197,9 +194,9 @@ class _Fits:
         slow += [whittle.gauss_markov(float(time)) for time in times]
         self.slow = np.column_stack(slow)
 
-    def unfiltered(self) -> float:
-        """Return the cost without a filter."""
-        return self._powers(np.column_stack([self.whittle.column("N"), self.slow]))[1]
+    def unfiltered(self) -> tuple[Array, float]:
+        """Return the squared densities without a filter, that of white noise first, and -log L."""
+        return self._powers(np.column_stack([self.whittle.column("N"), self.slow]))
 
     def cost(self, cutoff: float, order: int, floor: bool) -> float:
         """Return -log L at a cut-off."""

@@ -37,8 +37,11 @@ _QUANTIZATION_BAND = 1 / 10
 _SETTLING = (1 / 64, 1 / 32, 1 / 16)
 """Parts of the log at its beginning in which a sensor may settle."""
 
-_BEYOND = 4.0
+_BEYOND = 6.0
 """Log likelihood by which the square, or a beginning apart, must be the better beyond BIC."""
+
+_MOST_LOST = 2.5
+"""Growth of the error of s beyond which the beginning holds what the log says of it."""
 
 _FEWEST_BINS = 24
 
@@ -126,7 +129,7 @@ def fit_temperature(
         Whether the square of the temperature is in the model; by default where the log favours
         it.
     longest_lag : float, optional
-        s; by default a tenth of the log, at most an hour. 0: no lag.
+        s; by default a twentieth of the log, at most half an hour. 0: no lag.
     rng : numpy.random.Generator
 
     Raises
@@ -243,7 +246,7 @@ class _Fit:
             if not gains or max(gains) < needed:
                 break
             wider = self._best(tried[int(np.argmax(gains))])
-            if wider.cost > found.cost - _BEYOND:
+            if wider.cost > found.cost - _BEYOND or _error(wider) > _MOST_LOST * _error(found):
                 break
             found = wider
         return found
@@ -263,9 +266,7 @@ class _Fit:
         starts.append(self._weights(self.whittle.of(left), self.chosen)[0])
         return min((self._settle(regressors, start) for start in starts), key=lambda f: f.cost)
 
-    def _weights(
-        self, whittle: Whittle, spectrum: Spectrum
-    ) -> tuple[Array, Sequence[Candidate]]:
+    def _weights(self, whittle: Whittle, spectrum: Spectrum) -> tuple[Array, Sequence[Candidate]]:
         candidates = compare(whittle, quantization=self.quantization)
         return spectrum.ordinates / whittle.density(candidates[0].found), candidates
 
@@ -304,6 +305,11 @@ class _Fit:
         """Return half the BIC of the best noise without temperature."""
         candidates = compare(self.whittle, quantization=self.quantization)
         return self._cost(self.whittle, candidates, candidates[0].found.terms.parameters)
+
+
+def _error(found: _Found) -> float:
+    """Return the standard deviation of s, for given noise."""
+    return math.sqrt(float(found.regression.covariance[0, 0]))
 
 
 def _model_of(found: _Found) -> NoiseModel:
@@ -349,9 +355,7 @@ def _described(
     if verdict.compensated:
         regressors = found.regressors.also(used=np.ones(len(fit.used), dtype=np.bool_))
         weights = np.zeros(len(fit.used))
-        weights[fit.used] = fit.chosen.ordinates / found.whittle.density(
-            found.candidates[0].found
-        )
+        weights[fit.used] = fit.chosen.ordinates / found.whittle.density(found.candidates[0].found)
         left = regressors.without(fit.spectrum, found.regression, weights)
         without = likelihood.fit_spectrum(left, fit.lines, band=band, bandwidth=bandwidth, rng=rng)
         effect = regressors.effect(found.regression)
@@ -378,9 +382,7 @@ def _described(
     )
 
 
-def _nothing(
-    plain: Likelihood, path: TemperaturePath, fit: _Fit, reason: str
-) -> ThermalFit:
+def _nothing(plain: Likelihood, path: TemperaturePath, fit: _Fit, reason: str) -> ThermalFit:
     unknown = Parameter(None, "not_identified", reason)
     mean, spread = fit.spectrum.mean, _mean_error(plain.estimates[0].model, fit.spectrum)
     return ThermalFit(

@@ -27,7 +27,9 @@ def _lagged(times: Array, values: Array, lag: float) -> Array:
         decay = math.exp(-h)
         # (1 - e^-h) / h: the part of the new value that a ramp to it has reached.
         mean = -math.expm1(-h) / h if h > _SHORT else 1.0 - h / 2.0 + h * h / 6.0
-        result[i] = decay * result[i - 1] + (mean - decay) * values[i - 1] + (1.0 - mean) * values[i]
+        result[i] = (
+            decay * result[i - 1] + (mean - decay) * values[i - 1] + (1.0 - mean) * values[i]
+        )
     return result
 
 

@@ -162,9 +162,7 @@ class _Evidence:
         centre = self._read.centre[part] / self._width
         return np.asarray(np.diff(centre, prepend=centre[0] - 1.0))
 
-    def part(
-        self, part: slice, q: float, noise: float
-    ) -> tuple[Array, Array, float, Array, Array]:
+    def part(self, part: slice, q: float, noise: float) -> tuple[Array, Array, float, Array, Array]:
         """Return mean, variance and log evidence of a segment, and its Gaussian equivalents."""
         read, least = self._read, (1e-6 * self._spread) ** 2
         mean = read.mean[part] - self._level

@@ -235,9 +235,7 @@ def propagate(
 
 
 @njit(cache=True)
-def _joined(
-    x: float, s: float, a: float, b: float, c: float, future: Array
-) -> tuple[float, float]:
+def _joined(x: float, s: float, a: float, b: float, c: float, future: Array) -> tuple[float, float]:
     """Return mean and variance of x, given a Gaussian state and what the future says of it."""
     fa, fb, fc, fe, ff = future[0], future[1], future[2], future[3], future[4]
     # (1 + P Lambda)^-1 times (state + P shift), and times P.
@@ -249,9 +247,7 @@ def _joined(
 
 
 @njit(cache=True)
-def drawn(
-    steps: Array, q: float, spread: float, tau: Array, nu: Array, normals: Array
-) -> Array:
+def drawn(steps: Array, q: float, spread: float, tau: Array, nu: Array, normals: Array) -> Array:
     """Return draws of the path from its Gaussian posterior: filter forwards, sample backwards.
 
     Parameters

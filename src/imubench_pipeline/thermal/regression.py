@@ -17,10 +17,10 @@ from imubench_pipeline.thermal.products import Coefficients, Products
 Array = NDArray[np.float64]
 
 _LAGS = 16
-_LONGEST = 1 / 10
+_LONGEST = 1 / 20
 """Part of the log: a longer lag is a drift of its own."""
 
-_LONGEST_LAG = 3600.0
+_LONGEST_LAG = 1800.0
 _LEAST_ORDINATES = 0.02
 
 

@@ -32,6 +32,12 @@ _WITHIN = 8.0
 """Log likelihood below the best at which lags are no longer of interest."""
 
 _LEAST_SHARE = 0.05
+_LEAST_WALK = 0.3
+"""Share of a random walk among the models of the noise, at least."""
+
+_FAVOURED = 4.0
+"""BIC by which temperature must be the better: a walk is easily taken for it."""
+
 _AS_TIME = 0.95
 """Share of what the log says of s that a ramp takes: beyond, temperature is time."""
 
@@ -99,7 +105,7 @@ def judge(
     at_mean = regressors.means(found.lag)
     excluded = any(lower[i] > 0.0 or upper[i] < 0.0 for i in range(1 + regressors.quadratic))
     confused = _confused(regressors, found, weights, excluded)
-    compensated = excluded and confused is None and gained > 0.0
+    compensated = excluded and confused is None and gained > _FAVOURED
     reason = confused or _reason(excluded, gained)
     if regressors.settling > 0.0:
         early = found.beta[0] + found.beta[p - 1]
@@ -124,8 +130,8 @@ def judge(
 def _reason(excluded: bool, gained: float) -> str:
     if not excluded:
         return "the interval of the sensitivity contains 0"
-    if gained <= 0.0:
-        return f"BIC favours the noise without temperature by {-gained:.1f}"
+    if gained <= _FAVOURED:
+        return f"BIC favours the noise with temperature by {gained:.1f} only"
     return f"BIC favours the noise with temperature by {gained:.1f}"
 
 
@@ -218,18 +224,28 @@ def _drawn(
     alike = [
         c for c in candidates if c is chosen or (c.share >= _LEAST_SHARE and not c.found.terms.ramp)
     ]
-    total = sum(candidate.share for candidate in alike)
+    shares = [candidate.share for candidate in alike]
+    walks = [c for c in candidates if "K" in c.found.terms.linear and not c.found.terms.ramp]
+    if walks and walks[0] not in alike:
+        alike.append(walks[0])
+        shares.append(walks[0].share)
+    if walks:
+        # What temperature takes from a walk leaves the fit without one all too easily.
+        place = alike.index(walks[0])
+        shares[place] = max(shares[place], _LEAST_WALK * sum(shares))
     everything = [regressors.products(float(lag)) for lag in lags]
     cross = np.array([products.cross for products in everything])
     gram = np.array([products.gram for products in everything])
     betas, chosen_lags = [], []
-    for candidate in alike:
-        number = max(8, round(_NOISES * candidate.share / total))
+    for candidate, share in zip(alike, shares, strict=True):
+        number = max(8, round(_NOISES * share / sum(shares)))
         densities = _densities(whittle, candidate.found, number, rng)
         weights = regressors.ordinates / densities
         information = np.einsum("db,lbij->dlij", weights, gram, optimize=True)
-        information += 1e-12 * information.diagonal(axis1=2, axis2=3)[..., None] * np.eye(
-            information.shape[-1]
+        information += (
+            1e-12
+            * information.diagonal(axis1=2, axis2=3)[..., None]
+            * np.eye(information.shape[-1])
         )
         target = np.einsum("db,lbi->dli", weights, cross, optimize=True)
         beta = np.linalg.solve(information, target[..., None])[..., 0]
@@ -246,9 +262,7 @@ def _drawn(
     return np.concatenate(betas), np.concatenate(chosen_lags)
 
 
-def _densities(
-    whittle: Whittle, found: Maximum, number: int, rng: np.random.Generator
-) -> Array:
+def _densities(whittle: Whittle, found: Maximum, number: int, rng: np.random.Generator) -> Array:
     """Return densities of the noise drawn from its posterior, shape (number, b)."""
     posterior = sample(whittle, found, rng, 8 * number)
     rows = []
