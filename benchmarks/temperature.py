@@ -194,7 +194,8 @@ def real(path: Path) -> None:
         s = fit.sensitivity
         print(
             f"gyro_{axis}: s = {1e3 * (s.in_model or 0.0):.4f} mrad/s/K "
-            f"[{1e3 * (s.lower or 0.0):.4f}, {1e3 * (s.upper or 0.0):.4f}], {s.status}; {fit.reason}"
+            f"[{1e3 * (s.lower or 0.0):.4f}, {1e3 * (s.upper or 0.0):.4f}], {s.status}; "
+            f"{fit.reason}"
         )
         left = np.concatenate(list(fit.compensate([values])))
         for n in (300, 1000, 3000, 10000):
@@ -202,7 +203,8 @@ def real(path: Path) -> None:
             before = allan_variance(values, 1.0, cluster_sizes=size).deviation[0]
             after = allan_variance(left, 1.0, cluster_sizes=size).deviation[0]
             print(
-                f"    {n:6d} s: {1e6 * before:8.2f} -> {1e6 * after:8.2f} urad/s, {before / after:.2f} times less"
+                f"    {n:6d} s: {1e6 * before:8.2f} -> {1e6 * after:8.2f} urad/s, "
+                f"{before / after:.2f} times less"
             )
 
 

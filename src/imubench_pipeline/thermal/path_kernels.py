@@ -133,12 +133,12 @@ def _smoothed(
     path[n - 1], variance[n - 1] = x, a
     for i in range(n - 2, -1, -1):
         h = steps[i + 1]
-        j, k, l, m, la, lb, lc = _gain(h, q, covs[i])
+        j, k, r, m, la, lb, lc = _gain(h, q, covs[i])
         dx, ds = x - means[i, 0] - h * means[i, 1], s - means[i, 1]
-        x, s = means[i, 0] + j * dx + k * ds, means[i, 1] + l * dx + m * ds
+        x, s = means[i, 0] + j * dx + k * ds, means[i, 1] + r * dx + m * ds
         la += j * j * a + 2.0 * j * k * b + k * k * c
-        lb += j * l * a + (j * m + k * l) * b + k * m * c
-        lc += l * l * a + 2.0 * l * m * b + m * m * c
+        lb += j * r * a + (j * m + k * r) * b + k * m * c
+        lc += r * r * a + 2.0 * r * m * b + m * m * c
         a, b, c = la, lb, lc
         path[i], variance[i] = x, max(a, 1e-300)
 
@@ -155,11 +155,11 @@ def _messages(steps: Array, q: float, tau: Array, nu: Array, future: Array) -> N
         qa, qb, qc = q * h**3 / 3.0, q * h * h / 2.0, q * h
         # (1 + Lambda Q)^-1, row by row.
         j, k = 1.0 + a * qa + b * qb, a * qb + b * qc
-        l, m = b * qa + c * qb, 1.0 + b * qb + c * qc
-        det = j * m - k * l
-        j, k, l, m = m / det, -k / det, -l / det, j / det
-        a, b, c = j * a + k * b, j * b + k * c, l * b + m * c
-        e, f = j * e + k * f, l * e + m * f
+        r, m = b * qa + c * qb, 1.0 + b * qb + c * qc
+        det = j * m - k * r
+        j, k, r, m = m / det, -k / det, -r / det, j / det
+        a, b, c = j * a + k * b, j * b + k * c, r * b + m * c
+        e, f = j * e + k * f, r * e + m * f
         future[i, 0], future[i, 1] = a, b + h * a
         future[i, 2] = c + 2.0 * h * b + h * h * a
         future[i, 3], future[i, 4] = e, f + h * e
@@ -240,8 +240,8 @@ def _joined(x: float, s: float, a: float, b: float, c: float, future: Array) -> 
     fa, fb, fc, fe, ff = future[0], future[1], future[2], future[3], future[4]
     # (1 + P Lambda)^-1 times (state + P shift), and times P.
     j, k = 1.0 + a * fa + b * fb, a * fb + b * fc
-    l, m = b * fa + c * fb, 1.0 + b * fb + c * fc
-    det = j * m - k * l
+    r, m = b * fa + c * fb, 1.0 + b * fb + c * fc
+    det = j * m - k * r
     right, below = x + a * fe + b * ff, s + b * fe + c * ff
     return (m * right - k * below) / det, (m * a - k * b) / det
 
@@ -267,9 +267,9 @@ def drawn(steps: Array, q: float, spread: float, tau: Array, nu: Array, normals:
             a, b, c = covs[i, 0], covs[i, 1], covs[i, 2]
             if i < n - 1:
                 h = steps[i + 1]
-                j, k, l, m, a, b, c = _gain(h, q, covs[i])
+                j, k, r, m, a, b, c = _gain(h, q, covs[i])
                 dx, ds = x - mx - h * ms, s - ms
-                mx, ms = mx + j * dx + k * ds, ms + l * dx + m * ds
+                mx, ms = mx + j * dx + k * ds, ms + r * dx + m * ds
             first = math.sqrt(max(a, 0.0))
             x = mx + first * normals[d, i, 0]
             cross = b / first if first > 0.0 else 0.0

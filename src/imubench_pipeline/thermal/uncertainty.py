@@ -110,8 +110,8 @@ def judge(
     if regressors.settling > 0.0:
         early = found.beta[0] + found.beta[p - 1]
         reason += (
-            f"; the first {regressors.settling:.0f} s follow it otherwise ({early:.3g} SI per K) and "
-            "do not count for the sensitivity"
+            f"; the first {regressors.settling:.0f} s follow it otherwise ({early:.3g} SI per K) "
+            "and do not count for the sensitivity"
         )
     s = _parameter(float(found.beta[0]), float(lower[0]), float(upper[0]), confused)
     q = Parameter(None, "absent", "the data do not ask for it")
