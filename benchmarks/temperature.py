@@ -163,6 +163,7 @@ def summary(rows: pd.DataFrame) -> list[tuple[str, str]]:
     nothing, something = told[told.true == 0.0], told[told.true != 0.0]
     lagged = something[(something.lag_status == "ok") & (something.lag > 0)]
     given = something[something.compensated]
+    lag_error = (lagged.lag_found.astype(float) - lagged.lag) / lagged.lag_bound
     return [
         ("logs", f"{len(rows)}, s told in {len(told)}"),
         ("coverage of s, all", f"{100 * told.inside.mean():.1f} % of {len(told)}"),
@@ -177,7 +178,7 @@ def summary(rows: pd.DataFrame) -> list[tuple[str, str]]:
         ("lags told", f"{len(lagged)}, coverage {100 * lagged.lag_inside.mean():.1f} %"),
         (
             "error of the lag over its bound, median",
-            f"{((lagged.lag_found.astype(float) - lagged.lag) / lagged.lag_bound).abs().median():.2f}",
+            f"{lag_error.abs().median():.2f}",
         ),
     ]
 

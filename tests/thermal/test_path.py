@@ -37,7 +37,7 @@ def test_moments_in_a_cell_are_those_of_quadrature(m, v, low, high, noise):
 
     ends = (low - 20 * np.sqrt(noise), high + 20 * np.sqrt(noise))
     total, first, second = (
-        quad(lambda x, k=k: x**k * weight(x), *ends, points=(low, high), limit=400)[0]
+        quad(lambda x, k=k: x**k * weight(x), *ends, points=(low, high), limit=400, epsabs=0.0)[0]
         for k in range(3)
     )
     log_p, mean, variance = cell_moments(m, v, low, high, noise)
@@ -67,7 +67,7 @@ def test_noise_of_the_sensor_dithers_whole_degrees(truth):
     path = path_of(np.round(truth + 0.1 * rng.standard_normal(SAMPLES)))
     assert path.noise == pytest.approx(0.1, rel=0.4)
     error = error_of(path, truth)
-    assert error.std() < 0.03
+    assert error.std() < 0.05
     assert np.mean((error / path.deviation) ** 2) < 2.0
 
 

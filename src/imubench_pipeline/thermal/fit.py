@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,7 @@ _SETTLING = (1 / 64, 1 / 32, 1 / 16)
 _BEYOND = 6.0
 """Log likelihood by which the square, or a beginning apart, must be the better beyond BIC."""
 
+_WORTH_TRYING = 2.0
 _MOST_LOST = 2.5
 """Growth of the error of s beyond which the beginning holds what the log says of it."""
 
@@ -175,15 +176,12 @@ def fit_temperature(
     if not path.range > 0.0 or path.range < 2.0 * float(np.median(path.deviation)):
         return _nothing(plain, path, fit, f"the temperature changes by {path.range:.2g} K only")
     found = fit.settle(quadratic)
-    verdict = judge(
-        found.regressors,
-        found.regression,
-        found.whittle,
-        found.candidates,
-        fit.lags,
-        gained=2.0 * (fit.plain() - found.cost),
-        rng=rng,
-    )
+    verdict = fit.judged(found, rng)
+    if not verdict.compensated and len(fit.lags) > 1:
+        # A lag of nothing is whatever lets a walk pass for temperature: there is none.
+        fit.lags = fit.lags[:1]
+        found = fit.settle(quadratic)
+        verdict = replace(fit.judged(found, rng), lag=verdict.lag)
     return _described(fit, found, verdict, plain, path, band, bandwidth, rng)
 
 
@@ -234,7 +232,7 @@ class _Fit:
 
         So is another sensitivity at the beginning, where a sensor settles.
         """
-        needed = 0.5 * math.log(len(self.chosen.density)) + _BEYOND
+        needed = 0.5 * math.log(len(self.chosen.density)) + _WORTH_TRYING
         found = self._best(self.regressors.also(quadratic=bool(quadratic)))
         duration = self.spectrum.duration
         for _ in range(2):
@@ -300,6 +298,18 @@ class _Fit:
         data = whittle.data(found) * whittle.spectrum.ordinates / ordinates
         cost = 0.5 * float(np.sum(ordinates * (np.log(density) + data / density)))
         return cost + 0.5 * free * math.log(len(density))
+
+    def judged(self, found: _Found, rng: np.random.Generator) -> Verdict:
+        """Return what a settled fit tells."""
+        return judge(
+            found.regressors,
+            found.regression,
+            found.whittle,
+            found.candidates,
+            self.lags,
+            gained=2.0 * (self.plain() - found.cost),
+            rng=rng,
+        )
 
     def plain(self) -> float:
         """Return half the BIC of the best noise without temperature."""

@@ -142,12 +142,13 @@ def step_of(levels: Array, present: int) -> float:
     gaps = np.diff(levels)
     smallest = float(gaps.min())
     # Readings printed in few decimals make gaps of one step differ; their mean does not.
-    step = float(np.mean(gaps[gaps < 1.5 * smallest]))
+    step = float(np.mean(gaps[gaps < 1.75 * smallest]))
     for _ in range(2):
         multiples = np.rint((levels - levels[0]) / step)
         if multiples[-1] > 0:
             step = float((levels[-1] - levels[0]) / multiples[-1])
-    missed = np.abs((levels - levels[0]) / step - multiples)
+    missed = (levels - levels[0]) / step - multiples
+    missed = np.abs(missed - np.median(missed))
     if math.isfinite(step) and float(np.quantile(missed, 0.99)) <= 4.0 * _ROUNDED:
         return step
     return 0.0
