@@ -33,6 +33,7 @@ def cutoff_of(log, rate):
     return find_cutoff(spectra([log], len(log), rate)[0])
 
 
+@pytest.mark.filterwarnings("ignore:The occurrence of roundoff")  # beyond the digits compared
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 @pytest.mark.parametrize("cutoff", [10.0, 64.0, 150.0])
 def test_folds_are_those_of_the_sampled_covariance(order, cutoff):

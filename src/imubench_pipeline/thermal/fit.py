@@ -23,6 +23,7 @@ from imubench_pipeline.estimators.whittle import Whittle, whittle_of
 from imubench_pipeline.missing import block_means, divided, filled, slow_part
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.spectrum import LineSpectrum, Spectrum, block_of, spectra
+from imubench_pipeline.thermal.level import mean_error
 from imubench_pipeline.thermal.path import TemperaturePath
 from imubench_pipeline.thermal.products import BlockSeries, Coefficients
 from imubench_pipeline.thermal.regression import Regression, Regressors
@@ -372,7 +373,7 @@ def _described(
     at_centres = [np.interp(centres, path.sample, effect) for centres in fit.series.centres]
     shift = float(np.concatenate(at_centres).mean())
     spread = math.hypot(
-        _mean_error(without.estimates[0].model, fit.spectrum), verdict.temperature_error
+        mean_error(without.estimates[0].model, fit.spectrum), verdict.temperature_error
     )
     bias = Parameter(
         mean - shift, lower=mean - shift - 1.96 * spread, upper=mean - shift + 1.96 * spread
@@ -394,7 +395,7 @@ def _described(
 
 def _nothing(plain: Likelihood, path: TemperaturePath, fit: _Fit, reason: str) -> ThermalFit:
     unknown = Parameter(None, "not_identified", reason)
-    mean, spread = fit.spectrum.mean, _mean_error(plain.estimates[0].model, fit.spectrum)
+    mean, spread = fit.spectrum.mean, mean_error(plain.estimates[0].model, fit.spectrum)
     return ThermalFit(
         path.mean,
         unknown,
@@ -408,19 +409,3 @@ def _nothing(plain: Likelihood, path: TemperaturePath, fit: _Fit, reason: str) -
         np.zeros(len(path.value)),
         path.sample,
     )
-
-
-def _mean_error(model: NoiseModel, spectrum: Spectrum) -> float:
-    """Return the standard deviation of the mean of a log about the bias at its beginning.
-
-    A random walk counts from 0 at the beginning of the log.
-    """
-    T, whole = 1.0 / spectrum.rate, spectrum.duration
-    total = model.N**2 / whole + model.K**2 * whole / 3.0
-    for term in model.realised(T, whole):
-        T_B = getattr(term, "T_B", None)
-        if T_B is not None:
-            variance = float(term.state_space(T).initial_variance[0, 0])
-            x = whole / T_B
-            total += 2.0 * variance / x * (1.0 + math.expm1(-x) / x)
-    return math.sqrt(total)
