@@ -25,7 +25,7 @@ _LEVELS = 1 << 16
 _FEWEST_REPEATS = 8.0
 """Readings a level: rarer repeats may be by chance."""
 
-_ROUNDED = 0.05
+_ROUNDED = 0.2
 """Part of a step by which readings in decimals may miss its multiples."""
 
 
@@ -143,12 +143,12 @@ def step_of(levels: Array, present: int) -> float:
     smallest = float(gaps.min())
     # Readings printed in few decimals make gaps of one step differ; their mean does not.
     step = float(np.mean(gaps[gaps < 1.75 * smallest]))
+    first = float(levels[0])
     for _ in range(2):
-        multiples = np.rint((levels - levels[0]) / step)
-        if multiples[-1] > 0:
-            step = float((levels[-1] - levels[0]) / multiples[-1])
-    missed = (levels - levels[0]) / step - multiples
-    missed = np.abs(missed - np.median(missed))
-    if math.isfinite(step) and float(np.quantile(missed, 0.99)) <= 4.0 * _ROUNDED:
+        multiples = np.rint((levels - first) / step)
+        if multiples[-1] > multiples[0]:
+            step, first = (float(value) for value in np.polyfit(multiples, levels, 1))
+    missed = np.abs((levels - first) / step - multiples)
+    if math.isfinite(step) and float(np.quantile(missed, 0.99)) <= _ROUNDED:
         return step
     return 0.0
