@@ -49,7 +49,7 @@ def test_moments_in_a_cell_are_those_of_quadrature(m, v, low, high, noise):
 @pytest.mark.parametrize("truth", [DAY, WARM_UP], ids=["day", "warm-up"])
 def test_whole_degrees_are_smoothed_within_their_cells(truth):
     path = path_of(np.round(truth))
-    assert path.step == 1.0
+    assert path.step == pytest.approx(1.0)
     nearest = np.round(np.interp(path.sample, np.arange(SAMPLES), truth))
     there = np.interp(path.sample, np.arange(SAMPLES), np.round(truth))
     plain = there == nearest

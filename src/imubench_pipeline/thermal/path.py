@@ -200,13 +200,13 @@ class _Evidence:
         least = _QUIETEST * self._spread
         noises = {max(part * read.step, least) for part in _NOISES} | {max(rough, least)}
 
-        def cost(at: Sequence[float]) -> float:
-            q, noise = self._spread**2 * 10.0 ** at[0], 10.0 ** at[1]
+        def cost(at: Array) -> float:
+            q, noise = self._spread**2 * 10.0 ** float(at[0]), 10.0 ** float(at[1])
             if not (-16.0 < at[0] < 6.0 and 0.99 * least < noise < 10.0 * self._spread):
                 return _NEVER
             return min(-sum(self.part(part, q, noise)[2] for part in read.parts), _NEVER)
 
-        starts = [(float(k), math.log10(noise)) for k in _SCAN for noise in sorted(noises)]
+        starts = [np.array([k, math.log10(noise)]) for k in _SCAN for noise in sorted(noises)]
         first = min(starts, key=cost)
         found = minimize(
             cost,

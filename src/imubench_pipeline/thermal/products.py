@@ -33,7 +33,7 @@ class BlockSeries:
 
     def __init__(self, segments: Sequence[Span], block: int) -> None:
         self.segments, self.block = tuple(segments), block
-        self._sums = [np.zeros((stop - start) // block) for start, stop in segments]
+        self._sums: list[Array] = [np.zeros((stop - start) // block) for start, stop in segments]
 
     def watch(self, blocks: Iterable[Array]) -> Iterator[Array]:
         """Yield the blocks of a log as they are, and keep the means."""
@@ -53,7 +53,7 @@ class BlockSeries:
     @property
     def means(self) -> list[Array]:
         """Means of the blocks of each part that has two and more."""
-        return [sums / self.block for sums in self._sums if len(sums) >= 2]
+        return [np.asarray(sums / self.block) for sums in self._sums if len(sums) >= 2]
 
     @property
     def centres(self) -> list[Array]:
