@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-from scipy.integrate import quad
 from scipy.special import ndtr
 
 from imubench_pipeline.thermal.path import temperature_path
@@ -35,11 +34,9 @@ def test_moments_in_a_cell_are_those_of_quadrature(m, v, low, high, noise):
         there = ndtr((high - x) / spread) - ndtr((low - x) / spread)
         return there * np.exp(-((x - m) ** 2) / (2 * v)) / np.sqrt(2 * np.pi * v)
 
-    ends = (low - 20 * np.sqrt(noise), high + 20 * np.sqrt(noise))
-    total, first, second = (
-        quad(lambda x, k=k: x**k * weight(x), *ends, points=(low, high), limit=400, epsabs=0.0)[0]
-        for k in range(3)
-    )
+    # The integrand and all its slopes vanish at the ends: the sum over a grid is exact.
+    x = np.linspace(low - 20 * np.sqrt(noise), high + 20 * np.sqrt(noise), 200_001)
+    total, first, second = (np.sum(x**k * weight(x)) * (x[1] - x[0]) for k in range(3))
     log_p, mean, variance = cell_moments(m, v, low, high, noise)
     assert log_p == pytest.approx(np.log(total), abs=1e-6)
     assert mean == pytest.approx(first / total, abs=1e-6)

@@ -59,7 +59,7 @@ class BlockSeries:
     def centres(self) -> list[Array]:
         """Middle of each block of those parts, samples."""
         return [
-            start + (np.arange(len(sums)) + 0.5) * self.block - 0.5
+            np.asarray(start + (np.arange(len(sums)) + 0.5) * self.block - 0.5, dtype=np.float64)
             for sums, (start, _) in zip(self._sums, self.segments, strict=True)
             if len(sums) >= 2
         ]
