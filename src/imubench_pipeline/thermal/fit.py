@@ -27,7 +27,7 @@ from imubench_pipeline.thermal.level import mean_error
 from imubench_pipeline.thermal.path import TemperaturePath
 from imubench_pipeline.thermal.products import BlockSeries, Coefficients
 from imubench_pipeline.thermal.regression import Regression, Regressors
-from imubench_pipeline.thermal.uncertainty import Verdict, judge
+from imubench_pipeline.thermal.uncertainty import Verdict, judge, shares
 
 Array = NDArray[np.float64]
 Span = tuple[int, int]
@@ -314,8 +314,12 @@ class _Fit:
 
     def plain(self) -> float:
         """Return half the BIC of the best noise without temperature."""
-        candidates = compare(self.whittle, quantization=self.quantization)
+        candidates = self.of_the_log()
         return self._cost(self.whittle, candidates, candidates[0].found.terms.parameters)
+
+    def of_the_log(self) -> Sequence[Candidate]:
+        """Return the models of the noise without temperature, the best first."""
+        return compare(self.whittle, quantization=self.quantization)
 
 
 def _error(found: _Found) -> float:
@@ -372,9 +376,9 @@ def _described(
         effect = regressors.effect(found.regression)
     at_centres = [np.interp(centres, path.sample, effect) for centres in fit.series.centres]
     shift = float(np.concatenate(at_centres).mean())
-    spread = math.hypot(
-        mean_error(without.estimates[0].model, fit.spectrum), verdict.temperature_error
-    )
+    candidates = found.candidates if verdict.compensated else fit.of_the_log()
+    noises = [(likelihood.model_of(one.found), share) for one, share in shares(candidates)]
+    spread = math.hypot(mean_error(noises, fit.spectrum), verdict.temperature_error)
     bias = Parameter(
         mean - shift, lower=mean - shift - 1.96 * spread, upper=mean - shift + 1.96 * spread
     )
@@ -395,7 +399,7 @@ def _described(
 
 def _nothing(plain: Likelihood, path: TemperaturePath, fit: _Fit, reason: str) -> ThermalFit:
     unknown = Parameter(None, "not_identified", reason)
-    mean, spread = fit.spectrum.mean, mean_error(plain.estimates[0].model, fit.spectrum)
+    mean, spread = fit.spectrum.mean, mean_error([(plain.estimates[0].model, 1.0)], fit.spectrum)
     return ThermalFit(
         path.mean,
         unknown,

@@ -212,6 +212,34 @@ def _fine(regressors: Regressors, weights: Array, lags: Array) -> Array:
     return np.asarray(np.linspace(low, high, _LAGS))
 
 
+def shares(candidates: Sequence[Candidate]) -> list[tuple[Candidate, float]]:
+    """Return the noise models that the log does not rule out, each with its share of 1.
+
+    Parameters
+    ----------
+    candidates : sequence of Candidate
+        The best first.
+    """
+    chosen = candidates[0]
+    alike = {
+        place: c.share
+        for place, c in enumerate(candidates)
+        if c is chosen or (c.share >= _LEAST_SHARE and not c.found.terms.ramp)
+    }
+    walks = (
+        place
+        for place, c in enumerate(candidates)
+        if "K" in c.found.terms.linear and not c.found.terms.ramp
+    )
+    walk = next(walks, None)
+    if walk is not None:
+        # What temperature takes from a walk leaves the fit without one all too easily.
+        alike.setdefault(walk, candidates[walk].share)
+        alike[walk] = max(alike[walk], _LEAST_WALK * sum(alike.values()))
+    total = sum(alike.values())
+    return [(candidates[place], share / total) for place, share in alike.items()]
+
+
 def _drawn(
     regressors: Regressors,
     whittle: Whittle,
@@ -220,25 +248,13 @@ def _drawn(
     rng: np.random.Generator,
 ) -> tuple[Array, Array]:
     """Return draws of beta (d, p) and of the lag (d,)."""
-    chosen = candidates[0]
-    alike = [
-        c for c in candidates if c is chosen or (c.share >= _LEAST_SHARE and not c.found.terms.ramp)
-    ]
-    shares = [candidate.share for candidate in alike]
-    walks = [c for c in candidates if "K" in c.found.terms.linear and not c.found.terms.ramp]
-    if walks and walks[0] not in alike:
-        alike.append(walks[0])
-        shares.append(walks[0].share)
-    if walks:
-        # What temperature takes from a walk leaves the fit without one all too easily.
-        place = alike.index(walks[0])
-        shares[place] = max(shares[place], _LEAST_WALK * sum(shares))
+    alike = shares(candidates)
     everything = [regressors.products(float(lag)) for lag in lags]
     cross = np.array([products.cross for products in everything])
     gram = np.array([products.gram for products in everything])
     betas, chosen_lags = [], []
-    for candidate, share in zip(alike, shares, strict=True):
-        number = max(8, round(_NOISES * share / sum(shares)))
+    for candidate, share in alike:
+        number = max(8, round(_NOISES * share))
         densities = _densities(whittle, candidate.found, number, rng)
         weights = regressors.ordinates / densities
         information = np.einsum("db,lbij->dlij", weights, gram, optimize=True)
