@@ -33,7 +33,7 @@ _LONGEST_SEGMENT = 1 << 15
 _SHORTEST_SEGMENT = 1 << 9
 _SEGMENT_OVER_BLOCK = 512
 _ENOUGH_SEGMENTS = 0.75
-_BLOCK_BAND = 0.25
+BLOCK_BAND = 0.25
 """Highest frequency taken from block means, rad a block."""
 
 _AVERAGED = 8
@@ -164,6 +164,11 @@ def spectra(
     return sums.finish()
 
 
+def block_of(segments: Sequence[tuple[int, int]]) -> int:
+    """Return samples in the blocks whose means give the low frequencies of a spectrum."""
+    return _resolution(np.array([stop - start for start, stop in segments]))[1]
+
+
 class _Sums:
     """Takes the parts of a log, block by block."""
 
@@ -220,7 +225,7 @@ class _Sums:
         parts = [_transform(values, interval) for values in series]
         low = tuple(np.concatenate(column) for column in zip(*parts, strict=True))
         if block > 1:
-            low = tuple(column[2.0 * np.pi * low[0] * interval <= _BLOCK_BAND] for column in low)
+            low = tuple(column[2.0 * np.pi * low[0] * interval <= BLOCK_BAND] for column in low)
         bins = [_binned(low, block)]
         if block > 1:
             beyond = float(bins[0]["upper"][-1])

@@ -8,6 +8,7 @@ I to I - 2 R cross + R^2 ramp, and is profiled out.
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -125,6 +126,13 @@ class Whittle:
         self.times = np.geomspace(self.shortest, self.longest, self.shapes)
         self.table = np.log(np.array([self.shape_of.gauss_markov(time) for time in self.times]))
         self._nu = self.spectrum.ordinates
+
+    def of(self, spectrum: Spectrum) -> Whittle:
+        """Return the likelihood of other data in the same bins."""
+        other = copy.copy(self)
+        other.spectrum, other._nu = spectrum, spectrum.ordinates
+        other.scale = float(np.median(spectrum.density))
+        return other
 
     def column(self, letter: str) -> Array:
         """Return the density of a unit linear term (Q, N, F or K) in each bin."""

@@ -1,0 +1,415 @@
+"""Temperature and noise of a log, estimated together: sensitivity, lag, bias, and what is left.
+
+y(t) = bias + s (T_L(t) - T_0) + q (T_L(t) - T_0)^2 + noise, with T_L behind a first-order lag L and
+T_0 the mean temperature of the log (a convention: it sets what `bias` means). For given noise the
+rest is generalised least squares on the DCT coefficients; for given s, q and L the noise is a
+Whittle fit of what they leave; in turn until they settle.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.estimators import likelihood
+from imubench_pipeline.estimators.estimate import Parameter
+from imubench_pipeline.estimators.likelihood import Likelihood
+from imubench_pipeline.estimators.model_choice import Candidate, compare
+from imubench_pipeline.estimators.whittle import Whittle, whittle_of
+from imubench_pipeline.missing import block_means, divided, filled, slow_part
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.spectrum import LineSpectrum, Spectrum, block_of, spectra
+from imubench_pipeline.thermal.level import mean_error
+from imubench_pipeline.thermal.path import TemperaturePath
+from imubench_pipeline.thermal.products import BlockSeries, Coefficients
+from imubench_pipeline.thermal.regression import Regression, Regressors
+from imubench_pipeline.thermal.uncertainty import Verdict, judge, shares
+
+Array = NDArray[np.float64]
+Span = tuple[int, int]
+
+_MOST_ROUNDS = 10
+_SETTLED = 0.02
+_QUANTIZATION_BAND = 1 / 10
+_SETTLING = (1 / 64, 1 / 32, 1 / 16)
+"""Parts of the log at its beginning in which a sensor may settle."""
+
+_BEYOND = 6.0
+"""Log likelihood by which the square, or a beginning apart, must be the better beyond BIC."""
+
+_WORTH_TRYING = 2.0
+_MOST_LOST = 2.5
+"""Growth of the error of s beyond which the beginning holds what the log says of it."""
+
+_FEWEST_BINS = 24
+
+
+@dataclass(frozen=True)
+class ThermalFit:
+    """What temperature does to a channel.
+
+    Attributes
+    ----------
+    reference : float
+        T_0, the mean temperature, °C.
+    sensitivity, quadratic : Parameter
+        s and q, SI per K and per K²; q has status ``absent`` where it is not in the model.
+    lag : Parameter
+        L, s.
+    bias : Parameter
+        Mean of the log, at T_0, SI.
+    compensated : bool
+        Temperature is taken out of the noise: the interval of s (or q) excludes 0, and BIC
+        favours it.
+    reason : str
+        Why it is, or is not.
+    plain, without_temperature : Likelihood
+        The noise of the log as it is, and of what temperature leaves of it; the same where
+        nothing is taken out.
+    effect : ndarray, shape (k,)
+        What temperature adds to the log at the knots of the path, SI; zeros where nothing is
+        taken out.
+    sample : ndarray, shape (k,)
+        Those knots, on the grid of the log.
+    """
+
+    reference: float
+    sensitivity: Parameter
+    quadratic: Parameter
+    lag: Parameter
+    bias: Parameter
+    compensated: bool
+    reason: str
+    plain: Likelihood
+    without_temperature: Likelihood
+    effect: Array
+    sample: Array
+
+    def compensate(self, blocks: Iterable[Array]) -> Iterator[Array]:
+        """Yield the blocks of the log less what temperature adds to it."""
+        reached = 0
+        for values in blocks:
+            points = np.arange(reached, reached + len(values))
+            yield values - np.interp(points, self.sample, self.effect)
+            reached += len(values)
+
+
+def fit_temperature(
+    blocks: Callable[[], Iterable[Array]],
+    samples: int,
+    rate: float,
+    path: TemperaturePath,
+    *,
+    holes: bool = False,
+    band: float | None = None,
+    bandwidth: float | None = None,
+    quadratic: bool | None = None,
+    longest_lag: float | None = None,
+    rng: np.random.Generator,
+) -> ThermalFit:
+    """Estimate what temperature does to a channel, together with its noise.
+
+    Parameters
+    ----------
+    blocks : callable
+        Gives the log in order, in SI, as often as it is called; NaN where a sample is missing.
+    samples : int
+        L, the length of all blocks together.
+    rate : float
+        Hz.
+    path : TemperaturePath
+        Temperature of the log; its segments are those of the log.
+    holes : bool
+        Samples may be missing.
+    band, bandwidth : float, optional
+        As in `imubench_pipeline.estimators.likelihood.fit`.
+    quadratic : bool, optional
+        Whether the square of the temperature is in the model; by default where the log favours
+        it.
+    longest_lag : float, optional
+        s; by default a twentieth of the log, at most half an hour. 0: no lag.
+    rng : numpy.random.Generator
+
+    Raises
+    ------
+    ValueError
+        If the log has fewer than 16 samples.
+
+    References
+    ----------
+    A. C. Aitken, "On least squares and linear combinations of observations", Proc. R. Soc.
+    Edinburgh 55, 1935; H. D. Patterson and R. Thompson, "Recovery of inter-block information
+    when block sizes are unequal", Biometrika 58, 1971.
+    """
+    spans = path.segments
+    if holes:
+        means = block_means(blocks(), spans)
+        spans = divided(means, spans)
+        plain = likelihood.fit_blocks(
+            blocks,
+            samples,
+            rate,
+            holes=True,
+            segments=path.segments,
+            band=band,
+            bandwidth=bandwidth,
+            rng=rng,
+        )
+        model, effect = plain.estimates[0].model, np.zeros(len(path.value))
+        for _ in range(2):
+            complete = _complete(blocks, spans, model, path, effect, rate, rng)
+            fit = _Fit(complete, samples, rate, spans, path, band, bandwidth, longest_lag)
+            if not fit.possible:
+                break
+            found = fit.settle(quadratic)
+            model, effect = _model_of(found), found.regressors.effect(found.regression)
+    else:
+        fit = _Fit(blocks(), samples, rate, spans, path, band, bandwidth, longest_lag)
+        plain = likelihood.fit_spectrum(
+            fit.spectrum, fit.lines, band=band, bandwidth=bandwidth, rng=rng
+        )
+    if not fit.possible:
+        return _nothing(plain, path, fit, "too short a log")
+    if not path.range > 0.0 or path.range < 2.0 * float(np.median(path.deviation)):
+        return _nothing(plain, path, fit, f"the temperature changes by {path.range:.2g} K only")
+    found = fit.settle(quadratic)
+    verdict = fit.judged(found, rng)
+    if not verdict.compensated and len(fit.lags) > 1:
+        # A lag of nothing is whatever lets a walk pass for temperature: there is none.
+        fit.lags = fit.lags[:1]
+        found = fit.settle(quadratic)
+        verdict = replace(fit.judged(found, rng), lag=verdict.lag)
+    return _described(fit, found, verdict, plain, path, band, bandwidth, rng)
+
+
+@dataclass(frozen=True)
+class _Found:
+    """Where the fit has settled."""
+
+    regressors: Regressors
+    regression: Regression
+    whittle: Whittle
+    candidates: Sequence[Candidate]
+    cost: float
+
+
+class _Fit:
+    """The spectrum of a complete log, and its products with the temperature."""
+
+    def __init__(
+        self,
+        blocks: Iterable[Array],
+        samples: int,
+        rate: float,
+        spans: Sequence[Span],
+        path: TemperaturePath,
+        band: float | None,
+        bandwidth: float | None,
+        longest_lag: float | None,
+    ) -> None:
+        series = BlockSeries(spans, block_of(spans))
+        self.spectrum: Spectrum
+        self.lines: list[LineSpectrum]
+        self.spectrum, self.lines = spectra(series.watch(blocks), samples, rate, spans)
+        self.series = series
+        _, self.used, limit = likelihood.lines_and_band(self.spectrum, self.lines, band, bandwidth)
+        self.possible = bool(self.used.sum() >= _FEWEST_BINS)
+        if not self.possible:
+            return
+        self.chosen = self.spectrum.taken(self.used)
+        self.whittle = whittle_of(self.chosen, limit.highest)
+        self.quantization = limit.highest >= _QUANTIZATION_BAND * rate
+        self.regressors = Regressors(
+            Coefficients(self.spectrum, series), path, rate, path.mean, self.used
+        )
+        self.lags = self.regressors.lags(longest_lag)
+
+    def settle(self, quadratic: bool | None) -> _Found:
+        """Return the joint fit; the square is tried where nothing is said of it.
+
+        So is another sensitivity at the beginning, where a sensor settles.
+        """
+        needed = 0.5 * math.log(len(self.chosen.density)) + _WORTH_TRYING
+        found = self._best(self.regressors.also(quadratic=bool(quadratic)))
+        duration = self.spectrum.duration
+        for _ in range(2):
+            tried = [found.regressors.also(settling=part * duration) for part in _SETTLING]
+            tried = [] if found.regressors.settling else tried
+            if quadratic is None and not found.regressors.quadratic:
+                tried.append(found.regressors.also(quadratic=True))
+            gains = [self._gained(found, regressors) for regressors in tried]
+            if not gains or max(gains) < needed:
+                break
+            wider = self._best(tried[int(np.argmax(gains))])
+            if wider.cost > found.cost - _BEYOND or _error(wider) > _MOST_LOST * _error(found):
+                break
+            found = wider
+        return found
+
+    def _gained(self, found: _Found, regressors: Regressors) -> float:
+        """Return the log likelihood that more regressors gain, for the noise as it is fitted."""
+        density = found.whittle.density(found.candidates[0].found)
+        wider = regressors.at(found.regression.lag, self.chosen.ordinates / density)
+        return wider.gain - found.regression.gain
+
+    def _best(self, regressors: Regressors) -> _Found:
+        """Settle from the noise of the log as it is, and from that of ordinary least squares."""
+        flat = self.chosen.ordinates * np.ones(len(self.chosen.density))
+        starts = [self._weights(self.whittle, self.chosen)[0]]
+        rough = regressors.at(0.0, flat)
+        left = regressors.without(self.chosen, rough, flat)
+        starts.append(self._weights(self.whittle.of(left), self.chosen)[0])
+        return min((self._settle(regressors, start) for start in starts), key=lambda f: f.cost)
+
+    def _weights(self, whittle: Whittle, spectrum: Spectrum) -> tuple[Array, Sequence[Candidate]]:
+        candidates = compare(whittle, quantization=self.quantization)
+        return spectrum.ordinates / whittle.density(candidates[0].found), candidates
+
+    def _settle(self, regressors: Regressors, weights: Array) -> _Found:
+        before: Regression | None = None
+        for _ in range(_MOST_ROUNDS):
+            found = regressors.best(weights, self.lags)
+            left = regressors.without(self.chosen, found, weights)
+            whittle = self.whittle.of(left)
+            weights, candidates = self._weights(whittle, self.chosen)
+            ramp = candidates[0].found.terms.ramp
+            if ramp != regressors.ramp:
+                regressors = regressors.also(ramp=ramp)
+                before = None
+                continue
+            if before is not None:
+                spread = math.sqrt(found.covariance[0, 0])
+                if abs(found.beta[0] - before.beta[0]) < _SETTLED * spread:
+                    break
+            before = found
+        free = candidates[0].found.terms.parameters + len(found.beta) - ramp + (found.lag > 0.0)
+        return _Found(regressors, found, whittle, candidates, self._cost(whittle, candidates, free))
+
+    def _cost(self, whittle: Whittle, candidates: Sequence[Candidate], free: int) -> float:
+        """Return half the BIC, with the ordinates of the log.
+
+        Those that a fit takes are counted as its parameters.
+        """
+        found, ordinates = candidates[0].found, self.chosen.ordinates
+        density = whittle.density(found)
+        data = whittle.data(found) * whittle.spectrum.ordinates / ordinates
+        cost = 0.5 * float(np.sum(ordinates * (np.log(density) + data / density)))
+        return cost + 0.5 * free * math.log(len(density))
+
+    def judged(self, found: _Found, rng: np.random.Generator) -> Verdict:
+        """Return what a settled fit tells."""
+        return judge(
+            found.regressors,
+            found.regression,
+            found.whittle,
+            found.candidates,
+            self.lags,
+            gained=2.0 * (self.plain() - found.cost),
+            rng=rng,
+        )
+
+    def plain(self) -> float:
+        """Return half the BIC of the best noise without temperature."""
+        candidates = self.of_the_log()
+        return self._cost(self.whittle, candidates, candidates[0].found.terms.parameters)
+
+    def of_the_log(self) -> Sequence[Candidate]:
+        """Return the models of the noise without temperature, the best first."""
+        return compare(self.whittle, quantization=self.quantization)
+
+
+def _error(found: _Found) -> float:
+    """Return the standard deviation of s, for given noise."""
+    return math.sqrt(float(found.regression.covariance[0, 0]))
+
+
+def _model_of(found: _Found) -> NoiseModel:
+    return likelihood.model_of(found.candidates[0].found)
+
+
+def _complete(
+    blocks: Callable[[], Iterable[Array]],
+    spans: Sequence[Span],
+    model: NoiseModel,
+    path: TemperaturePath,
+    effect: Array,
+    rate: float,
+    rng: np.random.Generator,
+) -> Iterator[Array]:
+    """Yield the log with its missing samples drawn: temperature's effect, and noise."""
+
+    def shifted(values: Iterable[Array], sign: float) -> Iterator[Array]:
+        reached = 0
+        for part in values:
+            points = np.arange(reached, reached + len(part))
+            yield part + sign * np.interp(points, path.sample, effect)
+            reached += len(part)
+
+    means = block_means(shifted(blocks(), -1.0), spans)
+    slow = slow_part(means, spans, model, rate, rng)
+    return shifted(filled(shifted(blocks(), -1.0), slow, model, rate, rng), 1.0)
+
+
+def _described(
+    fit: _Fit,
+    found: _Found,
+    verdict: Verdict,
+    plain: Likelihood,
+    path: TemperaturePath,
+    band: float | None,
+    bandwidth: float | None,
+    rng: np.random.Generator,
+) -> ThermalFit:
+    """Return the fit as it is told, with the noise that temperature leaves."""
+    without, effect = plain, np.zeros(len(path.value))
+    mean = fit.spectrum.mean
+    if verdict.compensated:
+        regressors = found.regressors.also(used=np.ones(len(fit.used), dtype=np.bool_))
+        weights = np.zeros(len(fit.used))
+        weights[fit.used] = fit.chosen.ordinates / found.whittle.density(found.candidates[0].found)
+        left = regressors.without(fit.spectrum, found.regression, weights)
+        without = likelihood.fit_spectrum(left, fit.lines, band=band, bandwidth=bandwidth, rng=rng)
+        effect = regressors.effect(found.regression)
+    at_centres = [np.interp(centres, path.sample, effect) for centres in fit.series.centres]
+    shift = float(np.concatenate(at_centres).mean())
+    candidates = found.candidates if verdict.compensated else fit.of_the_log()
+    noises = [(likelihood.model_of(one.found), share) for one, share in shares(candidates)]
+    spread = math.hypot(mean_error(noises, fit.spectrum), verdict.temperature_error)
+    bias = Parameter(
+        mean - shift, lower=mean - shift - 1.96 * spread, upper=mean - shift + 1.96 * spread
+    )
+    return ThermalFit(
+        path.mean,
+        verdict.sensitivity,
+        verdict.quadratic,
+        verdict.lag,
+        bias,
+        verdict.compensated,
+        verdict.reason,
+        plain,
+        without,
+        effect,
+        path.sample,
+    )
+
+
+def _nothing(plain: Likelihood, path: TemperaturePath, fit: _Fit, reason: str) -> ThermalFit:
+    unknown = Parameter(None, "not_identified", reason)
+    mean, spread = fit.spectrum.mean, mean_error([(plain.estimates[0].model, 1.0)], fit.spectrum)
+    return ThermalFit(
+        path.mean,
+        unknown,
+        unknown,
+        unknown,
+        Parameter(mean, lower=mean - 1.96 * spread, upper=mean + 1.96 * spread),
+        False,
+        reason,
+        plain,
+        plain,
+        np.zeros(len(path.value)),
+        path.sample,
+    )

@@ -1,0 +1,223 @@
+"""The smooth path of a temperature that is known by a register, with its error.
+
+The temperature is an integrated random walk; a block of equal readings says into which cell of
+the register it falls, a block that the register crosses where the edge of the cell was reached.
+How fast it varies and how much noise the register adds are those of the greatest evidence.
+
+References
+----------
+T. Minka, "Expectation propagation for approximate Bayesian inference", UAI 2001; G. Wahba,
+"Improper priors, spline smoothing and the problem of guarding against model errors in
+regression", J. R. Stat. Soc. B 40, 1978.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+from scipy.special import ndtri
+
+from imubench_pipeline.thermal.path_kernels import drawn, propagate
+from imubench_pipeline.thermal.register import Readings, Span, readings
+
+Array = NDArray[np.float64]
+
+DRAWS = 24
+"""Paths drawn from the distribution of what the register leaves open."""
+
+_SCAN = range(-14, 5, 2)
+_NOISES = (0.01, 0.1, 0.4)
+_QUIETEST = 1e-4
+_MOST_TRIES = 40
+_NEVER = 1e300
+_FLOOR = 1e-3
+_COARSE = 0.25
+"""Noise over step below which a reading bounds the temperature."""
+
+
+@dataclass(frozen=True)
+class TemperaturePath:
+    """A temperature on a coarse grid, linear between its knots.
+
+    Attributes
+    ----------
+    sample : ndarray, shape (k,)
+        Place of the knots on the grid of the log.
+    value, deviation : ndarray, shape (k,)
+        Temperature, and its standard deviation, °C.
+    draws : ndarray, shape (d, k)
+        Paths that the readings allow, drawn from their distribution, °C.
+    parts : tuple of slice
+        Knots of each segment.
+    segments : tuple of (int, int)
+        First and one-past-last sample of each segment.
+    step, noise : float
+        Least significant bit of the register (0: none shows), and standard deviation of the
+        noise of a reading, °C.
+    """
+
+    sample: Array
+    value: Array
+    deviation: Array
+    draws: Array
+    parts: tuple[slice, ...]
+    segments: tuple[Span, ...]
+    step: float
+    noise: float
+
+    @property
+    def mean(self) -> float:
+        """Mean over the log, °C: T_0 by convention."""
+        return float(np.mean(self.value))
+
+    @property
+    def range(self) -> float:
+        """Highest less lowest, °C."""
+        return float(np.ptp(self.value))
+
+
+def temperature_path(
+    blocks: Iterable[Array], segments: Sequence[Span], rng: np.random.Generator
+) -> TemperaturePath:
+    """Return the path of a temperature from the readings of its register.
+
+    Parameters
+    ----------
+    blocks : iterable of ndarray
+        Readings in order on the grid of the log, °C; NaN where missing.
+    segments : sequence of (int, int)
+        First and one-past-last sample of each part that no time relates to the others.
+    rng : numpy.random.Generator
+        For the draws.
+
+    Returns
+    -------
+    TemperaturePath
+
+    Raises
+    ------
+    ValueError
+        If no reading is present.
+    """
+    read = readings(blocks, segments)
+    level = float(np.nanmedian(read.mean))
+    spread = max(float(np.nanmax(read.high) - np.nanmin(read.low)), read.step, 1e-6)
+    evidence = _Evidence(read, level, spread)
+    q, noise = evidence.best()
+    value, variance = np.empty(len(read.begin)), np.empty(len(read.begin))
+    draws = np.empty((DRAWS, len(read.begin)))
+    for part in read.parts:
+        value[part], variance[part], _, tau, nu = evidence.part(part, q, noise)
+        normals = rng.standard_normal((DRAWS, part.stop - part.start, 2))
+        draws[:, part] = drawn(evidence.steps(part), q, spread, tau, nu, normals)
+    value, draws = value + level, draws + level
+    if noise < _COARSE * read.step:
+        inside = read.high == read.low
+        half = 0.5 * read.step
+        value[inside] = np.clip(value, read.mean - half, read.mean + half)[inside]
+    return TemperaturePath(
+        read.centre,
+        value,
+        np.sqrt(variance),
+        draws,
+        read.parts,
+        tuple((int(start), int(stop)) for start, stop in segments),
+        read.step,
+        noise,
+    )
+
+
+class _Evidence:
+    """The readings as the kernels take them, and how likely they are."""
+
+    def __init__(self, read: Readings, level: float, spread: float) -> None:
+        self._read, self._level, self._spread = read, level, spread
+        self._width = float(np.median(read.end - read.begin))
+        there = read.count > 0
+        stepped = there & (read.step > 0.0)
+        self._cell = stepped & (read.high == read.low)
+        self._two = stepped & ~self._cell & (read.high - read.low < 1.5 * read.step)
+        self._mean = there & ~self._cell & ~self._two
+        count = np.maximum(read.count, 1)
+        # All of n readings in one cell: x keeps clear of its edges by about the greatest of n
+        # normal variates, whose median and (nearly) standard deviation these are.
+        self._clear = ndtri(0.5 ** (1.0 / count))
+        self._soft = 1.0 / np.sqrt(1.0 + 0.9 * np.log(count))
+        # Readings on both sides of an edge: x follows from the share of each.
+        share = (read.mean - read.low) / max(read.step, 1e-300)
+        share = np.clip((share * count + 0.5) / (count + 1.0), 0.01, 0.99)
+        self._beyond = ndtri(share)
+        density = np.exp(-0.5 * self._beyond**2) / math.sqrt(2.0 * math.pi)
+        self._known = share * (1.0 - share) / count / density**2
+        # Within a block x moves on.
+        self._floor = max(_FLOOR * read.step, 2.0 * spread / len(count))
+
+    def steps(self, part: slice) -> Array:
+        """Return the time from the block before, in blocks; 1 for the first."""
+        centre = self._read.centre[part] / self._width
+        return np.asarray(np.diff(centre, prepend=centre[0] - 1.0))
+
+    def part(self, part: slice, q: float, noise: float) -> tuple[Array, Array, float, Array, Array]:
+        """Return mean, variance and log evidence of a segment, and its Gaussian equivalents."""
+        read, least = self._read, (1e-6 * self._spread) ** 2
+        mean = read.mean[part] - self._level
+        cell, two, many = self._cell[part], self._two[part], self._mean[part]
+        edge = 0.5 * (read.low[part] + read.high[part]) - self._level
+        at = np.where(two, edge + noise * self._beyond[part], mean)
+        variance = noise**2 * np.where(
+            two, self._known[part], 1.0 / np.maximum(read.count[part], 1)
+        )
+        variance += np.where(two, self._floor**2, 0.0) + least
+        tau = np.where(two | many, 1.0 / variance, 0.0)
+        nu = np.where(two | many, at / variance, 0.0)
+        height = -0.5 * np.log(variance[many]).sum()
+        # The share of a block is given, not the x that it tells: with dx = noise dz.
+        height += 0.5 * np.log((noise**2 * self._known[part] + least) / variance)[two].sum()
+        height += float((-0.5 * at**2 / variance)[two | many].sum())
+        half = np.maximum(0.5 * read.step - noise * self._clear[part], 0.05 * read.step)
+        path, spread, evidence = propagate(
+            self.steps(part),
+            q,
+            self._spread,
+            cell,
+            np.where(cell, mean - half, 0.0),
+            np.where(cell, mean + half, 0.0),
+            (noise * self._soft[part]) ** 2 + least,
+            tau,
+            nu,
+        )
+        return path, spread, evidence + float(height), tau, nu
+
+    def best(self) -> tuple[float, float]:
+        """Return q and the noise that make the readings most likely."""
+        read = self._read
+        rough = float(np.nanmedian(np.abs(np.diff(read.mean)))) if len(read.mean) > 1 else 0.0
+        least = _QUIETEST * self._spread
+        noises = {max(part * read.step, least) for part in _NOISES} | {max(rough, least)}
+
+        def cost(at: Array) -> float:
+            q, noise = self._spread**2 * 10.0 ** float(at[0]), 10.0 ** float(at[1])
+            if not (-16.0 < at[0] < 6.0 and 0.99 * least < noise < 10.0 * self._spread):
+                return _NEVER
+            return min(-sum(self.part(part, q, noise)[2] for part in read.parts), _NEVER)
+
+        starts = [np.array([k, math.log10(noise)]) for k in _SCAN for noise in sorted(noises)]
+        first = min(starts, key=cost)
+        found = minimize(
+            cost,
+            first,
+            method="Nelder-Mead",
+            options={
+                "maxfev": _MOST_TRIES,
+                "initial_simplex": np.array([first, first, first])
+                + np.array([[0.0, 0.0], [0.7, 0.0], [0.0, 0.3]]),
+                "xatol": 0.05,
+                "fatol": 0.05,
+            },
+        )
+        return self._spread**2 * 10.0 ** float(found.x[0]), 10.0 ** float(found.x[1])

@@ -1,0 +1,154 @@
+"""What a temperature register leaves of a temperature: the means of blocks of its readings.
+
+A temperature varies slowly. It is kept in blocks, at most `KNOTS` in a log: blocks of one sample
+where the log is no longer, else of ceil(L / KNOTS) samples.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Span = tuple[int, int]
+
+KNOTS = 8192
+"""Blocks that a log is divided into, at most (and one more a segment)."""
+
+_LEVELS = 1 << 16
+"""Different readings that are looked at for the steps of a register."""
+
+_FEWEST_REPEATS = 8.0
+"""Readings a level: rarer repeats may be by chance."""
+
+_ROUNDED = 0.2
+"""Part of a step by which readings in decimals may miss its multiples."""
+
+
+@dataclass(frozen=True)
+class Readings:
+    """The readings of a register in blocks.
+
+    Attributes
+    ----------
+    begin, end : ndarray of int, shape (k,)
+        First and one-past-last sample of each block.
+    count : ndarray of int, shape (k,)
+        Readings present.
+    mean, low, high : ndarray, shape (k,)
+        °C; NaN where none is present.
+    step : float
+        Least significant bit of the register, °C; 0: none shows.
+    parts : tuple of slice
+        Blocks of each segment.
+    """
+
+    begin: NDArray[np.int64]
+    end: NDArray[np.int64]
+    count: NDArray[np.int64]
+    mean: Array
+    low: Array
+    high: Array
+    step: float
+    parts: tuple[slice, ...]
+
+    @property
+    def centre(self) -> Array:
+        """Middle of each block, samples."""
+        return np.asarray((self.begin + self.end - 1) / 2.0)
+
+
+def readings(blocks: Iterable[Array], segments: Sequence[Span]) -> Readings:
+    """Gather the readings of a temperature in one pass, in bounded memory.
+
+    Parameters
+    ----------
+    blocks : iterable of ndarray
+        Temperature in order on the grid of the log, °C; NaN where missing.
+    segments : sequence of (int, int)
+        First and one-past-last sample of each part that no time relates to the others.
+
+    Raises
+    ------
+    ValueError
+        If no reading is present.
+    """
+    width = max(1, -(-sum(stop - start for start, stop in segments) // KNOTS))
+    begins = [np.arange(start, stop, width) for start, stop in segments]
+    begin = np.concatenate(begins)
+    end = np.concatenate(
+        [np.minimum(b + width, stop) for b, (_, stop) in zip(begins, segments, strict=True)]
+    )
+    total, count = np.zeros(len(begin)), np.zeros(len(begin), dtype=np.int64)
+    low, high = np.full(len(begin), np.inf), np.full(len(begin), -np.inf)
+    levels: Array = np.empty(0)
+    reached, present = 0, 0
+    for values in blocks:
+        there = np.flatnonzero(np.isfinite(values))
+        place = np.searchsorted(begin, reached + there, side="right") - 1
+        inside = (place >= 0) & (reached + there < end[place])
+        chosen, place = values[there[inside]], place[inside]
+        reached += len(values)
+        if len(chosen) == 0:
+            continue
+        edges = np.flatnonzero(np.diff(place, prepend=-1))
+        block = place[edges]
+        total[block] += np.add.reduceat(chosen, edges)
+        count[block] += np.diff(np.append(edges, len(chosen)))
+        low[block] = np.minimum(low[block], np.minimum.reduceat(chosen, edges))
+        high[block] = np.maximum(high[block], np.maximum.reduceat(chosen, edges))
+        present += len(chosen)
+        if len(levels) <= _LEVELS:
+            levels = np.union1d(levels, chosen)
+    if present == 0:
+        raise ValueError("no temperature is present")
+    stops = np.cumsum([len(part) for part in begins])
+    empty = count == 0
+    return Readings(
+        begin,
+        end,
+        count,
+        np.where(empty, np.nan, total / np.maximum(count, 1)),
+        np.where(empty, np.nan, low),
+        np.where(empty, np.nan, high),
+        step_of(levels, present),
+        tuple(slice(int(b - len(p)), int(b)) for p, b in zip(begins, stops, strict=True)),
+    )
+
+
+def step_of(levels: Array, present: int) -> float:
+    """Return the least significant bit of a register from the different values that it gave.
+
+    Parameters
+    ----------
+    levels : ndarray, shape (n,)
+        The values, rising, °C.
+    present : int
+        Readings that were made.
+
+    Returns
+    -------
+    float
+        °C. The smallest gap between values, of which all gaps are multiples, as closely as
+        decimals may have rounded them; 0 where there is none, or where only one value was read
+        (no step is known then) or hardly any was read twice.
+    """
+    if len(levels) < 2 or present < _FEWEST_REPEATS * len(levels):
+        return 0.0
+    gaps = np.diff(levels)
+    smallest = float(gaps.min())
+    # Readings printed in few decimals make gaps of one step differ; their mean does not.
+    step = float(np.mean(gaps[gaps < 1.75 * smallest]))
+    first = float(levels[0])
+    for _ in range(2):
+        multiples = np.rint((levels - first) / step)
+        if multiples[-1] > multiples[0]:
+            step, first = (float(value) for value in np.polyfit(multiples, levels, 1))
+    missed = np.abs((levels - first) / step - multiples)
+    if math.isfinite(step) and float(np.quantile(missed, 0.99)) <= _ROUNDED:
+        return step
+    return 0.0

@@ -1,0 +1,220 @@
+"""Generalised least squares of a log on its temperature, for given noise: s, q and the lag."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from imubench_pipeline.spectrum import Spectrum
+from imubench_pipeline.thermal.lag import lagged_path
+from imubench_pipeline.thermal.path import TemperaturePath
+from imubench_pipeline.thermal.products import Coefficients, Products
+
+Array = NDArray[np.float64]
+
+_LAGS = 16
+_LONGEST = 1 / 20
+"""Part of the log: a longer lag is a drift of its own."""
+
+_LONGEST_LAG = 1800.0
+_LEAST_ORDINATES = 0.02
+
+
+@dataclass(frozen=True)
+class Regression:
+    """A fit for given noise.
+
+    Attributes
+    ----------
+    beta : ndarray, shape (p,)
+        s, then q and what the beginning adds to s where they are in the model, then R where there
+        is a ramp; SI per K, K², K and s.
+    information : ndarray, shape (p, p)
+        Inverse of their covariance.
+    lag : float
+        s.
+    gain : float
+        Log likelihood over that of beta = 0.
+    """
+
+    beta: Array
+    information: Array
+    lag: float
+    gain: float
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance of beta, for given noise and lag."""
+        return np.asarray(np.linalg.inv(self.information))
+
+
+class Regressors:
+    """The regressors of a log, and their products with it, for any lag.
+
+    Parameters
+    ----------
+    coefficients : Coefficients
+        Of the log.
+    path : TemperaturePath
+    rate : float
+        Hz.
+    reference : float
+        T_0, °C.
+    used : ndarray of bool, shape (b,)
+        Bins to use.
+    quadratic, ramp : bool
+        Whether the square of the temperature, and time, are regressors too.
+    settling : float
+        s from the beginning of the log in which a sensor that settles may follow the temperature
+        otherwise; 0: none.
+    """
+
+    def __init__(
+        self,
+        coefficients: Coefficients,
+        path: TemperaturePath,
+        rate: float,
+        reference: float,
+        used: NDArray[np.bool_],
+        *,
+        quadratic: bool = False,
+        ramp: bool = False,
+        settling: float = 0.0,
+    ) -> None:
+        self.coefficients, self.path, self.rate = coefficients, path, rate
+        self.reference, self.used = reference, used
+        self.quadratic, self.ramp, self.settling = quadratic, ramp, settling
+        self._known: dict[float, Products] = {}
+        self._time = coefficients.of_time(rate)
+        self.ordinates = coefficients.ordinates[used]
+
+    def also(
+        self,
+        *,
+        quadratic: bool | None = None,
+        ramp: bool | None = None,
+        settling: float | None = None,
+        used: NDArray[np.bool_] | None = None,
+    ) -> Regressors:
+        """Return the regressors with other terms, or in other bins."""
+        return Regressors(
+            self.coefficients,
+            self.path,
+            self.rate,
+            self.reference,
+            self.used if used is None else used,
+            quadratic=self.quadratic if quadratic is None else quadratic,
+            ramp=self.ramp if ramp is None else ramp,
+            settling=self.settling if settling is None else settling,
+        )
+
+    @property
+    def thermal(self) -> int:
+        """Number of regressors that temperature has."""
+        return 1 + self.quadratic + (self.settling > 0.0)
+
+    def knots(self, lag: float) -> Array:
+        """Return T_lag - T_0 at the knots of the path, K."""
+        return lagged_path(self.path, self.path.value, self.rate, lag) - self.reference
+
+    def effect(self, found: Regression) -> Array:
+        """Return what temperature adds to the log, at the knots of the path, SI."""
+        of_knots = self._of(self.knots(found.lag))
+        return np.asarray(np.einsum("i,ik->k", found.beta[: self.thermal], np.array(of_knots)))
+
+    def _of(self, knots: Array) -> list[Array]:
+        """Return the regressors of temperature at the knots."""
+        terms = [knots, knots**2] if self.quadratic else [knots]
+        if self.settling > 0.0:
+            begin = self.path.sample[0] + self.settling * self.rate
+            end = int(np.searchsorted(self.path.sample, begin))
+            settled = knots[min(end, len(knots) - 1)]
+            terms.append(np.where(np.arange(len(knots)) < end, knots - settled, 0.0))
+        return terms
+
+    def means(self, lag: float) -> Array:
+        """Return the mean over the log of each regressor of temperature."""
+        return np.array([float(term.mean()) for term in self._of(self.knots(lag))])
+
+    def columns(self, lag: float) -> list[Array]:
+        """Return the coefficients of the regressors."""
+        terms = self._of(self.knots(lag))
+        columns = [self.coefficients.of_knots(self.path.sample, term) for term in terms]
+        return columns + [self._time] * self.ramp
+
+    def products(self, lag: float) -> Products:
+        """Return the products of log and regressors in the bins used."""
+        if lag not in self._known:
+            full = self.coefficients.products(self.columns(lag))
+            self._known[lag] = Products(full.cross[self.used], full.gram[self.used])
+        return self._known[lag]
+
+    def at(self, lag: float, weights: Array) -> Regression:
+        """Return the fit at a lag; the weights are nu / S of the bins used."""
+        products = self.products(lag)
+        information = np.einsum("b,bij->ij", weights, products.gram)
+        target = weights @ products.cross
+        information += 1e-12 * np.diag(np.diag(information)) + 1e-300 * np.eye(len(target))
+        beta = np.linalg.solve(information, target)
+        return Regression(beta, information, lag, 0.5 * float(target @ beta))
+
+    def lags(self, longest: float | None = None) -> Array:
+        """Return the lags to scan, 0 first, s."""
+        duration = max(stop - start for start, stop in self.path.segments) / self.rate
+        knot = float(np.median(np.diff(self.path.sample))) / self.rate
+        last = longest if longest is not None else min(_LONGEST * duration, _LONGEST_LAG)
+        first = max(0.5 * knot, last / 1000.0)
+        if first >= last:
+            return np.array([0.0])
+        return np.concatenate(([0.0], np.geomspace(first, last, _LAGS)))
+
+    def best(self, weights: Array, lags: Array) -> Regression:
+        """Return the fit with the lag that the log favours."""
+        return maximised(lambda lag: self.at(lag, weights), lags)
+
+    def without(self, spectrum: Spectrum, found: Regression, weights: Array) -> Spectrum:
+        """Return the spectrum (of the bins used) less what temperature explains.
+
+        The degrees of freedom that the fit takes from a bin are taken from its ordinates, so
+        that the density keeps its mean.
+        """
+        products = self.products(found.lag)
+        p = self.thermal
+        beta, cross, gram = found.beta[:p], products.cross[:, :p], products.gram[:, :p, :p]
+        left = spectrum.density - 2.0 * cross @ beta + np.einsum("i,bij,j->b", beta, gram, beta)
+        taken = weights * np.einsum("bij,ij->b", gram, np.linalg.inv(found.information[:p, :p]))
+        ordinates = np.maximum(
+            spectrum.ordinates - np.minimum(taken, 1.0), _LEAST_ORDINATES * spectrum.ordinates
+        )
+        with_time = self.also(ramp=True).products(found.lag) if not self.ramp else products
+        return replace(
+            spectrum,
+            ordinates=ordinates,
+            density=np.maximum(left, 1e-12 * spectrum.density) * spectrum.ordinates / ordinates,
+            cross=(spectrum.cross - with_time.gram[:, :p, -1] @ beta)
+            * spectrum.ordinates
+            / ordinates,
+            ramp=spectrum.ramp * spectrum.ordinates / ordinates,
+        )
+
+
+def maximised(at: Callable[[float], Regression], lags: Array) -> Regression:
+    """Return the fit of the greatest gain: scan the lags, then polish."""
+    fits = [at(float(lag)) for lag in lags]
+    place = int(np.argmax([fit.gain for fit in fits]))
+    best = fits[place]
+    if len(lags) == 1:
+        return best
+    low, high = float(lags[max(place - 1, 0)]), float(lags[min(place + 1, len(lags) - 1)])
+    polished = minimize_scalar(
+        lambda lag: -at(float(lag)).gain,
+        bounds=(low, high),
+        method="bounded",
+        options={"xatol": 2e-3 * high, "maxiter": 25},
+    )
+    other = at(float(polished.x))
+    return other if other.gain > best.gain + 1e-9 else best

@@ -1,0 +1,168 @@
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.linalg import toeplitz
+
+from imubench_pipeline.allan import allan_variance
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.simulate import simulate
+from imubench_pipeline.spectrum import block_of, spectra
+from imubench_pipeline.thermal.fit import fit_temperature
+from imubench_pipeline.thermal.path import temperature_path
+from imubench_pipeline.thermal.products import BlockSeries, Coefficients
+from imubench_pipeline.thermal.regression import Regressors
+
+RATE = 5.0
+SAMPLES = 90_000
+TIME = np.arange(SAMPLES) / RATE
+DAY = 22.0 + 6.0 * np.sin(2.0 * np.pi * TIME / 9_000.0 + 0.3)
+NOISE = NoiseModel(N=1e-4, K=1e-6)
+
+
+def behind(values, lag):
+    decay = math.exp(-1.0 / (lag * RATE))
+    result = np.empty_like(values)
+    result[0] = values[0]
+    for i in range(1, len(values)):
+        result[i] = decay * result[i - 1] + (1.0 - decay) * values[i]
+    return result
+
+
+def fitted(log, readings, segments=None, rate=RATE, **options):
+    rng = np.random.default_rng(11)
+    path = temperature_path([readings], segments or [(0, len(log))], rng)
+    return fit_temperature(lambda: [log], len(log), rate, path, rng=rng, **options)
+
+
+def test_products_with_the_log_itself_are_its_spectrum():
+    # Long enough for block means, in two segments.
+    rng = np.random.default_rng(1)
+    samples, spans = 300_000, [(0, 140_000), (150_000, 300_000)]
+    log = rng.standard_normal(samples).cumsum()
+    series = BlockSeries(spans, block_of(spans))
+    spectrum, _ = spectra(series.watch(np.array_split(log, 11)), samples, 100.0, spans)
+    coefficients = Coefficients(spectrum, series)
+    low = spectrum.block > 1
+    assert low.sum() > 64
+    assert coefficients.density()[low] == pytest.approx(spectrum.density[low], rel=1e-9)
+    ramp = coefficients.products([coefficients.of_time(100.0)])
+    assert ramp.gram[low, 0, 0] == pytest.approx(spectrum.ramp[low], rel=1e-6, abs=1e-12)
+    assert ramp.cross[low, 0] == pytest.approx(
+        spectrum.cross[low], abs=1e-6 * float(np.abs(spectrum.cross).max())
+    )
+
+
+def test_sensitivity_for_known_noise_is_generalised_least_squares():
+    # The dense covariance of white noise, a process and a walk, and a free level.
+    n = 600
+    rng = np.random.default_rng(2)
+    noise = NoiseModel(N=1e-4, K=2e-5)
+    t = np.arange(n) / RATE
+    temperature = 20.0 + 3.0 * np.sin(2.0 * np.pi * t / 50.0) + 0.01 * t
+    log = simulate(noise, RATE, n, rng) + 2e-4 * temperature
+    steps = np.minimum.outer(np.arange(n), np.arange(n)) / RATE * noise.K**2
+    covariance = toeplitz(np.r_[noise.N**2 * RATE, np.zeros(n - 1)]) + steps
+    columns = np.column_stack([temperature, np.ones(n)])
+    weighted = np.linalg.solve(covariance, columns)
+    information = columns.T @ weighted
+    exact = np.linalg.solve(information, weighted.T @ log)[0]
+    bound = math.sqrt(np.linalg.inv(information)[0, 0])
+
+    spans = [(0, n)]
+    path = temperature_path([temperature], spans, rng)
+    series = BlockSeries(spans, block_of(spans))
+    spectrum, _ = spectra(series.watch([log]), n, RATE, spans)
+    used = np.ones(len(spectrum.density), dtype=np.bool_)
+    regressors = Regressors(Coefficients(spectrum, series), path, RATE, path.mean, used)
+    weights = (
+        spectrum.ordinates
+        / noise.sampled_spectrum(2.0 * np.pi * spectrum.frequency / RATE, RATE)
+        * RATE
+    )
+    found = regressors.at(0.0, weights)
+    assert math.sqrt(found.covariance[0, 0]) == pytest.approx(bound, rel=0.02)
+    assert found.beta[0] == pytest.approx(exact, abs=0.15 * bound)
+
+
+def test_sensitivity_lag_and_bias_are_found_and_taken_out():
+    rng = np.random.default_rng(3)
+    s, lag, bias = 4e-5, 200.0, 3e-3
+    log = simulate(NOISE, RATE, SAMPLES, rng) + bias + s * (behind(DAY, lag) - DAY.mean())
+    fit = fitted(log, np.round(DAY))
+    assert fit.compensated
+    assert fit.sensitivity.lower < s < fit.sensitivity.upper
+    assert fit.sensitivity.value == pytest.approx(s, rel=0.15)
+    assert fit.lag.lower < lag < fit.lag.upper
+    assert fit.bias.lower < bias < fit.bias.upper
+    plain = fit.plain.estimates[0].parameters["K"]
+    left = fit.without_temperature.estimates[0].parameters["K"]
+    assert plain.lower > NOISE.K  # temperature passes for a walk
+    assert left.lower < NOISE.K < left.upper
+    rest = np.concatenate(list(fit.compensate(np.array_split(log, 7))))
+    size = np.array([int(2_000 * RATE)])
+    before, after = (allan_variance(x, RATE, cluster_sizes=size).deviation for x in (log, rest))
+    assert after < 0.5 * before
+
+
+def test_a_temperature_that_does_nothing_is_left_in():
+    rng = np.random.default_rng(4)
+    fit = fitted(simulate(NOISE, RATE, SAMPLES, rng), np.round(DAY))
+    assert not fit.compensated
+    assert fit.sensitivity.lower < 0.0 < fit.sensitivity.upper
+    assert fit.lag.status == "not_identified"
+    assert fit.without_temperature is fit.plain
+    assert not fit.effect.any()
+
+
+@pytest.mark.parametrize(
+    "readings, word",
+    [
+        (20.0 + 8.0 * TIME / TIME[-1], "ramp"),
+        (np.full(SAMPLES, 21.0), "changes"),
+    ],
+    ids=["ramp", "constant"],
+)
+def test_temperature_that_cannot_be_told_from_time_is_said(readings, word):
+    rng = np.random.default_rng(5)
+    log = simulate(NOISE, RATE, SAMPLES, rng) + 4e-5 * readings
+    fit = fitted(log, readings)
+    assert fit.sensitivity.status == "not_identified"
+    assert fit.sensitivity.value is None
+    assert word in fit.sensitivity.reason
+    assert not fit.compensated
+
+
+def test_holes_and_segments_leave_the_sensitivity():
+    rng = np.random.default_rng(6)
+    log = simulate(NOISE, RATE, SAMPLES, rng) + 6e-5 * (DAY - DAY.mean())
+    log[rng.random(SAMPLES) < 0.03] = np.nan
+    log[20_000:20_400] = np.nan
+    fit = fitted(log, np.round(DAY, 2), [(0, 50_000), (50_000, SAMPLES)], holes=True)
+    assert fit.compensated
+    assert fit.sensitivity.lower < 6e-5 < fit.sensitivity.upper
+
+
+def test_a_square_is_found_where_there_is_one():
+    rng = np.random.default_rng(7)
+    off = DAY - DAY.mean()
+    log = simulate(NoiseModel(N=1e-4), RATE, SAMPLES, rng) + 2e-5 * off + 3e-6 * off**2
+    fit = fitted(log, DAY, longest_lag=0.0)
+    assert fit.quadratic.lower < 3e-6 < fit.quadratic.upper
+    assert fit.sensitivity.lower < 2e-5 < fit.sensitivity.upper
+    assert fitted(log, DAY, longest_lag=0.0, quadratic=False).quadratic.status == "absent"
+
+
+def test_gyro_y_of_the_tag_follows_its_temperature(shared):
+    log = pd.read_csv(shared / "logs/cats/day1.csv.gz")
+    values = log["gyro_y_mrad_s"].to_numpy() * 1e-3
+    fit = fitted(values, log["temperature_degC"].to_numpy(), rate=1.0)
+    s = fit.sensitivity
+    assert s.value == pytest.approx(0.46e-3, abs=0.01e-3)
+    assert 0.35e-3 < s.lower < s.value < s.upper < 0.55e-3
+    rest = np.concatenate(list(fit.compensate([values])))
+    for size, times in ((1_000, 1.5), (3_000, 3.0), (10_000, 6.0)):
+        n = np.array([size])
+        before, after = (allan_variance(x, 1.0, cluster_sizes=n).deviation for x in (values, rest))
+        assert before > times * after

@@ -1,0 +1,114 @@
+import numpy as np
+import pytest
+from scipy.special import ndtr
+
+from imubench_pipeline.thermal.path import temperature_path
+from imubench_pipeline.thermal.path_kernels import cell_moments
+from imubench_pipeline.thermal.register import KNOTS, readings, step_of
+
+SAMPLES = 60_000
+TIME = np.arange(SAMPLES) / SAMPLES
+DAY = 20.0 + 5.0 * np.sin(2.0 * np.pi * 1.3 * TIME + 0.4)
+WARM_UP = 30.0 + 6.0 * (1.0 - np.exp(-TIME / 0.1))
+
+
+def path_of(values, segments=None):
+    return temperature_path([values], segments or [(0, len(values))], np.random.default_rng(5))
+
+
+def error_of(path, truth):
+    return path.value - np.interp(path.sample, np.arange(len(truth)), truth)
+
+
+@pytest.mark.parametrize(
+    "m, v, low, high, noise",
+    [
+        (0.3, 0.5, 0.0, 1.0, 0.01),
+        (-4.0, 0.2, 0.0, 1.0, 0.1),
+        (6.0, 1.0, 0.0, 1.0, 1e-4),
+    ],
+)
+def test_moments_in_a_cell_are_those_of_quadrature(m, v, low, high, noise):
+    def weight(x):
+        spread = np.sqrt(noise)
+        there = ndtr((high - x) / spread) - ndtr((low - x) / spread)
+        return there * np.exp(-((x - m) ** 2) / (2 * v)) / np.sqrt(2 * np.pi * v)
+
+    # The integrand and all its slopes vanish at the ends: the sum over a grid is exact.
+    x = np.linspace(low - 20 * np.sqrt(noise), high + 20 * np.sqrt(noise), 200_001)
+    total, first, second = (np.sum(x**k * weight(x)) * (x[1] - x[0]) for k in range(3))
+    log_p, mean, variance = cell_moments(m, v, low, high, noise)
+    assert log_p == pytest.approx(np.log(total), abs=1e-6)
+    assert mean == pytest.approx(first / total, abs=1e-6)
+    assert variance == pytest.approx(second / total - (first / total) ** 2, rel=1e-4)
+
+
+@pytest.mark.parametrize("truth", [DAY, WARM_UP], ids=["day", "warm-up"])
+def test_whole_degrees_are_smoothed_within_their_cells(truth):
+    path = path_of(np.round(truth))
+    assert path.step == pytest.approx(1.0)
+    nearest = np.round(np.interp(path.sample, np.arange(SAMPLES), truth))
+    there = np.interp(path.sample, np.arange(SAMPLES), np.round(truth))
+    plain = there == nearest
+    assert np.abs(path.value - there)[plain].max() <= 0.5 + 1e-9
+    error = error_of(path, truth)
+    # Rounding alone has 1 / sqrt(12) = 0.29 K.
+    assert error.std() < 0.12
+    assert np.mean((error / path.deviation) ** 2) < 2.0
+    assert np.abs(error / path.deviation).max() < 4.5
+
+
+@pytest.mark.parametrize("truth", [DAY, WARM_UP], ids=["day", "warm-up"])
+def test_noise_of_the_sensor_dithers_whole_degrees(truth):
+    rng = np.random.default_rng(3)
+    path = path_of(np.round(truth + 0.1 * rng.standard_normal(SAMPLES)))
+    assert path.noise == pytest.approx(0.1, rel=0.4)
+    error = error_of(path, truth)
+    assert error.std() < 0.05
+    assert np.mean((error / path.deviation) ** 2) < 2.0
+
+
+def test_fine_steps_with_noise_are_averaged():
+    rng = np.random.default_rng(4)
+    read = np.round((DAY + 0.05 * rng.standard_normal(SAMPLES)) * 340.0) / 340.0
+    path = path_of(read)
+    assert path.step == pytest.approx(1.0 / 340.0, rel=1e-6)
+    error = error_of(path, DAY)
+    assert error.std() < 0.05 / np.sqrt(8.0)
+    assert 0.5 < np.mean((error / path.deviation) ** 2) < 1.6
+
+
+def test_a_temperature_without_steps_passes():
+    assert np.abs(error_of(path_of(DAY), DAY)).max() < 1e-3
+
+
+def test_draws_spread_as_the_deviation_says():
+    path = path_of(np.round(DAY))
+    spread = np.sqrt(np.mean((path.draws - path.value) ** 2, axis=0) / path.deviation**2)
+    assert np.mean(spread) == pytest.approx(1.0, abs=0.2)
+
+
+def test_knots_are_bounded_and_blocks_do_not_matter():
+    values = np.round(DAY, 1)
+    values[100:3000] = np.nan
+    segments = [(0, 30_001), (35_000, SAMPLES)]
+    whole = readings([values], segments)
+    parts = readings(np.array_split(values, 37), segments)
+    assert len(whole.mean) <= KNOTS + len(segments)
+    for name in ("count", "low", "high"):
+        assert np.array_equal(getattr(whole, name), getattr(parts, name), equal_nan=True)
+    assert np.allclose(whole.mean, parts.mean, equal_nan=True, rtol=1e-14)
+    path = path_of(values, segments)
+    assert np.isfinite(path.value).all()
+
+
+def test_steps_are_found_through_printed_decimals():
+    levels = np.unique(np.round(np.arange(300) / 340.0 + 12.0, 3))
+    assert step_of(levels, 100_000) == pytest.approx(1.0 / 340.0, rel=1e-3)
+    assert step_of(np.sort(np.random.default_rng(1).random(1000)), 1000) == 0.0
+    assert step_of(np.array([21.0]), 1000) == 0.0
+
+
+def test_no_reading_is_refused():
+    with pytest.raises(ValueError, match="temperature"):
+        path_of(np.full(100, np.nan))
