@@ -191,7 +191,7 @@ def real(path: Path) -> None:
     course = temperature_path([readings], [(0, len(readings))], rng)
     for axis in "xyz":
         values = log[f"gyro_{axis}_mrad_s"].to_numpy() * 1e-3
-        fit = fit_temperature(lambda v=values: [v], len(values), 1.0, course, rng=rng)  # type: ignore[misc]
+        fit = fit_temperature(lambda v=values: [v], len(values), 1.0, course, rng=rng)  # type: ignore[misc]  # mypy infers no type of a lambda's default
         s = fit.sensitivity
         print(
             f"gyro_{axis}: s = {1e3 * (s.in_model or 0.0):.4f} mrad/s/K "

@@ -23,5 +23,6 @@ def rng() -> np.random.Generator:
 def shared() -> Path:
     """Real logs and the results of other programs, where the project stands beside them."""
     if not SHARED.is_dir():
+        # They are not part of the project.
         pytest.skip("the folder with real logs and oracles is not beside the project")
     return SHARED

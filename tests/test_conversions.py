@@ -71,7 +71,7 @@ def test_noise_bandwidths() -> None:
 def test_noise_bandwidths_are_those_of_the_filters(poles: int, filter_: str) -> None:
     # the integral of 1 / (1 + f^2n) from 0 is (π/2n) / sin(π/2n)
     exact = (math.pi / 2 / poles) / math.sin(math.pi / 2 / poles)
-    assert noise_bandwidth(1.0, filter_) == pytest.approx(exact)  # type: ignore[arg-type]
+    assert noise_bandwidth(1.0, filter_) == pytest.approx(exact)  # type: ignore[arg-type]  # one of the filters, as text
 
 
 @pytest.mark.parametrize(

@@ -453,7 +453,7 @@ def test_lines_that_a_datasheet_does_not_have() -> None:
     assert found.noise is None and found.rms == pytest.approx(0.0, abs=1e-15)
     both_sides = sheet(noise_density={"value": math.sqrt(2), "unit": "deg/s/sqrt(Hz)"})
     one, two = curve_rms(list(comparables(both_sides, "gyro_x")), tau[:1], adev[:1])
-    assert (one.noise.sidedness, two.noise.sidedness) == ("one-sided", "two-sided")  # type: ignore[union-attr]
+    assert (one.noise.sidedness, two.noise.sidedness) == ("one-sided", "two-sided")  # type: ignore[union-attr]  # both figures print a noise
     assert one.rms == pytest.approx(0.0, abs=1e-15)
     assert two.rms_log10 == pytest.approx(math.log10(2) / 2)
     assert curve_rms(list(comparables(sheet(), "gyro_x")), tau, adev) == []

@@ -200,7 +200,7 @@ def test_a_time_that_is_none_is_refused(time: float) -> None:
 
 def test_bad_starts_are_refused() -> None:
     with pytest.raises(ValueError, match="quantity"):
-        budget("way", 1.0, gyro=NOTHING, accel=NOTHING, start=Start.calibrated(1.0))  # type: ignore[arg-type]
+        budget("way", 1.0, gyro=NOTHING, accel=NOTHING, start=Start.calibrated(1.0))  # type: ignore[arg-type]  # wrong on purpose
     with pytest.raises(ValueError, match="window"):
         Start.calibrated(0.0)
     with pytest.raises(ValueError, match="on_time"):
@@ -309,7 +309,7 @@ def test_the_best_window_of_a_walk_is_found() -> None:
 @pytest.mark.parametrize("positions", [1, 2])
 def test_a_line_counts_by_its_envelope_in_the_search(positions: int) -> None:
     gyro = NoiseModel(N=1e-6, sinusoids=(Sinusoid(1e-5, 2.0),))
-    compass = Gyrocompass(gyro=gyro, latitude=0.5, bias=0.0, positions=positions)  # type: ignore[arg-type]
+    compass = Gyrocompass(gyro=gyro, latitude=0.5, bias=0.0, positions=positions)  # type: ignore[arg-type]  # 1 or 2, from the parameters
     needed = compass.time_needed(0.01)
     assert needed is not None
     later = needed * np.linspace(1.0, 1.5, 400)
@@ -334,7 +334,7 @@ def test_bad_gyrocompasses_are_refused() -> None:
     with pytest.raises(ValueError, match="bias"):
         Gyrocompass(gyro=NOTHING, latitude=0.0, bias=-1.0)
     with pytest.raises(ValueError, match="positions"):
-        Gyrocompass(gyro=NOTHING, latitude=0.0, positions=3)  # type: ignore[arg-type]
+        Gyrocompass(gyro=NOTHING, latitude=0.0, positions=3)  # type: ignore[arg-type]  # wrong on purpose
     with pytest.raises(ValueError, match="accuracy"):
         Gyrocompass(gyro=NOTHING, latitude=0.0).time_needed(0.0)
 

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 
-import mpmath  # type: ignore[import-untyped]
+import mpmath  # type: ignore[import-untyped]  # has no types
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -279,7 +279,7 @@ def test_a_gauss_markov_process_lies_between_white_noise_and_a_walk(
 
 def test_unknown_terms_are_refused() -> None:
     with pytest.raises(TypeError, match="not known"):
-        variance(object(), 0, 1.0, Calibrated(1.0))  # type: ignore[arg-type]
+        variance(object(), 0, 1.0, Calibrated(1.0))  # type: ignore[arg-type]  # wrong on purpose
 
 
 def test_the_mean_of_flicker_since_switch_on() -> None:

@@ -100,7 +100,7 @@ def test_no_term_of_it_can_be_smaller(family: Family) -> None:
 
 def test_it_is_close_to_the_truth_where_the_curve_is_lowest() -> None:
     for family, most in (("N+K", 1.25), ("N+GM", 1.2), ("N+GM+K", 1.2)):
-        found = overbound(measured(GYRO), GYRO, RATE, family=family)  # type: ignore[arg-type]
+        found = overbound(measured(GYRO), GYRO, RATE, family=family)  # type: ignore[arg-type]  # one of the families, as text
         assert 1.0 < found.at_minimum < most
 
 
@@ -156,7 +156,7 @@ def test_limits_for_all_tau_together_hold_in_so_many_logs() -> None:
 )
 def test_what_cannot_be_done_is_refused(found: dict[str, object], expected: str) -> None:
     with pytest.raises(ValueError, match=expected):
-        overbound(measured(GYRO), GYRO, RATE, **found)  # type: ignore[arg-type]
+        overbound(measured(GYRO), GYRO, RATE, **found)  # type: ignore[arg-type]  # wrong on purpose
 
 
 def joined(*parts: float | Array) -> Array:

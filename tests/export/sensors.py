@@ -16,10 +16,10 @@ Array = NDArray[np.float64]
 def imu(gyro: NoiseModel = GYRO, accel: NoiseModel = ACCEL, **more: object) -> Imu:
     return Imu(
         sensor="mti_7",
-        rate=float(more.pop("rate", RATE)),  # type: ignore[arg-type]
+        rate=float(more.pop("rate", RATE)),  # type: ignore[arg-type]  # callers give what the field takes
         gyro=AxisNoise(gyro, "gyro_z of recording a"),
         accel=AxisNoise(accel, "accel_x of recording a"),
-        **more,  # type: ignore[arg-type]
+        **more,  # type: ignore[arg-type]  # callers give what the field takes
     )
 
 

@@ -1,4 +1,4 @@
-import mpmath  # type: ignore[import-untyped]
+import mpmath  # type: ignore[import-untyped]  # has no types
 import numpy as np
 import pytest
 from hypothesis import given

@@ -33,7 +33,7 @@ def test_an_inflation_needs_a_reason_and_the_file_gives_it() -> None:
 )
 def test_numbers_out_of_range_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ExportError):
-        imu(**wrong)  # type: ignore[arg-type]
+        imu(**wrong)  # type: ignore[arg-type]  # wrong on purpose
 
 
 def test_gravity_on_the_ellipsoid() -> None:

@@ -130,7 +130,7 @@ def test_what_cannot_be_made_says_why(
     tables: dict[str, pa.Table], wrong: dict[str, object], words: str
 ) -> None:
     with pytest.raises(ExportError, match=words):
-        made(tables, replace(REQUEST, **wrong))  # type: ignore[arg-type]
+        made(tables, replace(REQUEST, **wrong))  # type: ignore[arg-type]  # wrong on purpose
 
 
 def test_a_run_leaves_a_file_a_program_and_says_what_it_cannot(

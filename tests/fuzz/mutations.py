@@ -157,7 +157,7 @@ def _number(data: bytearray, rng: random.Random, _: Sequence[bytes]) -> None:
     size = rng.choice((1, 2, 4, 8))
     place = _place(data, rng)
     order = rng.choice(("little", "big"))
-    written = (rng.choice(_EXTREMES) % (1 << 8 * size)).to_bytes(size, order)  # type: ignore[arg-type]
+    written = (rng.choice(_EXTREMES) % (1 << 8 * size)).to_bytes(size, order)  # type: ignore[arg-type]  # choice forgets which two words they are
     data[place : place + size] = written
 
 

@@ -138,7 +138,7 @@ class Fuzzing:
         """Take what a worker says."""
         with self._lock:
             self.result.inputs += new
-            self.result.outcomes.update(said.get("outcomes", ()))  # type: ignore[arg-type]
+            self.result.outcomes.update(said.get("outcomes", ()))  # type: ignore[arg-type]  # read from JSON: a list of texts
         if "failure" in said:
             folder = mine / FAILED / str(said["failure"])
             self._fail(folder, (folder / FAULT).read_text("utf-8"))

@@ -151,7 +151,7 @@ def read_pages(folder: Path) -> dict[str, Read]:
     }
 
 
-def lost_links(pages: dict[str, Read], folder: Path, besides: set[str] = frozenset()) -> set[str]:  # type: ignore[assignment]
+def lost_links(pages: dict[str, Read], folder: Path, besides: set[str] = frozenset()) -> set[str]:  # type: ignore[assignment]  # an empty default, never written to
     """Return the links that lead to no page, section or file; ``besides`` are made by others."""
     lost = set()
     for path, page in pages.items():

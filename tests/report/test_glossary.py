@@ -239,7 +239,7 @@ def strings_in(path: str, function: str, parts: type[ast.AST] = ast.Constant) ->
         if isinstance(node, ast.FunctionDef) and node.name == function:
             for inner in node.body[1:]:
                 kept = [part for part in ast.walk(inner) if isinstance(part, parts)]
-                found |= {text for part in kept for text in literals(part)}  # type: ignore[arg-type]
+                found |= {text for part in kept for text in literals(part)}  # type: ignore[arg-type]  # what `parts` names are nodes with literals
     return found
 
 
@@ -397,7 +397,7 @@ def minimum(model: NoiseModel) -> float:
 def test_the_growth_of_errors(cause: str) -> None:
     model, start = CAUSES[cause]
     for shown, quantity in zip(cells(cause), ("heading", "velocity", "position"), strict=True):
-        error = budget(quantity, 60.0, gyro=model, accel=NOTHING, start=start).total  # type: ignore[arg-type]
+        error = budget(quantity, 60.0, gyro=model, accel=NOTHING, start=start).total  # type: ignore[arg-type]  # one of the errors, as text
         error = math.degrees(error) if quantity == "heading" else error
         assert figure(shown) == pytest.approx(error, rel=0.04)
 

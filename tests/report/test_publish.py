@@ -391,7 +391,7 @@ def test_a_requirement_that_no_recording_answers_is_no_fault(tmp_path: Path) -> 
 
 def test_a_sensor_without_a_file_is_called_by_its_folder(tmp_path: Path) -> None:
     made = run(rejected_rows("lost", "r", "no sensor file for lost"))
-    del made.settings["sensors"]["lost"]  # type: ignore[attr-defined]
+    del made.settings["sensors"]["lost"]  # type: ignore[attr-defined]  # settings are nested mappings
     publish(made, tmp_path)
     assert "lost" in sound(tmp_path)["sensors/lost.html"].text
 
@@ -475,7 +475,7 @@ def test_names_of_any_kind_break_nothing(tmp_path: Path) -> None:
         {"coverage": [coverage_rows(name)["coverage"][0] | {"document": HOSTILE}]},
     ]
     made = run(*several, asked=requirement, title=HOSTILE)
-    made.settings["sensors"][name] |= {"vendor": HOSTILE, "model": HOSTILE, "price_class": HOSTILE}  # type: ignore[index]
+    made.settings["sensors"][name] |= {"vendor": HOSTILE, "model": HOSTILE, "price_class": HOSTILE}  # type: ignore[index]  # settings are nested mappings
     publish(made, tmp_path)
     read = sound(tmp_path)
     assert f"recordings/{name}/{name}.html" in read and f"sensors/{name}.html" in read

@@ -109,7 +109,7 @@ def test_a_simulated_device_is_not_taken_for_one_whose_name_says_so() -> None:
 
 def test_sensors_are_named_by_vendor_and_model_or_by_their_folder() -> None:
     made = of(recording_rows("b", "r"), rejected_rows("a", "r"))
-    del made.settings["sensors"]["a"]  # type: ignore[attr-defined]
+    del made.settings["sensors"]["a"]  # type: ignore[attr-defined]  # settings are nested mappings
     assert made.sensors == ["a", "b"]
     assert made.names == {"a": "a", "b": "V & Co b"}
     assert list(made.looks) == ["a", "b"]

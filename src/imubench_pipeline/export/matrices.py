@@ -189,5 +189,5 @@ def write_npz(imu: Imu) -> bytes:
             arrays[f"{name}_{key}"] = np.asarray(getattr(found, key))
     about = np.array(heading(imu, "any Kalman filter", _CONVENTION.format(rate=imu.rate)))
     stream = io.BytesIO()
-    np.savez(stream, about=about, **arrays)  # type: ignore[arg-type]
+    np.savez(stream, about=about, **arrays)  # type: ignore[arg-type]  # its stub takes a flag among the arrays
     return stream.getvalue()

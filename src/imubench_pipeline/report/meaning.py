@@ -169,7 +169,7 @@ def _sensible(row: Row, sigma: float) -> bool:
 
 
 def _shown(error: str, sigma: float, unit: PageUnit) -> str:
-    if DIMENSIONS[error] == "angle" and sigma > 0.5 * _HALF_TURN:  # type: ignore[index]
+    if DIMENSIONS[error] == "angle" and sigma > 0.5 * _HALF_TURN:  # type: ignore[index]  # the table has known errors alone
         return "not to be found" if error == "north" else f"over {unit.text(0.5 * _HALF_TURN, 3)}"
     return unit.text(sigma, 3)
 

@@ -104,7 +104,7 @@ def _devices(own: Sequence[RecordingView]) -> Iterator[dict[str, Any]]:
 def _pooled(row: Row) -> Row:
     quantity = row["channel"].split("_", maxsplit=1)[0]
     bias = row["parameter"] == "bias"
-    return row | {  # type: ignore[operator]
+    return row | {  # type: ignore[operator]  # a row of a table is a dict
         "axis": row["channel"].replace("_", " "),
         "digits": limit_digits(row["lower"], row["upper"], 4),
         "ref": f"{quantity}.{'signal' if bias else row['parameter']}",

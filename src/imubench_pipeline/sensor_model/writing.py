@@ -141,7 +141,7 @@ def layout(path: Path, columns: Iterable[str], rate: float, sensor: LogFormat | 
     warm = _si_source(TEMPERATURE) if TEMPERATURE in names else None
     delimiter = ","
     if text and sensor is not None and _has_names(sensor, channels):
-        channels = {name: sensor.channels[name] for name in channels}  # type: ignore[index]
+        channels = {name: sensor.channels[name] for name in channels}  # type: ignore[index]  # the keys are channels, as text
         warm = sensor.temperature if warm and sensor.temperature else warm
         delimiter = sensor.delimiter or delimiter
     keys: dict[str, Any] = {
