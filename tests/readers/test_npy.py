@@ -71,7 +71,7 @@ def test_a_matrix(
         np.testing.assert_array_equal(time, np.arange(50.0))
 
 
-@pytest.mark.filterwarnings("ignore:Stored array in format 3.0")
+@pytest.mark.filterwarnings("ignore:Stored array in format 3.0")  # it is meant to be
 def test_records_with_fields(tmp_path: Path) -> None:
     records = np.zeros(5, RECORD)
     records["t"] = FIRST.astype("M8[us]") + np.arange(5) * (STEP // 1000)

@@ -69,6 +69,29 @@ def _log_mass(m: float, v: float, tau: float, nu: float) -> float:
 
 
 @njit(cache=True)
+def _ahead(
+    x: float, s: float, a: float, b: float, c: float, h: float, q: float
+) -> tuple[float, float, float, float]:
+    """Return x, and the covariance (a, b; b, c) of x and its slope s, after a time h."""
+    return (
+        x + h * s,
+        a + 2.0 * h * b + h * h * c + q * h**3 / 3.0,
+        b + h * c + q * h * h / 2.0,
+        c + q * h,
+    )
+
+
+@njit(cache=True)
+def _measured(
+    x: float, s: float, a: float, b: float, c: float, tau: float, nu: float
+) -> tuple[float, float, float, float, float]:
+    """Return state and covariance after exp(-tau x^2 / 2 + nu x) is known of x."""
+    grown = 1.0 + tau * a
+    pull = (nu - tau * x) / grown
+    return x + a * pull, s + b * pull, a / grown, b / grown, c - b * b * tau / grown
+
+
+@njit(cache=True)
 def _filtered(
     steps: Array, q: float, spread: float, tau: Array, nu: Array, means: Array, covs: Array
 ) -> float:
@@ -79,17 +102,10 @@ def _filtered(
     a, b, c = _VAGUE * spread**2, 0.0, _VAGUE * spread**2 / steps.max() ** 2
     for i in range(n):
         if i > 0:
-            h = steps[i]
-            x = x + h * s
-            a = a + 2.0 * h * b + h * h * c + q * h**3 / 3.0
-            b = b + h * c + q * h * h / 2.0
-            c = c + q * h
+            x, a, b, c = _ahead(x, s, a, b, c, steps[i], q)
         if tau[i] > 0.0:
             total += _log_mass(x, a, tau[i], nu[i])
-            grown = 1.0 + tau[i] * a
-            pull = (nu[i] - tau[i] * x) / grown
-            x, s = x + a * pull, s + b * pull
-            a, b, c = a / grown, b / grown, c - b * b * tau[i] / grown
+            x, s, a, b, c = _measured(x, s, a, b, c, tau[i], nu[i])
         means[i, 0], means[i, 1] = x, s
         covs[i, 0], covs[i, 1], covs[i, 2] = a, b, c
     return total
@@ -203,11 +219,7 @@ def propagate(
         a, b, c = _VAGUE * spread**2, 0.0, _VAGUE * spread**2 / steps.max() ** 2
         for i in range(n):
             if i > 0:
-                h = steps[i]
-                x = x + h * s
-                a = a + 2.0 * h * b + h * h * c + q * h**3 / 3.0
-                b = b + h * c + q * h * h / 2.0
-                c = c + q * h
+                x, a, b, c = _ahead(x, s, a, b, c, steps[i], q)
             if cell[i]:
                 m, v = _joined(x, s, a, b, c, future[i])
                 _, mean, var = cell_moments(m, v, low[i], high[i], noise[i])
@@ -217,10 +229,7 @@ def propagate(
                 moved = max(moved, abs(mean - before) / (high[i] - low[i]))
                 tau[i], nu[i] = wanted, shift
             if tau[i] > 0.0:
-                grown = 1.0 + tau[i] * a
-                pull = (nu[i] - tau[i] * x) / grown
-                x, s = x + a * pull, s + b * pull
-                a, b, c = a / grown, b / grown, c - b * b * tau[i] / grown
+                x, s, a, b, c = _measured(x, s, a, b, c, tau[i], nu[i])
         settled = moved < _SETTLED
     evidence = _filtered(steps, q, spread, tau, nu, means, covs)
     _smoothed(steps, q, means, covs, path, variance)
