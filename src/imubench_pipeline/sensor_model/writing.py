@@ -9,12 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
-import numpy as np
 import pyarrow as pa
-import pyarrow.csv as pacsv
 import yaml
 
 from imubench_pipeline.readers.batch import TEMPERATURE
@@ -22,12 +19,12 @@ from imubench_pipeline.recording import LogWriter
 from imubench_pipeline.sensor import QUANTITIES, ColumnSource, LogFormat, quantity_of
 from imubench_pipeline.sensor_model.low_pass import Array
 from imubench_pipeline.tables import replacing
-from imubench_pipeline.units import SI_UNITS, conversion
+from imubench_pipeline.text_log import TextLog
+from imubench_pipeline.units import SI_UNITS
 from imubench_pipeline.validation import ConfigError
 
 MARK = "SIMULATED, not measured"
 FORMATS = (".parquet", ".csv")
-_DECIMALS = 12
 
 Blocks = Iterable[Mapping[str, Array]]
 
@@ -61,6 +58,9 @@ def write_log(
         Is told after each block how many samples there are.
     """
     names = list(columns)
+    known = {str(name): source for name, source in log.channels.items()}
+    known |= {} if log.temperature is None else {TEMPERATURE: log.temperature}
+    sources = {name: known[name] for name in names}
     with replacing(path) as temporary:
         done = 0
         if path.suffix == ".parquet":
@@ -71,7 +71,7 @@ def write_log(
                     said(done)
                 writer.finish({**metadata, "rows": done, "grid": done, "segments": [[0, done]]})
             return
-        with _CsvWriter(temporary, log, names, remarks) as text:
+        with TextLog(temporary, log, sources, log.rate_hz or 1.0, remarks) as text:
             for block in blocks:
                 text.write(block)
                 done += len(next(iter(block.values())))
@@ -184,44 +184,3 @@ def _over(own: Mapping[str, Any], base: Mapping[str, Any]) -> dict[str, Any]:
         elif value != before:
             found[key] = dict(value) if isinstance(value, Mapping) else value
     return found
-
-
-class _CsvWriter:
-    def __init__(
-        self, path: Path, log: LogFormat, names: list[str], remarks: Iterable[str]
-    ) -> None:
-        sources = {str(name): source for name, source in log.channels.items()}
-        if log.temperature is not None:
-            sources[TEMPERATURE] = log.temperature
-        self._sources = {name: sources[name] for name in names}
-        delimiter = log.delimiter or ","
-        headings = [str(source.column) for source in self._sources.values()]
-        self._file = path.open("wb")
-        for line in remarks:
-            self._file.write(f"# {line}\n".encode())
-        self._file.write((delimiter.join(headings) + "\n").encode())
-        self._options = pacsv.WriteOptions(
-            include_header=False, delimiter=delimiter, quoting_style="none"
-        )
-
-    def __enter__(self) -> _CsvWriter:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._file.close()
-
-    def write(self, block: Mapping[str, Array]) -> None:
-        """Write the next samples, given in SI."""
-        columns = {}
-        for name, source in self._sources.items():
-            dimension = "temperature" if name == TEMPERATURE else QUANTITIES[quantity_of(name)]
-            factor, zero = conversion(source.unit, dimension)
-            raw = (block[name] - zero) / (factor * source.scale) + source.offset
-            # The last digits are of the arithmetic, and twice the size of the file.
-            columns[name] = np.round(raw, _DECIMALS)
-        pacsv.write_csv(pa.table(columns), self._file, self._options)
