@@ -92,6 +92,23 @@ def test_ramps_and_lines_pass_with_the_weights_at_their_frequency() -> None:
     assert fused_allan(board, KalmanFusion(board), TAU).variance == pytest.approx(expected)
 
 
+def test_the_line_of_a_faster_sensor_is_weakened_by_the_mean_of_its_blocks() -> None:
+    # Constant weights know the Allan variance of each sensor at its own rate; as a response they
+    # must come to the same.
+    class Response:
+        def response(self, omega: np.ndarray) -> np.ndarray:
+            return np.full((len(omega), 2), 0.5)
+
+    line = Sinusoid(1e-3, 30.0)
+    models = [NoiseModel(N=1e-5, R=1e-6, sinusoids=[line]), NoiseModel(N=1e-5, R=-2e-6)]
+    shared = Shared(NoiseModel(R=1e-6, sinusoids=[Sinusoid(1e-3, 7.0)]), [1.0, 3.0])
+    board = Board(models, [500.0, RATE], [shared])
+    expected = fused_allan(board, equal(2), TAU)
+    found = fused_allan(board, Response(), TAU)
+    assert found.variance == pytest.approx(expected.variance, rel=1e-6)
+    assert found.common == pytest.approx(expected.common, rel=1e-6)
+
+
 BOARDS = {
     "2 alike": Board.alike(SMOOTH, 2, RATE),
     "3 mixed": BOARD,

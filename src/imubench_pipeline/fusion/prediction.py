@@ -89,7 +89,11 @@ def fused_allan(board: Board, weights: Weights, tau: ArrayLike) -> FusedCurve:
         Of `weights` or a filter of `kalman`; they may be made for another board, for sensors
         that are not quite what they were thought to be.
     tau : array_like, shape (m,)
-        s; taken to the next whole number of fused samples.
+        s; taken to the nearest whole number of fused samples, at least one.
+
+    Returns
+    -------
+    FusedCurve
     """
     sizes = np.maximum(np.rint(np.atleast_1d(np.asarray(tau)) * board.rate).astype(np.int64), 1)
     tau = sizes / board.rate
@@ -108,17 +112,18 @@ def _spectra(board: Board, weights: Weights, omega: Array) -> Array:
 
 def _of_deterministic(board: Board, weights: Weights, tau: Array) -> Array:
     """Return the Allan variances of ramps and lines, alone and common, shape (m, 2)."""
-    alone = list(zip(board.models, np.eye(board.sensors), strict=True))
-    common = [(one.model, np.asarray(one.sensitivity)) for one in board.shared]
+    # Each at its own rate: the means of the blocks of a faster sensor weaken its lines.
+    alone = list(zip(board.models, board.rates, np.eye(board.sensors), strict=True))
+    common = [(one.model, board.rate, np.asarray(one.sensitivity)) for one in board.shared]
     parts = np.zeros((len(tau), 2))
     for column, members in enumerate((alone, common)):
-        for model, gains in members:
+        for model, rate, gains in members:
             if model.R:
-                ramp = NoiseModel(R=model.R).allan_variance(tau, board.rate)
+                ramp = NoiseModel(R=model.R).allan_variance(tau, rate)
                 parts[:, column] += ramp * _power(weights, _SLOW, gains)
             for line in model.sinusoids:
                 omega = 2.0 * np.pi * line.frequency / board.rate
-                alone_line = NoiseModel(sinusoids=[line]).allan_variance(tau, board.rate)
+                alone_line = NoiseModel(sinusoids=[line]).allan_variance(tau, rate)
                 parts[:, column] += alone_line * _power(weights, omega, gains)
     return parts
 
