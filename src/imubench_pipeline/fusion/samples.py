@@ -30,15 +30,14 @@ def at_fused_rate(board: Board, samples: Sequence[Array]) -> Array:
     Returns
     -------
     ndarray, shape (k, n)
+        rad/s or m/s^2.
 
     Raises
     ------
     ValueError
         If the number of sensors differs.
     """
-    if len(samples) != board.sensors:
-        raise ValueError(f"found samples of {len(samples)} sensors, expected {board.sensors}")
-    number = min(len(log) // size for log, size in zip(samples, board.blocks, strict=True))
+    number = _length(board, samples)
     fused = np.empty((number, board.sensors))
     for i, (log, size) in enumerate(zip(samples, board.blocks, strict=True)):
         fused[:, i] = np.asarray(log[: number * size]).reshape(number, size).mean(axis=1)
@@ -59,8 +58,13 @@ def fuse(board: Board, how: Constant | KalmanFusion, samples: Sequence[Array]) -
     -------
     ndarray, shape (k,)
         rad/s or m/s^2, at the fused rate.
+
+    Raises
+    ------
+    ValueError
+        If the number of sensors differs.
     """
-    number = min(len(log) // size for log, size in zip(samples, board.blocks, strict=True))
+    number = _length(board, samples)
     blocks = (
         at_fused_rate(
             board,
@@ -76,3 +80,10 @@ def fuse(board: Board, how: Constant | KalmanFusion, samples: Sequence[Array]) -
     else:
         parts = list(how.fuse(blocks))
     return np.concatenate(parts) if parts else np.empty(0)
+
+
+def _length(board: Board, samples: Sequence[Array]) -> int:
+    """Return how many fused samples the logs of all sensors make."""
+    if len(samples) != board.sensors:
+        raise ValueError(f"found samples of {len(samples)} sensors, expected {board.sensors}")
+    return min(len(log) // size for log, size in zip(samples, board.blocks, strict=True))
