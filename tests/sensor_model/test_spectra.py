@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpmath import mp, mpf, workdps
 
-from imubench_pipeline.noise import NoiseModel, RandomWalk, WhiteNoise
+from imubench_pipeline.noise import NoiseModel, RandomWalk, Sinusoid, WhiteNoise
 from imubench_pipeline.noise_terms import Flicker, GaussMarkov
 from imubench_pipeline.sensor_model.discretisation import (
     filter_transition,
@@ -169,9 +169,16 @@ def test_without_a_filter_the_model_is_that_of_the_noise() -> None:
     np.testing.assert_allclose(spectrum, noise.sampled_spectrum(omega, RATE) + added)
 
 
-def test_quantization_is_behind_the_filter_and_lines_are_before_it() -> None:
-    from imubench_pipeline.noise import Sinusoid
+def test_ramps_and_lines_have_no_density() -> None:
+    noise = NoiseModel(N=0.3)
+    more = NoiseModel(Q=1e-3, N=0.3, R=1e-3, sinusoids=[Sinusoid(1.0, 6.0)])
+    f = np.array([1e-5, 1.0])
+    for low_pass in (None, LowPass(3.0, 2)):
+        found = SensorModel(noise=more, low_pass=low_pass).psd(f)
+        np.testing.assert_array_equal(found, SensorModel(noise=noise, low_pass=low_pass).psd(f))
 
+
+def test_quantization_is_behind_the_filter_and_lines_are_before_it() -> None:
     low_pass = LowPass(3.0, 2)
     quantized = SensorModel(noise=NoiseModel(Q=1e-3), low_pass=low_pass)
     tau = np.array([0.01, 0.5])

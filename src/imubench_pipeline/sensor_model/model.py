@@ -28,6 +28,7 @@ from imubench_pipeline.noise_terms import (
     Flicker,
     GaussMarkov,
     Quantization,
+    Ramp,
     RandomWalk,
     Sinusoid,
     WhiteNoise,
@@ -133,8 +134,8 @@ class SensorModel:
             sampling folds it and adds quantization and rounding. Lines and a ramp have none.
         """
         f = np.asarray(frequency, dtype=np.float64)
-        terms = (Quantization, Sinusoid)
-        parts = [term.psd(f) for term in self.noise.terms if not isinstance(term, terms)]
+        left_out = (Quantization, Ramp, Sinusoid)
+        parts = [term.psd(f) for term in self.noise.terms if not isinstance(term, left_out)]
         density = np.asarray(np.sum(parts, axis=0)) if parts else np.zeros_like(f)
         return density * self.low_pass.power(f) if self.low_pass else density
 
