@@ -85,6 +85,13 @@ def test_a_common_process_keeps_its_signs() -> None:
     assert delayed[0, 1] == pytest.approx(spectra.shared[0, 0] * 2e-6)
 
 
+def test_a_tau_below_half_a_sample_is_one_sample() -> None:
+    board = Board([MODEL, MODEL], [100.0, 200.0], [Shared(MODEL, [1.0, 2.0])])
+    found, one = board.allan_parts([0.0, 0.004, 0.01]), board.allan_parts([0.01])
+    assert np.array_equal(found.own, np.tile(one.own, (3, 1)))
+    assert np.array_equal(found.shared, np.tile(one.shared, (3, 1)))
+
+
 def test_a_board_that_cannot_be_is_refused() -> None:
     with pytest.raises(ValueError, match="found 1 models and 2 rates"):
         Board([MODEL], [1.0, 2.0])

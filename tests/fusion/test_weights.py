@@ -80,6 +80,17 @@ def test_what_is_large_is_taken_off_where_two_see_it_unlike() -> None:
 def test_weights_pass_the_signal_unchanged() -> None:
     with pytest.raises(ValueError, match="sum of 1"):
         Constant(np.array([0.5, 0.4]))
+    with pytest.raises(ValueError, match="sum of 1"):
+        Constant(np.array([0.5, np.nan]))
+
+
+def test_the_weights_for_a_tau_below_half_a_sample_are_those_for_one_sample() -> None:
+    assert best_constant(BOARD, 0.004).values == pytest.approx(best_constant(BOARD, 0.01).values)
+
+
+def test_no_sensors_have_no_weights() -> None:
+    with pytest.raises(ValueError, match="0 sensors"):
+        equal(0)
 
 
 def test_a_sensor_without_noise_is_refused() -> None:

@@ -169,6 +169,15 @@ def test_without_a_filter_the_model_is_that_of_the_noise() -> None:
     np.testing.assert_allclose(spectrum, noise.sampled_spectrum(omega, RATE) + added)
 
 
+@pytest.mark.parametrize("low_pass", [None, LowPass(64.0, 1)])
+def test_a_tau_below_half_a_sample_is_one_sample(low_pass: LowPass | None) -> None:
+    noise = NoiseModel(Q=1e-3, N=0.3, B=0.2, K=0.01, R=1e-3)
+    model = SensorModel(noise=noise, low_pass=low_pass, resolution=0.1)
+    found = model.allan_variance([0.0, 0.004, 0.01], RATE)
+    np.testing.assert_array_equal(found, np.full(3, found[2]))
+    assert np.isfinite(found).all()
+
+
 def test_ramps_and_lines_have_no_density() -> None:
     noise = NoiseModel(N=0.3)
     more = NoiseModel(Q=1e-3, N=0.3, R=1e-3, sinusoids=[Sinusoid(1.0, 6.0)])

@@ -187,10 +187,14 @@ class Board:
         Parameters
         ----------
         tau : array_like, shape (m,)
-            s; taken to the next whole number of fused samples.
+            s; taken to the nearest whole number of fused samples, at least one.
+
+        Returns
+        -------
+        Parts
         """
         t = np.atleast_1d(np.asarray(tau, dtype=np.float64))
-        t = np.rint(t * self.rate) / self.rate
+        t = np.maximum(np.rint(t * self.rate), 1.0) / self.rate
         own = [m.allan_variance(t, r) for m, r in zip(self.models, self.rates, strict=True)]
         common = [one.model.allan_variance(t, self.rate) for one in self.shared]
         return self._parts(own, common, len(t))
@@ -202,6 +206,10 @@ class Board:
         ----------
         omega : array_like, shape (m,)
             rad a fused sample, above 0.
+
+        Returns
+        -------
+        Parts
         """
         w = np.atleast_1d(np.asarray(omega, dtype=np.float64))
         found: dict[tuple[int, int], Array] = {}  # specimens of one sensor have one spectrum

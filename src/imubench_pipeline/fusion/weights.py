@@ -34,12 +34,17 @@ class Constant:
     ----------
     values : ndarray, shape (n,)
         Their sum is 1: what all sensors measure alike passes unchanged.
+
+    Raises
+    ------
+    ValueError
+        If there is not one weight a sensor, or their sum is not 1 or not a number.
     """
 
     values: Array
 
     def __post_init__(self) -> None:
-        if self.values.ndim != 1 or abs(self.values.sum() - 1.0) > 1e-9:
+        if self.values.ndim != 1 or not abs(self.values.sum() - 1.0) <= 1e-9:
             raise ValueError("expected a weight for each sensor, with a sum of 1")
 
     def response(self, omega: Array) -> Array:
@@ -76,7 +81,18 @@ def equal(sensors: int) -> Constant:
     ----------
     sensors : int
         From 1.
+
+    Returns
+    -------
+    Constant
+
+    Raises
+    ------
+    ValueError
+        If there is no sensor.
     """
+    if sensors < 1:
+        raise ValueError(f"found {sensors} sensors, expected at least one")
     return Constant(np.full(sensors, 1.0 / sensors))
 
 
@@ -90,7 +106,12 @@ def best_constant(board: Board, tau: float | None = None) -> Constant:
     ----------
     board : Board
     tau : float, optional
-        s; without one the weights are the best for white noise, N^-2.
+        s, taken to the nearest whole number of fused samples, at least one; without it the
+        weights are the best for white noise, N^-2.
+
+    Returns
+    -------
+    Constant
 
     Raises
     ------

@@ -168,7 +168,7 @@ class SensorModel:
         Parameters
         ----------
         tau : array_like
-            Cluster lengths, s; rounded to whole samples.
+            Cluster lengths, s; taken to the nearest whole number of samples, at least one.
         rate : float
             Hz.
 
@@ -179,10 +179,10 @@ class SensorModel:
             and motion are not in it.
         """
         t = np.asarray(tau, dtype=np.float64)
-        n = np.rint(t * rate)
+        n = np.maximum(np.rint(t * rate), 1.0)
         rounding = self.resolution**2 / 12.0 / n
         if self.low_pass is None:
-            return self.noise.allan_variance(t, rate) + rounding
+            return self.noise.allan_variance(n / rate, rate) + rounding
         found = rounding + spectra.allan_variance(self.sources, self.low_pass, n, rate)
         for term in self.noise.terms:
             if isinstance(term, Sinusoid):
