@@ -192,7 +192,7 @@ def _used() -> float:
 
 
 def _peak() -> float:
-    return resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1000
+    return resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024 / 1e6  # KiB
 
 
 def measure(lab: Lab, recordings: int) -> None:

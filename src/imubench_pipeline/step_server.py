@@ -96,7 +96,7 @@ def _run(connection: socket.socket, script: str, given: Mapping[str, Any]) -> No
         sys.stdout.flush()
         sys.stderr.flush()
         used = resource.getrusage(resource.RUSAGE_SELF)
-        cost = {"cpu": used.ru_utime + used.ru_stime, "memory": used.ru_maxrss / 1000}
+        cost = {"cpu": used.ru_utime + used.ru_stime, "memory": used.ru_maxrss * 1024 / 1e6}  # KiB
         connection.sendall(answer + json.dumps(cost).encode())
         os._exit(answer != DONE)
 
