@@ -82,6 +82,16 @@ def test_a_temperature_without_steps_passes():
     assert np.abs(error_of(path_of(DAY), DAY)).max() < 1e-3
 
 
+def test_the_noise_of_readings_far_apart_is_found():
+    # No two blocks beside each other have a reading.
+    rng = np.random.default_rng(8)
+    values = np.full(4_000, np.nan)
+    values[::10] = DAY[::150] + 0.05 * rng.standard_normal(400)
+    path = path_of(values)
+    assert path.noise == pytest.approx(0.05, rel=0.15)
+    assert np.abs(error_of(path, DAY[::15]))[:-9].max() < 0.1
+
+
 def test_draws_spread_as_the_deviation_says():
     path = path_of(np.round(DAY))
     spread = np.sqrt(np.mean((path.draws - path.value) ** 2, axis=0) / path.deviation**2)

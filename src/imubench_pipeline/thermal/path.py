@@ -196,7 +196,8 @@ class _Evidence:
     def best(self) -> tuple[float, float]:
         """Return q and the noise that make the readings most likely."""
         read = self._read
-        rough = float(np.nanmedian(np.abs(np.diff(read.mean)))) if len(read.mean) > 1 else 0.0
+        there = read.mean[read.count > 0]
+        rough = float(np.median(np.abs(np.diff(there)))) if len(there) > 1 else 0.0
         least = _QUIETEST * self._spread
         noises = {max(part * read.step, least) for part in _NOISES} | {max(rough, least)}
 
