@@ -54,6 +54,31 @@ def test_products_with_the_log_itself_are_its_spectrum():
     )
 
 
+def test_a_temperature_that_steps_between_segments_is_no_regressor():
+    # Equal within each segment: the coefficients, which leave the means out, are 0.
+    segments = [(0, 45_000), (45_000, SAMPLES)]
+    readings = np.where(TIME < 9_000.0, 20.0, 30.0)
+    log = simulate(NOISE, RATE, SAMPLES, np.random.default_rng(9))
+    path = temperature_path([readings], segments, np.random.default_rng(10))
+    series = BlockSeries(segments, block_of(segments))
+    spectrum, _ = spectra(series.watch([log]), SAMPLES, RATE, segments)
+    coefficients = Coefficients(spectrum, series)
+    levels = np.where(path.sample < 45_000, 20.0, 30.0)
+    assert np.abs(coefficients.of_knots(path, levels)).max() < 1e-9
+
+
+def test_what_temperature_adds_to_one_segment_is_not_taken_from_the_next():
+    segments = [(0, 45_000), (45_000, SAMPLES)]
+    off = DAY - DAY.mean() + np.where(TIME < 9_000.0, 0.0, 20.0)
+    s = 1e-3
+    log = simulate(NoiseModel(N=1e-4), RATE, SAMPLES, np.random.default_rng(12)) + s * off
+    fit = fitted(log, 20.0 + off, segments, longest_lag=0.0, quadratic=False)
+    assert fit.compensated
+    taken = log - np.concatenate(list(fit.compensate(np.array_split(log, 7))))
+    truth = s * (off - off.mean())
+    assert np.abs(taken - truth).max() < 0.005 * s * np.ptp(off)
+
+
 def test_sensitivity_for_known_noise_is_generalised_least_squares():
     # The dense covariance of white noise, a process and a walk, and a free level.
     n = 600

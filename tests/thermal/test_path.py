@@ -92,6 +92,19 @@ def test_the_noise_of_readings_far_apart_is_found():
     assert np.abs(error_of(path, DAY[::15]))[:-9].max() < 0.1
 
 
+def test_between_segments_nothing_is_interpolated():
+    segments = [(0, 30_000), (30_500, SAMPLES)]
+    path = path_of(np.where(TIME < 0.505, 20.0, 30.0), segments)
+    values = np.where(path.sample < 30_250, 1.0, 2.0)
+    points = np.arange(SAMPLES)
+    expected = np.where(points < 30_500, 1.0, 2.0)
+    assert np.array_equal(path.at(points, values), expected)
+    parts = [path.at(part, values) for part in np.array_split(points, 97)]
+    assert np.array_equal(np.concatenate(parts), expected)
+    within = path.at(np.array([29_998.5, 30_500.5]), path.sample)
+    assert within == pytest.approx([29_995.5, 30_503.5])
+
+
 def test_draws_spread_as_the_deviation_says():
     path = path_of(np.round(DAY))
     spread = np.sqrt(np.mean((path.draws - path.value) ** 2, axis=0) / path.deviation**2)

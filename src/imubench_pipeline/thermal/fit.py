@@ -73,8 +73,8 @@ class ThermalFit:
     effect : ndarray, shape (k,)
         What temperature adds to the log at the knots of the path, SI; zeros where nothing is
         taken out.
-    sample : ndarray, shape (k,)
-        Those knots, on the grid of the log.
+    path : TemperaturePath
+        Temperature of the log.
     """
 
     reference: float
@@ -87,15 +87,11 @@ class ThermalFit:
     plain: Likelihood
     without_temperature: Likelihood
     effect: Array
-    sample: Array
+    path: TemperaturePath
 
     def compensate(self, blocks: Iterable[Array]) -> Iterator[Array]:
         """Yield the blocks of the log less what temperature adds to it."""
-        reached = 0
-        for values in blocks:
-            points = np.arange(reached, reached + len(values))
-            yield values - np.interp(points, self.sample, self.effect)
-            reached += len(values)
+        return _shifted(blocks, self.path, self.effect, -1.0)
 
 
 def fit_temperature(
@@ -340,18 +336,22 @@ def _complete(
     rate: float,
     rng: np.random.Generator,
 ) -> Iterator[Array]:
-    """Yield the log with its missing samples drawn: temperature's effect, and noise."""
-
-    def shifted(values: Iterable[Array], sign: float) -> Iterator[Array]:
-        reached = 0
-        for part in values:
-            points = np.arange(reached, reached + len(part))
-            yield part + sign * np.interp(points, path.sample, effect)
-            reached += len(part)
-
-    means = block_means(shifted(blocks(), -1.0), spans)
+    """Return the log with its missing samples drawn: temperature's effect, and noise."""
+    means = block_means(_shifted(blocks(), path, effect, -1.0), spans)
     slow = slow_part(means, spans, model, rate, rng)
-    return shifted(filled(shifted(blocks(), -1.0), slow, model, rate, rng), 1.0)
+    without = _shifted(blocks(), path, effect, -1.0)
+    return _shifted(filled(without, slow, model, rate, rng), path, effect, 1.0)
+
+
+def _shifted(
+    blocks: Iterable[Array], path: TemperaturePath, effect: Array, sign: float
+) -> Iterator[Array]:
+    """Yield the blocks of a log and, with a sign, what temperature adds to it."""
+    reached = 0
+    for values in blocks:
+        points = np.arange(reached, reached + len(values))
+        yield values + sign * path.at(points, effect)
+        reached += len(values)
 
 
 def _described(
@@ -374,7 +374,7 @@ def _described(
         left = regressors.without(fit.spectrum, found.regression, weights)
         without = likelihood.fit_spectrum(left, fit.lines, band=band, bandwidth=bandwidth, rng=rng)
         effect = regressors.effect(found.regression)
-    at_centres = [np.interp(centres, path.sample, effect) for centres in fit.series.centres]
+    at_centres = [path.at(centres, effect) for centres in fit.series.centres]
     shift = float(np.concatenate(at_centres).mean())
     candidates = found.candidates if verdict.compensated else fit.of_the_log()
     noises = [(likelihood.model_of(one.found), share) for one, share in shares(candidates)]
@@ -393,7 +393,7 @@ def _described(
         plain,
         without,
         effect,
-        path.sample,
+        path,
     )
 
 
@@ -411,5 +411,5 @@ def _nothing(plain: Likelihood, path: TemperaturePath, fit: _Fit, reason: str) -
         plain,
         plain,
         np.zeros(len(path.value)),
-        path.sample,
+        path,
     )

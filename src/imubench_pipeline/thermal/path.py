@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +43,7 @@ _COARSE = 0.25
 
 @dataclass(frozen=True)
 class TemperaturePath:
-    """A temperature on a coarse grid, linear between its knots.
+    """A temperature on a coarse grid, linear between the knots of a segment.
 
     Attributes
     ----------
@@ -79,6 +80,26 @@ class TemperaturePath:
     def range(self) -> float:
         """Highest less lowest, °C."""
         return float(np.ptp(self.value))
+
+    def at(self, points: NDArray[Any], values: Array) -> Array:
+        """Return what is known at the knots, between them; no segment tells of another.
+
+        Parameters
+        ----------
+        points : ndarray, shape (n,)
+            Places on the grid of the log, rising. Those after a segment and before the next are
+            given what its last knot has.
+        values : ndarray, shape (k,)
+            At the knots, in any unit.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+        """
+        cuts = np.searchsorted(points, [start for start, _ in self.segments[1:]])
+        pieces = zip(np.split(points, cuts), self.parts, strict=True)
+        found = [np.interp(piece, self.sample[part], values[part]) for piece, part in pieces]
+        return np.concatenate(found)
 
 
 def temperature_path(

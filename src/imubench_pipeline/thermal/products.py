@@ -15,6 +15,7 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from imubench_pipeline.spectrum import BLOCK_BAND, Spectrum
+from imubench_pipeline.thermal.path import TemperaturePath
 
 Array = NDArray[np.float64]
 Span = tuple[int, int]
@@ -114,16 +115,22 @@ class Coefficients:
         ]
         return np.asarray(np.concatenate(transformed)[self._kept])
 
-    def of_knots(self, sample: Array, values: Array) -> Array:
+    def of_knots(self, path: TemperaturePath, values: Array) -> Array:
         """Return the coefficients of a regressor that is linear between knots.
 
         Parameters
         ----------
-        sample : ndarray, shape (k,)
-            Knots on the grid of the log.
+        path : TemperaturePath
+            Whose knots they are.
         values : ndarray, shape (k,)
+            The regressor at the knots.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            In the unit of the values.
         """
-        return self._of([np.interp(centres, sample, values) for centres in self.centres])
+        return self._of([path.at(centres, values) for centres in self.centres])
 
     def of_time(self, rate: float) -> Array:
         """Return the coefficients of a ramp of 1 a second."""

@@ -143,7 +143,7 @@ class Regressors:
     def columns(self, lag: float) -> list[Array]:
         """Return the coefficients of the regressors."""
         terms = self._of(self.knots(lag))
-        columns = [self.coefficients.of_knots(self.path.sample, term) for term in terms]
+        columns = [self.coefficients.of_knots(self.path, term) for term in terms]
         return columns + [self._time] * self.ramp
 
     def products(self, lag: float) -> Products:

@@ -296,7 +296,7 @@ def _path_errors(regressors: Regressors, found: Regression, weights: Array) -> A
     step = max(0.05 * found.lag, 0.5 * float(np.median(np.diff(path.sample))) / regressors.rate)
     by_lag = slope * (regressors.knots(found.lag + step) - knots) / step
     columns = regressors.columns(found.lag)
-    columns.append(regressors.coefficients.of_knots(path.sample, by_lag))
+    columns.append(regressors.coefficients.of_knots(path, by_lag))
     full = np.zeros(len(regressors.used))
     full[regressors.used] = weights
     gram = regressors.coefficients.products(columns).gram
@@ -307,7 +307,7 @@ def _path_errors(regressors: Regressors, found: Regression, weights: Array) -> A
     moved = []
     for draw in path.draws:
         error = lagged_path(path, draw - path.value, regressors.rate, found.lag)
-        other = regressors.coefficients.of_knots(path.sample, slope * error)
+        other = regressors.coefficients.of_knots(path, slope * error)
         shared = regressors.coefficients.products([*columns, other]).gram[:, :-1, -1]
         moved.append(inverse @ ((full @ shared) / scale) / scale)
     at = np.array(moved)
