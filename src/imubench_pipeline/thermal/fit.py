@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -254,16 +255,20 @@ class _Fit:
 
     def _best(self, regressors: Regressors) -> _Found:
         """Settle from the noise of the log as it is, and from that of ordinary least squares."""
-        flat = self.chosen.ordinates * np.ones(len(self.chosen.density))
-        starts = [self._weights(self.whittle, self.chosen)[0]]
+        flat = self.chosen.ordinates
         rough = regressors.at(0.0, flat)
-        left = regressors.without(self.chosen, rough, flat)
-        starts.append(self._weights(self.whittle.of(left), self.chosen)[0])
+        left = self.whittle.of(regressors.without(self.chosen, rough, flat))
+        starts = (
+            self._weights(self.whittle, self.of_the_log),
+            self._weights(left, self._compared(left)),
+        )
         return min((self._settle(regressors, start) for start in starts), key=lambda f: f.cost)
 
-    def _weights(self, whittle: Whittle, spectrum: Spectrum) -> tuple[Array, Sequence[Candidate]]:
-        candidates = compare(whittle, quantization=self.quantization)
-        return spectrum.ordinates / whittle.density(candidates[0].found), candidates
+    def _compared(self, whittle: Whittle) -> Sequence[Candidate]:
+        return compare(whittle, quantization=self.quantization)
+
+    def _weights(self, whittle: Whittle, candidates: Sequence[Candidate]) -> Array:
+        return self.chosen.ordinates / whittle.density(candidates[0].found)
 
     def _settle(self, regressors: Regressors, weights: Array) -> _Found:
         before: Regression | None = None
@@ -271,7 +276,8 @@ class _Fit:
             found = regressors.best(weights, self.lags)
             left = regressors.without(self.chosen, found, weights)
             whittle = self.whittle.of(left)
-            weights, candidates = self._weights(whittle, self.chosen)
+            candidates = self._compared(whittle)
+            weights = self._weights(whittle, candidates)
             ramp = candidates[0].found.terms.ramp
             if ramp != regressors.ramp:
                 regressors = regressors.also(ramp=ramp)
@@ -310,12 +316,13 @@ class _Fit:
 
     def plain(self) -> float:
         """Return half the BIC of the best noise without temperature."""
-        candidates = self.of_the_log()
+        candidates = self.of_the_log
         return self._cost(self.whittle, candidates, candidates[0].found.terms.parameters)
 
+    @cached_property
     def of_the_log(self) -> Sequence[Candidate]:
-        """Return the models of the noise without temperature, the best first."""
-        return compare(self.whittle, quantization=self.quantization)
+        """The models of the noise without temperature, the best first."""
+        return self._compared(self.whittle)
 
 
 def _error(found: _Found) -> float:
@@ -376,7 +383,7 @@ def _described(
         effect = regressors.effect(found.regression)
     at_centres = [path.at(centres, effect) for centres in fit.series.centres]
     shift = float(np.concatenate(at_centres).mean())
-    candidates = found.candidates if verdict.compensated else fit.of_the_log()
+    candidates = found.candidates if verdict.compensated else fit.of_the_log
     noises = [(likelihood.model_of(one.found), share) for one, share in shares(candidates)]
     spread = math.hypot(mean_error(noises, fit.spectrum), verdict.temperature_error)
     bias = Parameter(
