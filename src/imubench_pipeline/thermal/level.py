@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.error_budget.growth import mean_variance
+from imubench_pipeline.noise import GaussMarkov, NoiseModel, RandomWalk, WhiteNoise
 from imubench_pipeline.spectrum import Spectrum
 
 
@@ -22,17 +23,20 @@ def mean_error(models: Iterable[tuple[NoiseModel, float]], spectrum: Spectrum) -
         the choice may still carry the mean away.
     spectrum : Spectrum
         Of the log: its rate, and its length.
+
+    Returns
+    -------
+    float
+        rad/s or m/s².
     """
     return math.sqrt(sum(share * _variance(model, spectrum) for model, share in models))
 
 
 def _variance(model: NoiseModel, spectrum: Spectrum) -> float:
     T, whole = 1.0 / spectrum.rate, spectrum.duration
-    total = model.N**2 / whole + model.K**2 * whole / 3.0
-    for term in model.realised(T, whole):
-        T_B = getattr(term, "T_B", None)
-        if T_B is not None:
-            variance = float(term.state_space(T).initial_variance[0, 0])
-            x = whole / T_B
-            total += 2.0 * variance / x * (1.0 + math.expm1(-x) / x)
-    return total
+    # What begins at 0 has been on since the beginning of the log; a ramp is no part of the bias.
+    return sum(
+        mean_variance(term, whole, 0.0)
+        for term in model.realised(T, whole)
+        if isinstance(term, WhiteNoise | GaussMarkov | RandomWalk)
+    )
