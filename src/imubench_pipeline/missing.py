@@ -96,19 +96,41 @@ def block_means(blocks: Iterable[Array], segments: Sequence[tuple[int, int]]) ->
     ends = np.concatenate([np.full(-(-(b - a) // BLOCK), b) for a, b in segments])
     end = np.minimum(begin + BLOCK, ends)
     total, count = np.zeros(len(begin)), np.zeros(len(begin), dtype=np.int64)
+    for place, present in samples_present(blocks, begin, end):
+        first, width = place[0], place[-1] + 1 - place[0]
+        part = slice(first, first + width)
+        total[part] += np.bincount(place - first, weights=present, minlength=width)
+        count[part] += np.bincount(place - first, minlength=width)
+    return BlockMeans(begin, end, total / np.maximum(count, 1), count)
+
+
+def samples_present(
+    parts: Iterable[Array], begin: NDArray[np.int64], end: NDArray[np.int64]
+) -> Iterator[tuple[NDArray[np.int64], Array]]:
+    """Yield the samples of a log that are present, and the blocks that they belong to.
+
+    Parameters
+    ----------
+    parts : iterable of ndarray
+        The log in order; NaN where a sample is missing.
+    begin, end : ndarray of int, shape (b,)
+        First and one-past-last sample of each block, rising; samples of no block are left out.
+
+    Yields
+    ------
+    place : ndarray of int, shape (n,)
+        Block of each sample, rising.
+    present : ndarray, shape (n,)
+        The samples, at least one.
+    """
     reached = 0
-    for values in blocks:
+    for values in parts:
         there = np.flatnonzero(np.isfinite(values))
         place = np.searchsorted(begin, reached + there, side="right") - 1
         inside = (place >= 0) & (reached + there < end[place])
-        there, place = there[inside], place[inside]
-        if len(place):
-            first, width = place[0], place[-1] + 1 - place[0]
-            part = slice(first, first + width)
-            total[part] += np.bincount(place - first, weights=values[there], minlength=width)
-            count[part] += np.bincount(place - first, minlength=width)
+        if inside.any():
+            yield place[inside], values[there[inside]]
         reached += len(values)
-    return BlockMeans(begin, end, total / np.maximum(count, 1), count)
 
 
 def divided(means: BlockMeans, segments: Sequence[tuple[int, int]]) -> tuple[tuple[int, int], ...]:

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from imubench_pipeline.missing import samples_present
+
 Array = NDArray[np.float64]
 Span = tuple[int, int]
 
@@ -86,15 +88,8 @@ def readings(blocks: Iterable[Array], segments: Sequence[Span]) -> Readings:
     total, count = np.zeros(len(begin)), np.zeros(len(begin), dtype=np.int64)
     low, high = np.full(len(begin), np.inf), np.full(len(begin), -np.inf)
     levels: Array = np.empty(0)
-    reached, present = 0, 0
-    for values in blocks:
-        there = np.flatnonzero(np.isfinite(values))
-        place = np.searchsorted(begin, reached + there, side="right") - 1
-        inside = (place >= 0) & (reached + there < end[place])
-        chosen, place = values[there[inside]], place[inside]
-        reached += len(values)
-        if len(chosen) == 0:
-            continue
+    present = 0
+    for place, chosen in samples_present(blocks, begin, end):
         edges = np.flatnonzero(np.diff(place, prepend=-1))
         block = place[edges]
         total[block] += np.add.reduceat(chosen, edges)
