@@ -12,9 +12,6 @@ from imubench_pipeline.thermal.path import TemperaturePath
 
 Array = NDArray[np.float64]
 
-_SHORT = 1e-4
-"""Step over lag below which the exact weights lose digits, and their series is taken."""
-
 
 @njit(cache=True)
 def _lagged(times: Array, values: Array, lag: float) -> Array:
@@ -22,14 +19,13 @@ def _lagged(times: Array, values: Array, lag: float) -> Array:
     if values.size == 0:
         return result
     result[0] = values[0]
+    # T_lag - T, as it decays and as a ramp of the temperature adds to it: weights of T_lag itself
+    # would be differences of nearly equal numbers over short steps.
+    behind = 0.0
     for i in range(1, values.size):
         h = (times[i] - times[i - 1]) / lag
-        decay = math.exp(-h)
-        # (1 - e^-h) / h: the part of the new value that a ramp to it has reached.
-        mean = -math.expm1(-h) / h if h > _SHORT else 1.0 - h / 2.0 + h * h / 6.0
-        result[i] = (
-            decay * result[i - 1] + (mean - decay) * values[i - 1] + (1.0 - mean) * values[i]
-        )
+        behind = math.exp(-h) * behind + math.expm1(-h) / h * (values[i] - values[i - 1])
+        result[i] = values[i] + behind
     return result
 
 
