@@ -10,7 +10,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_continuous_lyapunov
 
 from imubench_pipeline.sensor_model.discretisation import (
     filter_transition,
@@ -223,6 +222,5 @@ def _one_sample(
         start[i, 0, 0] = variance
         start[i, 0, 1:] = start[i, 1:, 0] = variance * given[0]
         start[i, 1:, 1:] = rest + variance * np.outer(given[0], given[0])
-    F, b = low_pass.transition / low_pass.speed, low_pass.input / low_pass.speed
-    start[n, 1:, 1:] = solve_continuous_lyapunov(F, -white * low_pass.speed * np.outer(b, b))
+    start[n, 1:, 1:] = stationary(times[:0], densities[:0], white, low_pass)[1]
     return one, start
