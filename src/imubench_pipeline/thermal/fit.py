@@ -21,17 +21,18 @@ from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.model_choice import Candidate, compare
 from imubench_pipeline.estimators.whittle import Whittle, whittle_of
-from imubench_pipeline.missing import block_means, divided, filled, slow_part
+from imubench_pipeline.missing import block_means, divided
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.spectrum import LineSpectrum, Spectrum, block_of, spectra
+from imubench_pipeline.thermal.effect import complete, shifted
 from imubench_pipeline.thermal.level import mean_error
 from imubench_pipeline.thermal.path import TemperaturePath
 from imubench_pipeline.thermal.products import BlockSeries, Coefficients
+from imubench_pipeline.thermal.register import Span
 from imubench_pipeline.thermal.regression import Regression, Regressors
 from imubench_pipeline.thermal.uncertainty import Verdict, judge, shares
 
 Array = NDArray[np.float64]
-Span = tuple[int, int]
 
 _MOST_ROUNDS = 10
 _SETTLED = 0.02
@@ -92,7 +93,7 @@ class ThermalFit:
 
     def compensate(self, blocks: Iterable[Array]) -> Iterator[Array]:
         """Yield the blocks of the log less what temperature adds to it."""
-        return _shifted(blocks, self.path, self.effect, -1.0)
+        return shifted(blocks, self.path, self.effect, -1.0)
 
 
 def fit_temperature(
@@ -158,8 +159,8 @@ def fit_temperature(
         )
         model, effect = plain.estimates[0].model, np.zeros(len(path.value))
         for _ in range(2):
-            complete = _complete(blocks, spans, model, path, effect, rate, rng)
-            fit = _Fit(complete, samples, rate, spans, path, band, bandwidth, longest_lag)
+            whole = complete(blocks, spans, model, path, effect, rate, rng)
+            fit = _Fit(whole, samples, rate, spans, path, band, bandwidth, longest_lag)
             if not fit.possible:
                 break
             found = fit.settle(quadratic)
@@ -332,33 +333,6 @@ def _error(found: _Found) -> float:
 
 def _model_of(found: _Found) -> NoiseModel:
     return likelihood.model_of(found.candidates[0].found)
-
-
-def _complete(
-    blocks: Callable[[], Iterable[Array]],
-    spans: Sequence[Span],
-    model: NoiseModel,
-    path: TemperaturePath,
-    effect: Array,
-    rate: float,
-    rng: np.random.Generator,
-) -> Iterator[Array]:
-    """Return the log with its missing samples drawn: temperature's effect, and noise."""
-    means = block_means(_shifted(blocks(), path, effect, -1.0), spans)
-    slow = slow_part(means, spans, model, rate, rng)
-    without = _shifted(blocks(), path, effect, -1.0)
-    return _shifted(filled(without, slow, model, rate, rng), path, effect, 1.0)
-
-
-def _shifted(
-    blocks: Iterable[Array], path: TemperaturePath, effect: Array, sign: float
-) -> Iterator[Array]:
-    """Yield the blocks of a log and, with a sign, what temperature adds to it."""
-    reached = 0
-    for values in blocks:
-        points = np.arange(reached, reached + len(values))
-        yield values + sign * path.at(points, effect)
-        reached += len(values)
 
 
 def _described(
