@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,14 +33,7 @@ def of_block_means(space: StateSpace, size: int) -> StateSpace:
     """
     m = len(space.output)
     if size == 1 or m == 0:
-        return StateSpace(
-            space.transition,
-            space.process_noise,
-            space.output,
-            space.measurement_noise / size,
-            space.initial_mean,
-            space.initial_variance,
-        )
+        return replace(space, measurement_noise=space.measurement_noise / size)
     # One sample: the sum takes in the state, and the state goes on.
     step = np.zeros((m + 1, m + 1))
     step[:m, :m] = space.transition

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 _WHOLE = 1e-9
 """Relative distance of a ratio of rates from a whole number that is rounding alone."""
 
-_AMPLITUDES = {"N": "N", "B": "B", "K": "K", "R": "R"}
+_AMPLITUDES = ("N", "B", "K", "R")
 """The parameters that sensors may have in common, each the root of a variance."""
 
 

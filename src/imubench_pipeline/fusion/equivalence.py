@@ -91,7 +91,7 @@ class Candidate:
                 if parameter.value is not None or parameter.status in ("absent", "not_shown"):
                     continue
                 part = _alone(name, group, tau)
-                if part > _MATTERS * max(total, part):
+                if part > _MATTERS * total:
                     status = parameter.status.replace("_", " ")
                     yield f"{name} of {self.sensor}/{self.recording} {self.channel} is {status}"
 
@@ -148,8 +148,8 @@ def answer(
     ----------
     sensor : str
     candidates : sequence of Candidate
-        All channels of one quantity of the sensor; where some are measured, simulated ones are
-        left out. Of two the worse one is the median.
+        All channels of one quantity of the sensor, at least one; where some are measured,
+        simulated ones are left out. Of two the worse one is the median.
     tau : float
         s.
     correlation : mapping of str to float
@@ -160,10 +160,13 @@ def answer(
         Models drawn from the limits of the parameters.
     seed : int
         Each channel has a stream of its own.
+
+    Returns
+    -------
+    Answer or str
+        The reason, where there is no answer.
     """
     measured = [one for one in candidates if not one.simulated] or list(candidates)
-    if not measured:
-        return f"no such channel of {sensor}"
     long = [one for one in measured if tau <= longest * one.duration]
     if not long:
         most = longest * max(one.duration for one in measured)

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.spectrum import BLOCK_BAND, Spectrum
 from imubench_pipeline.thermal.path import TemperaturePath
+from imubench_pipeline.thermal.register import Span
 
 Array = NDArray[np.float64]
-Span = tuple[int, int]
 
 
 class BlockSeries:
@@ -96,7 +96,7 @@ class Coefficients:
     def __init__(self, spectrum: Spectrum, series: BlockSeries) -> None:
         self._interval = series.block / spectrum.rate
         self.centres = series.centres
-        low = spectrum.block == series.block if series.block > 1 else spectrum.block == 1
+        low = spectrum.block == series.block
         self._bins, self._low = len(low), np.flatnonzero(low)
         counts = np.rint(spectrum.ordinates[low]).astype(np.int64)
         lengths = [len(means) for means in series.means]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -173,8 +172,21 @@ class Regressors:
         return np.concatenate(([0.0], np.geomspace(first, last, _LAGS)))
 
     def best(self, weights: Array, lags: Array) -> Regression:
-        """Return the fit with the lag that the log favours."""
-        return maximised(lambda lag: self.at(lag, weights), lags)
+        """Return the fit of the greatest gain: scan the lags, then polish."""
+        fits = [self.at(float(lag), weights) for lag in lags]
+        place = int(np.argmax([fit.gain for fit in fits]))
+        best = fits[place]
+        if len(lags) == 1:
+            return best
+        low, high = float(lags[max(place - 1, 0)]), float(lags[min(place + 1, len(lags) - 1)])
+        polished = minimize_scalar(
+            lambda lag: -self.at(float(lag), weights).gain,
+            bounds=(low, high),
+            method="bounded",
+            options={"xatol": 2e-3 * high, "maxiter": 25},
+        )
+        other = self.at(float(polished.x), weights)
+        return other if other.gain > best.gain + 1e-9 else best
 
     def without(self, spectrum: Spectrum, found: Regression, weights: Array) -> Spectrum:
         """Return the spectrum (of the bins used) less what temperature explains.
@@ -200,21 +212,3 @@ class Regressors:
             / ordinates,
             ramp=spectrum.ramp * spectrum.ordinates / ordinates,
         )
-
-
-def maximised(at: Callable[[float], Regression], lags: Array) -> Regression:
-    """Return the fit of the greatest gain: scan the lags, then polish."""
-    fits = [at(float(lag)) for lag in lags]
-    place = int(np.argmax([fit.gain for fit in fits]))
-    best = fits[place]
-    if len(lags) == 1:
-        return best
-    low, high = float(lags[max(place - 1, 0)]), float(lags[min(place + 1, len(lags) - 1)])
-    polished = minimize_scalar(
-        lambda lag: -at(float(lag)).gain,
-        bounds=(low, high),
-        method="bounded",
-        options={"xatol": 2e-3 * high, "maxiter": 25},
-    )
-    other = at(float(polished.x))
-    return other if other.gain > best.gain + 1e-9 else best
