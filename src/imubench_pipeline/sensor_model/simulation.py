@@ -143,6 +143,10 @@ class _Axis:
         self._white = sources.white
         begin, self._noise, self._lines, self._counts = rng.spawn(4)
         self._discrete = self._discretised(interval)
+        slow, held = self._discrete.slow, self._discrete.held
+        self._coupling = np.ascontiguousarray(slow.coupling.T)
+        self._shared = np.ascontiguousarray(slow.shared.T)
+        self._lag = np.array([held.lag_decay, held.lag_step])
         self._x, self._e = self._start(begin)
         self._memory = np.zeros(4)
         terms = model.noise.terms
@@ -222,14 +226,14 @@ class _Axis:
             self._e,
             discrete.slow.decay,
             discrete.slow.own,
-            np.ascontiguousarray(discrete.slow.coupling.T),
-            np.ascontiguousarray(discrete.slow.shared.T),
+            self._coupling,
+            self._shared,
             discrete.transition,
             discrete.factor,
             discrete.output,
             discrete.white,
             held.step,
-            np.array([held.lag_decay, held.lag_step]),
+            self._lag,
             held.lag_coupling,
             held.lagged_step,
             self._drift,
