@@ -83,11 +83,6 @@ class LowPass:
         _, rest = self._sections()
         return rest
 
-    @property
-    def delay(self) -> float:
-        """Delay of slow signals, s: how long a ramp comes late."""
-        return float(self.output @ np.linalg.solve(-self.transition, self.rest))
-
     def power(self, frequency: ArrayLike) -> Array:
         """Return |H|^2 = 1 / (1 + (f / cutoff)^(2 order)) at frequencies in Hz."""
         ratio = np.asarray(frequency, dtype=np.float64) / self.cutoff
