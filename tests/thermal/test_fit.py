@@ -159,6 +159,20 @@ def test_temperature_that_cannot_be_told_from_time_is_said(readings, word):
     assert not fit.compensated
 
 
+def test_a_constant_temperature_is_refused_before_holes_are_filled_again(monkeypatch):
+    rng = np.random.default_rng(13)
+    log = simulate(NOISE, RATE, SAMPLES, rng) + 3e-3
+    log[rng.random(SAMPLES) < 0.03] = np.nan
+
+    def never(*_):
+        raise AssertionError("a joint fit")
+
+    monkeypatch.setattr("imubench_pipeline.thermal.fit._Fit.settle", never)
+    fit = fitted(log, np.full(SAMPLES, 21.0), holes=True)
+    assert "changes" in fit.sensitivity.reason
+    assert fit.bias.lower < 3e-3 < fit.bias.upper
+
+
 def test_holes_and_segments_leave_the_sensitivity():
     rng = np.random.default_rng(6)
     log = simulate(NOISE, RATE, SAMPLES, rng) + 6e-5 * (DAY - DAY.mean())

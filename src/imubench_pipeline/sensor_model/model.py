@@ -194,7 +194,7 @@ class SensorModel:
 
     @property
     def sources(self) -> spectra.Sources:
-        """The noise that a low-pass is driven by, flicker noise apart."""
+        """The noise that a low-pass is driven by, with flicker noise as a number of its own."""
         return sources_of(self.noise.terms)
 
 

@@ -144,6 +144,7 @@ def fit_temperature(
     when block sizes are unequal", Biometrika 58, 1971.
     """
     spans = path.segments
+    varies = path.range > 0.0 and path.range >= 2.0 * float(np.median(path.deviation))
     if holes:
         means = block_means(blocks(), spans)
         spans = divided(means, spans)
@@ -161,7 +162,7 @@ def fit_temperature(
         for _ in range(2):
             whole = complete(blocks, spans, model, path, effect, rate, rng)
             fit = _Fit(whole, samples, rate, spans, path, band, bandwidth, longest_lag)
-            if not fit.possible:
+            if not (fit.possible and varies):
                 break
             found = fit.settle(quadratic)
             model, effect = _model_of(found), found.regressors.effect(found.regression)
@@ -172,7 +173,7 @@ def fit_temperature(
         )
     if not fit.possible:
         return _nothing(plain, path, fit, "too short a log")
-    if not path.range > 0.0 or path.range < 2.0 * float(np.median(path.deviation)):
+    if not varies:
         return _nothing(plain, path, fit, f"the temperature changes by {path.range:.2g} K only")
     found = fit.settle(quadratic)
     verdict = fit.judged(found, rng)
