@@ -92,7 +92,18 @@ class ThermalFit:
     path: TemperaturePath
 
     def compensate(self, blocks: Iterable[Array]) -> Iterator[Array]:
-        """Yield the blocks of the log less what temperature adds to it."""
+        """Return the blocks of the log less what temperature adds to it.
+
+        Parameters
+        ----------
+        blocks : iterable of ndarray
+            The log in order from its first sample, SI.
+
+        Returns
+        -------
+        iterator of ndarray
+            SI, in the shape of each block.
+        """
         return shifted(blocks, self.path, self.effect, -1.0)
 
 
@@ -129,8 +140,12 @@ def fit_temperature(
         Whether the square of the temperature is in the model; by default where the log favours
         it.
     longest_lag : float, optional
-        s; by default a twentieth of the log, at most half an hour. 0: no lag.
+        s; by default a twentieth of the longest segment, at most half an hour. 0: no lag.
     rng : numpy.random.Generator
+
+    Returns
+    -------
+    ThermalFit
 
     Raises
     ------
@@ -253,7 +268,7 @@ class _Fit:
         """Return the log likelihood that more regressors gain, for the noise as it is fitted."""
         density = found.whittle.density(found.candidates[0].found)
         wider = regressors.at(found.regression.lag, self.chosen.ordinates / density)
-        return wider.gain - found.regression.gain
+        return wider.log_likelihood_gain - found.regression.log_likelihood_gain
 
     def _best(self, regressors: Regressors) -> _Found:
         """Settle from the noise of the log as it is, and from that of ordinary least squares."""

@@ -44,6 +44,11 @@ def lagged(times: Array, values: Array, lag: float) -> Array:
     lag : float
         L, s; 0: none.
 
+    Returns
+    -------
+    ndarray, shape (k,)
+        °C.
+
     Raises
     ------
     ValueError
@@ -68,7 +73,17 @@ def lagged_path(path: TemperaturePath, values: Array, rate: float, lag: float) -
     rate : float
         Of the log, Hz.
     lag : float
-        s.
+        s; 0: none.
+
+    Returns
+    -------
+    ndarray, shape (k,)
+        °C.
+
+    Raises
+    ------
+    ValueError
+        If the lag is below 0 or not finite.
     """
     return np.concatenate(
         [lagged(path.sample[part] / rate, values[part], lag) for part in path.parts]

@@ -133,9 +133,9 @@ def temperature_path(
     value, variance = np.empty(len(read.begin)), np.empty(len(read.begin))
     draws = np.empty((DRAWS, len(read.begin)))
     for part in read.parts:
-        value[part], variance[part], _, tau, nu = evidence.part(part, q, noise)
+        value[part], variance[part], _, precision, shift = evidence.part(part, q, noise)
         normals = rng.standard_normal((DRAWS, part.stop - part.start, 2))
-        draws[:, part] = drawn(evidence.steps(part), q, spread, tau, nu, normals)
+        draws[:, part] = drawn(evidence.steps(part), q, spread, precision, shift, normals)
     value, draws = value + level, draws + level
     if noise < _COARSE * read.step:
         inside = read.high == read.low
@@ -194,8 +194,8 @@ class _Evidence:
             two, self._known[part], 1.0 / np.maximum(read.count[part], 1)
         )
         variance += np.where(two, self._floor**2, 0.0) + least
-        tau = np.where(two | many, 1.0 / variance, 0.0)
-        nu = np.where(two | many, at / variance, 0.0)
+        precision = np.where(two | many, 1.0 / variance, 0.0)
+        shift = np.where(two | many, at / variance, 0.0)
         height = -0.5 * np.log(variance[many]).sum()
         # The share of a block is given, not the x that it tells: with dx = noise dz.
         height += 0.5 * np.log((noise**2 * self._known[part] + least) / variance)[two].sum()
@@ -209,10 +209,10 @@ class _Evidence:
             np.where(cell, mean - half, 0.0),
             np.where(cell, mean + half, 0.0),
             (noise * self._soft[part]) ** 2 + least,
-            tau,
-            nu,
+            precision,
+            shift,
         )
-        return path, spread, evidence + float(height), tau, nu
+        return path, spread, evidence + float(height), precision, shift
 
     def best(self) -> tuple[float, float]:
         """Return q and the noise that make the readings most likely."""

@@ -1,9 +1,9 @@
 """The compiled recursions of the path of a temperature: expectation propagation on its blocks.
 
 The temperature is an integrated random walk, x'' white of density q. What a block says of x is
-exp(-tau x^2 / 2 + nu x) where it measures x, and P(x + noise in the cell) where it only says
-into which cell of the register x falls; the latter is replaced by the Gaussian of equal moments
-under everything else.
+exp(-precision x^2 / 2 + shift x) where it measures x, and P(x + noise in the cell) where it only
+says into which cell of the register x falls; the latter is replaced by the Gaussian of equal
+moments under everything else.
 """
 
 from __future__ import annotations
@@ -36,6 +36,11 @@ def cell_moments(m: float, v: float, low: float, high: float, noise: float) -> t
         Edges of the cell.
     noise : float
         Variance of the noise.
+
+    Returns
+    -------
+    tuple of float
+        log P, mean and variance.
     """
     spread = math.sqrt(v + noise)
     a, b = (low - m) / spread, (high - m) / spread
@@ -62,10 +67,13 @@ def cell_moments(m: float, v: float, low: float, high: float, noise: float) -> t
 
 
 @njit(cache=True)
-def _log_mass(m: float, v: float, tau: float, nu: float) -> float:
-    """Return log of the mean of exp(-tau x^2 / 2 + nu x) over N(m, v)."""
-    grown = 1.0 + v * tau
-    return -0.5 * math.log(grown) + 0.5 * (2.0 * m * nu - m * m * tau + v * nu * nu) / grown
+def _log_mass(m: float, v: float, precision: float, shift: float) -> float:
+    """Return log of the mean of exp(-precision x^2 / 2 + shift x) over N(m, v)."""
+    grown = 1.0 + v * precision
+    return (
+        -0.5 * math.log(grown)
+        + 0.5 * (2.0 * m * shift - m * m * precision + v * shift * shift) / grown
+    )
 
 
 @njit(cache=True)
@@ -83,29 +91,29 @@ def _ahead(
 
 @njit(cache=True)
 def _measured(
-    x: float, s: float, a: float, b: float, c: float, tau: float, nu: float
+    x: float, s: float, a: float, b: float, c: float, precision: float, shift: float
 ) -> tuple[float, float, float, float, float]:
-    """Return state and covariance after exp(-tau x^2 / 2 + nu x) is known of x."""
-    grown = 1.0 + tau * a
-    pull = (nu - tau * x) / grown
-    return x + a * pull, s + b * pull, a / grown, b / grown, c - b * b * tau / grown
+    """Return state and covariance after exp(-precision x^2 / 2 + shift x) is known of x."""
+    grown = 1.0 + precision * a
+    pull = (shift - precision * x) / grown
+    return x + a * pull, s + b * pull, a / grown, b / grown, c - b * b * precision / grown
 
 
 @njit(cache=True)
 def _filtered(
-    steps: Array, q: float, spread: float, tau: Array, nu: Array, means: Array, covs: Array
+    steps: Array, q: float, spread: float, precision: Array, shift: Array, means: Array, covs: Array
 ) -> float:
     """Filter; leave the filtered means (n, 2) and covariances (n, 3), return log evidence."""
-    n = tau.size
+    n = precision.size
     total = 0.0
     x, s = 0.0, 0.0
     a, b, c = _VAGUE * spread**2, 0.0, _VAGUE * spread**2 / steps.max() ** 2
     for i in range(n):
         if i > 0:
             x, a, b, c = _ahead(x, s, a, b, c, steps[i], q)
-        if tau[i] > 0.0:
-            total += _log_mass(x, a, tau[i], nu[i])
-            x, s, a, b, c = _measured(x, s, a, b, c, tau[i], nu[i])
+        if precision[i] > 0.0:
+            total += _log_mass(x, a, precision[i], shift[i])
+            x, s, a, b, c = _measured(x, s, a, b, c, precision[i], shift[i])
         means[i, 0], means[i, 1] = x, s
         covs[i, 0], covs[i, 1], covs[i, 2] = a, b, c
     return total
@@ -160,14 +168,14 @@ def _smoothed(
 
 
 @njit(cache=True)
-def _messages(steps: Array, q: float, tau: Array, nu: Array, future: Array) -> None:
+def _messages(steps: Array, q: float, precision: Array, shift: Array, future: Array) -> None:
     """Leave what the blocks after each say of its state: precision (3) and shift (2), (n, 5)."""
-    n = tau.size
+    n = precision.size
     future[n - 1] = 0.0
     for i in range(n - 2, -1, -1):
         h = steps[i + 1]
-        a, b, c = future[i + 1, 0] + tau[i + 1], future[i + 1, 1], future[i + 1, 2]
-        e, f = future[i + 1, 3] + nu[i + 1], future[i + 1, 4]
+        a, b, c = future[i + 1, 0] + precision[i + 1], future[i + 1, 1], future[i + 1, 2]
+        e, f = future[i + 1, 3] + shift[i + 1], future[i + 1, 4]
         qa, qb, qc = q * h**3 / 3.0, q * h * h / 2.0, q * h
         # (1 + Lambda Q)^-1, row by row.
         j, k = 1.0 + a * qa + b * qb, a * qb + b * qc
@@ -190,15 +198,37 @@ def propagate(
     low: Array,
     high: Array,
     noise: Array,
-    tau: Array,
-    nu: Array,
+    precision: Array,
+    shift: Array,
 ) -> tuple[Array, Array, float]:
     """Return mean and variance of the path, and the log evidence of q and the noise.
 
-    ``tau`` and ``nu`` hold what the blocks measure; those of cells are found here. The evidence
-    is -inf where that does not settle.
+    Parameters
+    ----------
+    steps : ndarray, shape (n,)
+        Time from the block before, in blocks; that of the first is not used but for its size.
+    q : float
+        Density of x'', °C² a block³.
+    spread : float
+        Range of the readings, °C: beside it, what is known of the first x is next to nothing.
+    cell : ndarray of bool, shape (n,)
+        Blocks that say into which cell x falls.
+    low, high : ndarray, shape (n,)
+        Edges of their cells, °C; of the others not used.
+    noise : ndarray, shape (n,)
+        Variance of the noise between x and those edges, °C².
+    precision, shift : ndarray, shape (n,)
+        1/°C² and 1/°C. What the blocks measure, 0 where one measures nothing; changed in place:
+        those of cells are found here.
+
+    Returns
+    -------
+    path, variance : ndarray, shape (n,)
+        °C and °C².
+    evidence : float
+        -inf where the cells do not settle.
     """
-    n = tau.size
+    n = precision.size
     means, covs = np.empty((n, 2)), np.empty((n, 3))
     path, variance = np.empty(n), np.empty(n)
     future = np.empty((n, 5))
@@ -207,12 +237,12 @@ def propagate(
         if cell[i]:
             any_cell = True
             width = (high[i] - low[i]) ** 2 / 12.0 + noise[i]
-            tau[i], nu[i] = 1.0 / width, 0.5 * (low[i] + high[i]) / width
+            precision[i], shift[i] = 1.0 / width, 0.5 * (low[i] + high[i]) / width
     settled = not any_cell
     for _ in range(_MOST_SWEEPS):
         if settled:
             break
-        _messages(steps, q, tau, nu, future)
+        _messages(steps, q, precision, shift, future)
         moved = 0.0
         # Forwards, each block after those before it: all at once would overshoot.
         x, s = 0.0, 0.0
@@ -224,22 +254,22 @@ def propagate(
                 m, v = _joined(x, s, a, b, c, future[i])
                 _, mean, var = cell_moments(m, v, low[i], high[i], noise[i])
                 wanted = max(1.0 / var - 1.0 / v, 1e-12 / (high[i] - low[i]) ** 2)
-                shift = mean * (wanted + 1.0 / v) - m / v
-                before = (m / v + nu[i]) / (1.0 / v + tau[i])
+                wanted_shift = mean * (wanted + 1.0 / v) - m / v
+                before = (m / v + shift[i]) / (1.0 / v + precision[i])
                 moved = max(moved, abs(mean - before) / (high[i] - low[i]))
-                tau[i], nu[i] = wanted, shift
-            if tau[i] > 0.0:
-                x, s, a, b, c = _measured(x, s, a, b, c, tau[i], nu[i])
+                precision[i], shift[i] = wanted, wanted_shift
+            if precision[i] > 0.0:
+                x, s, a, b, c = _measured(x, s, a, b, c, precision[i], shift[i])
         settled = moved < _SETTLED
-    evidence = _filtered(steps, q, spread, tau, nu, means, covs)
+    evidence = _filtered(steps, q, spread, precision, shift, means, covs)
     _smoothed(steps, q, means, covs, path, variance)
     for i in range(n):
         if cell[i]:
-            rest = 1.0 / variance[i] - tau[i]
+            rest = 1.0 / variance[i] - precision[i]
             v = 1.0 / max(rest, 1e-9 / variance[i])
-            m = v * (path[i] / variance[i] - nu[i])
+            m = v * (path[i] / variance[i] - shift[i])
             log_p = cell_moments(m, v, low[i], high[i], noise[i])[0]
-            evidence += log_p - _log_mass(m, v, tau[i], nu[i])
+            evidence += log_p - _log_mass(m, v, precision[i], shift[i])
     return path, variance, evidence if settled and np.isfinite(evidence) else -np.inf
 
 
@@ -256,18 +286,28 @@ def _joined(x: float, s: float, a: float, b: float, c: float, future: Array) -> 
 
 
 @njit(cache=True)
-def drawn(steps: Array, q: float, spread: float, tau: Array, nu: Array, normals: Array) -> Array:
+def drawn(
+    steps: Array, q: float, spread: float, precision: Array, shift: Array, normals: Array
+) -> Array:
     """Return draws of the path from its Gaussian posterior: filter forwards, sample backwards.
 
     Parameters
     ----------
-    steps, q, spread, tau, nu
-        As `propagate` left them.
+    steps : ndarray, shape (n,)
+    q, spread : float
+    precision, shift : ndarray, shape (n,)
+        All as `propagate` left them.
     normals : ndarray, shape (draws, n, 2)
+        Standard normal deviates.
+
+    Returns
+    -------
+    ndarray, shape (draws, n)
+        °C.
     """
     draws, n = normals.shape[0], normals.shape[1]
     means, covs = np.empty((n, 2)), np.empty((n, 3))
-    _filtered(steps, q, spread, tau, nu, means, covs)
+    _filtered(steps, q, spread, precision, shift, means, covs)
     paths = np.empty((draws, n))
     for d in range(draws):
         x, s = 0.0, 0.0

@@ -37,7 +37,18 @@ class BlockSeries:
         self._sums: list[Array] = [np.zeros((stop - start) // block) for start, stop in segments]
 
     def watch(self, blocks: Iterable[Array]) -> Iterator[Array]:
-        """Yield the blocks of a log as they are, and keep the means."""
+        """Yield the blocks of a log as they are, and keep the means.
+
+        Parameters
+        ----------
+        blocks : iterable of ndarray
+            The log in order, complete, SI.
+
+        Yields
+        ------
+        ndarray
+            Each as it came.
+        """
         reached = 0
         for values in blocks:
             for sums, (start, _) in zip(self._sums, self.segments, strict=True):
@@ -73,9 +84,9 @@ class Products:
     Attributes
     ----------
     cross : ndarray, shape (b, p)
-        Of the log and each of p regressors.
+        Of the log and each of p regressors, SI times its unit, per Hz.
     gram : ndarray, shape (b, p, p)
-        Of the regressors.
+        Of the regressors, in the product of their units, per Hz.
     """
 
     cross: Array
@@ -133,15 +144,43 @@ class Coefficients:
         return self._of([path.at(centres, values) for centres in self.centres])
 
     def of_time(self, rate: float) -> Array:
-        """Return the coefficients of a ramp of 1 a second."""
+        """Return the coefficients of a ramp of 1 a second.
+
+        Parameters
+        ----------
+        rate : float
+            Of the log, Hz.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            s.
+        """
         return self._of([centres / rate for centres in self.centres])
 
     def density(self) -> Array:
-        """Return the log's own density in each bin that has these coefficients, else 0."""
+        """Return the log's own density in each bin that has these coefficients, else 0.
+
+        Returns
+        -------
+        ndarray, shape (b,)
+            (rad/s)²/Hz or (m/s²)²/Hz, two-sided.
+        """
         return self._binned(self.log**2)
 
     def products(self, regressors: Sequence[Array]) -> Products:
-        """Return the products of the log and regressors (each of coefficients) in every bin."""
+        """Return the products of the log and regressors in every bin.
+
+        Parameters
+        ----------
+        regressors : sequence of ndarray, shape (n,)
+            Their coefficients (`of_knots`, `of_time`).
+
+        Returns
+        -------
+        Products
+            0 in bins that have no coefficients.
+        """
         p = len(regressors)
         cross, gram = np.zeros((self._bins, p)), np.zeros((self._bins, p, p))
         for i, left in enumerate(regressors):

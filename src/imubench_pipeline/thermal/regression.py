@@ -36,14 +36,14 @@ class Regression:
         Inverse of their covariance.
     lag : float
         s.
-    gain : float
+    log_likelihood_gain : float
         Log likelihood over that of beta = 0.
     """
 
     beta: Array
     information: Array
     lag: float
-    gain: float
+    log_likelihood_gain: float
 
     @property
     def covariance(self) -> Array:
@@ -99,7 +99,19 @@ class Regressors:
         settling: float | None = None,
         used: NDArray[np.bool_] | None = None,
     ) -> Regressors:
-        """Return the regressors with other terms, or in other bins."""
+        """Return the regressors with other terms, or in other bins; None: as they are.
+
+        Parameters
+        ----------
+        quadratic, ramp : bool, optional
+        settling : float, optional
+            s.
+        used : ndarray of bool, shape (b,), optional
+
+        Returns
+        -------
+        Regressors
+        """
         return Regressors(
             self.coefficients,
             self.path,
@@ -117,11 +129,33 @@ class Regressors:
         return 1 + self.quadratic + (self.settling > 0.0)
 
     def knots(self, lag: float) -> Array:
-        """Return T_lag - T_0 at the knots of the path, K."""
+        """Return T_lag - T_0 at the knots of the path.
+
+        Parameters
+        ----------
+        lag : float
+            s.
+
+        Returns
+        -------
+        ndarray, shape (k,)
+            K.
+        """
         return lagged_path(self.path, self.path.value, self.rate, lag) - self.reference
 
     def effect(self, found: Regression) -> Array:
-        """Return what temperature adds to the log, at the knots of the path, SI."""
+        """Return what temperature adds to the log, at the knots of the path.
+
+        Parameters
+        ----------
+        found : Regression
+            Of these regressors.
+
+        Returns
+        -------
+        ndarray, shape (k,)
+            rad/s or m/s².
+        """
         of_knots = self._of(self.knots(found.lag))
         return np.asarray(np.einsum("i,ik->k", found.beta[: self.thermal], np.array(of_knots)))
 
@@ -136,24 +170,68 @@ class Regressors:
         return terms
 
     def means(self, lag: float) -> Array:
-        """Return the mean over the log of each regressor of temperature."""
+        """Return the mean over the log of each regressor of temperature.
+
+        Parameters
+        ----------
+        lag : float
+            s.
+
+        Returns
+        -------
+        ndarray, shape (thermal,)
+            K, or K² of the square.
+        """
         return np.array([float(term.mean()) for term in self._of(self.knots(lag))])
 
     def columns(self, lag: float) -> list[Array]:
-        """Return the coefficients of the regressors."""
+        """Return the coefficients of the regressors, in the order of `Regression.beta`.
+
+        Parameters
+        ----------
+        lag : float
+            s.
+
+        Returns
+        -------
+        list of ndarray, shape (n,)
+            K, or K² of the square; s of the ramp.
+        """
         terms = self._of(self.knots(lag))
         columns = [self.coefficients.of_knots(self.path, term) for term in terms]
         return columns + [self._time] * self.ramp
 
     def products(self, lag: float) -> Products:
-        """Return the products of log and regressors in the bins used."""
+        """Return the products of log and regressors in the bins used.
+
+        Parameters
+        ----------
+        lag : float
+            s.
+
+        Returns
+        -------
+        Products
+        """
         if lag not in self._known:
             full = self.coefficients.products(self.columns(lag))
             self._known[lag] = Products(full.cross[self.used], full.gram[self.used])
         return self._known[lag]
 
     def at(self, lag: float, weights: Array) -> Regression:
-        """Return the fit at a lag; the weights are nu / S of the bins used."""
+        """Return the fit at a lag.
+
+        Parameters
+        ----------
+        lag : float
+            s.
+        weights : ndarray, shape (b,)
+            nu / S of the bins used: their ordinates over the density of the noise, Hz/SI².
+
+        Returns
+        -------
+        Regression
+        """
         products = self.products(lag)
         information = np.einsum("b,bij->ij", weights, products.gram)
         target = weights @ products.cross
@@ -162,7 +240,18 @@ class Regressors:
         return Regression(beta, information, lag, 0.5 * float(target @ beta))
 
     def lags(self, longest: float | None = None) -> Array:
-        """Return the lags to scan, 0 first, s."""
+        """Return the lags to scan.
+
+        Parameters
+        ----------
+        longest : float, optional
+            s; by default a twentieth of the longest segment, at most half an hour.
+
+        Returns
+        -------
+        ndarray, shape (l,)
+            s, 0 first, then rising; 0 alone where the knots lie too far apart for more.
+        """
         duration = max(stop - start for start, stop in self.path.segments) / self.rate
         knot = float(np.median(np.diff(self.path.sample))) / self.rate
         last = longest if longest is not None else min(_LONGEST * duration, _LONGEST_LAG)
@@ -172,27 +261,52 @@ class Regressors:
         return np.concatenate(([0.0], np.geomspace(first, last, _LAGS)))
 
     def best(self, weights: Array, lags: Array) -> Regression:
-        """Return the fit of the greatest gain: scan the lags, then polish."""
+        """Return the fit of the greatest log likelihood: scan the lags, then polish.
+
+        Parameters
+        ----------
+        weights : ndarray, shape (b,)
+            As for `at`.
+        lags : ndarray, shape (l,)
+            s, rising (`lags`).
+
+        Returns
+        -------
+        Regression
+        """
         fits = [self.at(float(lag), weights) for lag in lags]
-        place = int(np.argmax([fit.gain for fit in fits]))
+        place = int(np.argmax([fit.log_likelihood_gain for fit in fits]))
         best = fits[place]
         if len(lags) == 1:
             return best
         low, high = float(lags[max(place - 1, 0)]), float(lags[min(place + 1, len(lags) - 1)])
         polished = minimize_scalar(
-            lambda lag: -self.at(float(lag), weights).gain,
+            lambda lag: -self.at(float(lag), weights).log_likelihood_gain,
             bounds=(low, high),
             method="bounded",
             options={"xatol": 2e-3 * high, "maxiter": 25},
         )
         other = self.at(float(polished.x), weights)
-        return other if other.gain > best.gain + 1e-9 else best
+        return other if other.log_likelihood_gain > best.log_likelihood_gain + 1e-9 else best
 
     def without(self, spectrum: Spectrum, found: Regression, weights: Array) -> Spectrum:
         """Return the spectrum (of the bins used) less what temperature explains.
 
         The degrees of freedom that the fit takes from a bin are taken from its ordinates, so
         that the density keeps its mean.
+
+        Parameters
+        ----------
+        spectrum : Spectrum
+            Of the bins used.
+        found : Regression
+            Of these regressors.
+        weights : ndarray, shape (b,)
+            As for `at`: those that the fit was made with.
+
+        Returns
+        -------
+        Spectrum
         """
         products = self.products(found.lag)
         p = self.thermal

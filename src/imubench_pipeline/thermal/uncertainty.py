@@ -87,11 +87,15 @@ def judge(
         Of what temperature leaves.
     candidates : sequence of Candidate
         Noise models of that, the best first.
-    lags : ndarray
+    lags : ndarray, shape (l,)
         Lags that were scanned, s.
     gained : float
         BIC of the best noise without temperature, less that of the fit.
     rng : numpy.random.Generator
+
+    Returns
+    -------
+    Verdict
     """
     weights = whittle.spectrum.ordinates / whittle.density(candidates[0].found)
     p = regressors.thermal
@@ -200,13 +204,13 @@ def _explained(regressors: Regressors, found: Regression) -> float:
 
 def _fine(regressors: Regressors, weights: Array, lags: Array) -> Array:
     """Return lags that lie densely where the log allows them, s."""
-    gains = np.array([regressors.at(float(lag), weights).gain for lag in lags])
+    gains = np.array([regressors.at(float(lag), weights).log_likelihood_gain for lag in lags])
     likely = np.flatnonzero(gains > gains.max() - _WITHIN)
     low, high = lags[max(likely[0] - 1, 0)], lags[min(likely[-1] + 1, len(lags) - 1)]
     if high == low:
         return np.array([low])
     even = np.linspace(low, high, _LAGS)
-    gains = np.array([regressors.at(float(lag), weights).gain for lag in even])
+    gains = np.array([regressors.at(float(lag), weights).log_likelihood_gain for lag in even])
     likely = np.flatnonzero(gains > gains.max() - _WITHIN)
     low, high = even[max(likely[0] - 1, 0)], even[min(likely[-1] + 1, _LAGS - 1)]
     return np.asarray(np.linspace(low, high, _LAGS))
@@ -219,6 +223,10 @@ def shares(candidates: Sequence[Candidate]) -> list[tuple[Candidate, float]]:
     ----------
     candidates : sequence of Candidate
         The best first.
+
+    Returns
+    -------
+    list of (Candidate, float)
     """
     chosen = candidates[0]
     alike = {
