@@ -38,7 +38,7 @@ def test_the_states_of_a_filter_have_its_poles(order: int) -> None:
     np.testing.assert_allclose(np.abs(response) ** 2, theory.butterworth(f, 64.0, order), 1e-12)
     np.testing.assert_allclose(low_pass.power(f), theory.butterworth(f, 64.0, order), 1e-12)
     np.testing.assert_allclose(response, [low_pass.response(x) for x in f], 1e-12)
-    np.testing.assert_allclose(F @ low_pass.rest, -b, atol=1e-12 * low_pass.speed)
+    np.testing.assert_allclose(F @ low_pass.steady_state, -b, atol=1e-12 * low_pass.angular_cutoff)
 
 
 @pytest.mark.parametrize(("cutoff", "order"), [(64.0, 1), (64.0, 4), (3.0, 2), (20.0, 3)])
@@ -98,7 +98,7 @@ def test_a_correlation_time_of_a_day_beside_a_filter_of_a_millisecond(
 ) -> None:
     """The discretisation against its integrals with fifty digits."""
     low_pass = LowPass(1000 / (2 * np.pi), 1)
-    w, T, a = mpf(low_pass.speed), 1 / mpf(rate), 1 / mpf(T_B)
+    w, T, a = mpf(low_pass.angular_cutoff), 1 / mpf(rate), 1 / mpf(T_B)
     found = slow_sources(np.array([T_B]), 1 / rate, low_pass)
 
     def integral(p, q):  # of e^-(p t) e^-(q t)

@@ -64,7 +64,18 @@ class SlowSources:
 
 
 def filter_transition(low_pass: LowPass, interval: float) -> Array:
-    """Return e^(F interval), shape (m, m)."""
+    """Return what becomes of the states of a filter without input, e^(F interval).
+
+    Parameters
+    ----------
+    low_pass : LowPass
+    interval : float
+        s.
+
+    Returns
+    -------
+    ndarray, shape (m, m)
+    """
     return np.asarray(expm(low_pass.transition * interval))
 
 
@@ -97,9 +108,9 @@ def slow_sources(times: Array, interval: float, low_pass: LowPass | None) -> Slo
         return SlowSources(decay, lost, own, none, none, np.zeros((n, m, m)))
     system = np.zeros((n, 1 + m, 1 + m))
     system[:, 0, 0] = -1.0 / times
-    system[:, 1:, 0] = low_pass.rest / times[:, None]
+    system[:, 1:, 0] = low_pass.steady_state / times[:, None]
     system[:, 1:, 1:] = low_pass.transition
-    impulse = np.concatenate(([1.0], -low_pass.rest))
+    impulse = np.concatenate(([1.0], -low_pass.steady_state))
     transition, factor = _integrated(system, np.broadcast_to(impulse, (n, 1 + m)), interval)
     sign = np.sign(factor[:, 0, 0])
     return SlowSources(
@@ -114,6 +125,12 @@ def slow_sources(times: Array, interval: float, low_pass: LowPass | None) -> Slo
 
 def white_factor(low_pass: LowPass, interval: float) -> Array:
     """Return a factor of the noise that white noise of density 1 leaves in the filter.
+
+    Parameters
+    ----------
+    low_pass : LowPass
+    interval : float
+        s.
 
     Returns
     -------
@@ -200,17 +217,17 @@ def held_input(low_pass: LowPass | None, lag: float, interval: float) -> Held:
     lag_step = math.expm1(-x) / x if lag > 0 else 0.0
     if low_pass is None:
         return Held(np.zeros(0), decay, lag_step, np.zeros(0), np.zeros(0))
-    rest, transition = low_pass.rest, low_pass.transition
+    steady_state, transition = low_pass.steady_state, low_pass.transition
     # Columns of e^(system interval): e from ε and from a slope of 1 / interval.
     plain = np.zeros((m + 1, m + 1))
     plain[:m, :m] = transition
-    plain[:m, m] = -rest / interval
+    plain[:m, m] = -steady_state / interval
     step = expm(plain * interval)[:m, m]
     if lag <= 0:
         return Held(step, decay, lag_step, np.zeros(m), step)
     lagged = np.zeros((m + 2, m + 2))
     lagged[:m, :m] = transition
-    lagged[:m, m] = rest / lag
+    lagged[:m, m] = steady_state / lag
     lagged[m, m] = -1.0 / lag
     lagged[m, m + 1] = -1.0 / interval
     whole = expm(lagged * interval)
@@ -234,27 +251,27 @@ def stationary(
 
     Returns
     -------
-    given : ndarray, shape (n, m)
-        Mean of e is ``x @ given``.
-    rest : ndarray, shape (m, m)
+    mean_given_x : ndarray, shape (n, m)
+        Mean of e is ``x @ mean_given_x``.
+    covariance_given_x : ndarray, shape (m, m)
         Covariance of e for a given x.
     """
     # In units of the filter's own time, for the sake of the equations' condition.
-    speed = low_pass.speed
-    F, p = low_pass.transition / speed, low_pass.rest
-    b = low_pass.input / speed
-    rates = 1.0 / (times * speed)
+    unit = low_pass.angular_cutoff
+    F, p = low_pass.transition / unit, low_pass.steady_state
+    b = low_pass.input / unit
+    rates = 1.0 / (times * unit)
     # With P the variance of x: F r - r/T - p P/T = 0, so r / P has no P; 0 for a random walk.
-    given = np.array([np.linalg.solve(F - rate * np.eye(len(p)), p * rate) for rate in rates])
-    given = given.reshape(len(times), len(p))
-    drive = white * speed * np.outer(b, b)
+    means = np.array([np.linalg.solve(F - rate * np.eye(len(p)), p * rate) for rate in rates])
+    means = means.reshape(len(times), len(p))
+    drive = white * unit * np.outer(b, b)
     left = np.zeros_like(drive)
-    for rate, density, mean in zip(rates, densities, given, strict=True):
-        drive = drive + density / speed * np.outer(p, p)
+    for rate, density, mean in zip(rates, densities, means, strict=True):
+        drive = drive + density / unit * np.outer(p, p)
         if rate > 0:
-            variance = density / speed / (2.0 * rate)
+            variance = density / unit / (2.0 * rate)
             cross = np.outer(p, mean) * variance * rate
             drive = drive + cross + cross.T
             left = left + variance * np.outer(mean, mean)
     whole = solve_continuous_lyapunov(F, -drive)
-    return given, np.asarray((whole + whole.T) / 2.0 - left)
+    return means, np.asarray((whole + whole.T) / 2.0 - left)

@@ -40,6 +40,10 @@ def bank(B: float, lowest: float, highest: float) -> list[GaussMarkov]:
     lowest, highest : float
         The band, Hz.
 
+    Returns
+    -------
+    list of GaussMarkov
+
     Raises
     ------
     ValueError
@@ -57,7 +61,18 @@ def bank(B: float, lowest: float, highest: float) -> list[GaussMarkov]:
 
 
 def ripple(lowest: float, highest: float) -> float:
-    """Return the largest relative error of the density of a bank inside its band."""
+    """Return the largest relative error of the density of a bank inside its band.
+
+    Parameters
+    ----------
+    lowest, highest : float
+        The band, Hz.
+
+    Returns
+    -------
+    float
+        Of any B.
+    """
     terms = bank(1.0, lowest, highest)
     decades = math.log10(highest / lowest)
     f = np.geomspace(lowest, highest, 2 + math.ceil(decades * 10 * _POINTS_A_DECADE))

@@ -54,7 +54,18 @@ class ImuModel:
             raise ValueError(f"temperature_step is {self.temperature_step}, expected from 0")
 
     def sensed(self, channel: str) -> dict[str, float]:
-        """Return which true channels an axis senses, and how much of each."""
+        """Return which true channels an axis senses, and how much of each.
+
+        Parameters
+        ----------
+        channel : str
+            Such as ``gyro_x``.
+
+        Returns
+        -------
+        dict of str to float
+            By channel; those of which it senses nothing are left out.
+        """
         quantity, row = quantity_of(channel), "xyz".index(channel[-1])
         matrix = np.asarray(self.misalignment.get(quantity, np.eye(3)))
         parts = {f"{quantity}_{axis}": float(matrix[row, i]) for i, axis in enumerate("xyz")}
@@ -105,7 +116,7 @@ def simulate_imu(
             samples,
             channel_rng(seed, *names, channel),
             true=shared.along(imu.sensed(channel)),
-            temperature=shared.warmth,
+            temperature=shared.temperature_signal,
             block=BLOCK,
         )
         for channel, model in imu.axes.items()
@@ -115,9 +126,8 @@ def simulate_imu(
             shared.advance(start, min(start + BLOCK, samples))
             blocks = dict(zip(streams, pool.map(next, streams.values()), strict=True))
             if shared.temperature is not None:
-                step = imu.temperature_step
-                warm = shared.temperature
-                blocks[TEMPERATURE] = np.rint(warm / step) * step if step else warm
+                block, step = shared.temperature, imu.temperature_step
+                blocks[TEMPERATURE] = np.rint(block / step) * step if step else block
             yield blocks
 
 
@@ -127,7 +137,7 @@ class _Shared:
     def __init__(
         self, rate: float, motion: Mapping[str, Profile], temperature: Profile | None
     ) -> None:
-        self._rate, self._profiles, self._warmth = rate, motion, temperature
+        self._rate, self._profiles, self._temperature = rate, motion, temperature
         self._start = 0
         self._motion: dict[str, Array] = {}
         self.temperature: Array | None = None
@@ -137,7 +147,7 @@ class _Shared:
         times = np.arange(start, stop) / self._rate
         self._start = start
         self._motion = {name: profile.at(times) for name, profile in self._profiles.items()}
-        self.temperature = None if self._warmth is None else self._warmth.at(times)
+        self.temperature = None if self._temperature is None else self._temperature.at(times)
 
     def along(self, sensed: Mapping[str, float]) -> Signal | None:
         """Return the signal along an axis; None where it senses no motion."""
@@ -155,13 +165,13 @@ class _Shared:
         return true
 
     @property
-    def warmth(self) -> Signal | None:
+    def temperature_signal(self) -> Signal | None:
         """The temperature as a signal; None where none is given."""
-        if self._warmth is None:
+        if self._temperature is None:
             return None
 
-        def warm(start: int, stop: int) -> Array:
+        def temperature(start: int, stop: int) -> Array:
             assert self.temperature is not None  # `advance` has been called
             return self.temperature[start - self._start : stop - self._start]
 
-        return warm
+        return temperature

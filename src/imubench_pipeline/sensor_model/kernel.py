@@ -57,25 +57,27 @@ def run(
     white : float
         Standard deviation of white noise a sample, where there is no filter.
     step : ndarray, shape (m,)
+        What the filter's lack gains of a unit change of the input (`discretisation.Held`).
     lag : ndarray, shape (2,)
-        Decay, and step.
+        Decay of the lag of the temperature over a sample, and what it gains of a change of 1 K.
     lag_coupling, lagged_step : ndarray, shape (m,)
+        What the filter's lack gains of a lag of 1 K and of a change of 1 K, of a drift of 1 SI a K.
     drift : ndarray, shape (3,)
-        Sensitivity, quadratic, reference.
+        Sensitivity, SI/K, quadratic, SI/K², and reference, °C.
     """
     n, m = x.size, e.size
     before = np.empty(m)
     for i in range(log.size):
         u = given[i]
-        warm = 0.0
+        present = 0.0
         change_of_temperature = 0.0
         if temperature.size:
-            warm = temperature[i]
+            present = temperature[i]
             if memory[STARTED] > 0.0:
-                change_of_temperature = warm - memory[TEMPERATURE]
+                change_of_temperature = present - memory[TEMPERATURE]
         behind = memory[LAG]
         ahead = lag[0] * behind + lag[1] * change_of_temperature
-        lagged = warm + ahead - drift[2]
+        lagged = present + ahead - drift[2]
         if temperature.size:
             u += drift[1] * lagged * lagged
         if memory[STARTED] > 0.0:
@@ -95,7 +97,7 @@ def run(
                 e[a] = before[a]
         memory[LAG] = ahead
         memory[INPUT] = u
-        memory[TEMPERATURE] = warm
+        memory[TEMPERATURE] = present
         memory[STARTED] = 1.0
         total = u
         if temperature.size:

@@ -45,7 +45,7 @@ class LowPass:
             raise ValueError(f"the order is {self.order}, expected 1 to {_HIGHEST_ORDER}")
 
     @property
-    def speed(self) -> float:
+    def angular_cutoff(self) -> float:
         """Angular cut-off frequency, rad/s."""
         return 2.0 * math.pi * self.cutoff
 
@@ -59,14 +59,14 @@ class LowPass:
             # The first state of a section is its output, and the last one takes its input.
             matrix[begin + len(section) + len(following) - 1, begin] = 1.0
             begin += len(section)
-        return self.speed * matrix
+        return self.angular_cutoff * matrix
 
     @property
     def input(self) -> Array:
         """Column b, shape (order,), 1/s."""
         sections, _ = self._sections()
         column = np.zeros(self.order)
-        column[len(sections[0]) - 1] = self.speed
+        column[len(sections[0]) - 1] = self.angular_cutoff
         return column
 
     @property
@@ -78,18 +78,39 @@ class LowPass:
         return row
 
     @property
-    def rest(self) -> Array:
+    def steady_state(self) -> Array:
         """States at rest under a unit input, -F^-1 b, shape (order,)."""
-        _, rest = self._sections()
-        return rest
+        _, states = self._sections()
+        return states
 
     def power(self, frequency: ArrayLike) -> Array:
-        """Return |H|^2 = 1 / (1 + (f / cutoff)^(2 order)) at frequencies in Hz."""
+        """Return |H|^2 = 1 / (1 + (f / cutoff)^(2 order)).
+
+        Parameters
+        ----------
+        frequency : array_like
+            Hz.
+
+        Returns
+        -------
+        ndarray
+            Gain of the power, in the shape of ``frequency``.
+        """
         ratio = np.asarray(frequency, dtype=np.float64) / self.cutoff
         return np.asarray(1.0 / (1.0 + ratio ** (2 * self.order)))
 
     def response(self, frequency: float) -> complex:
-        """Return H at a frequency in Hz: gain and phase of a sinusoid."""
+        """Return H: gain and phase of a sinusoid.
+
+        Parameters
+        ----------
+        frequency : float
+            Hz.
+
+        Returns
+        -------
+        complex
+        """
         s = 1j * frequency / self.cutoff
         poles = np.exp(
             1j * math.pi * (2 * np.arange(1, self.order + 1) + self.order - 1) / (2 * self.order)
@@ -105,5 +126,5 @@ class LowPass:
         sections = [np.array([[0.0, 1.0], [-1.0, -2.0 * zeta]]) for zeta in damping]
         if self.order % 2:
             sections.append(np.array([[-1.0]]))
-        rest = np.concatenate([np.eye(len(section))[0] for section in sections])
-        return sections, rest
+        steady_state = np.concatenate([np.eye(len(section))[0] for section in sections])
+        return sections, steady_state

@@ -204,6 +204,11 @@ def sources_of(terms: Sequence[object]) -> spectra.Sources:
     Parameters
     ----------
     terms : sequence of Term
+
+    Returns
+    -------
+    Sources
+        White and flicker noise, Gauss-Markov processes and random walks; others have no density.
     """
     white = sum(term.N**2 for term in terms if isinstance(term, WhiteNoise))
     flicker = sum(term.B**2 for term in terms if isinstance(term, Flicker))
@@ -223,6 +228,11 @@ def bank_for(model: SensorModel, rate: float, duration: float) -> list[GaussMark
         Hz.
     duration : float
         s; the density is followed down to 1 / (2 duration).
+
+    Returns
+    -------
+    list of GaussMarkov
+        None without flicker noise, or without a filter.
     """
     found: list[GaussMarkov] = []
     for term in model.noise.terms:

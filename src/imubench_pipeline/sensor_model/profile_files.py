@@ -82,7 +82,13 @@ class FileSeries:
         self._batches = None
 
     def span(self) -> tuple[float, float]:
-        """Return the first and the last time, s; the whole file is read for it."""
+        """Return the first and the last time, s; the whole file is read for it.
+
+        Raises
+        ------
+        ConfigError
+            If the file has no rows, a number is missing in it, or its times do not ascend.
+        """
         first, last = np.nan, np.nan
         for batch in self._read():
             times = self._columns(batch, last)[_TIME]
@@ -94,7 +100,19 @@ class FileSeries:
         return float(first), float(last)
 
     def at(self, name: str, times: Array) -> Array:
-        """Return a column at ascending times in s, linear between rows, its ends held.
+        """Return a column, linear between rows, its ends held.
+
+        Parameters
+        ----------
+        name : str
+            That was taken (`take`).
+        times : ndarray, shape (k,)
+            s, ascending.
+
+        Returns
+        -------
+        ndarray, shape (k,)
+            In SI; temperature in °C.
 
         Raises
         ------

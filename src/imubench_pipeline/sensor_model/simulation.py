@@ -192,12 +192,14 @@ class _Axis:
         low_pass = self._model.low_pass
         if low_pass is None:
             return x, np.zeros(0)
-        given, rest = stationary(self._times, self._densities, self._white, low_pass)
-        values, vectors = np.linalg.eigh(rest)
+        mean_given_x, covariance_given_x = stationary(
+            self._times, self._densities, self._white, low_pass
+        )
+        values, vectors = np.linalg.eigh(covariance_given_x)
         root = vectors * np.sqrt(np.maximum(values, 0.0))
         # A ramp that has always been rising leaves the filter behind by F^-1 p R.
-        ramp = np.linalg.solve(low_pass.transition, low_pass.rest) * self._model.noise.R
-        return x, x @ given + root @ rng.standard_normal(low_pass.order) + ramp
+        ramp = np.linalg.solve(low_pass.transition, low_pass.steady_state) * self._model.noise.R
+        return x, x @ mean_given_x + root @ rng.standard_normal(low_pass.order) + ramp
 
     def samples(
         self, start: int, stop: int, true: Signal | None, temperature: Signal | None
@@ -210,16 +212,16 @@ class _Axis:
             given += (1.0 + model.scale_error) * _checked(true(start, stop), size, "motion")
         if model.noise.R:
             given += model.noise.R / self._rate * np.arange(start, stop)
-        warm = np.empty(0)
+        temperatures = np.empty(0)
         if temperature is not None and model.drift is not None:
-            warm = _checked(temperature(start, stop), size, "temperature")
+            temperatures = _checked(temperature(start, stop), size, "temperature")
         own = max(len(self._e), 1)
         normal = self._noise.standard_normal((size, len(self._x) + own))
         log = np.empty(size)
         run(
             log,
             given,
-            warm,
+            temperatures,
             normal,
             self._memory,
             self._x,

@@ -51,10 +51,23 @@ class Sources:
     densities: Array
 
     def realised(self, low_pass: LowPass, interval: float, longest: float) -> tuple[Array, Array]:
-        """Return times and densities with those of flicker noise up to a time in s."""
+        """Return times and densities with those of the processes that make up flicker noise.
+
+        Parameters
+        ----------
+        low_pass : LowPass
+        interval : float
+            Sampling interval, s.
+        longest : float
+            Longest time that is asked for, s.
+
+        Returns
+        -------
+        times, densities : ndarray, shape (n,)
+        """
         if self.flicker == 0.0:
             return self.times, self.densities
-        shortest = _FASTEST * min(1.0 / low_pass.speed, interval)
+        shortest = _FASTEST * min(1.0 / low_pass.angular_cutoff, interval)
         times, variance = mixture(shortest, _SLOWEST * longest)
         densities = self.flicker * 2.0 * variance / times
         return np.concatenate([self.times, times]), np.concatenate([self.densities, densities])
@@ -71,6 +84,11 @@ def sampled_spectrum(sources: Sources, low_pass: LowPass, omega: Array, rate: fl
         rad a sample, not 0.
     rate : float
         Hz.
+
+    Returns
+    -------
+    ndarray
+        In the shape of ``omega``.
     """
     interval = 1.0 / rate
     flat = np.ravel(omega)
@@ -115,6 +133,11 @@ def allan_variance(sources: Sources, low_pass: LowPass, n: Array, rate: float) -
         Samples a cluster, whole numbers from 1.
     rate : float
         Hz.
+
+    Returns
+    -------
+    ndarray
+        In the shape of ``n``.
     """
     interval = 1.0 / rate
     sizes = np.ravel(n).astype(np.int64)
@@ -217,10 +240,10 @@ def _one_sample(
     for i in range(n):
         # Where a walk stands at the start does not matter: the difference does not see it.
         alone = (times[i : i + 1], densities[i : i + 1])
-        given, rest = stationary(*alone, 0.0, low_pass)
+        mean, covariance = stationary(*alone, 0.0, low_pass)
         variance = 0.0 if math.isinf(times[i]) else densities[i] * times[i] / 2.0
         start[i, 0, 0] = variance
-        start[i, 0, 1:] = start[i, 1:, 0] = variance * given[0]
-        start[i, 1:, 1:] = rest + variance * np.outer(given[0], given[0])
+        start[i, 0, 1:] = start[i, 1:, 0] = variance * mean[0]
+        start[i, 1:, 1:] = covariance + variance * np.outer(mean[0], mean[0])
     start[n, 1:, 1:] = stationary(times[:0], densities[:0], white, low_pass)[1]
     return one, start
