@@ -57,14 +57,14 @@ class Extent:
 
     Attributes
     ----------
-    samples : float
-        Of one channel, in millions.
+    million_samples : float
+        Of one channel.
     channels : int
     recordings : int
         Of the run, or of one sensor.
     """
 
-    samples: float = 0.0
+    million_samples: float = 0.0
     channels: int = 1
     recordings: int = 1
 
@@ -110,8 +110,8 @@ def resources_of(rule: str, extent: Extent, attempt: int = 1) -> Resources:
         time += more_time * extent.recordings
     else:
         memory, of_samples, time, of_channels, of_values = _OF_A_RECORDING[rule]
-        memory += of_samples * extent.samples
-        time += (of_channels + of_values * extent.samples) * extent.channels
+        memory += of_samples * extent.million_samples
+        time += (of_channels + of_values * extent.million_samples) * extent.channels
     start = 0 if rule in _STARTED else _START
     times: int = 2 ** (attempt - 1)
     return {
