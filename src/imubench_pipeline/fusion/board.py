@@ -150,6 +150,10 @@ class Board:
         correlation : mapping of str to float, optional
             Part of the variance of N, B, K and R that is common to all, 0 to 1; by default none.
 
+        Returns
+        -------
+        Board
+
         Raises
         ------
         ValueError
@@ -299,5 +303,14 @@ def block_mean_spectrum(model: NoiseModel, omega: Array, rate: float, size: int)
 
 
 def stochastic(model: NoiseModel) -> NoiseModel:
-    """Return a model without its ramp and its lines, which have no spectrum."""
+    """Return a model without its ramp and its lines, which have no spectrum.
+
+    Parameters
+    ----------
+    model : NoiseModel
+
+    Returns
+    -------
+    NoiseModel
+    """
     return replace(model, R=0.0, sinusoids=())

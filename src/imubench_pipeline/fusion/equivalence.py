@@ -79,11 +79,11 @@ class Candidate:
         return self.estimate.model
 
     def variance(self, tau: float) -> float:
-        """Return the Allan variance of the model, SI."""
+        """Return the Allan variance of the model, (rad/s)² or (m/s²)², at a tau in s."""
         return float(self.model.allan_variance(tau))
 
     def unknown(self, tau: float) -> Iterator[str]:
-        """Yield the parameters that the log does not tell and that may matter at a tau."""
+        """Yield the parameters that the log does not tell and that may matter at a tau in s."""
         total = self.variance(tau)
         groups = [self.estimate.parameters, *self.estimate.further]
         for group in groups:
@@ -214,6 +214,11 @@ def equivalence_rows(
     draws : int
         Noise models that give the interval.
     seed : int
+
+    Yields
+    ------
+    mapping
+        By column of the table.
     """
     listed = list(candidates)
     sensors = sorted({one.sensor for one in listed})

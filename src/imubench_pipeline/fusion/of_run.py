@@ -22,6 +22,10 @@ def candidates(recordings: pa.Table, parameters: pa.Table) -> Iterator[Candidate
     ----------
     recordings, parameters : pyarrow.Table
         The tables of these names.
+
+    Yields
+    ------
+    Candidate
     """
     about = {(row["sensor"], row["recording"]): row for row in recordings.to_pylist()}
     groups: dict[tuple[str, str, str, str], list[Row]] = {}
@@ -41,12 +45,16 @@ def candidates(recordings: pa.Table, parameters: pa.Table) -> Iterator[Candidate
 
 
 def fusion_rows(recordings: pa.Table, parameters: pa.Table, how: FusionSettings) -> Iterator[Row]:
-    """Yield the rows of the table ``fusion``.
+    """Return the rows of the table ``fusion``.
 
     Parameters
     ----------
     recordings, parameters : pyarrow.Table
     how : FusionSettings
+
+    Returns
+    -------
+    iterator of mapping
     """
     return equivalence_rows(
         candidates(recordings, parameters),

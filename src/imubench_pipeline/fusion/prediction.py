@@ -160,6 +160,7 @@ def prediction_limits(
     tau : array_like, shape (m,)
         s.
     draws : int
+        Boards that are drawn from the limits of the parameters.
     rng : numpy.random.Generator
     level : float
         Share of the draws between the limits.

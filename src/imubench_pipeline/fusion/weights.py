@@ -20,9 +20,17 @@ class Weights(Protocol):
     """What weighs the sensors of a board."""
 
     def response(self, omega: Array) -> NDArray[Any]:
-        """Return the weight of each sensor at angular frequencies, shape (m, n).
+        """Return the weight of each sensor at angular frequencies.
 
-        rad a fused sample; complex where a filter delays.
+        Parameters
+        ----------
+        omega : ndarray, shape (m,)
+            rad a fused sample.
+
+        Returns
+        -------
+        ndarray, shape (m, n)
+            Complex where a filter delays.
         """
 
 
@@ -48,7 +56,7 @@ class Constant:
             raise ValueError("expected a weight for each sensor, with a sum of 1")
 
     def response(self, omega: Array) -> Array:
-        """Return the weights, at every frequency the same."""
+        """Return the weights, shape (m, n), at every frequency the same (see `Weights`)."""
         return np.broadcast_to(self.values, (len(omega), len(self.values)))
 
 
@@ -70,7 +78,7 @@ class ByFrequency:
     board: Board
 
     def response(self, omega: Array) -> Array:
-        """Return the weights, real: no delay."""
+        """Return the weights, shape (m, n), real: no delay (see `Weights`)."""
         return least(self.board.spectral_parts(omega))
 
 
@@ -139,6 +147,7 @@ def least(parts: Parts) -> Array:
     Parameters
     ----------
     parts : Parts
+        Of m frequencies or tau.
 
     Returns
     -------
