@@ -138,19 +138,19 @@ def layout(path: Path, columns: Iterable[str], rate: float, sensor: LogFormat | 
     names = list(columns)
     text = path.suffix == ".csv"
     channels = {name: _si_source(name) for name in names if name != TEMPERATURE}
-    warm = _si_source(TEMPERATURE) if TEMPERATURE in names else None
+    temperature = _si_source(TEMPERATURE) if TEMPERATURE in names else None
     delimiter = ","
     if text and sensor is not None and _has_names(sensor, channels):
         channels = {name: sensor.channels[name] for name in channels}  # type: ignore[index]  # the keys are channels, as text
-        warm = sensor.temperature if warm and sensor.temperature else warm
+        temperature = sensor.temperature if temperature and sensor.temperature else temperature
         delimiter = sensor.delimiter or delimiter
     keys: dict[str, Any] = {
         "reader": "csv" if text else "arrow",
         "rate": f"{rate:.17g} Hz",
         "channels": {name: one.model_dump(exclude_unset=True) for name, one in channels.items()},
     }
-    if warm is not None:
-        keys["temperature"] = warm.model_dump(exclude_unset=True)
+    if temperature is not None:
+        keys["temperature"] = temperature.model_dump(exclude_unset=True)
     if text:
         keys |= {"delimiter": delimiter, "header": True, "comment": "#", "decimal": "."}
     if sensor is not None and sensor.bandwidth is not None:
