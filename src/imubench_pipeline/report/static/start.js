@@ -44,6 +44,9 @@ function startPages(main) {
     if (location.hash === hash) show();
     else location.hash = hash;
   });
+  // The address says where to be: a browser that restores the place of before, on a reload, would
+  // do so after this.
+  history.scrollRestoration = "manual";
   window.addEventListener("hashchange", show);
   show();
 }
