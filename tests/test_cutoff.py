@@ -5,8 +5,11 @@ import pytest
 from scipy.integrate import quad
 from scipy.signal import lfilter
 
-from imubench_pipeline.cutoff import find_cutoff, folded_low_pass, low_pass
-from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.cutoff import find_cutoff, folded_low_pass
+from imubench_pipeline.noise import GaussMarkov, NoiseModel
+from imubench_pipeline.sensor_model.low_pass import LowPass
+from imubench_pipeline.sensor_model.model import SensorModel
+from imubench_pipeline.sensor_model.simulation import simulate as simulate_sensor
 from imubench_pipeline.simulate import simulate
 from imubench_pipeline.spectrum import spectra
 
@@ -39,16 +42,19 @@ def cutoff_of(log, rate):
 def test_folds_are_those_of_the_sampled_covariance(order, cutoff):
     rate = 100.0
     f = np.array([1.0, 13.0, 49.0])
+
+    def power(frequency):
+        return 1.0 / (1.0 + (frequency / cutoff) ** (2 * order))
+
     # Poisson: the sum over folds is the Fourier series of the covariance, each by quadrature.
     covariance = [
-        quad(low_pass, 0.0, np.inf, args=(cutoff, order), limit=400)[0] * 2.0
+        quad(power, 0.0, np.inf, limit=400)[0] * 2.0
         if k == 0
         else 2.0
         * quad(
-            low_pass,
+            power,
             0.0,
             np.inf,
-            args=(cutoff, order),
             weight="cos",
             wvar=2.0 * np.pi * k / rate,
             limit=800,
@@ -76,6 +82,21 @@ def test_first_order_cutoff_is_found_also_above_nyquist(cutoff, rate, hours):
     assert found.N.value == pytest.approx(1e-4, rel=0.02)
 
 
+@pytest.mark.parametrize("seed", [9, 10, 11])
+def test_a_cutoff_above_nyquist_is_not_taken_for_another_of_higher_order(seed):
+    # Of 64 Hz at 100 Hz; those of 120 Hz and third order fold into much the same.
+    rng = np.random.default_rng(seed)
+    found = cutoff_of(first_order(1e-4, 64.0, 100.0, 400_000, rng), 100.0)
+    assert found.order == 1
+    assert found.frequency.value == pytest.approx(64.0, rel=0.03)
+
+
+def test_a_butterworth_filter_above_nyquist_is_not_named():
+    rng = np.random.default_rng(1)
+    found = cutoff_of(butterworth(1e-4, 70.0, 2, 100.0, 120_000, rng), 100.0)
+    assert found.frequency.status == "not_identified"
+
+
 @pytest.mark.parametrize("cutoff, order", [(20.0, 2), (30.0, 4)])
 def test_butterworth_cutoff_and_order_are_found(cutoff, order):
     rng = np.random.default_rng(2)
@@ -96,3 +117,91 @@ def test_a_short_log_with_a_high_cutoff_does_not_tell_it():
     found = cutoff_of(first_order(1e-4, 64.0, 100.0, 4_000, rng), 100.0)
     assert found.frequency.status in ("not_identified", "absent")
     assert found.frequency.value is None
+
+
+def test_the_rounding_of_a_register_does_not_move_the_cutoff():
+    rng = np.random.default_rng(5)
+    log = first_order(1e-4, 7.5, 50.0, 500_000, rng)
+    step = 0.5 * float(np.std(log))
+    spectrum, _ = spectra([np.round(log / step) * step], len(log), 50.0)
+    moved, found = find_cutoff(spectrum), find_cutoff(spectrum, resolution=step)
+    assert moved.frequency.lower > 7.5  # what the rounding adds passes for a higher cut-off
+    assert found.frequency.lower < 7.5 < found.frequency.upper
+    assert found.N.lower < 1e-4 < found.N.upper
+    assert found.floor == pytest.approx(step / math.sqrt(12.0 * 50.0))
+
+
+def test_flicker_noise_that_folds_does_not_move_the_cutoff():
+    model = SensorModel(noise=NoiseModel(N=1e-4, B=1.2e-3), low_pass=LowPass(10.0))
+    found = cutoff_of(simulate_sensor(model, 25.0, 300_000, np.random.default_rng(6)), 25.0)
+    assert found.order == 1
+    assert found.frequency.lower < 10.0 < found.frequency.upper
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+def test_where_folds_of_other_filters_look_alike_none_is_told(seed):
+    model = SensorModel(noise=NoiseModel(N=1e-4), low_pass=LowPass(28.4, 2))
+    found = cutoff_of(simulate_sensor(model, 50.0, 300_000, np.random.default_rng(seed)), 50.0)
+    assert found.frequency.status == "not_identified"
+    assert found.frequency.lower < 28.4 < found.frequency.upper
+
+
+def test_a_bend_that_is_no_filter_of_these_is_not_identified():
+    # The mean of two samples: cos^2(pi f / rate), which falls to nothing at Nyquist.
+    white = 1e-3 * np.random.default_rng(6).standard_normal(100_001)
+    found = cutoff_of((white[1:] + white[:-1]) / 2.0, 100.0)
+    assert found.frequency.status == found.N.status == "not_identified"
+    assert found.frequency.value is None and found.N.value is None
+    reason = "the spectrum bends, but not as behind a first-order or Butterworth low-pass"
+    assert found.frequency.reason == found.N.reason == reason
+    assert found.frequency.fitted is not None and found.N.fitted is not None
+    # Its interval is narrow: it is the shape that refuses it.
+    assert found.frequency.upper < 1.2 * found.frequency.lower
+
+
+@pytest.mark.parametrize("T_B", [1.0, 1.7, 5.0, 50.0])
+@pytest.mark.parametrize("B", [1e-3, 3e-2])
+def test_a_strong_slow_process_is_no_low_pass(B, T_B):
+    # Its density bends as behind a first-order filter, down to the white noise.
+    rng = np.random.default_rng(7)
+    found = cutoff_of(simulate(NoiseModel(N=1e-3, B=B, T_B=T_B), 100.0, 100_000, rng), 100.0)
+    assert found.frequency.status == "absent"
+    assert (found.order, found.floor) == (None, 0.0)
+    assert found.frequency.reason == "the spectrum shows no low-pass"
+
+
+def test_two_processes_are_no_low_pass():
+    rng = np.random.default_rng(9)
+    model = NoiseModel(N=1e-3, B=5e-3, T_B=50.0, further=[GaussMarkov(5e-3, 1.0)])
+    found = cutoff_of(simulate(model, 100.0, 100_000, rng), 100.0)
+    assert found.frequency.status == "absent"
+    assert found.N.value == pytest.approx(1e-3, rel=0.03)
+
+
+def test_white_noise_behind_the_filter_is_told_from_that_before_it():
+    rng = np.random.default_rng(104)
+    log = first_order(1e-3, 10.0, 100.0, 100_000, rng)
+    assert cutoff_of(log, 100.0).floor == 0.0
+    log += 3e-4 * math.sqrt(100.0) * rng.standard_normal(len(log))  # as of a register
+    found = cutoff_of(log, 100.0)
+    assert found.floor == pytest.approx(3e-4, rel=0.1)
+    assert found.frequency.lower < 10.0 < found.frequency.upper
+    assert found.N.lower < 1e-3 < found.N.upper
+
+
+def test_bins_that_a_line_touches_are_left_out():
+    rng = np.random.default_rng(11)
+    samples = 100_000
+    log = first_order(1e-3, 20.0, 100.0, samples, rng)
+    log += 0.02 * np.sin(2.0 * np.pi * 30.0 * np.arange(samples) / 100.0)
+    spectrum = spectra([log], samples, 100.0)[0]
+    clear = (spectrum.upper < 29.0) | (spectrum.lower > 31.0)
+    found = find_cutoff(spectrum, clear)
+    assert found.frequency.value == pytest.approx(20.0, rel=0.02)
+    assert find_cutoff(spectrum).frequency.value != pytest.approx(20.0, rel=0.02)
+
+
+def test_a_spectrum_of_few_bins_shows_nothing():
+    found = cutoff_of(np.random.default_rng(12).standard_normal(20), 100.0)
+    assert found.frequency.status == found.N.status == "not_shown"
+    assert "bins only" in found.frequency.reason

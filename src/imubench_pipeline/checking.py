@@ -51,6 +51,6 @@ def spectral_findings(channel: str, log: ChannelLog, bandwidth: float | None) ->
         # Filling holes takes a model: that is the estimation's.
         return []
     spectrum, line_spectra = spectra(log.blocks(), log.grid, log.rate, log.segments)
-    lines, _, band = lines_and_band(spectrum, line_spectra, bandwidth=bandwidth)
+    lines, _, _, band = lines_and_band(spectrum, line_spectra, bandwidth=bandwidth)
     rows = [asdict(line) | {"channel": channel} for line in lines]
     return [*line_findings(rows), *band_finding(channel, band.highest, band.source)]

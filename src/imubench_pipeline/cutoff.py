@@ -9,7 +9,7 @@ the folds leave little of the bend, but a long log shows it. N is the density be
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,28 +17,46 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq, minimize_scalar
 
 from imubench_pipeline.estimators.estimate import Parameter
+from imubench_pipeline.estimators.goodness import goodness
 from imubench_pipeline.estimators.whittle import COARSE, Whittle, whittle_of
 from imubench_pipeline.estimators.whittle_kernels import best_powers
+from imubench_pipeline.sensor_model.low_pass import LowPass
 from imubench_pipeline.spectrum import Spectrum
 
 Array = NDArray[np.float64]
 
 _POINTS = 6
-_FOLDS = 64
-_SCAN = 32
-_LOWEST, _HIGHEST = 1 / 500, 4.0
-"""Cut-offs that are looked for, parts of the rate."""
+"""Frequencies of a bin over which a density is averaged."""
 
-_CORRELATIONS = (1e3, 1e4, 1e5)
+_FOLDS = 8
+"""Folds on each side that are added one by one; those beyond are an integral."""
+
+_SLOW_FOLDS = 3
+"""Folds on each side of slow noise, of which little is left there."""
+
+_SCAN = 32
+"""Cut-offs tried before the best is polished."""
+
+_LOWEST, _HIGHEST, _HIGHEST_STEEP = 1 / 500, 4.0, 1.0
+"""Cut-offs that are looked for, parts of the rate; a filter of higher order is there to keep noise
+from folding, and beyond the rate its folds are those of a lower one of first order."""
+
+_CORRELATIONS = (1e2, 3e2, 1e3, 1e4, 1e5)
 """Correlation times of slow noise beside flicker and random walk, sampling intervals."""
 
 _HALF_CHI_SQUARED = 1.9207
 """Log likelihood below its maximum at the ends of a 95 % interval."""
 
+_RULED_OUT = 3.0
+"""Log likelihood by which another filter must be the worse not to count: its share is 5 %."""
+
 _BEYOND_BIC = 6.0
+"""Gain of BIC below which there is no filter: strong evidence, on the scale that is used of it."""
+
 _WIDEST = 1.2
 """Ratio of the limits of a cut-off beyond which it is not called known."""
 
+_ABOVE_ENDS = 1.01
 _FEWEST_BINS = 24
 
 
@@ -55,7 +73,7 @@ class Cutoff:
     N : Parameter
         Density of white noise before the filter, SI.
     floor : float
-        Density of white noise after it, as of rounding, SI.
+        Density of white noise after it, that of rounding and what else shows, SI.
     gained : float
         BIC of the noise without a filter, less that with it.
     """
@@ -65,22 +83,6 @@ class Cutoff:
     N: Parameter
     floor: float
     gained: float
-
-
-def low_pass(frequency: ArrayLike, cutoff: float, order: int = 1) -> Array:
-    """Return the power gain of a Butterworth low-pass in continuous time.
-
-    Parameters
-    ----------
-    frequency : array_like
-        Hz.
-    cutoff : float
-        f_c, Hz.
-    order : int
-        n.
-    """
-    f = np.asarray(frequency, dtype=np.float64)
-    return np.asarray(1.0 / (1.0 + (f / cutoff) ** (2 * order)))
 
 
 def folded_low_pass(frequency: ArrayLike, cutoff: float, rate: float, order: int = 1) -> Array:
@@ -109,7 +111,7 @@ def folded_low_pass(frequency: ArrayLike, cutoff: float, rate: float, order: int
         return np.asarray(0.5 * h * sine / (cosine - decay * np.cos(2.0 * np.pi * f / rate)))
     folds = int(_FOLDS + math.ceil(4.0 * cutoff / rate))
     k = np.arange(-folds, folds + 1) * rate
-    total = low_pass(f[..., None] + k, cutoff, order).sum(axis=-1)
+    total = LowPass(cutoff, order).power(f[..., None] + k).sum(axis=-1)
     # Folds beyond: the integral of (f / f_c)^(-2 n) on both sides.
     rest = (folds + 0.5) * rate / cutoff
     return np.asarray(total + 2.0 * cutoff / rate * rest ** (1 - 2 * order) / (2 * order - 1))
@@ -120,11 +122,14 @@ def find_cutoff(
     clear: NDArray[np.bool_] | None = None,
     *,
     orders: Sequence[int] = (1, 2, 3, 4),
+    resolution: float = 0.0,
 ) -> Cutoff:
     """Find the low-pass of a sensor from its spectrum.
 
     Slow noise (flicker noise, a random walk, Gauss-Markov processes) stands beside the white;
-    the order and a floor behind the filter are chosen by BIC.
+    the order, and a floor behind the filter beyond that of rounding, are chosen by BIC. The
+    interval is that of all filters that the log does not rule out: above Nyquist the folds of
+    one may look like those of another. Of order 2 and more, cut-offs up to the rate are tried.
 
     Parameters
     ----------
@@ -133,48 +138,87 @@ def find_cutoff(
     clear : ndarray of bool, shape (b,), optional
         Bins that no line touches.
     orders : sequence of int
-        Orders to try.
+        Orders to try, at least one.
+    resolution : float
+        Step of the register (LSB), SI, where the samples are rounded: white noise of variance
+        LSB^2 / 12 behind the filter.
 
     Returns
     -------
     Cutoff
-        With status ``not_identified`` where the interval of the cut-off is wider than a fifth,
-        ``absent`` where no filter shows.
+        With status ``not_identified`` where the interval of the cut-off is wider than a fifth, or
+        the bend is another than that of such a filter; ``absent`` where no filter shows.
     """
     used = np.ones(len(spectrum.frequency), dtype=np.bool_) if clear is None else clear
     if used.sum() < _FEWEST_BINS:
         unknown = Parameter(None, "not_shown", f"the spectrum has {used.sum()} bins only")
         return Cutoff(unknown, None, unknown, 0.0, 0.0)
     fits = _Fits(spectrum.taken(used))
-    penalty = 0.5 * math.log(used.sum())
     powers, without = fits.unfiltered()
-    best: tuple[float, int, bool, float] | None = None
-    for order in orders:
-        for floor in (False, True):
-            cutoff, cost = fits.best(order, floor)
-            score = cost + penalty * (1 + floor)
-            if best is None or score < best[0] - (1.0 if floor else 0.0):
-                best = (score, order, floor, cutoff)
-    assert best is not None
-    score, order, floor, cutoff = best
-    gained = 2.0 * (without - score)
+    tried = fits.tried(orders)
+    rounding = resolution**2 / (12.0 * spectrum.rate)
+    if rounding > 0.0 and tried:
+        fits.rounded = rounding / fits.density(*tried[0].filter)[0] ** 2
+        tried = fits.tried(orders)
+    gained = 2.0 * (without - tried[0].score) if tried else 0.0
     if gained < _BEYOND_BIC:
-        absent = Parameter(None, "absent", "the spectrum shows no low-pass below Nyquist")
+        absent = Parameter(None, "absent", "the spectrum shows no low-pass")
         return Cutoff(absent, None, Parameter(math.sqrt(powers[0])), 0.0, gained)
-    lower, upper = fits.limits(cutoff, order, floor)
-    N, after = fits.density(cutoff, order, floor)
-    ends = sorted(fits.density(end, order, floor)[0] for end in (lower, upper))
+    best = tried[0]
+    # A floor is taken to be there where it shows only: with it a high cut-off is never told.
+    alike = [
+        one
+        for one in tried
+        if one.floor <= best.floor and one.cost + one.floor < best.cost + best.floor + _RULED_OUT
+    ]
+    ends = [(end, one) for one in alike for end in fits.limits(*one.filter)]
+    lower, upper = min(end for end, _ in ends), max(end for end, _ in ends)
+    N, after = fits.density(*best.filter)
     error = 1.96 * N / math.sqrt(2.0 * float(spectrum.ordinates[used].sum()))
-    density = Parameter(N, lower=min(ends[0], N) - error, upper=max(ends[1], N) + error)
-    if upper > _WIDEST * lower or upper >= 0.999 * fits.highest:
+    found_N = [N, *(fits.density(end, one.order, one.floor)[0] for end, one in ends)]
+    density = Parameter(N, lower=min(found_N) - error, upper=max(found_N) + error)
+    reason = ""
+    if upper > _WIDEST * lower or upper >= 0.999 * fits.highest(best.order):
         reason = f"the log allows cut-offs from {lower:.4g} to {upper:.4g} Hz"
-        found = Parameter(None, "not_identified", reason, lower, upper, fitted=cutoff)
+    elif not fits.explains(*best.filter):
+        reason = "the spectrum bends, but not as behind a first-order or Butterworth low-pass"
+    if reason:
+        found = Parameter(None, "not_identified", reason, lower, upper, fitted=best.cutoff)
         density = replace(
             density, value=None, status="not_identified", reason=reason, fitted=density.value
         )
     else:
-        found = Parameter(cutoff, lower=lower, upper=upper)
-    return Cutoff(found, order, density, after, gained)
+        found = Parameter(best.cutoff, lower=lower, upper=upper)
+    return Cutoff(found, best.order, density, math.hypot(after, math.sqrt(rounding)), gained)
+
+
+@dataclass(frozen=True)
+class _Tried:
+    """A filter, where its likelihood has a maximum.
+
+    Attributes
+    ----------
+    score : float
+        Half its BIC.
+    cost : float
+        -log L.
+    cutoff : float
+        Hz.
+    order : int
+    floor : bool
+        White noise stands behind it beside that of rounding.
+    """
+
+    score: float
+    cost: float
+    cutoff: float
+    order: int
+    floor: bool
+
+    @property
+    def filter(self) -> tuple[float, int, bool]:
+        """Cut-off, order and floor."""
+        return self.cutoff, self.order, self.floor
 
 
 class _Fits:
@@ -182,7 +226,7 @@ class _Fits:
 
     def __init__(self, spectrum: Spectrum) -> None:
         self.rate = spectrum.rate
-        self.lowest, self.highest = _LOWEST * spectrum.rate, _HIGHEST * spectrum.rate
+        self.lowest = _LOWEST * spectrum.rate
         self.whittle: Whittle = whittle_of(spectrum, 0.5 * spectrum.rate, COARSE)
         whittle = self.whittle
         within = (np.arange(_POINTS) + 0.5) / _POINTS
@@ -193,6 +237,8 @@ class _Fits:
         slow = [whittle.column("F"), whittle.column("K")]
         slow += [whittle.gauss_markov(float(time)) for time in times]
         self.slow = np.column_stack(slow)
+        self.penalty = 0.5 * math.log(len(spectrum.frequency))
+        self.rounded = 0.0  # density of rounding, parts of N^2
 
     def unfiltered(self) -> tuple[Array, float]:
         """Return the squared densities without a filter, that of white noise first, and -log L."""
@@ -207,18 +253,45 @@ class _Fits:
         powers = self._powers(self._columns(cutoff, order, floor))[0]
         return math.sqrt(powers[0]), math.sqrt(powers[-1]) if floor else 0.0
 
-    def best(self, order: int, floor: bool) -> tuple[float, float]:
-        """Return the cut-off of the least cost, and the cost."""
-        scan = np.linspace(math.log(self.lowest), math.log(self.highest), _SCAN)
-        costs = [self.cost(math.exp(x), order, floor) for x in scan]
-        place = int(np.argmin(costs))
-        found = minimize_scalar(
-            lambda x: self.cost(math.exp(x), order, floor),
-            bounds=(scan[max(place - 1, 0)], scan[min(place + 1, _SCAN - 1)]),
-            method="bounded",
-            options={"xatol": 1e-5},
-        )
-        return math.exp(found.x), float(found.fun)
+    def highest(self, order: int) -> float:
+        """Return the highest cut-off that is looked for, Hz."""
+        return (_HIGHEST if order == 1 else _HIGHEST_STEEP) * self.rate
+
+    def tried(self, orders: Sequence[int]) -> list[_Tried]:
+        """Return the maxima of the likelihood, the best by BIC first."""
+        found = [one for order in orders for one in self._of(order)]
+        # A floor that gains next to nothing is none.
+        return sorted(found, key=lambda one: one.score + one.floor)
+
+    def _of(self, order: int) -> Iterator[_Tried]:
+        """Yield the maxima of the likelihood over the cut-off, without and with a floor."""
+        scan = np.linspace(math.log(self.lowest), math.log(self.highest(order)), _SCAN)
+        columns = [self._columns(math.exp(x), order, floor=True) for x in scan]
+        for floor in (False, True):
+            costs = np.array([self._powers(c if floor else c[:, :-1])[1] for c in columns])
+            beside = np.pad(costs, 1, constant_values=np.inf)
+            for place in np.flatnonzero((costs <= beside[:-2]) & (costs < beside[2:])).tolist():
+                best = minimize_scalar(
+                    lambda x, floor=floor: self.cost(math.exp(x), order, floor),
+                    bounds=(float(scan[max(place - 1, 0)]), float(scan[min(place + 1, _SCAN - 1)])),
+                    method="bounded",
+                    options={"xatol": 1e-5},
+                )
+                cutoff, cost = math.exp(best.x), float(best.fun)
+                before, after = self.density(cutoff, order, floor)
+                # Where what is behind the filter is the greater, it is a process of slow noise.
+                if before > after and cutoff > _ABOVE_ENDS * self.lowest:
+                    yield _Tried(cost + self.penalty * (1 + floor), cost, cutoff, order, floor)
+
+    def explains(self, cutoff: float, order: int, floor: bool) -> bool:
+        """Return whether the filter gives the spectrum where it bends."""
+        columns = self._columns(cutoff, order, floor)
+        fitted = columns @ self._powers(columns)[0]
+        spectrum = self.whittle.spectrum
+        bent = spectrum.frequency > min(0.1 * cutoff, spectrum.frequency[-_FEWEST_BINS])
+        shown = spectrum.taken(bent)
+        judged = goodness(shown.ordinates, shown.density, fitted[bent], shown.frequency, 2 + floor)
+        return judged.verdict == "explained"
 
     def limits(self, cutoff: float, order: int, floor: bool) -> tuple[float, float]:
         """Return the ends of the 95 % interval, by the profile of the likelihood."""
@@ -228,7 +301,7 @@ class _Fits:
             return self.cost(math.exp(x), order, floor) - most
 
         ends = []
-        for sign, end in ((-1.0, self.lowest), (1.0, self.highest)):
+        for sign, end in ((-1.0, self.lowest), (1.0, self.highest(order))):
             inside = math.log(cutoff)
             step, outside = 1e-3, inside
             while True:
@@ -244,9 +317,21 @@ class _Fits:
 
     def _columns(self, cutoff: float, order: int, floor: bool) -> Array:
         white = folded_low_pass(self.frequency, cutoff, self.rate, order).mean(axis=1)
-        slow = self.slow * low_pass(self.frequency, cutoff, order).mean(axis=1)[:, None]
-        columns = [white, *slow.T]
+        flicker, walk = self._slow_gains(LowPass(cutoff, order))
+        slow = self.slow * np.column_stack([flicker, *[walk] * (self.slow.shape[1] - 1)])
+        columns = [white + self.rounded, *slow.T]
         return np.column_stack([*columns, np.ones(len(white))] if floor else columns)
+
+    def _slow_gains(self, low_pass: LowPass) -> tuple[Array, Array]:
+        """Return what a filter leaves of sampled flicker noise and of a random walk, folds too."""
+        f = np.abs(self.frequency[..., None] + self.rate * np.arange(-_SLOW_FOLDS, _SLOW_FOLDS + 1))
+        power = low_pass.power(f)
+        # As sampled without a filter, sqrt(2 - 2 cos w) stands for w.
+        sampled = 2.0 * self.rate * np.sin(np.pi * self.frequency / self.rate)
+        angular = 2.0 * np.pi * f
+        flicker = sampled * (power / angular).sum(axis=-1)
+        walk = sampled**2 * (power / angular**2).sum(axis=-1)
+        return flicker.mean(axis=1), walk.mean(axis=1)
 
     def _powers(self, columns: Array) -> tuple[Array, float]:
         norm = columns.mean(axis=0)

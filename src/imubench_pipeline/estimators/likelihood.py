@@ -56,8 +56,8 @@ class Likelihood:
     band : Band or None
         The frequencies used.
     spectrum : Spectrum
-    used : ndarray of bool, shape (b,)
-        The bins used: below the end of the band, and clear of lines.
+    clear, used : ndarray of bool, shape (b,)
+        The bins clear of lines, and those of them that are used: below the end of the band.
     fitted : ndarray, shape (b,)
         Density of the chosen model in each bin, its ramp included; NaN where there is none.
     """
@@ -67,6 +67,7 @@ class Likelihood:
     lines: Sequence[Line]
     band: Band | None
     spectrum: Spectrum
+    clear: NDArray[np.bool_]
     used: NDArray[np.bool_]
     fitted: Array
 
@@ -169,7 +170,7 @@ def fit_blocks(
         spectrum, lines = spectra(complete, samples, rate, parts)
         spectrum = replace(spectrum, ordinates=spectrum.ordinates * present)
         if number < rounds:
-            _, used, limit = lines_and_band(spectrum, lines, band, bandwidth)
+            _, _, used, limit = lines_and_band(spectrum, lines, band, bandwidth)
             if used.sum() < _FEWEST_BINS:
                 break
             whittle = whittle_of(spectrum.taken(used), limit.highest)
@@ -204,7 +205,7 @@ def fit_spectrum(
     rng: np.random.Generator,
 ) -> Likelihood:
     """Estimate the noise parameters from a spectrum (see `fit`)."""
-    lines, used, limit = lines_and_band(spectrum, line_spectra, band, bandwidth)
+    lines, clear, used, limit = lines_and_band(spectrum, line_spectra, band, bandwidth)
     if used.sum() < _FEWEST_BINS:
         reason = f"the spectrum has {used.sum()} bins, {_FEWEST_BINS} are needed: too short a log"
         nothing = {name: Parameter(None, "not_shown", reason) for name in FAMILY}
@@ -214,6 +215,7 @@ def fit_spectrum(
             lines,
             None,
             spectrum,
+            clear,
             used,
             np.full(len(used), np.nan),
         )
@@ -247,6 +249,7 @@ def fit_spectrum(
         lines,
         limit,
         spectrum,
+        clear,
         used,
         whittle_of(spectrum, limit.highest, COARSE).density(chosen.found)
         + chosen.found.ramp**2 * spectrum.ramp,
@@ -268,7 +271,7 @@ def lines_and_band(
     line_spectra: Sequence[LineSpectrum],
     asked: float | None = None,
     bandwidth: float | None = None,
-) -> tuple[list[Line], NDArray[np.bool_], Band]:
+) -> tuple[list[Line], NDArray[np.bool_], NDArray[np.bool_], Band]:
     """Find the lines of a spectrum, and the bins that show noise and nothing else.
 
     Parameters
@@ -282,8 +285,8 @@ def lines_and_band(
     Returns
     -------
     lines : list of Line
-    used : ndarray of bool, shape (b,)
-        The bins below the end of the band, and clear of lines.
+    clear, used : ndarray of bool, shape (b,)
+        The bins clear of lines, and those of them below the end of the band.
     band : Band
     """
     everything = np.ones(len(spectrum.frequency), dtype=np.bool_)
@@ -300,7 +303,7 @@ def lines_and_band(
         density = whittle_of(spectrum, 0.5 * spectrum.rate, COARSE).density(found)
         clear = without_lines(spectrum, lines, density)
     band = find_band(spectrum, clear, asked=asked, bandwidth=bandwidth)
-    return lines, clear & (spectrum.upper <= band.highest * (1.0 + 1e-9)), band
+    return lines, clear, clear & (spectrum.upper <= band.highest * (1.0 + 1e-9)), band
 
 
 def model_of(found: Maximum) -> NoiseModel:

@@ -96,8 +96,9 @@ class LowPass:
         ndarray
             Gain of the power, in the shape of ``frequency``.
         """
-        ratio = np.asarray(frequency, dtype=np.float64) / self.cutoff
-        return np.asarray(1.0 / (1.0 + ratio ** (2 * self.order)))
+        square = np.square(np.asarray(frequency, dtype=np.float64) / self.cutoff)
+        # Products: numpy takes ten times as long for a power above 2.
+        return np.asarray(1.0 / (1.0 + math.prod([square] * self.order)))
 
     def response(self, frequency: float) -> complex:
         """Return H: gain and phase of a sinusoid.
