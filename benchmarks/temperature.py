@@ -81,16 +81,15 @@ def temperature(profile: str, samples: int, rate: float, rng: np.random.Generato
     return 20.0 + behind(simulate(weather, rate, samples, rng), rate, 120.0)
 
 
-def bounds(
-    case_model: NoiseModel, truth: Array, rate: float, lag: float, s: float
-) -> tuple[float, float]:
-    """Return the Cramér-Rao bounds of the sensitivity and the lag."""
+def bounds(spectrum: Array, truth: Array, rate: float, lag: float, s: float) -> tuple[float, float]:
+    """Return the Cramér-Rao bounds of the sensitivity and the lag.
+
+    ``spectrum`` is that of the noise at the n - 1 frequencies of the DCT-II of n samples.
+    """
     step = 0.02 * lag
     columns = [behind(truth, rate, lag)]
     if lag > 0.0:
         columns.append((behind(truth, rate, lag + step) - columns[0]) / step)
-    n = len(truth)
-    spectrum = case_model.sampled_spectrum(np.pi * np.arange(1, n) / n, rate)
     kept = np.array([scipy.fft.dct(c - c.mean(), norm="ortho")[1:] for c in columns])
     inverse = np.linalg.inv((kept / spectrum) @ kept.T)
     return math.sqrt(inverse[0, 0]), math.sqrt(inverse[1, 1]) / s if lag > 0 and s else math.nan
@@ -106,9 +105,10 @@ def case(number: int) -> Case:
     samples = int(rng.uniform(3.0, 10.0) * 3600.0 * rate)
     truth = temperature(profile, samples, rate, rng)
     lag = float(rng.choice([0.0, rng.uniform(30.0, 400.0)]))
-    bound, _ = bounds(model, truth, rate, lag, 0.0)
+    spectrum = model.sampled_spectrum(np.pi * np.arange(1, samples) / samples, rate)
+    bound, _ = bounds(spectrum, truth, rate, lag, 0.0)
     s = 0.0 if rng.random() < 0.3 else bound * float(np.exp(rng.uniform(np.log(3), np.log(60))))
-    _, lag_bound = bounds(model, truth, rate, lag, s)
+    _, lag_bound = bounds(spectrum, truth, rate, lag, s)
     bias = float(rng.normal(0.0, 1e-3))
     effect = s * (behind(truth, rate, lag) - truth.mean())
     log = simulate(model, rate, samples, rng) + bias + effect

@@ -183,6 +183,19 @@ def test_holes_and_segments_leave_the_sensitivity():
     assert fit.sensitivity.lower < 6e-5 < fit.sensitivity.upper
 
 
+@pytest.mark.parametrize("missing", [0, 2_000])
+def test_steps_of_a_temperature_are_no_lines_of_the_noise_that_it_leaves(missing):
+    rng = np.random.default_rng(31)
+    readings = rng.uniform(10.0, 40.0, 8)[np.minimum(TIME * 8 // TIME[-1], 7).astype(int)]
+    vibration = 3e-5 * np.sin(2.0 * np.pi * 0.7 * TIME)
+    log = simulate(NoiseModel(N=1e-4, B=3e-5), RATE, SAMPLES, rng) + 1e-4 * readings + vibration
+    log[rng.integers(0, SAMPLES, missing)] = np.nan
+    fit = fitted(log, readings, holes=missing > 0)
+    assert fit.compensated
+    (line,) = fit.without_temperature.lines
+    assert line.frequency == pytest.approx(0.7, abs=1e-3)
+
+
 def test_a_square_is_found_where_there_is_one():
     rng = np.random.default_rng(7)
     off = DAY - DAY.mean()

@@ -25,11 +25,12 @@ from imubench_pipeline.missing import block_means, divided
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.spectrum import LineSpectrum, Spectrum, block_of, spectra
 from imubench_pipeline.thermal.effect import complete, shifted
-from imubench_pipeline.thermal.level import mean_error
+from imubench_pipeline.thermal.level import mean_error, with_likely_walk
 from imubench_pipeline.thermal.path import TemperaturePath
 from imubench_pipeline.thermal.products import BlockSeries, Coefficients
 from imubench_pipeline.thermal.register import Span
 from imubench_pipeline.thermal.regression import Regression, Regressors
+from imubench_pipeline.thermal.result import ThermalFit
 from imubench_pipeline.thermal.uncertainty import Verdict, judge, shares
 
 Array = NDArray[np.float64]
@@ -50,63 +51,6 @@ _MOST_LOST = 2.5
 _FEWEST_BINS = 24
 
 
-@dataclass(frozen=True)
-class ThermalFit:
-    """What temperature does to a channel.
-
-    Attributes
-    ----------
-    reference : float
-        T_0, the mean temperature, °C.
-    sensitivity, quadratic : Parameter
-        s and q, SI per K and per K²; q has status ``absent`` where it is not in the model.
-    lag : Parameter
-        L, s.
-    bias : Parameter
-        Mean of the log, at T_0, SI.
-    compensated : bool
-        Temperature is taken out of the noise: the interval of s (or q) excludes 0, and BIC
-        favours it.
-    reason : str
-        Why it is, or is not.
-    plain, without_temperature : Likelihood
-        The noise of the log as it is, and of what temperature leaves of it; the same where
-        nothing is taken out.
-    effect : ndarray, shape (k,)
-        What temperature adds to the log at the knots of the path, SI; zeros where nothing is
-        taken out.
-    path : TemperaturePath
-        Temperature of the log.
-    """
-
-    reference: float
-    sensitivity: Parameter
-    quadratic: Parameter
-    lag: Parameter
-    bias: Parameter
-    compensated: bool
-    reason: str
-    plain: Likelihood
-    without_temperature: Likelihood
-    effect: Array
-    path: TemperaturePath
-
-    def compensate(self, blocks: Iterable[Array]) -> Iterator[Array]:
-        """Return the blocks of the log less what temperature adds to it.
-
-        Parameters
-        ----------
-        blocks : iterable of ndarray
-            The log in order from its first sample, SI.
-
-        Returns
-        -------
-        iterator of ndarray
-            SI, in the shape of each block.
-        """
-        return shifted(blocks, self.path, self.effect, -1.0)
-
-
 def fit_temperature(
     blocks: Callable[[], Iterable[Array]],
     samples: int,
@@ -118,6 +62,7 @@ def fit_temperature(
     bandwidth: float | None = None,
     quadratic: bool | None = None,
     longest_lag: float | None = None,
+    plain: Likelihood | None = None,
     rng: np.random.Generator,
 ) -> ThermalFit:
     """Estimate what temperature does to a channel, together with its noise.
@@ -141,6 +86,8 @@ def fit_temperature(
         it.
     longest_lag : float, optional
         s; by default a twentieth of the longest segment, at most half an hour. 0: no lag.
+    plain : Likelihood, optional
+        The noise of the log as it is, where it is known already.
     rng : numpy.random.Generator
 
     Returns
@@ -163,7 +110,7 @@ def fit_temperature(
     if holes:
         means = block_means(blocks(), spans)
         spans = divided(means, spans)
-        plain = likelihood.fit_blocks(
+        plain = plain or likelihood.fit_blocks(
             blocks,
             samples,
             rate,
@@ -175,15 +122,15 @@ def fit_temperature(
         )
         model, effect = plain.estimates[0].model, np.zeros(len(path.value))
         for _ in range(2):
-            whole = complete(blocks, spans, model, path, effect, rate, rng)
-            fit = _Fit(whole, samples, rate, spans, path, band, bandwidth, longest_lag)
+            log = complete(blocks, spans, model, path, effect, rate, rng)
+            fit = _Fit(log, samples, rate, spans, path, band, bandwidth, longest_lag)
             if not (fit.possible and varies):
                 break
             found = fit.settle(quadratic)
             model, effect = _model_of(found), found.regressors.effect(found.regression)
     else:
         fit = _Fit(blocks(), samples, rate, spans, path, band, bandwidth, longest_lag)
-        plain = likelihood.fit_spectrum(
+        plain = plain or likelihood.fit_spectrum(
             fit.spectrum, fit.lines, band=band, bandwidth=bandwidth, rng=rng
         )
     if not fit.possible:
@@ -197,7 +144,13 @@ def fit_temperature(
         fit.lags = fit.lags[:1]
         found = fit.settle(quadratic)
         verdict = replace(fit.judged(found, rng), lag=verdict.lag)
-    return _described(fit, found, verdict, plain, path, band, bandwidth, rng)
+
+    def whole(effect: Array) -> Iterator[Array]:
+        if not holes:
+            return iter(blocks())
+        return complete(blocks, spans, _model_of(found), path, effect, rate, rng)
+
+    return _described(fit, found, verdict, plain, path, whole, band, bandwidth, rng)
 
 
 @dataclass(frozen=True)
@@ -226,11 +179,14 @@ class _Fit:
         longest_lag: float | None,
     ) -> None:
         series = BlockSeries(spans, block_of(spans))
+        self._samples, self._spans = samples, spans
         self.spectrum: Spectrum
         self.lines: list[LineSpectrum]
         self.spectrum, self.lines = spectra(series.watch(blocks), samples, rate, spans)
         self.series = series
-        _, self.used, limit = likelihood.lines_and_band(self.spectrum, self.lines, band, bandwidth)
+        _, _, self.used, limit = likelihood.lines_and_band(
+            self.spectrum, self.lines, band, bandwidth
+        )
         self.possible = bool(self.used.sum() >= _FEWEST_BINS)
         if not self.possible:
             return
@@ -241,6 +197,10 @@ class _Fit:
             Coefficients(self.spectrum, series), path, rate, path.mean, self.used
         )
         self.lags = self.regressors.lags(longest_lag)
+
+    def lines_of(self, blocks: Iterable[Array]) -> list[LineSpectrum]:
+        """Return the spectra in which the lines of another log, as long as this one, show."""
+        return spectra(blocks, self._samples, self.spectrum.rate, self._spans)[1]
 
     def settle(self, quadratic: bool | None) -> _Found:
         """Return the joint fit; the square is tried where nothing is said of it.
@@ -357,11 +317,15 @@ def _described(
     verdict: Verdict,
     plain: Likelihood,
     path: TemperaturePath,
+    whole: Callable[[Array], Iterable[Array]],
     band: float | None,
     bandwidth: float | None,
     rng: np.random.Generator,
 ) -> ThermalFit:
-    """Return the fit as it is told, with the noise that temperature leaves."""
+    """Return the fit as it is told, with the noise that temperature leaves.
+
+    ``whole`` gives the log without holes, for what temperature adds to it.
+    """
     without, effect = plain, np.zeros(len(path.value))
     mean = fit.spectrum.mean
     if verdict.compensated:
@@ -369,13 +333,26 @@ def _described(
         weights = np.zeros(len(fit.used))
         weights[fit.used] = fit.chosen.ordinates / found.whittle.density(found.candidates[0].found)
         left = regressors.without(fit.spectrum, found.regression, weights)
-        without = likelihood.fit_spectrum(left, fit.lines, band=band, bandwidth=bandwidth, rng=rng)
         effect = regressors.effect(found.regression)
+        # Temperature stands out of the noise that it leaves: its own lines are none of that.
+        lines = fit.lines_of(shifted(whole(effect), path, effect, -1.0))
+        without = likelihood.fit_spectrum(left, lines, band=band, bandwidth=bandwidth, rng=rng)
     at_centres = [path.at(centres, effect) for centres in fit.series.centres]
     shift = float(np.concatenate(at_centres).mean())
     candidates = found.candidates if verdict.compensated else fit.of_the_log
-    noises = [(likelihood.model_of(one.found), share) for one, share in shares(candidates)]
-    spread = math.hypot(mean_error(noises, fit.spectrum), verdict.temperature_error)
+    K = without.estimates[0].parameters["K"]
+    noises = [
+        (with_likely_walk(model, K) if "K" in one.found.terms.linear else model, share)
+        for one, share in shares(candidates)
+        for model in [likelihood.model_of(one.found)]
+    ]
+    # T_0 is as uncertain as the mean of the path.
+    of_reference = float(np.std(path.draws.mean(axis=1))) * (verdict.sensitivity.in_model or 0.0)
+    spread = math.hypot(
+        mean_error(noises, fit.spectrum),
+        verdict.temperature_error,
+        of_reference if verdict.compensated else 0.0,
+    )
     bias = Parameter(
         mean - shift, lower=mean - shift - 1.96 * spread, upper=mean - shift + 1.96 * spread
     )

@@ -4,10 +4,37 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 
 from imubench_pipeline.error_budget.growth import mean_variance
+from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, RandomWalk, WhiteNoise
 from imubench_pipeline.spectrum import Spectrum
+
+_UPPER_OF_RMS = 2.24
+"""The 97.5 % limit of the size of a normal variate, over its standard deviation."""
+
+
+def with_likely_walk(model: NoiseModel, K: Parameter) -> NoiseModel:
+    """Return a model with a random walk as strong as it may be where the log does not show one.
+
+    The most likely walk is then often none at all, which would leave the mean all too sure: the
+    rms of K over its posterior, half a normal distribution, is taken.
+
+    Parameters
+    ----------
+    model : NoiseModel
+        With a random walk, of which nothing may be left.
+    K : Parameter
+        As it is told: its upper limit counts where it is absent.
+
+    Returns
+    -------
+    NoiseModel
+    """
+    if K.status != "absent" or K.upper is None:
+        return model
+    return replace(model, K=max(model.K, K.upper / _UPPER_OF_RMS))
 
 
 def mean_error(models: Iterable[tuple[NoiseModel, float]], spectrum: Spectrum) -> float:

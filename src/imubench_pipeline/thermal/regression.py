@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -89,6 +90,8 @@ class Regressors:
         self.quadratic, self.ramp, self.settling = quadratic, ramp, settling
         self._known: dict[float, Products] = {}
         self._time = coefficients.of_time(rate)
+        # With the ramp and in all bins, for `also` to share: the transforms are the costly part.
+        self._full: dict[tuple[float, bool, float], Products] = {}
         self.ordinates = coefficients.ordinates[used]
 
     def also(
@@ -112,16 +115,14 @@ class Regressors:
         -------
         Regressors
         """
-        return Regressors(
-            self.coefficients,
-            self.path,
-            self.rate,
-            self.reference,
-            self.used if used is None else used,
-            quadratic=self.quadratic if quadratic is None else quadratic,
-            ramp=self.ramp if ramp is None else ramp,
-            settling=self.settling if settling is None else settling,
-        )
+        other = copy.copy(self)
+        other.used = self.used if used is None else used
+        other.quadratic = self.quadratic if quadratic is None else quadratic
+        other.ramp = self.ramp if ramp is None else ramp
+        other.settling = self.settling if settling is None else settling
+        other._known = {}
+        other.ordinates = self.coefficients.ordinates[other.used]
+        return other
 
     @property
     def thermal(self) -> int:
@@ -214,8 +215,13 @@ class Regressors:
         Products
         """
         if lag not in self._known:
-            full = self.coefficients.products(self.columns(lag))
-            self._known[lag] = Products(full.cross[self.used], full.gram[self.used])
+            key = (lag, self.quadratic, self.settling)
+            if key not in self._full:
+                columns = self.also(ramp=True).columns(lag)
+                self._full[key] = self.coefficients.products(columns)
+            full, kept = self._full[key], slice(None if self.ramp else self.thermal)
+            cross, gram = full.cross[self.used, kept], full.gram[self.used, kept, kept]
+            self._known[lag] = Products(cross, gram)
         return self._known[lag]
 
     def at(self, lag: float, weights: Array) -> Regression:

@@ -44,6 +44,9 @@ _AS_TIME = 0.95
 _MONOTONE = 0.9
 _EXPLAINED = 0.5
 _WIDE_LAG = 0.5
+_AS_SHORT = 1.02
+"""Width of the interval from 0 over that of the shortest, up to which it is that from 0: draws are
+uneven."""
 
 
 @dataclass(frozen=True)
@@ -112,10 +115,9 @@ def judge(
     compensated = excluded and confused is None and gained > _FAVOURED
     reason = confused or _reason(excluded, gained)
     if regressors.settling > 0.0:
-        early = found.beta[0] + found.beta[p - 1]
         reason += (
-            f"; the first {regressors.settling:.0f} s follow it otherwise ({early:.3g} SI per K) "
-            "and do not count for the sensitivity"
+            f"; the first {regressors.settling:.0f} s follow it otherwise and do not count for the "
+            "sensitivity"
         )
     s = _parameter(float(found.beta[0]), float(lower[0]), float(upper[0]), confused)
     q = Parameter(None, "absent", "the data do not ask for it")
@@ -124,7 +126,7 @@ def judge(
     return Verdict(
         s,
         q,
-        _lag(found.lag, drawn_lags, float(lags[-1]), compensated),
+        told_lag(found.lag, drawn_lags, float(lags[-1]), compensated),
         compensated,
         reason,
         float(np.std(betas @ at_mean)),
@@ -145,16 +147,35 @@ def _parameter(value: float, lower: float, upper: float, confused: str | None) -
     return Parameter(value, "ok", None, lower, upper)
 
 
-def _lag(value: float, draws: Array, longest: float, compensated: bool) -> Parameter:
-    """Return the lag as it is told."""
+def told_lag(value: float, draws: Array, longest: float, compensated: bool) -> Parameter:
+    """Return the lag as it is told, with the shortest interval that holds 95 % of its draws.
+
+    Equal tails would leave out a lag of 0 in every other log that has none.
+
+    Parameters
+    ----------
+    value : float
+        The most likely lag, s.
+    draws : ndarray, shape (d,)
+        s.
+    longest : float
+        The longest lag that was looked for, s.
+    compensated : bool
+        Temperature is taken out of the noise.
+
+    Returns
+    -------
+    Parameter
+    """
     if longest == 0.0:
         return Parameter(None, "absent", "no lag was asked for")
     if not compensated:
         return Parameter(None, "not_identified", "temperature explains nothing that would lag")
-    lower, upper = (float(q) for q in np.quantile(draws, [0.025, 0.975]))
+    lower, upper = _shortest(draws)
     # A lag at its lower end: one limit, of the whole 5 %.
-    if value == 0.0 or lower < 1e-3 * upper:
-        lower, upper = 0.0, float(np.quantile(draws, 0.95))
+    below = float(np.quantile(draws, 0.95))
+    if value == 0.0 or below < _AS_SHORT * (upper - lower):
+        lower, upper = 0.0, below
     lower, upper = min(lower, value), max(upper, value)
     if upper - lower > _WIDE_LAG * longest:
         reason = f"the log allows lags from {lower:.3g} to {upper:.3g} s"
@@ -163,6 +184,15 @@ def _lag(value: float, draws: Array, longest: float, compensated: bool) -> Param
         reason = "its interval contains 0; only that is given"
         return Parameter(None, "not_identified", reason, lower, upper, fitted=value)
     return Parameter(value, "ok", None, lower, upper)
+
+
+def _shortest(draws: Array) -> tuple[float, float]:
+    """Return the shortest interval that holds 95 % of the draws."""
+    ordered = np.sort(draws)
+    inside = math.ceil(0.95 * len(ordered))
+    widths = ordered[inside - 1 :] - ordered[: len(ordered) - inside + 1]
+    first = int(np.argmin(widths))
+    return float(ordered[first]), float(ordered[first + inside - 1])
 
 
 def _confused(
