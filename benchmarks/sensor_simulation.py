@@ -22,7 +22,8 @@ from resident import peak_memory
 _LOW_PASS = {"cutoff": "60 Hz", "order": 1}
 _AXES: dict[str, dict[str, Any]] = {
     "gyro": {
-        "noise": {"N": "0.2 deg/sqrt(h)", "K": "2 deg/h/sqrt(h)"},
+        "N": "0.2 deg/sqrt(h)",
+        "K": "2 deg/h/sqrt(h)",
         "bias": "0.1 deg/s",
         "drift": {"sensitivity": "0.01 deg/s/K", "lag": "5 min"},
         "low_pass": _LOW_PASS,
@@ -30,7 +31,8 @@ _AXES: dict[str, dict[str, Any]] = {
         "full_scale": "250 deg/s",
     },
     "accel": {
-        "noise": {"N": "0.1 m/s/sqrt(h)", "K": "10 ug/sqrt(h)"},
+        "N": "0.1 m/s/sqrt(h)",
+        "K": "10 ug/sqrt(h)",
         "bias": "5 mg",
         "drift": {"sensitivity": "0.1 mg/K", "lag": "5 min"},
         "low_pass": _LOW_PASS,
@@ -51,7 +53,7 @@ _WARM = {"form": "day_cycle", "mean": "25 degC", "amplitude": "10 K"}
 def write_settings(folder: Path, floor: str) -> None:
     """Write the model of a sensor with one kind of bias instability, and its surroundings."""
     axes = {
-        f"{quantity}_{axis}": settings | {"noise": settings["noise"] | _FLOORS[floor][quantity]}
+        f"{quantity}_{axis}": settings | _FLOORS[floor][quantity]
         for quantity, settings in _AXES.items()
         for axis in "xyz"
     }

@@ -6,13 +6,14 @@ from typing import Any
 import pytest
 import yaml
 
-from imubench_pipeline.config import Run, read_run, read_simulated
+from imubench_pipeline.config import Run, read_run
 from imubench_pipeline.sensor import (
     RecordingNotes,
     Sensor,
     merged_log,
     read_sensors,
 )
+from imubench_pipeline.simulated_recordings import read_simulated
 from imubench_pipeline.validation import ConfigError, parse, read_yaml
 from tests.conftest import PROJECT
 
@@ -86,7 +87,7 @@ def test_the_shipped_configuration_is_valid_and_states_the_defaults() -> None:
     assert shipped == Run()
     sensors = read_sensors(PROJECT / "config/sensors")
     assert {"mti_7", "c102_f9r", "sirrs01_03", "adis16405", "mpu6050", "cats_tag"} <= set(sensors)
-    assert read_simulated(PROJECT / "config/simulated.yaml", sensors)
+    assert read_simulated(PROJECT / "config/simulated.yaml", sensors).recordings
 
 
 def test_snakemake_hands_text_over() -> None:
@@ -144,14 +145,16 @@ def test_simulated_recordings_name_known_sensors_and_channels(tmp_path: Path) ->
         path.write_text(yaml.safe_dump({"recordings": [entry | changes]}))
         return path
 
-    assert read_simulated(written(), sensors)[0].channels["gyro_x"].si("gyro_x") == {"N": 1e-4}
+    assert read_simulated(written(), sensors).recordings[0].channels["gyro_x"].si("gyro_x") == {
+        "N": 1e-4
+    }
     for change, message in (
         ({"sensor": "t"}, "found 't'; expected one of the sensor files: s"),
         ({"channels": {"gyro_z": {"N": "1 rad/√s"}}}, "gyro_z not channels of s"),
         ({"channels": {"gyro_x": {"N": "1 m/s"}}}, "is no unit of gyro density"),
-        ({"channels": {"gyro_x": {"B": "1 rad/s"}}}, "B and T_B go together"),
+        ({"channels": {"gyro_x": {"T_B": "1 s"}}}, "correlation time of B, which is missing"),
         ({"recording": "a"}, "recording: found 'a'"),
     ):
         with pytest.raises(ConfigError, match=message):
             read_simulated(written(**change), sensors)
-    assert read_simulated(None, sensors) == []
+    assert read_simulated(None, sensors).recordings == []

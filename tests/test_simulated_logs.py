@@ -4,10 +4,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from imubench_pipeline.config import SimulatedRecording, read_simulated
 from imubench_pipeline.readers import read
 from imubench_pipeline.sensor import LogFormat, read_sensors
 from imubench_pipeline.simulated_logs import write_simulated
+from imubench_pipeline.simulated_recordings import SimulatedRecording, read_simulated
 from tests.conftest import PROJECT
 
 RECORDING = SimulatedRecording.model_validate(
@@ -71,7 +71,7 @@ def test_the_reader_of_a_layout_reads_what_is_written(log: dict[str, Any], tmp_p
 
 def test_the_shipped_ones_can_all_be_written() -> None:
     sensors = read_sensors(PROJECT / "config/sensors")
-    shipped = read_simulated(PROJECT / "config/simulated.yaml", sensors)
+    shipped = read_simulated(PROJECT / "config/simulated.yaml", sensors).recordings
     assert len(shipped) == 6
     assert all(sensors[entry.sensor].log.reader == "csv" for entry in shipped)
     first = shipped[0].channels["gyro_x"].si("gyro_x")

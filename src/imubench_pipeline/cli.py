@@ -13,12 +13,13 @@ from pathlib import Path
 from pydantic import BaseModel
 
 from imubench_pipeline import show
-from imubench_pipeline.config import Run, Simulated
+from imubench_pipeline.config import Run
 from imubench_pipeline.nightly import command as nightly
 from imubench_pipeline.report import command as report
 from imubench_pipeline.report.static_figures import command as figures
 from imubench_pipeline.sensor import RecordingNotes, Sensor
 from imubench_pipeline.sensor_model import command as simulation
+from imubench_pipeline.simulated_recordings import Board, Simulated
 from imubench_pipeline.tables import replacing, write_content, write_json
 from imubench_pipeline.units import UnitError, quantity_to_si
 from imubench_pipeline.validation import ConfigError, read_yaml
@@ -28,8 +29,10 @@ SCHEMAS: dict[str, type[BaseModel]] = {
     "sensor": Sensor,
     "recording": RecordingNotes,
     "simulated": Simulated,
+    "board": Board,
 }
-"""The configuration files: config.yaml, a sensor's, the notes beside a log, simulated.yaml."""
+"""The configuration files: config.yaml, a sensor's, the notes beside a log, simulated.yaml, a
+board's."""
 
 _CLOSED_PIPE = 141
 """Exit status that shells give a command whose reader has gone."""

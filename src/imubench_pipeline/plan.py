@@ -12,11 +12,18 @@ from itertools import chain
 
 from pydantic import BaseModel
 
-from imubench_pipeline.config import Run, read_run, read_simulated
-from imubench_pipeline.drop_zone import Recording, fingerprints, found_logs
+from imubench_pipeline.config import Run, read_run
+from imubench_pipeline.drop_zone import Recording, fingerprint, fingerprints, found_logs
 from imubench_pipeline.provenance import source_digest
 from imubench_pipeline.requirements import Requirement, read_requirements
 from imubench_pipeline.sensor import LogFormat, RecordingNotes, Sensor, merged_log, read_sensors
+from imubench_pipeline.simulated_recordings import (
+    Board,
+    SimulatedRecording,
+    layout,
+    profile_files,
+    read_simulated,
+)
 from imubench_pipeline.units import quantity_to_si
 from imubench_pipeline.validation import ConfigError, parse, read_yaml
 
@@ -58,10 +65,9 @@ class Plan:
         self.run: Run = read_run(config)
         self.sensors: dict[str, Sensor] = read_sensors(self.run.sensors)
         self.requirements: dict[str, Requirement] = read_requirements(self.run.requirements)
-        self._simulated = {
-            (entry.sensor, entry.recording): entry
-            for entry in read_simulated(self.run.simulated, self.sensors)
-        }
+        simulated = read_simulated(self.run.simulated, self.sensors)
+        self.boards: dict[str, Board] = simulated.boards
+        self._simulated = {(entry.sensor, entry.recording): entry for entry in simulated.recordings}
         self._of_ingest: dict[tuple[str, str], str] = {}
         self.recordings: dict[tuple[str, str], Recording] = {}
         for found in [*self._found_logs(), *self._to_simulate()]:
@@ -125,12 +131,11 @@ class Plan:
         }
         try:
             log, notes = self._written(recording)
-            layout = log.model_dump(mode="json", exclude={"bandwidth"})
             if recording.simulated:
-                made = self._simulated[recording.sensor, recording.name].channels
-                layout["channels"] = {channel: layout["channels"][channel] for channel in made}
+                log = layout(self._simulated[recording.sensor, recording.name], log)
+            written = log.model_dump(mode="json", exclude={"bandwidth"})
             said = notes.model_dump(mode="json", exclude={"log"})
-            return settings | {"notes": said, "log": layout, "files": fingerprints(recording)}
+            return settings | {"notes": said, "log": written, "files": fingerprints(recording)}
         except ConfigError as error:
             return settings | {"error": str(error)}
 
@@ -175,12 +180,27 @@ class Plan:
 
     def simulated_settings(self, sensor: str, name: str) -> str:
         """Return the parameters of a simulated recording and the layout that it is written in."""
+        recording = self._simulated[sensor, name]
+        written = layout(recording, self.sensors[sensor].log)
         return _text(
             {
-                "recording": self._simulated[sensor, name].model_dump(mode="json"),
-                "log": self.sensors[sensor].log.model_dump(mode="json", exclude={"bandwidth"}),
+                "recording": recording.model_dump(
+                    mode="json", exclude={"channels": {"__all__": {"published", "figures"}}}
+                ),
+                "log": written.model_dump(mode="json", exclude={"bandwidth"}),
+                "profiles": self._profiles(recording),
             }
         )
+
+    @staticmethod
+    def _profiles(recording: SimulatedRecording) -> dict[str, str]:
+        try:
+            return {str(path): fingerprint(path) for path in profile_files(recording)}
+        except OSError as error:
+            raise ConfigError(
+                f"{recording.sensor}/{recording.recording}: {error.filename} cannot be read "
+                f"({error.strerror}); expected the file of a profile of temperature or motion"
+            ) from None
 
     def settings(self, section: str) -> str:
         """Return one section of the run's configuration."""
@@ -251,9 +271,24 @@ class Plan:
                     )
                 },
                 "sensors": self._described("vendor", "model", "price_class"),
+                "boards": {name: self._board(board) for name, board in self.boards.items()},
                 "requirements": self._requirements(),
             }
         )
+
+    @staticmethod
+    def _board(board: Board) -> dict[str, object]:
+        """Return what the report says of a board beside its tables."""
+        return {
+            "title": board.title,
+            "note": board.note,
+            "sensors": {
+                sensor.sensor: {name: one.figures for name, one in sensor.channels.items()}
+                for sensor in board.sensors
+            },
+            "temperature": board.temperature is not None,
+            "motion": sorted(board.motion),
+        }
 
     def figures_settings(self) -> str:
         """Return what the figures of all sensors show beside the tables."""

@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.config import SimulatedRecording
-from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.readers.batch import TEMPERATURE
 from imubench_pipeline.sensor import ColumnSource, LogFormat
-from imubench_pipeline.simulate import channel_rng, simulate_blocks
+from imubench_pipeline.sensor_model.imu import simulate_imu
+from imubench_pipeline.sensor_model.models import imu_model
+from imubench_pipeline.sensor_model.profiles import profiles_of
+from imubench_pipeline.simulated_recordings import SimulatedRecording
 from imubench_pipeline.text_log import TextLog
 from imubench_pipeline.units import quantity_to_si
 from imubench_pipeline.validation import ConfigError
-
-_BLOCK = 1 << 18
 
 
 def write_simulated(recording: SimulatedRecording, log: LogFormat, folder: Path) -> None:
@@ -27,7 +27,7 @@ def write_simulated(recording: SimulatedRecording, log: LogFormat, folder: Path)
     ----------
     recording : SimulatedRecording
     log : LogFormat
-        The sensor's: the columns, units and files that its reader expects.
+        Its `layout`: the columns, units and files that the reader expects.
     folder : Path
         Where the files go.
 
@@ -44,9 +44,11 @@ def write_simulated(recording: SimulatedRecording, log: LogFormat, folder: Path)
     rate = quantity_to_si(recording.rate, "frequency")
     samples = round(quantity_to_si(recording.duration, "time") * rate)
     files: dict[str, dict[str, ColumnSource]] = {}
-    for channel in recording.channels:
-        source = log.channels[channel]
-        files.setdefault(source.file or "log.txt", {})[channel] = source
+    sources = {str(name): source for name, source in log.channels.items()}
+    if log.temperature is not None:
+        sources[TEMPERATURE] = log.temperature
+    for name, source in sources.items():
+        files.setdefault(source.file or "log.txt", {})[name] = source
     folder.mkdir(parents=True, exist_ok=True)
     remarks = ("simulated, not measured", f"Update Rate: {recording.rate}")
     with ExitStack() as stack:
@@ -62,19 +64,19 @@ def write_simulated(recording: SimulatedRecording, log: LogFormat, folder: Path)
 def _blocks(
     recording: SimulatedRecording, rate: float, samples: int
 ) -> Iterator[dict[str, NDArray[np.float64]]]:
-    """Yield the channels in SI, block by block."""
-    streams = {}
-    bias = {}
-    for channel, settings in recording.channels.items():
-        truth = settings.si(channel)
-        bias[channel] = truth.get("bias", 0.0)
-        rng = channel_rng(recording.seed, recording.sensor, recording.recording, channel)
-        model = NoiseModel(
-            N=truth.get("N", 0.0),
-            B=truth.get("B", 0.0),
-            T_B=truth.get("T_B"),
-            K=truth.get("K", 0.0),
-        )
-        streams[channel] = simulate_blocks(model, rate, samples, rng, _BLOCK)
-    for _ in range(0, samples, _BLOCK):
-        yield {str(name): next(stream) + bias[name] for name, stream in streams.items()}
+    """Return the blocks of the channels in SI and, where there is one, of the temperature."""
+    try:
+        model = imu_model(recording.channels, recording)
+    except ValueError as error:
+        name = f"{recording.sensor}/{recording.recording}"
+        raise ConfigError(f"{name}: channels.{error}") from error
+    motion, temperature = profiles_of(recording, Path())
+    return simulate_imu(
+        model,
+        rate,
+        samples,
+        recording.seed,
+        (recording.sensor, recording.recording),
+        motion=motion,
+        temperature=temperature,
+    )

@@ -17,9 +17,10 @@ from imubench_pipeline.readers import read
 from imubench_pipeline.recording import channel_logs, read_metadata
 from imubench_pipeline.results import Key, parameter_rows
 from imubench_pipeline.sensor import RecordingNotes, merged_log, read_sensors
-from imubench_pipeline.tables import write
+from imubench_pipeline.tables import write, write_arrow
 from imubench_pipeline.validation import parse, read_yaml
 from tests.conftest import PROJECT
+from tests.report.tables import HOUR, joined, recording_rows
 
 SENSORS = PROJECT / "config/sensors"
 WARM = "time [min],temperature [degC]\n0,22\n10,30\n60,35\n"
@@ -98,12 +99,10 @@ MODEL = {
     "misalignment": {"gyro": [[1, 0, 0.5], [0, 1, 0], [0, 0, 1]]},
     "axes": {
         "gyro_x": {
-            "noise": {
-                "N": "0.6 deg/sqrt(h)",
-                "K": "1 deg/h/sqrt(h)",
-                "further": [{"B": "1 deg/h", "T_B": "5 s"}],
-                "sinusoids": [{"amplitude": "1e-3 deg/s", "frequency": "30 Hz"}],
-            },
+            "N": "0.6 deg/sqrt(h)",
+            "K": "1 deg/h/sqrt(h)",
+            "further": [{"B": "1 deg/h", "T_B": "5 s"}],
+            "sinusoids": [{"amplitude": "1e-3 deg/s", "frequency": "30 Hz"}],
             "bias": "-5.4 deg/s",
             "drift": {"sensitivity": "0.1 deg/s/K", "reference": "295.15 K", "lag": "1 s",
                       "quadratic": "0.01 deg/s/K^2"},
@@ -153,6 +152,8 @@ def test_estimates_of_a_run_are_simulated_as_the_log_showed_them(tmp_path: Path,
     write("parameters", list(rows), tables / "parameters.parquet")
     bias = {"sensor": "bno055", "recording": "night", "channel": "gyro_y", "value": 0.02}
     write("fixed_bias", [bias | {"unit": "rad/s"}], tables / "fixed_bias.parquet")
+    for table in ("temperature", "low_pass"):
+        write(table, [], tables / f"{table}.parquet")
     path = tmp_path / "log.parquet"
     given = ["--duration", "2000 s", "--results", tmp_path / "results", "--out", path]
     assert simulate("bno055", *given) == 0
@@ -165,6 +166,23 @@ def test_estimates_of_a_run_are_simulated_as_the_log_showed_them(tmp_path: Path,
     assert curve.deviation[0] == pytest.approx(3e-3, rel=0.05)
     assert simulate("mti_7", *given, "--duration", "1 s") == 2
     assert "no estimate of sensor 'mti_7'; there are: bno055" in capsys.readouterr().err
+
+
+def test_drift_and_cut_off_are_those_of_the_run(tmp_path: Path, capsys) -> None:
+    rows = recording_rows("bno055", "night", temperature="followed")
+    for name, table in joined(rows).items():
+        write_arrow(table, tmp_path / f"tables/{name}.parquet")
+    out = tmp_path / "log.parquet"
+    given = ["--duration", "2000 s", "--rate", "10 Hz", "--results", tmp_path, "--out", out]
+    warm = ["--temperature", "42.5 degC"]
+    assert simulate("bno055", *given, *warm) == 0
+    said = capsys.readouterr().out
+    assert "noise N+GM+K: estimated by compensated from bno055/night" in said
+    assert "cut-off 64 Hz: estimated from bno055/night" in said
+    assert "temperature sensitivity 0.0004363 rad/s/K: estimated" in said
+    assert "no drift" not in said and "first order" not in said
+    # 20 K above T_0, by 90 °/h/K, beside the bias there.
+    assert channel_logs(tmp_path)["gyro_x"].mean() == pytest.approx((20 * 90 + 5) * HOUR, rel=0.01)
 
 
 @pytest.mark.parametrize(
@@ -205,7 +223,7 @@ def test_other_formats_and_other_notes_are_left_alone(tmp_path: Path, capsys) ->
     [
         ({"axes": {"gyro_x": {"bias": "3 m"}}}, "axes.gyro_x: 'm' is no unit"),
         ({"axes": {"gyro_x": {"low_pass": {"cutoff": "0 Hz"}}}}, "frequency above zero"),
-        ({"axes": {"gyro_x": {"noise": {"N": "-1 deg/sqrt(h)"}}}}, "N is -"),
+        ({"axes": {"gyro_x": {"N": "-1 deg/sqrt(h)"}}}, "N is -"),
         ({"axes": {}}, "axes"),
         ({"misalignment": {"gyro": [[1, 0, 0]]}}, "three rows"),
         ({"misalignment": {"mag": [[1, 0, 0]] * 3}}, "expected gyro or accel"),

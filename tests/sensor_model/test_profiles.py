@@ -9,13 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from imubench_pipeline.sensor_model.profile_files import FileSeries
-from imubench_pipeline.sensor_model.profiles import Surroundings
+from imubench_pipeline.sensor_model.profile_forms import Surroundings
+from imubench_pipeline.sensor_model.profiles import profiles_of
 from imubench_pipeline.units import UnitError, difference_to_si
 from imubench_pipeline.validation import ConfigError, parse
 
 
 def profiles(settings: dict, folder: Path = Path()):
-    return parse(Surroundings, settings, "board.yaml").profiles(folder)
+    return profiles_of(parse(Surroundings, settings, "board.yaml"), folder)
 
 
 def test_formulas_are_what_they_say_in_si() -> None:
@@ -54,6 +55,29 @@ def test_a_difference_of_temperatures_has_no_zero() -> None:
     assert difference_to_si("5 K", "temperature") == pytest.approx(5.0)
     with pytest.raises(UnitError, match="no unit of temperature"):
         difference_to_si("5 m", "temperature")
+
+
+def test_a_sum_is_a_value_and_what_is_added_to_it() -> None:
+    t = np.array([0.0, 100.0, 600.0, 21600.0])
+    warm = {"form": "warm_up", "start": "26 degC", "end": "298.15 K", "time_constant": "200 s"}
+    day = {"form": "day_cycle", "mean": "0 K", "amplitude": "0.4 degC", "highest": "6 h"}
+    step = {"form": "steps", "times": ["0 s", "600 s"], "values": ["0 K", "-3 degC"]}
+    _, total = profiles({"temperature": {"form": "sum", "parts": [warm, day, step]}})
+    expected = 25 + np.exp(-t / 200) + 0.4 * np.cos(2 * np.pi * (t - 21600) / 86400)
+    expected[2:] -= 3
+    np.testing.assert_allclose(total.at(t), expected, rtol=1e-12)
+
+
+def test_a_sum_of_differences_does_not_depend_on_their_unit() -> None:
+    t = np.linspace(0.0, 1000.0, 7)
+
+    def total(first: str, added: str) -> np.ndarray:
+        parts = [{"form": "constant", "value": value} for value in (first, added)]
+        _, found = profiles({"temperature": {"form": "sum", "parts": parts}})
+        return found.at(t)
+
+    np.testing.assert_allclose(total("20 degC", "5 K"), 25.0)
+    np.testing.assert_allclose(total("293.15 K", "5 degC"), 25.0)
 
 
 @pytest.mark.parametrize(

@@ -101,13 +101,16 @@ def _run(given: argparse.Namespace) -> None:
     form = layout(given.out, columns, rate, log)
     notes_path(given.out)
     if temperature is None and any(axis.drift for axis in origin.imu.axes.values()):
-        origin.assumed.append("no drift with temperature: none is given (--temperature)")
-    origin.assumed += [*_ended(duration, motion, temperature), *_folded(origin, rate)]
+        origin.assume("drift", "no drift with temperature: none is given (--temperature)")
+    for text in (*_ended(duration, motion, temperature), *_folded(origin, rate)):
+        origin.assume("log", text)
     if not motion:
-        origin.assumed.append("at rest, and no gravity (--motion)")
+        origin.assume("log", "at rest, and no gravity (--motion)")
     remarks = [MARK, f"from {origin.said}"]
-    remarks += [f"{name}: {line}" for name, lines in origin.figures.items() for line in lines]
-    remarks += [f"assumed: {line}" for line in _short(origin.assumed)]
+    figures = {name: [one.text for one in said] for name, said in origin.figures.items()}
+    assumed = [one.text for one in origin.assumed]
+    remarks += [f"{name}: {line}" for name, lines in figures.items() for line in lines]
+    remarks += [f"assumed: {line}" for line in _short(assumed)]
     print(f"{remarks[0]}: {samples:,} samples of {', '.join(columns)} at {rate:g} Hz")
     print("\n".join(_short(remarks[1:])), flush=True)
     name = given.out.stem
@@ -129,8 +132,8 @@ def _run(given: argparse.Namespace) -> None:
         "unusable": [],
         "simulation": {
             "from": origin.said,
-            "figures": origin.figures,
-            "assumed": origin.assumed,
+            "figures": figures,
+            "assumed": assumed,
             "seed": given.seed,
             "model": {channel: repr(axis) for channel, axis in origin.imu.axes.items()},
             "temperature": given.temperature,
@@ -159,6 +162,8 @@ def _origin(given: argparse.Namespace) -> tuple[Origin, Any]:
     """Return the model, and the sensor file where there is one."""
     from imubench_pipeline.sensor import CHANNELS, Sensor
     from imubench_pipeline.sensor_model import sources
+    from imubench_pipeline.sensor_model.from_datasheet import from_datasheet
+    from imubench_pipeline.sensor_model.from_estimates import with_estimates
     from imubench_pipeline.sensor_model.imu import ImuModel
 
     asked = [name.strip() for name in given.channels.split(",")] if given.channels else None
@@ -180,13 +185,13 @@ def _origin(given: argparse.Namespace) -> tuple[Origin, Any]:
             )
         sensor = parse(Sensor, read_yaml(file), str(file))
         try:
-            origin = sources.from_datasheet(given.sensor, sensor, given.seed)
+            origin = from_datasheet(given.sensor, sensor, given.seed)
         except ConfigError:
             if not given.results:
                 raise
             origin = sources.Origin(ImuModel(axes={}), "", sensor=given.sensor)
         if given.results:
-            origin = sources.with_estimates(origin, given.results, given.sensor, given.recording)
+            origin = with_estimates(origin, given.results, given.sensor, given.recording)
     if asked:
         origin = sources.only(origin, asked)
     return origin, sensor
@@ -207,7 +212,8 @@ def _profiles(
     given: argparse.Namespace, origin: Origin
 ) -> tuple[dict[str, Profile], Profile | None]:
     from imubench_pipeline.sensor_model.profile_files import FileSeries
-    from imubench_pipeline.sensor_model.profiles import Surroundings
+    from imubench_pipeline.sensor_model.profile_forms import Surroundings
+    from imubench_pipeline.sensor_model.profiles import profiles_of
 
     forms: dict[str, Any] = {}
     folder = Path()
@@ -221,7 +227,7 @@ def _profiles(
             if not names:
                 raise ConfigError(f"{given.motion}: no column gyro_x to accel_z")
             forms["motion"] = {n: {"form": "file", "file": str(given.motion)} for n in names}
-    motion, _ = parse(Surroundings, forms, str(given.motion)).profiles(folder)
+    motion, _ = profiles_of(parse(Surroundings, forms, str(given.motion)), folder)
     if given.temperature is None:
         return motion, None
     path, folder = Path(given.temperature), Path()
@@ -234,7 +240,8 @@ def _profiles(
     else:
         quantity_to_si(given.temperature, "temperature")
         warm = given.temperature
-    _, temperature = parse(Surroundings, {"temperature": warm}, given.temperature).profiles(folder)
+    around = parse(Surroundings, {"temperature": warm}, given.temperature)
+    _, temperature = profiles_of(around, folder)
     return motion, temperature
 
 
@@ -256,7 +263,7 @@ def _ended(
 
 def _folded(origin: Origin, rate: float) -> list[str]:
     """Say how much of the white noise beyond Nyquist sampling folds into the log."""
-    from imubench_pipeline.sensor_model.sources import folding
+    from imubench_pipeline.sensor_model.noise_in_log import folding
 
     found = []
     for channel, axis in origin.imu.axes.items():
