@@ -31,7 +31,16 @@ RESULTS = str(plan.run.results)
 FOLDER = RESULTS + "/recordings/{sensor}/{recording}"
 JOINED = sorted(set(TABLES) - set(OF_ONE_RECORDING))
 RANKED = {"ranking", "fusion", "coverage", "coverage_by_vendor"}
-ESTIMATED = ("parameters", "models", "lines", "spectrum", "fixed_bias")
+ESTIMATED = (
+    "parameters",
+    "models",
+    "lines",
+    "spectrum",
+    "fixed_bias",
+    "temperature",
+    "allan_compensated",
+    "low_pass",
+)
 ANALYSED = [table for table in JOINED if table not in RANKED]
 PARTS = (
     "allan",
@@ -165,6 +174,7 @@ rule reconstruct:
         quality=FOLDER + "/quality.json",
         allan=FOLDER + "/allan.parquet",
         parameters=FOLDER + "/parameters.parquet",
+        compensated=FOLDER + "/allan_compensated.parquet",
     output:
         reconstruction=FOLDER + "/reconstruction.parquet",
         scores=FOLDER + "/scores.parquet",
@@ -271,8 +281,15 @@ rule ranking:
 
 rule fusion:
     input:
-        recordings=RESULTS + "/tables/recordings.parquet",
-        parameters=RESULTS + "/tables/parameters.parquet",
+        **{
+            table: f"{RESULTS}/tables/{table}.parquet"
+            for table in (
+                "recordings",
+                "parameters",
+                "allan_compensated",
+                "temperature",
+            )
+        },
     output:
         as_files("fusion"),
     group:

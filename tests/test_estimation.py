@@ -7,6 +7,7 @@ import pyarrow as pa
 import pytest
 
 from imubench_pipeline.allan import AllanCurve, allan_variance, of_blocks
+from imubench_pipeline.compensation import resolution_of
 from imubench_pipeline.config import EstimateSettings, Method
 from imubench_pipeline.estimation import Estimation, estimate_channel
 from imubench_pipeline.noise import NoiseModel
@@ -74,6 +75,16 @@ def estimated(log: ChannelLog, bandwidth: float | None = None, **settings: Any) 
     how = EstimateSettings(**settings)
     estimate_channel(key(log.channel), log, curve_of(log), how, bandwidth, found)
     return found
+
+
+def test_the_step_of_a_register_is_read_from_the_samples(tmp_path: Path) -> None:
+    fine = {channel: samples_of(channel, 40_000) for channel in BIAS}
+    step = 1e-3
+    rounded = {channel: np.round(values / step) * step for channel, values in fine.items()}
+    for channel, log in recorded(tmp_path / "rounded", rounded).items():
+        assert resolution_of(log) == pytest.approx(step, rel=1e-6), channel
+    for channel, log in recorded(tmp_path / "fine", fine).items():
+        assert resolution_of(log) == 0.0, channel
 
 
 @pytest.fixture(scope="module")

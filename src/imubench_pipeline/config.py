@@ -1,4 +1,4 @@
-"""The configuration of one run, and the list of simulated recordings."""
+"""The configuration of one run."""
 
 from __future__ import annotations
 
@@ -6,83 +6,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field, field_validator, model_validator
+from pydantic import BeforeValidator, Field, field_validator
 
 from imubench_pipeline.requirements import Axis, Latitude, Time
-from imubench_pipeline.sensor import QUANTITIES, Channel, Sensor, quantity_of
-from imubench_pipeline.units import UnitError, quantity_to_si
 from imubench_pipeline.validation import (
-    ConfigError,
     FractionOfLog,
     Frequency,
     Strict,
     Text,
     parse,
-    read_yaml,
 )
-
-
-class SimulatedChannel(Strict):
-    """The true noise of one simulated channel, with units as published."""
-
-    N: str | None = Field(None, description="white noise density, two-sided")
-    B: str | None = Field(None, description="bias instability (the curve's peak is 0.664 B)")
-    T_B: str | None = Field(None, description="correlation time of the Gauss-Markov process")
-    K: str | None = Field(None, description="rate or acceleration random walk")
-    bias: str | None = Field(None, description="constant bias")
-    assumed: tuple[Literal["N", "B", "T_B", "K", "bias"], ...] = Field(
-        (), description="parameters that no source publishes"
-    )
-
-    @model_validator(mode="after")
-    def _both(self) -> SimulatedChannel:
-        if (self.B is None) != (self.T_B is None):
-            raise ValueError("B and T_B go together; expected both or neither")
-        return self
-
-    def si(self, channel: str) -> dict[str, float]:
-        """Return the parameters that are there, and the bias, in SI."""
-        quantity = quantity_of(channel)
-        dimensions = {
-            "N": f"{quantity}_density",
-            "B": QUANTITIES[quantity],
-            "T_B": "time",
-            "K": f"{quantity}_random_walk",
-            "bias": QUANTITIES[quantity],
-        }
-        return {
-            name: quantity_to_si(text, dimension)
-            for name, dimension in dimensions.items()
-            if (text := getattr(self, name)) is not None
-        }
-
-
-class SimulatedRecording(Strict):
-    """A recording that is made before the run, from known parameters."""
-
-    sensor: str = Field(description="name of the sensor file whose log format it is written in")
-    recording: str = Field(pattern=r"^sim_[A-Za-z0-9_.-]+$", description="starts with sim_")
-    duration: str = Field(description="length with its unit, such as 10 h")
-    rate: Frequency
-    seed: int
-    source: str = Field(description="where the parameters are published")
-    channels: dict[Channel, SimulatedChannel] = Field(min_length=1)
-
-    @model_validator(mode="after")
-    def _units(self) -> SimulatedRecording:
-        quantity_to_si(self.duration, "time")
-        for channel, truth in self.channels.items():
-            try:
-                truth.si(channel)
-            except UnitError as error:
-                raise ValueError(f"channels.{channel}: {error}") from error
-        return self
-
-
-class Simulated(Strict):
-    """The file that lists the simulated recordings."""
-
-    recordings: tuple[SimulatedRecording, ...]
 
 
 class AllanSettings(Strict):
@@ -99,14 +32,14 @@ class AllanSettings(Strict):
 
 HeldBack = Annotated[Text, Field(pattern=r"^[^/]+/[^/]+$", examples=["my_sensor/run_7"])]
 
-Method = Literal["likelihood", "likelihood_gm", "curve", "paper", "weighted"]
+Method = Literal["likelihood", "likelihood_gm", "compensated", "curve", "paper", "weighted"]
 
 
 class EstimateSettings(Strict):
     """How the noise parameters are estimated."""
 
     methods: tuple[Method, ...] = Field(
-        ("likelihood", "likelihood_gm", "curve", "paper", "weighted"), min_length=1
+        ("likelihood", "likelihood_gm", "compensated", "curve", "paper", "weighted"), min_length=1
     )
 
     longest: FractionOfLog = Field(
@@ -126,6 +59,8 @@ class EstimateSettings(Strict):
     def _once(cls, methods: tuple[Method, ...]) -> tuple[Method, ...]:
         if len(set(methods)) < len(methods):
             raise ValueError(f"{', '.join(methods)}: a method stands twice")
+        if methods == ("compensated",):
+            raise ValueError("compensated stands beside another method, such as likelihood")
         return methods
 
 
@@ -298,24 +233,3 @@ class Run(Strict):
 def read_run(config: Mapping[str, object], file: str = "config/config.yaml or --config") -> Run:
     """Validate the configuration of a run, as Snakemake hands it over (numbers may be text)."""
     return parse(Run, config, file)
-
-
-def read_simulated(path: Path | None, sensors: Mapping[str, Sensor]) -> list[SimulatedRecording]:
-    """Read the list of simulated recordings; an empty one where ``path`` is None."""
-    if path is None:
-        return []
-    recordings = parse(Simulated, read_yaml(path), str(path)).recordings
-    for number, entry in enumerate(recordings):
-        key = f"{path}: recordings.{number}"
-        if entry.sensor not in sensors:
-            raise ConfigError(
-                f"{key}.sensor: found {entry.sensor!r}; expected one of the sensor "
-                f"files: {', '.join(sensors)}"
-            )
-        unknown = set(entry.channels) - set(sensors[entry.sensor].log.channels)
-        if unknown:
-            raise ConfigError(
-                f"{key}.channels: {', '.join(sorted(unknown))} not channels "
-                f"of {entry.sensor}: {', '.join(sensors[entry.sensor].log.channels)}"
-            )
-    return list(recordings)

@@ -4,11 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from imubench_pipeline.allan import AllanCurve
+from imubench_pipeline.compensation import (
+    compensated_curve,
+    compensated_estimate,
+    compensated_rows,
+    low_pass_of,
+    low_pass_rows,
+    temperature_curve,
+    temperature_of,
+    temperature_rows,
+)
 from imubench_pipeline.config import EstimateSettings
 from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators import least_squares, likelihood
@@ -19,6 +31,7 @@ from imubench_pipeline.recording import ChannelLog
 from imubench_pipeline.results import Key, parameter_rows
 from imubench_pipeline.sensor import quantity_of
 from imubench_pipeline.simulate import channel_rng
+from imubench_pipeline.thermal.path import TemperaturePath, temperature_path
 from imubench_pipeline.units import quantity_to_si
 
 Row = Mapping[str, Any]
@@ -33,6 +46,11 @@ class Estimation:
     lines: list[Row] = field(default_factory=list)
     spectrum: list[Row] = field(default_factory=list)
     fixed_bias: list[Row] = field(default_factory=list)
+    temperature: list[Row] = field(default_factory=list)
+    allan_compensated: list[Row] = field(default_factory=list)
+    low_pass: list[Row] = field(default_factory=list)
+    paths: dict[Path, TemperaturePath] = field(default_factory=dict)
+    """Of the temperature, by the file of the log: its channels have one."""
 
 
 def estimate_channel(
@@ -63,27 +81,55 @@ def estimate_channel(
     for method in ("paper", "weighted"):
         if method in settings.methods:
             estimates[method] = least_squares.fit(curve, method=method, longest=settings.longest)
-    if {"likelihood", "likelihood_gm"} & set(settings.methods):
-        found = likelihood.fit_blocks(
+    if _BY_LIKELIHOOD & set(settings.methods):
+        band = quantity_to_si(settings.band, "frequency") if settings.band else None
+
+        def stream(use: str) -> np.random.Generator:
+            return channel_rng(settings.seed, *asdict(key).values(), use)
+
+        fit = partial(
+            likelihood.fit_blocks,
             log.blocks,
             log.grid,
             log.rate,
             holes=log.holes,
             segments=log.segments,
-            band=quantity_to_si(settings.band, "frequency") if settings.band else None,
-            bandwidth=bandwidth,
-            rng=channel_rng(settings.seed, *asdict(key).values(), "posterior"),
+            band=band,
         )
+        found = fit(bandwidth=bandwidth, rng=stream("posterior"))
+        low_pass = low_pass_of(log, found)
+        cutoff = low_pass.frequency.value
+        if bandwidth is None and cutoff is not None:
+            # A bend of a per cent, which does not end the band, is many times the error of N.
+            bandwidth = cutoff
+            found = fit(bandwidth=bandwidth, rng=stream("posterior"))
         estimates |= {estimate.method: estimate for estimate in found.estimates}
         into.models += _model_rows(key, found)
         into.lines += _line_rows(key, found)
         into.spectrum += _spectrum_rows(key, found)
+        into.low_pass += low_pass_rows(key, low_pass)
+        if log.temperature and "compensated" in settings.methods:
+            if log.path not in into.paths:
+                rng = channel_rng(settings.seed, key.sensor, key.recording, log.path.name)
+                path = temperature_path(log.temperatures(), log.segments, rng)
+                into.paths[log.path] = path
+            path = into.paths[log.path]
+            warm = temperature_of(log, path, found, band, bandwidth, stream("temperature"))
+            into.temperature += temperature_rows(key, warm)
+            if warm.compensated:
+                estimates["compensated"] = compensated_estimate(warm)
+                left = compensated_curve(log, warm, curve)
+                added = temperature_curve(log, warm, curve)
+                into.allan_compensated += compensated_rows(key, left, added)
     best = next(method for method in _BEST_FIRST if method in settings.methods)
     for method in settings.methods:
-        into.parameters += parameter_rows(key, estimates[method], recommended=method == best)
+        if method in estimates:
+            into.parameters += parameter_rows(key, estimates[method], recommended=method == best)
     unit = SI_UNITS[quantity_of(key.channel)]["B"]
     into.fixed_bias.append(asdict(key) | {"value": log.mean(), "unit": unit})
 
+
+_BY_LIKELIHOOD = {"likelihood", "likelihood_gm", "compensated"}
 
 _BEST_FIRST = ("likelihood", "likelihood_gm", "weighted", "paper", "curve")
 """The method to use is the first of these that is asked for."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -125,6 +125,8 @@ class ChannelLog:
         Grid points that begin and end each segment.
     holes : bool
         Samples are missing: blocks have NaN in their place.
+    temperature : bool
+        There are readings of the temperature on the same grid.
     """
 
     path: Path
@@ -133,6 +135,7 @@ class ChannelLog:
     grid: int
     segments: tuple[tuple[int, int], ...]
     holes: bool
+    temperature: bool = False
 
     def blocks(self) -> Iterator[NDArray[np.float64]]:
         """Yield the samples on the uniform grid in SI, in consecutive blocks; NaN where missing."""
@@ -156,6 +159,10 @@ class ChannelLog:
                     reached = int(points[stop - 1]) + 1
                     start = stop
                     yield block
+
+    def temperatures(self) -> Iterator[NDArray[np.float64]]:
+        """Yield the readings of the temperature, °C, in blocks like those of the samples."""
+        return replace(self, channel=TEMPERATURE).blocks()
 
     def mean(self) -> float:
         """Return the mean of the samples present, SI."""
@@ -184,7 +191,8 @@ def channel_logs(folder: Path) -> dict[str, ChannelLog]:
     logs: dict[str, ChannelLog] = {}
     for path in log_paths(folder):
         metadata = read_metadata(path)
-        for channel in pq.read_schema(path).names:
+        columns = pq.read_schema(path).names
+        for channel in columns:
             if channel in _NOT_CHANNELS or channel in metadata["unusable"]:
                 continue
             logs[channel] = ChannelLog(
@@ -194,6 +202,7 @@ def channel_logs(folder: Path) -> dict[str, ChannelLog]:
                 metadata["grid"],
                 tuple((start, stop) for start, stop in metadata["segments"]),
                 bool(metadata["holes"].get(channel, True)),
+                TEMPERATURE in columns,
             )
     order = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
     return {name: logs[name] for name in order if name in logs}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -12,16 +12,19 @@ import numpy as np
 import pyarrow as pa
 
 from imubench_pipeline.allan import AllanCurve
-from imubench_pipeline.config import SimulatedRecording
 from imubench_pipeline.drift import drift_rows
 from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate, Parameter, Status
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.noise import FLOOR
 from imubench_pipeline.pooled import pooled_rows
+from imubench_pipeline.published import published_rows
 from imubench_pipeline.quality.spectral import band_finding, line_findings
 from imubench_pipeline.sensor import Sensor, quantity_of
+from imubench_pipeline.sensor_model.truth import figures_of
+from imubench_pipeline.simulated_recordings import SimulatedRecording
 from imubench_pipeline.suspicion import suspicious, usual_figures
 from imubench_pipeline.tables import build, read
+from imubench_pipeline.units import quantity_to_si
 
 Row = Mapping[str, Any]
 
@@ -83,6 +86,22 @@ def curves(path: Path, quality: Quality) -> dict[str, AllanCurve]:
             samples=int(quality.channels[channel]["grid"]),
             averaged=table["averaged"].to_numpy(),
         )
+        for (channel,), table in by_channel.items()
+    }
+
+
+def compensated_curves(path: Path, measured: Mapping[str, AllanCurve]) -> dict[str, AllanCurve]:
+    """Read the table ``allan_compensated`` of a recording, by channel.
+
+    Parameters
+    ----------
+    path : Path
+    measured : mapping of str to AllanCurve
+        Of the log as it is, with the same clusters.
+    """
+    by_channel = _by(read("allan_compensated", [path]), "channel")
+    return {
+        channel: replace(measured[channel], variance=table["adev"].to_numpy() ** 2)
         for (channel,), table in by_channel.items()
     }
 
@@ -184,7 +203,9 @@ def joined_tables(
     of_logs = (row for quality in qualities for row in quality.findings)
     unusual = unusual_rows(recommended.to_pylist(), catalogue)
     joined["findings"] = build("findings", [*of_logs, *spectral_rows(joined), *unusual])
-    joined["simulated_truth"] = build("simulated_truth", truth_rows(truths))
+    truth = list(truth_rows(truths))
+    joined["simulated_truth"] = build("simulated_truth", truth)
+    joined["published"] = build("published", published_rows(truths, truth, joined))
     return joined
 
 
@@ -219,19 +240,20 @@ def sensors_of(catalogue: str) -> dict[str, Sensor]:
 
 
 def truth_rows(truths: str) -> Iterator[Row]:
-    """Yield the rows of the table ``simulated_truth``."""
+    """Yield the rows of the table ``simulated_truth``: N as the log shows it."""
     for entry in json.loads(truths):
         recording = SimulatedRecording.model_validate(entry)
+        rate = quantity_to_si(recording.rate, "frequency")
         for channel, truth in recording.channels.items():
-            units = SI_UNITS[quantity_of(channel)]
-            for parameter, value in truth.si(channel).items():
+            for figure in figures_of(truth, channel, rate):
                 yield {
                     "sensor": recording.sensor,
                     "recording": recording.recording,
                     "channel": channel,
-                    "parameter": parameter,
-                    "value": value,
-                    "unit": units["B"] if parameter == "bias" else units[parameter],
-                    "assumed": parameter in truth.assumed,
+                    "parameter": figure.name,
+                    "component": figure.component,
+                    "value": figure.value,
+                    "unit": figure.unit,
+                    "assumed": bool({figure.setting, figure.name} & set(truth.assumed)),
                     "source": recording.source,
                 }

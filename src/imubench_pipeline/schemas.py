@@ -30,6 +30,19 @@ def _count(name: str, meaning: str, required: bool = False) -> Column:
     return Column(name, pa.int64(), "-", meaning, required)
 
 
+def _figure(parameters: str) -> tuple[Column, ...]:
+    return (
+        _text("parameter", parameters),
+        _number("value", "as in unit", "estimate; null where status says why"),
+        _number("lower", "as in unit", "lower 95 % limit"),
+        _number("upper", "as in unit", "upper 95 % limit"),
+        _text("unit", "SI unit of value, lower and upper; degC for T_0"),
+        _text("status", "ok, not_shown, at_bound, not_identified or absent"),
+        _text("reason", "why there is no plain value", required=False),
+        _number("fitted", "as in unit", "what the model has where value is null; no estimate"),
+    )
+
+
 _SENSOR = _text("sensor", "name of the sensor file")
 _RECORDING = _text("recording", "name of the recording")
 _CHANNEL = _text("channel", "axis and quantity, gyro_x to accel_z")
@@ -157,6 +170,24 @@ TABLES: dict[str, tuple[Column, ...]] = {
         *_KEYS,
         _number("value", "as in unit", "mean of the samples", required=True),
         _text("unit", "SI unit of value"),
+    ),
+    "temperature": (
+        *_KEYS,
+        Column("compensated", pa.bool_(), "-", "taken out of the noise: method compensated"),
+        *_figure("T_0 (mean temperature), sensitivity, quadratic, lag, bias (at T_0)"),
+    ),
+    "allan_compensated": (
+        *_KEYS,
+        _number("tau", "s", "cluster length", required=True),
+        _number("adev", _SI, "Allan deviation of the log less what temperature adds", True),
+        _number("lower", _SI, "lower 95 % limit"),
+        _number("upper", _SI, "upper 95 % limit"),
+        _number("temperature", _SI, "Allan deviation of what temperature adds", True),
+    ),
+    "low_pass": (
+        *_KEYS,
+        _count("order", "of the filter: 1, or that of Butterworth; null: none shows"),
+        *_figure("cutoff (-3 dB), N (before the filter), floor (white, behind the filter)"),
     ),
     "drift": (
         _SENSOR,
@@ -317,6 +348,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _number("adev", _SI, "Allan deviation of one of them, by its noise model"),
         _number("floor", _SI, "part of it that all have in common: any number keeps it"),
         _number("common_share", "-", "the same as a part of the variance"),
+        _number("temperature_share", "-", "part of the variance that temperature adds: common"),
         _text("other", "sensor of which one is to be equalled"),
         _text("other_recording", "that answers for it", required=False),
         _text("other_channel", "that answers", required=False),
@@ -328,9 +360,28 @@ TABLES: dict[str, tuple[Column, ...]] = {
         Column("reachable", pa.bool_(), "-", "some number is enough", required=False),
         _text("reason", "why there is no n or no limit", required=False),
     ),
+    "published": (
+        *_KEYS,
+        _text("place", "table of the source"),
+        _text("figure", "its name there"),
+        _text("printed", "as printed, with its unit"),
+        _text("of", "log or datasheet: what it says something of"),
+        _text("parameter", "N, B, bias or sensitivity"),
+        _number("means", "as in unit", "what it stands for as that parameter", required=True),
+        _text("unit", "SI unit of the numbers"),
+        _number("truth", "as in unit", "of the simulation"),
+        _number("curve", "as in unit", "read from the curve of the simulated log; mean of the log"),
+        _number("value", "as in unit", "as the recommended method estimates it of that log"),
+        _number("lower", "as in unit", "lower 95 % limit"),
+        _number("upper", "as in unit", "upper 95 % limit"),
+        _number("datasheet", "as in unit", "of the sensor file, in the convention of N and B"),
+        _number("datasheet_upper", "as in unit", "the largest of several, or of two readings"),
+        _text("reason", "why the printed figure differs", required=False),
+    ),
     "simulated_truth": (
         *_KEYS,
-        _text("parameter", "N, B, K, T_B or bias"),
+        _text("parameter", "as in parameters, temperature and low_pass; bias"),
+        _count("component", "number of a repeated term, from 1", required=True),
         _number("value", "as in unit", "true value of the simulation", required=True),
         _text("unit", "SI unit of value"),
         Column("assumed", pa.bool_(), "-", "not published by the source: chosen"),
@@ -355,7 +406,11 @@ BY_RECORDING = (
     "datasheet_curve",
     "spectrum",
     "fixed_bias",
+    "temperature",
+    "allan_compensated",
+    "low_pass",
     "simulated_truth",
+    "published",
     "error_budget",
 )
 """The joined tables in which a recording has rows of its own."""

@@ -5,22 +5,24 @@ from pathlib import Path
 
 from imubench_pipeline.config import ReconstructionSettings
 from imubench_pipeline.reconstruction import reconstruct
-from imubench_pipeline.results import Key, Quality, curves, estimates
+from imubench_pipeline.results import Key, Quality, compensated_curves, curves, estimates
 from imubench_pipeline.tables import write
 
 
 def main(inputs: list[Path], outputs: list[Path], settings: ReconstructionSettings) -> None:
     """Write the tables ``reconstruction`` and ``scores`` of a recording."""
-    quality, allan, parameters = inputs
+    quality, allan, parameters, compensated = inputs
     about = Quality.read(quality)
     measured = curves(allan, about)
+    left = compensated_curves(compensated, measured)
     found = []
     for channel, by_method in estimates(parameters).items():
         key = Key(about.recording["sensor"], about.recording["recording"], channel)
         rate = about.channels[channel]["rate"]
         for estimate in by_method:
             series = quality.parent / "series" / f"{channel}.{estimate.method}.parquet"
-            found.append(reconstruct(key, estimate, measured[channel], rate, settings, series))
+            curve = (left if estimate.method == "compensated" else measured)[channel]
+            found.append(reconstruct(key, estimate, curve, rate, settings, series))
     write("reconstruction", [row for result in found for row in result.curve_rows], outputs[0])
     write("scores", [result.score_row for result in found], outputs[1])
 
