@@ -7,7 +7,12 @@ import pytest
 from imubench_pipeline.config import FusionSettings
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.fusion.board import Board
-from imubench_pipeline.fusion.equivalence import Candidate, equivalence_rows, number_needed
+from imubench_pipeline.fusion.equivalence import (
+    Candidate,
+    TemperaturePart,
+    equivalence_rows,
+    number_needed,
+)
 from imubench_pipeline.fusion.of_run import fusion_rows
 from imubench_pipeline.fusion.prediction import fused_allan
 from imubench_pipeline.fusion.weights import equal
@@ -39,6 +44,33 @@ def rows_of(
     rows = equivalence_rows(candidates, [tau], common or {}, longest=1 / 9, draws=draws, seed=1)
     table = build("fusion", rows).to_pylist()
     return {(row["sensor"], row["other"]): row for row in table}
+
+
+def test_what_temperature_adds_is_not_averaged_away() -> None:
+    tau = np.array([1.0, 100.0])
+    warm = TemperaturePart(tau, np.array([1e-6, 1e-4]), relative_error=0.05)
+    assert warm.variance(10.0) == pytest.approx(1e-10)  # straight lines on logarithmic axes
+    noise = known(N=3e-5 * math.sqrt(10.0))  # 9e-10 at 10 s
+    good = candidate("good", known(N=math.sqrt(4e-10 * 10.0)))
+    row = rows_of(candidate("bad", noise, temperature=warm), good)["bad", "good"]
+    assert row["adev"] == pytest.approx(math.sqrt(1e-9))
+    assert (row["common_share"], row["temperature_share"]) == pytest.approx((0.1, 0.1))
+    assert row["n"] == pytest.approx(9.0 / (4.0 - 1.0))
+    assert row["lower"] < row["n"] < row["upper"]
+    better = candidate("good", known(N=math.sqrt(0.9e-10 * 10.0)))
+    row = rows_of(candidate("bad", noise, temperature=warm), better)["bad", "good"]
+    assert not row["reachable"] and "floor" in row["reason"]
+
+
+def test_a_run_takes_temperature_from_its_tables() -> None:
+    made = joined(recording_rows("one", temperature="followed"), recording_rows("two"))
+    rows = build("fusion", fusion_rows(made, FusionSettings(tau=["100 s"], draws=100))).to_pylist()
+    (row,) = (row for row in rows if row["sensor"] == "one")
+    # Three quarters of what was measured, beside the model that the tables have of the rest.
+    added = 0.75 * row["other_adev"] ** 2
+    assert row["floor"] == pytest.approx(math.sqrt(added), rel=0.02)
+    assert row["temperature_share"] == pytest.approx(row["common_share"])
+    assert row["adev"] == pytest.approx(row["other_adev"], rel=0.02)
 
 
 def test_without_a_common_part_it_is_the_ratio_of_the_variances() -> None:
@@ -159,7 +191,7 @@ def test_it_does_not_matter_what_else_is_compared() -> None:
 def test_the_tables_of_a_run_give_its_rows() -> None:
     made = joined(recording_rows("one"), recording_rows("two"), rejected_rows("three"))
     how = FusionSettings(tau=("1 s", "100 s", "1 h"), draws=100)
-    rows = build("fusion", fusion_rows(made["recordings"], made["parameters"], how)).to_pylist()
+    rows = build("fusion", fusion_rows(made, how)).to_pylist()
     assert [(row["sensor"], row["other"], row["tau"]) for row in rows] == [
         (a, b, tau) for tau in (1.0, 100.0, 3600.0) for a, b in (("one", "two"), ("two", "one"))
     ]

@@ -53,6 +53,35 @@ def number_needed(own: ArrayLike, common: ArrayLike, wanted: ArrayLike) -> Array
 
 
 @dataclass(frozen=True)
+class TemperaturePart:
+    """What temperature adds to a channel: all specimens on a board follow it together.
+
+    Attributes
+    ----------
+    tau : ndarray, shape (t,)
+        s.
+    deviation : ndarray, shape (t,)
+        Its Allan deviation over the recording, (rad/s) or (m/s²).
+    relative_error : float
+        Standard deviation of the sensitivity over its value.
+    """
+
+    tau: Array
+    deviation: Array
+    relative_error: float
+
+    def variance(self, tau: float) -> float:
+        """Return its Allan variance at a tau in s, (rad/s)² or (m/s²)²."""
+        there = np.log(np.maximum(self.deviation, 1e-300))
+        return math.exp(2.0 * float(np.interp(math.log(tau), np.log(self.tau), there)))
+
+    def drawn(self, tau: float, draws: int, rng: np.random.Generator) -> Array:
+        """Return Allan variances, shape (draws,), of sensitivities drawn from their interval."""
+        factor = 1.0 + self.relative_error * rng.standard_normal(draws)
+        return np.asarray(factor**2 * self.variance(tau))
+
+
+@dataclass(frozen=True)
 class Candidate:
     """A channel that may answer for its sensor.
 
@@ -63,7 +92,9 @@ class Candidate:
     duration : float
         Of the recording, s.
     estimate : Estimate
-        The recommended one.
+        The recommended one; where temperature is taken out, that of what it leaves.
+    temperature : TemperaturePart, optional
+        What is taken out.
     """
 
     sensor: str
@@ -72,6 +103,7 @@ class Candidate:
     simulated: bool
     duration: float
     estimate: Estimate
+    temperature: TemperaturePart | None = None
 
     @cached_property
     def model(self) -> NoiseModel:
@@ -79,8 +111,12 @@ class Candidate:
         return self.estimate.model
 
     def variance(self, tau: float) -> float:
-        """Return the Allan variance of the model, (rad/s)² or (m/s²)², at a tau in s."""
-        return float(self.model.allan_variance(tau))
+        """Return the Allan variance, (rad/s)² or (m/s²)², at a tau in s."""
+        return float(self.model.allan_variance(tau)) + self.of_temperature(tau)
+
+    def of_temperature(self, tau: float) -> float:
+        """Return what temperature adds to it, (rad/s)² or (m/s²)², at a tau in s."""
+        return 0.0 if self.temperature is None else self.temperature.variance(tau)
 
     def unknown(self, tau: float) -> Iterator[str]:
         """Yield the parameters that the log does not tell and that may matter at a tau in s."""
@@ -177,9 +213,12 @@ def answer(
     chosen = noisy[len(noisy) // 2]
     stream = channel_rng(seed, chosen.sensor, chosen.recording, chosen.channel, "fusion")
     own, common = _parts([chosen.model], correlation, tau)
-    drawn = _parts(draw_models(chosen.estimate, draws, stream), correlation, tau)
+    drawn_own, drawn_common = _parts(draw_models(chosen.estimate, draws, stream), correlation, tau)
+    if chosen.temperature is not None:
+        common = common + chosen.of_temperature(tau)
+        drawn_common = drawn_common + chosen.temperature.drawn(tau, draws, stream)
     unknown = "; ".join(dict.fromkeys(chosen.unknown(tau))) or None
-    return Answer(chosen, float(own[0]), float(common[0]), *drawn, unknown)
+    return Answer(chosen, float(own[0]), float(common[0]), drawn_own, drawn_common, unknown)
 
 
 def _parts(
@@ -262,7 +301,9 @@ def _pair(a: Answer | str, b: Answer | str, tau: float) -> dict[str, Any]:
         }
     plain = not reasons
     if not isinstance(a, str):
-        row |= {"floor": math.sqrt(a.common), "common_share": a.common / (a.own + a.common)}
+        whole = a.own + a.common
+        row |= {"floor": math.sqrt(a.common), "common_share": a.common / whole}
+        row["temperature_share"] = a.candidate.of_temperature(tau) / whole
     if isinstance(a, str) or isinstance(b, str):
         return row | {"reason": "; ".join(reasons)}
     number = float(number_needed(a.own, a.common, b.own + b.common))

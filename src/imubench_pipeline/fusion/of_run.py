@@ -5,31 +5,51 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from imubench_pipeline.config import FusionSettings
-from imubench_pipeline.fusion.equivalence import Candidate, equivalence_rows
+from imubench_pipeline.fusion.equivalence import (
+    Candidate,
+    TemperaturePart,
+    equivalence_rows,
+)
 from imubench_pipeline.results import estimate_of
 from imubench_pipeline.units import quantity_to_si
 
 Row = Mapping[str, Any]
 
+NEEDED = ("recordings", "parameters", "allan_compensated", "temperature")
+"""The tables of a run that it takes."""
 
-def candidates(recordings: pa.Table, parameters: pa.Table) -> Iterator[Candidate]:
+_OF_LIMIT = 1.96
+"""Standard deviations from an estimate to a 95 % limit."""
+
+
+def candidates(tables: Mapping[str, pa.Table]) -> Iterator[Candidate]:
     """Yield the channels of a run, each with the estimate of the method to use.
+
+    Where temperature is taken out of a channel, its estimate is that of what temperature leaves.
 
     Parameters
     ----------
-    recordings, parameters : pyarrow.Table
-        The tables of these names.
+    tables : mapping of str to pyarrow.Table
+        Those of `NEEDED`, of a run.
 
     Yields
     ------
     Candidate
     """
+    recordings, parameters = tables["recordings"], tables["parameters"]
+    warm = _temperature_parts(tables)
+    compensated = parameters.filter(pc.equal(parameters["method"], "compensated")).to_pylist()
+    recommended = parameters.filter(parameters["recommended"]).to_pylist()
     about = {(row["sensor"], row["recording"]): row for row in recordings.to_pylist()}
     groups: dict[tuple[str, str, str, str], list[Row]] = {}
-    for row in parameters.filter(parameters["recommended"]).to_pylist():
+    used = [row for row in compensated if _channel(row) in warm]
+    used += [row for row in recommended if _channel(row) not in warm]
+    for row in used:
         key = (row["sensor"], row["recording"], row["channel"], row["method"])
         groups.setdefault(key, []).append(row)
     for (sensor, recording, channel, method), rows in groups.items():
@@ -41,15 +61,39 @@ def candidates(recordings: pa.Table, parameters: pa.Table) -> Iterator[Candidate
             of["simulated"],
             of["duration"] or 0.0,
             estimate_of(method, rows),
+            warm.get((sensor, recording, channel)),
         )
 
 
-def fusion_rows(recordings: pa.Table, parameters: pa.Table, how: FusionSettings) -> Iterator[Row]:
+def _temperature_parts(
+    tables: Mapping[str, pa.Table],
+) -> dict[tuple[str, str, str], TemperaturePart]:
+    """Return what temperature adds to the channels of which it is taken out."""
+    curves: dict[tuple[str, str, str], list[tuple[float, float]]] = {}
+    for row in tables["allan_compensated"].to_pylist():
+        curves.setdefault(_channel(row), []).append((row["tau"], row["temperature"]))
+    temperature = tables["temperature"]
+    chosen = pc.and_(temperature["compensated"], pc.equal(temperature["parameter"], "sensitivity"))
+    found = {}
+    for row in temperature.filter(chosen).to_pylist():
+        if _channel(row) in curves:
+            tau, deviation = np.array(curves[_channel(row)]).T
+            error = (row["upper"] - row["lower"]) / (2.0 * _OF_LIMIT * abs(row["value"]))
+            found[_channel(row)] = TemperaturePart(tau, deviation, error)
+    return found
+
+
+def _channel(row: Row) -> tuple[str, str, str]:
+    return row["sensor"], row["recording"], row["channel"]
+
+
+def fusion_rows(tables: Mapping[str, pa.Table], how: FusionSettings) -> Iterator[Row]:
     """Return the rows of the table ``fusion``.
 
     Parameters
     ----------
-    recordings, parameters : pyarrow.Table
+    tables : mapping of str to pyarrow.Table
+        Those of `NEEDED`, of a run.
     how : FusionSettings
 
     Returns
@@ -57,7 +101,7 @@ def fusion_rows(recordings: pa.Table, parameters: pa.Table, how: FusionSettings)
     iterator of mapping
     """
     return equivalence_rows(
-        candidates(recordings, parameters),
+        candidates(tables),
         [quantity_to_si(tau, "time") for tau in how.tau],
         how.common.model_dump(),
         longest=how.longest,
