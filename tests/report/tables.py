@@ -62,10 +62,11 @@ def recording_rows(
     printed: bool = True,
     found: Sequence[float] = (),
     findings: Sequence[Row] = (),
+    temperature: str | None = None,
     requirements: Mapping[str, Any] | None = None,
     **about: Any,
 ) -> Rows:
-    """What a run finds in one recording."""
+    """What a run finds in one recording; ``temperature``: followed, or why not."""
     names = {"sensor": sensor, "recording": recording}
     row = {"device": recording, "kind": "static", "simulated": simulated, "status": "ok",
            "rate": RATE, "rate_from": "stated", "duration": 7200.0, "samples": 720_000}  # fmt: skip
@@ -80,6 +81,9 @@ def recording_rows(
         own = _channel_rows(Key(sensor, recording, channel), parameters, simulated, printed, found)
         for table, more in own.items():
             rows.setdefault(table, []).extend(more)
+        if temperature is not None:
+            for table, more in thermal_rows(Key(sensor, recording, channel), temperature).items():
+                rows.setdefault(table, []).extend(more)
     questions = [*standard([60.0], 60.0, math.pi / 4, ["worst"])]
     for name, given in (requirements or {}).items():
         questions += of_requirement(name, Requirement.model_validate(given))
@@ -148,10 +152,60 @@ def _channel_rows(
         ],
         "fixed_bias": [names | {"value": 5 * HOUR, "unit": "rad/s"}],
         "simulated_truth": [
-            names | {"parameter": "N", "value": MODEL.N, "unit": "rad/s/sqrt(Hz)",
+            names | {"parameter": "N", "component": 1, "value": MODEL.N, "unit": "rad/s/sqrt(Hz)",
                      "assumed": True, "source": "a table"},
         ] * simulated,
     }  # fmt: skip
+
+
+def thermal_rows(key: Key, temperature: str) -> Rows:
+    """What is found of temperature, which is ``followed`` or not, and of a low-pass."""
+    names = {"sensor": key.sensor, "recording": key.recording, "channel": key.channel}
+    followed = temperature == "followed"
+    s = 90 * HOUR
+    figures = {
+        "T_0": (22.5, None, None, "degC", "ok", None),
+        "sensitivity": (s, 0.9 * s, 1.1 * s, "rad/s/K", "ok", temperature),
+        "quadratic": (None, None, None, "rad/s/K^2", "absent", "not asked for"),
+        "lag": (None, 0.0, 60.0, "s", "not_identified", "it may be 0"),
+        "bias": (5 * HOUR, 4 * HOUR, 6 * HOUR, "rad/s", "ok", None),
+    }
+    cutoff = {"cutoff": (64.0, 63.0, 65.0, "Hz", "ok", None),
+              "N": (14 * HOUR, 13 * HOUR, 15 * HOUR, "rad/s/sqrt(Hz)", "ok", None)}  # fmt: skip
+    columns = ("value", "lower", "upper", "unit", "status", "reason")
+
+    def of(about: Row, given: Mapping[str, tuple[Any, ...]]) -> list[Row]:
+        return [
+            names | about | {"parameter": name} | dict(zip(columns, one, strict=True))
+            for name, one in given.items()
+        ]
+
+    adev = np.sqrt(MODEL.allan_variance(TAU))
+    left = [
+        names
+        | {
+            "tau": t,
+            "adev": a / 2,
+            "lower": a / 2.4,
+            "upper": a / 1.6,
+            "temperature": a * math.sqrt(0.75),
+        }
+        for t, a in zip(TAU, adev, strict=True)
+    ]
+    half = {
+        name: Parameter(
+            one.value if name == "T_B" else one.value / 2, lower=one.lower, upper=one.upper
+        )
+        for name, one in KNOWN.items()
+        if one.value is not None
+    }
+    best = parameter_rows(key, Estimate("compensated", half), recommended=False)
+    return {
+        "parameters": list(best) * followed,
+        "temperature": of({"compensated": followed}, figures),
+        "allan_compensated": left * followed,
+        "low_pass": of({"order": 1}, cutoff),
+    }
 
 
 def _not_shown() -> Parameter:
@@ -198,7 +252,7 @@ def joined(*several: Rows, requirements: Mapping[str, Any] | None = None) -> Tab
         "pooled": build("pooled", pooled_rows(recommended, biases, devices)),
         "drift": build("drift", drift_rows(recommended, biases, about)),
         "ranking": build("ranking", ranking_rows(errors, asked, sensors)),
-        "fusion": build("fusion", fusion_rows(made["recordings"], made["parameters"], FUSION)),
+        "fusion": build("fusion", fusion_rows(made, FUSION)),
     }
 
 
@@ -206,6 +260,7 @@ def settings_of(
     tables: Mapping[str, pa.Table],
     *,
     requirements: Mapping[str, Any] | None = None,
+    boards: Mapping[str, Any] | None = None,
     units: str = "practical",
     title: str = "A title",
 ) -> str:
@@ -224,6 +279,7 @@ def settings_of(
                 name: {"vendor": "V & Co", "model": name, "price_class": "cheap"}
                 for name in sensors
             },
+            "boards": boards or {},
             "requirements": {
                 name: Requirement.model_validate(one).model_dump(mode="json")
                 for name, one in (requirements or {}).items()

@@ -49,10 +49,15 @@ def test_what_is_not_known_of_a_pair_is_said_once() -> None:
 
 def test_the_page_says_what_it_assumes() -> None:
     assert "independent" in shared_words({"N": 0.0, "B": 0.0, "K": 0.0, "R": 0.0})
-    assert shared_words({"N": 0.125, "B": 0.0, "K": 1.0, "R": 0.0}) == (
+    assert shared_words({"N": 0.125, "B": 0.0, "K": 1.0, "R": 0.0}).startswith(
         "Specimens of one sensor are taken to have in common 12.5 % of the variance of the white "
-        "noise (N), 100 % of the variance of the random walk (K)."
+        "noise (N), 100 % of the variance of the random walk (K). What temperature adds"
     )
+
+
+def test_what_temperature_adds_is_told_apart_of_what_is_common() -> None:
+    assert line(temperature_share=0.1)["common"] == "12.5 % (temperature 10 %)"
+    assert line(temperature_share=0.0)["common"] == "12.5 %"
 
 
 def test_sensors_that_are_alike_have_no_line_and_one_where_nothing_is_known(

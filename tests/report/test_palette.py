@@ -11,7 +11,7 @@ from imubench_pipeline.report.palette import (
 from imubench_pipeline.report.view import METHOD_NAMES
 
 MARKERS = {"circle", "square", "diamond", "triangle-up", "triangle-down", "cross", "x"}
-DASHES = {"solid", "dash", "dot", "dashdot", "longdash"}
+DASHES = {"solid", "dash", "dot", "dashdot", "longdash", "longdashdot"}
 BACKGROUNDS = {"light": "#ffffff", "dark": "#161a1e"}  # of report.css
 
 

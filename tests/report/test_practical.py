@@ -19,7 +19,10 @@ from imubench_pipeline.report.practical import (
 )
 
 ASCII = str.maketrans("−⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "--0123456789")
-SYMBOLS = {"Q", "N", "B", "T_B", "K", "R", "adev", "psd", "signal"}
+SYMBOLS = {
+    *("Q", "N", "B", "T_B", "K", "R", "adev", "psd", "signal"),
+    *("sensitivity", "quadratic"),
+}
 
 
 def rounded(value: float, digits: int) -> Decimal:

@@ -267,7 +267,7 @@ def test_a_simulated_log_is_called_so_in_every_figure(tmp_path: Path) -> None:
     rows = rows_of(simulated=True)
     truth = {"sensor": "imu", "recording": "day1", "channel": "gyro_x", "parameter": "N"}
     rows["simulated_truth"] = [
-        truth | {"value": MODEL.N, "unit": "x", "assumed": True, "source": "x"}
+        truth | {"component": 1, "value": MODEL.N, "unit": "x", "assumed": True, "source": "x"}
     ]
     views = views_of(rows)
     figures = [make() for _, make in (*cross_figures(views), *channel_figures(views[0]))]

@@ -52,11 +52,14 @@ def shared_words(common: Mapping[str, float]) -> str:
         if share > 0.0
     ]
     if not named:
-        return (
-            "Nothing is taken to be common: the noise of each specimen is independent. "
-            "What they follow together (temperature, supply, motion) makes the numbers too small."
-        )
-    return f"Specimens of one sensor are taken to have in common {', '.join(named)}."
+        shared = "The noise of each specimen is taken to be independent."
+    else:
+        shared = f"Specimens of one sensor are taken to have in common {', '.join(named)}."
+    return (
+        f"{shared} What temperature adds to a log with readings of it is common to all: they are "
+        "taken to have the same sensitivity. What else they follow together, such as supply or "
+        "motion, or a temperature that is not logged, makes the numbers too small."
+    )
 
 
 def equal_numbers(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
@@ -85,10 +88,18 @@ def equal_numbers(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
             "other_adev": row["other_adev"],
             "number": _number(row),
             "limits": _limits(row),
-            "common": "–"
-            if row["common_share"] is None
-            else f"{number_text(100.0 * row['common_share'], 3)} %",
+            "common": _common(row),
         }
+
+
+def _common(row: Row) -> str:
+    if row["common_share"] is None:
+        return "–"
+    text = f"{number_text(100.0 * row['common_share'], 3)} %"
+    of_temperature = row["temperature_share"]
+    if of_temperature:
+        text += f" (temperature {number_text(100.0 * of_temperature, 3)} %)"
+    return text
 
 
 def _number(row: Row) -> str:

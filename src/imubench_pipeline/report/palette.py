@@ -19,7 +19,7 @@ class Appearance:
     light, dark : str
         Colour on a light and on a dark background.
     dash : str
-        ``solid``, ``dash``, ``dot``, ``dashdot`` or ``longdash``.
+        ``solid``, ``dash``, ``dot``, ``dashdot``, ``longdash`` or ``longdashdot``.
     marker : str
         ``circle``, ``square``, ``diamond``, ``triangle-up``, ``triangle-down``, ``cross``, ``x``.
     """
@@ -46,6 +46,7 @@ _DASHES = ("solid", "dash", "dot", "dashdot", "longdash")
 _METHODS = {
     "likelihood": Appearance("#008F6B", "#2EC4A0", "solid", "diamond"),
     "likelihood_gm": Appearance("#9A6B00", "#E0A82E", "longdash", "square"),
+    "compensated": Appearance("#5B5FC7", "#A3A6F2", "longdashdot", "x"),
     "curve": Appearance("#D55E00", "#F08A3C", "dash", "triangle-up"),
     "paper": Appearance("#B3508C", "#DB8FBC", "dashdot", "triangle-down"),
     "weighted": Appearance("#0072B2", "#4DA3D9", "dot", "cross"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from typing import Any
 
 from imubench_pipeline.estimators.estimate import FAMILY, PARAMETERS
@@ -43,8 +43,8 @@ def methods_table(
         }
         for method in channel.parameters
     ]
-    if channel.truth:
-        cells = [_truth(channel.truth.get(symbol)) for symbol in symbols]
+    if channel.true_components:
+        cells = [_truth(channel.true_components.get(symbol, [])) for symbol in symbols]
         lines.append({"method": None, "recommended": False, "model": "", "cells": cells})
     return symbols, lines
 
@@ -74,14 +74,16 @@ def cell(
     }
 
 
-def _truth(row: Row | None) -> dict[str, Any]:
-    if row is None:
+def _truth(rows: Sequence[Row]) -> dict[str, Any]:
+    if not rows:
         return {"parts": [], "words": "The simulation has none.", "value": None, "digits": 3}
-    status = "assumed" if row["assumed"] else ""
-    part: Mapping[str, Any] = {
-        "value": row["value"],
-        "lower": None,
-        "upper": None,
-        "status": status,
-    }
-    return {"parts": [part], "words": row["source"], "value": row["value"], "digits": 3}
+    parts = [
+        {
+            "value": row["value"],
+            "lower": None,
+            "upper": None,
+            "status": "assumed" if row["assumed"] else "",
+        }
+        for row in rows
+    ]
+    return {"parts": parts, "words": rows[0]["source"], "value": rows[0]["value"], "digits": 3}

@@ -134,6 +134,7 @@ def channel_payload(view: ChannelView, rate: float, arrays: Arrays) -> dict[str,
             }
             for name, term in [*_named_terms(model), *_lines(model)]
         ],
+        "compensated": {name: arrays.log(values) for name, values in view.compensated.items()},
         "datasheet": datasheet_lines(view),
         "spectrum": _spectrum(view, model, rate, arrays),
     }

@@ -66,6 +66,8 @@ _CHOICES: dict[str, dict[str, dict[str, str]]] = {
             "adev": "°/h",
             "psd": "°/s/√Hz",
             "signal": "°/s",
+            "sensitivity": "°/h/K",
+            "quadratic": "°/h/K²",
         },
         "°/s": {
             "Q": "°",
@@ -77,6 +79,8 @@ _CHOICES: dict[str, dict[str, dict[str, str]]] = {
             "adev": "°/s",
             "psd": "°/s/√Hz",
             "signal": "°/s",
+            "sensitivity": "°/s/K",
+            "quadratic": "°/s/K²",
         },
         "SI: rad/s": {
             "Q": "rad",
@@ -88,6 +92,8 @@ _CHOICES: dict[str, dict[str, dict[str, str]]] = {
             "adev": "rad/s",
             "psd": "rad/s/√Hz",
             "signal": "rad/s",
+            "sensitivity": "rad/s/K",
+            "quadratic": "rad/s/K²",
         },
     },
     "accel": {
@@ -101,6 +107,8 @@ _CHOICES: dict[str, dict[str, dict[str, str]]] = {
             "adev": "µg",
             "psd": "µg/√Hz",
             "signal": "mg",
+            "sensitivity": "µg/K",
+            "quadratic": "µg/K²",
         },
         "mg and m/s/√h": {
             "Q": "m/s",
@@ -112,6 +120,8 @@ _CHOICES: dict[str, dict[str, dict[str, str]]] = {
             "adev": "mg",
             "psd": "mg/√Hz",
             "signal": "mg",
+            "sensitivity": "mg/K",
+            "quadratic": "mg/K²",
         },
         "SI: m/s²": {
             "Q": "m/s",
@@ -123,6 +133,8 @@ _CHOICES: dict[str, dict[str, dict[str, str]]] = {
             "adev": "m/s²",
             "psd": "m/s²/√Hz",
             "signal": "m/s²",
+            "sensitivity": "m/s²/K",
+            "quadratic": "m/s²/K²",
         },
     },
 }
@@ -178,6 +190,8 @@ def _unit(quantity: str, symbol: str, choice: str) -> PageUnit:
         "N": f"{quantity}_density",
         "K": f"{quantity}_random_walk",
         "T_B": "time",
+        "sensitivity": f"{quantity}_temperature_coefficient",
+        "quadratic": f"{quantity}_temperature_curvature",
     }.get(symbol, QUANTITIES[quantity])
     return _page_unit(sign, dimension)
 

@@ -14,6 +14,7 @@ import pyarrow as pa
 from plotly.offline import get_plotlyjs
 
 from imubench_pipeline.provenance import source_digest
+from imubench_pipeline.report.boards import boards_page
 from imubench_pipeline.report.fusion import fusion_page
 from imubench_pipeline.report.glossary import glossary
 from imubench_pipeline.report.html import environment
@@ -58,6 +59,8 @@ def pages(site: Site) -> Iterator[Page]:
     yield recordings_page(site)
     yield datasheets_page(site)
     yield fusion_page(site)
+    if site.settings.get("boards"):
+        yield boards_page(site)
     yield Page(
         "theory.html",
         "theory.html.jinja",

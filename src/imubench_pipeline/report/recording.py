@@ -9,6 +9,7 @@ from typing import Any
 
 from imubench_pipeline.estimators.estimate import PARAMETERS
 from imubench_pipeline.recording import log_paths, read_metadata
+from imubench_pipeline.report import thermal
 from imubench_pipeline.report.datasheets import curve_distances, delta_rows
 from imubench_pipeline.report.meaning import budget_tables, budget_words
 from imubench_pipeline.report.parameters import methods_table
@@ -148,6 +149,8 @@ def _channel(
             for row in _best(channel.models)
         ],
         "spectral_lines": channel.lines,
+        "thermal": thermal.answer(channel, site.system),
+        "thermal_figures": list(thermal.figures(channel)),
         "line_count": counted(len(channel.lines), "line"),
         "deltas": list(delta_rows(channel, site.coverage, site.system)),
         "away": list(curve_distances(channel, site.system)),

@@ -24,6 +24,7 @@ NAVIGATION = (
     ("recordings.html", "Recordings"),
     ("datasheets.html", "Datasheets"),
     ("fusion.html", "Fusion"),
+    ("boards.html", "Boards"),
     ("theory.html", "Theory"),
     ("made.html", "How this was made"),
 )
@@ -120,6 +121,12 @@ class Site:
     def _device_pages(self) -> dict[tuple[str, str], str | None]:
         return {(view.sensor, view.name): view.device_page for view in self.views}
 
+    @property
+    def navigation(self) -> list[tuple[str, str]]:
+        """The pages that every page leads to, with their names."""
+        boards = bool(self.settings.get("boards"))
+        return [one for one in NAVIGATION if boards or one[0] != "boards.html"]
+
     @cached_property
     def sensors(self) -> list[str]:
         """The sensors that have recordings."""
@@ -209,7 +216,7 @@ class Site:
         """
         return {
             "title": self.title,
-            "navigation": NAVIGATION,
+            "navigation": self.navigation,
             "units": {quantity: list(found) for quantity, found in units_of_pages().items()},
             "first_units": first_choices(self.system),
             "names": self.names,

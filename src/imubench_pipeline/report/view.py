@@ -25,6 +25,7 @@ Name = tuple[str, str]
 METHOD_NAMES = {
     "likelihood": "likelihood",
     "likelihood_gm": "likelihood, papers' model",
+    "compensated": "likelihood, temperature taken out",
     "curve": "read from the curve",
     "paper": "fit, weights as printed",
     "weighted": "fit, right weights",
@@ -50,13 +51,22 @@ class ChannelView:
     scores: dict[str, Row] = field(default_factory=dict)
     datasheet: list[Row] = field(default_factory=list)
     datasheet_curve: list[Row] = field(default_factory=list)
-    truth: dict[str, Row] = field(default_factory=dict)
+    true_components: dict[str, list[Row]] = field(default_factory=dict)
     models: list[Row] = field(default_factory=list)
     lines: list[Row] = field(default_factory=list)
     spectrum: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     findings: list[Row] = field(default_factory=list)
+    published: list[Row] = field(default_factory=list)
     fixed_bias: float | None = None
+    temperature: dict[str, Row] = field(default_factory=dict)
+    low_pass: dict[str, Row] = field(default_factory=dict)
+    compensated: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     _models: dict[str, NoiseModel] = field(default_factory=dict)
+
+    @property
+    def truth(self) -> dict[str, Row]:
+        """The true parameters of a simulation, of a repeated term the first."""
+        return {name: rows[0] for name, rows in self.true_components.items()}
 
     @property
     def warnings(self) -> list[str]:
@@ -227,13 +237,25 @@ def _channels(view: RecordingView) -> list[ChannelView]:
             column: _floats(part, column)
             for column in ("frequency", "ordinates", "density", "fitted", "used")
         }
+    for (name,), part in _by(view.parts["allan_compensated"], "channel").items():
+        channels[name].compensated = {
+            column: _floats(part, column) for column in ("tau", "adev", "lower", "upper")
+        }
     for one in view.rows("scores"):
         channels[one["channel"]].scores[one["method"]] = one
     for one in view.rows("fixed_bias"):
         channels[one["channel"]].fixed_bias = one["value"]
+    for one in view.rows("temperature"):
+        channels[one["channel"]].temperature[one["parameter"]] = one
+    for one in view.rows("low_pass"):
+        channels[one["channel"]].low_pass[one["parameter"]] = one
     for one in view.rows("simulated_truth"):
         if one["channel"] in channels:
-            channels[one["channel"]].truth[one["parameter"]] = one
+            true = channels[one["channel"]].true_components.setdefault(one["parameter"], [])
+            true.append(one)
+    for one in view.rows("published"):
+        if one["channel"] in channels:
+            channels[one["channel"]].published.append(one)
     for name, channel in channels.items():
         channel.findings = [one for one in view.findings if one["channel"] in (None, name)]
     return list(channels.values())

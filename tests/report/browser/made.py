@@ -24,7 +24,7 @@ from imubench_pipeline.drift import drift_rows
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.expected_errors import error_rows, of_requirement, standard
 from imubench_pipeline.findings import Finding
-from imubench_pipeline.fusion.of_run import fusion_rows
+from imubench_pipeline.fusion.of_run import NEEDED, fusion_rows
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.overview import overview
 from imubench_pipeline.pooled import pooled_rows
@@ -232,8 +232,8 @@ def channel_rows(log: Log, channel: str) -> Rows:
             for one in curve_rms(list(comparables(sheet, channel)), TAU, adev)
         ],
         "simulated_truth": [
-            key | {"parameter": name, "value": log.level * value, "unit": "SI", "assumed": False,
-                   "source": "Table 1"}
+            key | {"parameter": name, "component": 1, "value": log.level * value, "unit": "SI",
+                   "assumed": False, "source": "Table 1"}
             for name, value in TRUTH[quantity_of(channel)].items()
         ] * log.simulated,
     }  # fmt: skip
@@ -278,8 +278,8 @@ def rows_of(logs: Sequence[Log], rejected: Sequence[tuple[str, str]] = ()) -> Ro
     prices = {name: {"price_class": one.price_class} for name, one in SENSORS.items()}
     errors = build("error_budget", rows["error_budget"]).to_pylist()
     rows["ranking"] = [*ranking_rows(errors, REQUIREMENTS, prices)]
-    tables = [build(name, rows[name]) for name in ("recordings", "parameters")]
-    rows["fusion"] = [*fusion_rows(*tables, FusionSettings(draws=100))]
+    tables = {name: build(name, rows.get(name, [])) for name in NEEDED}
+    rows["fusion"] = [*fusion_rows(tables, FusionSettings(draws=100))]
     covered = coverage(SENSORS)
     rows["coverage"] = [asdict(one) for one in covered]
     rows["coverage_by_vendor"] = [asdict(one) for one in by_vendor(covered)]

@@ -11,7 +11,8 @@ const termLook = (place) => {
 };
 
 function channelOf(figure) {
-  return pageData.channels.find((one) => one.channel === figure.dataset.channel);
+  const { channel, sensor } = figure.dataset;
+  return pageData.channels.find((one) => one.channel === channel && one.sensor === (sensor ?? one.sensor));
 }
 
 kinds.allan = (figure) => {
@@ -43,13 +44,25 @@ kinds.allan = (figure) => {
     text: tau.map((t, i) => `τ ${numberText(t, 3)} s: <b>${numberText(y[i], 3)} ${unit.sign}</b><br>95 %: ${interval(low[i], high[i])} ${unit.sign}`),
     hovertemplate: `${what}<br>%{text}<extra></extra>`,
   });
+  if ("tau" in one.compensated) {
+    const own = look.compensated;
+    const times = array(one.compensated.tau);
+    const [left, least, most] = ["adev", "lower", "upper"].map((name) => scaled(one.compensated[name], unit.factor));
+    traces.push({
+      group: "compensated", type: "scatter", mode: "lines+markers", x: times, y: left, line: { color: colourOf(own), width: 1.2 }, marker: { size: 4, color: colourOf(own) },
+      text: times.map((t, i) => `τ ${numberText(t, 3)} s: <b>${numberText(left[i], 3)} ${unit.sign}</b><br>95 %: ${interval(least[i], most[i])} ${unit.sign}`),
+      hovertemplate: "temperature taken out<br>%{text}<extra></extra>",
+    });
+    groups.push({ key: "compensated", label: `${what}, temperature taken out`, on: true, look: own });
+  }
   for (const [method, curve] of Object.entries(one.methods)) {
     const key = `method ${method}`;
     const use = method === one.recommended;
     traces.push(line(array(curve.tau), scaled(curve.model, unit.factor), { ...look[method], width: use ? 2.4 : 1.3 }, {
       group: key, hoverinfo: "name", name: look[method].name,
     }));
-    groups.push({ key, label: look[method].name + (use ? " (use this)" : ""), on: use, look: { ...look[method], marker: undefined } });
+    const on = use || (figure.dataset.methods ?? "").split(" ").includes(method);
+    groups.push({ key, label: look[method].name + (use ? " (use this)" : ""), on, look: { ...look[method], marker: undefined } });
   }
   one.terms.forEach((term, place) => {
     traces.push(line(tau, scaled(term.adev, unit.factor), termLook(place), { group: `term ${place}`, hoverinfo: "name", name: term.name }));

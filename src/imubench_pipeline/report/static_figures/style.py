@@ -87,6 +87,7 @@ _DASHES: dict[str, str | tuple[float, tuple[float, ...]]] = {
     "dot": (0.0, (1.0, 1.4)),
     "dashdot": (0.0, (5.0, 1.5, 1.0, 1.5)),
     "longdash": (0.0, (8.0, 2.0)),
+    "longdashdot": (0.0, (8.0, 2.0, 1.0, 2.0)),
 }
 _MARKERS = {
     "circle": "o",

@@ -1,0 +1,108 @@
+"""The page of the boards: sensors that share a place, beside what a paper prints of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from imubench_pipeline.report import thermal
+from imubench_pipeline.report.payload import Arrays, channel_payload, looks
+from imubench_pipeline.report.practical import limit_digits, number_text
+from imubench_pipeline.report.site import Page, Site
+from imubench_pipeline.report.view import ChannelView, RecordingView, Row
+
+_UNIT = {"bias": "signal"}
+"""Unit of the page of a parameter, where it has another name."""
+
+
+def boards_page(site: Site) -> Page:
+    """Return the page that shows every board."""
+    boards = site.settings["boards"]
+    views = [view for name in boards for view in _views(site, name)]
+    key = site.key_of(boards, site.looks, *(view.key for view in views))
+    return Page("boards.html", "boards.html.jinja", key, lambda: _context(site))
+
+
+def _context(site: Site) -> dict[str, Any]:
+    arrays = Arrays()
+    boards = []
+    payloads: list[dict[str, Any]] = []
+    for name, board in site.settings["boards"].items():
+        views = _views(site, name)
+        channels = {view.sensor: view.channels() for view in views}
+        payloads += (
+            channel_payload(one, view.row["rate"], arrays)
+            for view in views
+            for one in channels[view.sensor]
+        )
+        boards.append(
+            {
+                "name": name,
+                "title": board["title"],
+                "note": board["note"],
+                "shared": _shared(board),
+                "sensors": [
+                    {
+                        "view": view,
+                        "name": site.names[view.sensor],
+                        "channels": [
+                            _channel(site, one, board["sensors"][view.sensor])
+                            for one in channels[view.sensor]
+                        ],
+                    }
+                    for view in views
+                ],
+                "lost": sorted(set(board["sensors"]) - {view.sensor for view in views}),
+            }
+        )
+    used = {one["sensor"]: site.looks[one["sensor"]] for one in payloads}
+    page = {"looks": looks(used), "channels": payloads, "arrays": arrays.texts}
+    return {"boards": boards, "page": page}
+
+
+def _views(site: Site, board: str) -> list[RecordingView]:
+    """Return the recordings of a board that could be analysed."""
+    of_board = site.settings["boards"][board]["sensors"]
+    return [
+        view
+        for view in site.views
+        if view.simulated
+        and view.name == f"sim_{board}"
+        and view.sensor in of_board
+        and not view.rejected
+    ]
+
+
+def _shared(board: Mapping[str, Any]) -> str:
+    shared = ["one temperature"] * board["temperature"] + ["one motion"] * bool(board["motion"])
+    if not shared:
+        return "The sensors share nothing but their place."
+    return f"All sensors of the board have {' and '.join(shared)}."
+
+
+def _channel(site: Site, channel: ChannelView, figures: Mapping[str, str | None]) -> dict[str, Any]:
+    return {
+        "view": channel,
+        "figures": figures.get(channel.channel),
+        "answer": thermal.answer(channel, site.system),
+        "lines": list(published_lines(channel.published)),
+    }
+
+
+def published_lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
+    """Yield the lines of the table of what a source prints of a channel.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Of the table ``published``.
+    """
+    for row in rows:
+        quantity = row["channel"].split("_")[0]
+        ours = row["datasheet"] if row["of"] == "datasheet" else row["value"]
+        yield {
+            **row,
+            "unit": f"{quantity}.{_UNIT.get(row['parameter'], row['parameter'])}",
+            "digits": limit_digits(row["lower"], row["upper"], 4),
+            "ratio": number_text(ours / row["means"], 3) if ours and row["means"] else "–",
+        }

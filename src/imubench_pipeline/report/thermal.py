@@ -1,0 +1,116 @@
+"""What temperature and the sensor's own low-pass do to a channel, as a page says it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from imubench_pipeline.report.practical import (
+    System,
+    limit_digits,
+    number_text,
+    page_unit,
+)
+from imubench_pipeline.report.view import ChannelView, Row
+from imubench_pipeline.report.words import sentence
+
+_TEMPERATURE = (
+    ("sensitivity", "temperature_sensitivity", "sensitivity"),
+    ("quadratic", "temperature_quadratic", "square of the temperature"),
+    ("lag", "thermal_lag", "lag"),
+    ("bias", "bias_at_reference", "bias at T₀"),
+)
+_LOW_PASS = (("cutoff", "cutoff", "cut-off"), ("N", "N_before_low_pass", "N before the low-pass"))
+_TRUTHS = {"bias": None, "N": "N before the low-pass"}
+_SWITCHED = {"sensitivity": "sensitivity", "quadratic": "quadratic", "bias": "signal", "N": "N"}
+"""Unit of the page of what is shown in the units that the reader chooses."""
+
+_FIXED = {"lag": "s", "cutoff": "Hz"}
+_AT = np.array([100.0, 300.0, 1_000.0, 3_000.0, 10_000.0, 30_000.0])
+_SEEN = 1.05
+"""How many times lower an Allan deviation must be to be worth a word."""
+
+
+def figures(channel: ChannelView) -> Iterator[dict[str, Any]]:
+    """Yield the lines of the table: temperature's, where its effect was sought; the low-pass's.
+
+    Parameters
+    ----------
+    channel : ChannelView
+    """
+    found = (
+        *((channel.temperature, *names) for names in _TEMPERATURE),
+        *((channel.low_pass, *names) for names in _LOW_PASS),
+    )
+    for rows, name, term, words in found:
+        row = rows.get(name)
+        if row is None or row["status"] == "absent" or _without_filter(name, rows):
+            continue
+        truth = channel.truth.get(_TRUTHS.get(name, name) or "")
+        yield {
+            "term": term,
+            "words": words,
+            "unit": f"{channel.quantity}.{_SWITCHED[name]}" if name in _SWITCHED else None,
+            "sign": _FIXED.get(name),
+            "value": row["value"],
+            "lower": row["lower"],
+            "upper": row["upper"],
+            "digits": limit_digits(row["lower"], row["upper"], 4),
+            "status": "" if row["status"] == "ok" else row["status"],
+            "truth": truth["value"] if truth else None,
+            "why": sentence(row["reason"] or ""),
+        }
+
+
+def _without_filter(name: str, rows: Mapping[str, Row]) -> bool:
+    return name == "N" and rows["cutoff"]["status"] == "absent"
+
+
+def answer(channel: ChannelView, system: System) -> list[str]:
+    """Return in sentences what was found of temperature and low-pass.
+
+    Parameters
+    ----------
+    channel : ChannelView
+    system : str
+    """
+    said = []
+    temperature, low_pass = channel.temperature, channel.low_pass
+    if temperature:
+        sensitivity = temperature["sensitivity"]
+        if sensitivity["compensated"]:
+            unit = page_unit(channel.quantity, "sensitivity", system)
+            said.append(
+                f"The bias follows the temperature by {unit.text(sensitivity['value'], 3)} "
+                f"{unit.sign}.{_falls(channel)}"
+            )
+        else:
+            said.append(f"Temperature is not taken out: {sensitivity['reason']}.")
+        said.append(f"T₀, the mean temperature, is {number_text(temperature['T_0']['value'])} °C.")
+    if low_pass and low_pass["cutoff"]["status"] == "absent":
+        said.append("The spectrum shows no low-pass of the sensor.")
+    elif low_pass:
+        order = low_pass["cutoff"]["order"]
+        kind = "of first order" if order == 1 else f"as a Butterworth filter of order {order}"
+        if low_pass["cutoff"]["value"] is not None:
+            cutoff = number_text(low_pass["cutoff"]["value"])
+            said.append(f"The sensor's own low-pass cuts off at {cutoff} Hz, {kind}.")
+    return said
+
+
+def _falls(channel: ChannelView) -> str:
+    """Return how much lower the Allan deviation is without what temperature adds."""
+    left = channel.compensated
+    if not left:
+        return ""
+    ratio = np.interp(np.log(left["tau"]), np.log(channel.tau), channel.adev) / left["adev"]
+    there = _AT[(_AT >= left["tau"][0]) & (_AT <= left["tau"][-1])]
+    at = np.interp(np.log(there), np.log(left["tau"]), ratio)
+    parts = [
+        f"{number_text(float(fall), 3)} times at τ = {number_text(float(tau))} s"
+        for tau, fall in zip(there, at, strict=True)
+        if fall > _SEEN
+    ]
+    return f" Without it the Allan deviation is lower: {', '.join(parts)}." if parts else ""
