@@ -21,11 +21,12 @@ PUBLIC = ["allan", "confidence", "noise", "simulate", "score", "datasheet", "uni
           "fusion/of_run", "fusion/prediction", "fusion/quadrature", "fusion/riccati",
           "fusion/samples", "fusion/weights", "thermal/effect", "thermal/fit", "thermal/lag",
           "thermal/level", "thermal/path", "thermal/path_kernels", "thermal/products",
-          "thermal/register", "thermal/regression", "thermal/uncertainty",
+          "thermal/register", "thermal/regression", "thermal/result", "thermal/uncertainty",
           "sensor_model/discretisation", "sensor_model/flicker_band", "sensor_model/imu",
           "sensor_model/kernel", "sensor_model/low_pass", "sensor_model/model",
           "sensor_model/profile_files", "sensor_model/profiles", "sensor_model/settings",
           "sensor_model/simulation", "sensor_model/sources",
+          "sensor_model/from_datasheet", "sensor_model/from_estimates",
           "sensor_model/spectra", "sensor_model/writing"]  # fmt: skip
 
 
