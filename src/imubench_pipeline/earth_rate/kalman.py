@@ -1,0 +1,323 @@
+"""The Earth's rate as an unknown constant, by Kalman filter and smoother.
+
+The paper's filter (003 eq. 15, 16) is given the rate that it finds; see `known_rate`. Here the rate
+w is a state beside the gyro's own error, seen with the sign of the dwell:
+
+    x = [w, z_G ..., z_K],    mean of a block = s cos(latitude) w + mean of (z_G + ... + z_K) + v.
+
+The mean of the states over the block is a state of its own, so that what the states gain during
+the block and what the mean sees of it are correlated as they are (`states`). Covariances do not
+depend on the data: they are computed once for a design, as triangular roots that are turned by QR
+(P. G. Park and T. Kailath 1995). A root keeps its digits from a start of 1 rad/s, which stands for
+no knowledge at all, down to 1e-10 rad/s, where a covariance would have lost them.
+
+References
+----------
+P. Park and T. Kailath, "New square-root algorithms for Kalman filtering" and "Square-root RTS
+smoothing algorithms", IEEE Trans. Autom. Control 40(5), 1995, and Int. J. Control 62(5), 1995;
+H. E. Rauch, F. Tung and C. T. Striebel, AIAA Journal 3(8), 1965; Y. Bar-Shalom, X. R. Li and
+T. Kirubarajan, "Estimation with Applications to Tracking and Navigation", Wiley 2001, section 5.4
+(NEES, NIS).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+
+from imubench_pipeline.earth_rate.experiment import Blocks
+from imubench_pipeline.earth_rate.states import WIDE, block_states
+from imubench_pipeline.noise import NoiseModel
+
+Array = NDArray[np.float64]
+
+_NOTHING = 1e-12
+"""Singular value of a predicted root, of unit rows, that is rounding alone."""
+
+
+@dataclass(frozen=True)
+class Filtered:
+    """What a filter knows after each block, from the data up to there.
+
+    Attributes
+    ----------
+    time : ndarray, shape (b,)
+        End of each block, s from the first sample of the first.
+    rate : ndarray, shape (runs, b)
+        Estimated Earth's rate, rad/s.
+    rate_sigma : ndarray, shape (b,)
+        Its standard deviation, rad/s.
+    drift : ndarray, shape (runs, b)
+        Estimated mean of the gyro's slow error over the block, its bias included, rad/s.
+    drift_sigma : ndarray, shape (b,)
+        Its standard deviation, rad/s.
+    innovation : ndarray, shape (runs, b)
+        Each block mean less its prediction, rad/s.
+    innovation_sigma : ndarray, shape (b,)
+        Its standard deviation, rad/s.
+    states : ndarray, shape (runs, b, m + 2)
+        Rate, the states of `RateFilter.names` at the sample after the block, and the drift.
+    roots : ndarray, shape (b, m + 2, m + 2)
+        Lower triangular roots of their covariances.
+    """
+
+    time: Array
+    rate: Array
+    rate_sigma: Array
+    drift: Array
+    drift_sigma: Array
+    innovation: Array
+    innovation_sigma: Array
+    states: Array
+    roots: Array
+
+    @property
+    def nis(self) -> Array:
+        """Normalised innovation squared, shape (runs, b): chi-squared of one degree."""
+        return np.asarray((self.innovation / self.innovation_sigma) ** 2)
+
+    def rate_nees(self, rate: float) -> Array:
+        """Return the squared error of the rate over its variance.
+
+        Parameters
+        ----------
+        rate : float
+            The true one, rad/s.
+
+        Returns
+        -------
+        ndarray, shape (runs, b)
+            Chi-squared of one degree of freedom, where the filter is consistent and what it knew
+            at the start no longer counts: once both positions have been seen.
+        """
+        return np.asarray(((self.rate - rate) / self.rate_sigma) ** 2)
+
+    def nees(self, rate: float, states: Array) -> Array:
+        """Return the normalised estimation error squared of the rate and all states.
+
+        Parameters
+        ----------
+        rate : float
+            The true one, rad/s.
+        states : ndarray, shape (runs, b, m)
+            The true ones, at the sample after each block.
+
+        Returns
+        -------
+        ndarray, shape (runs, b)
+            Chi-squared of m + 1 degrees of freedom; see `rate_nees`. Not finite where a state is
+            known exactly.
+        """
+        error = self.states[:, :, :-1].copy()
+        error[:, :, 0] -= rate
+        error[:, :, 1:] -= states
+        found = np.empty(error.shape[:2])
+        for k, root in enumerate(self.roots[:, :-1, :-1]):
+            white = solve_triangular(root, error[:, k].T, lower=True)
+            found[:, k] = np.sum(white**2, axis=0)
+        return found
+
+
+@dataclass(frozen=True)
+class Smoothed:
+    """What is known of each block from all the data.
+
+    Attributes
+    ----------
+    rate : ndarray, shape (runs,)
+        Estimated Earth's rate, rad/s: a constant, which the filter has found at the end.
+    rate_sigma : float
+        Its standard deviation, rad/s.
+    drift : ndarray, shape (runs, b)
+        Mean of the gyro's slow error over each block, its bias included, rad/s.
+    drift_sigma : ndarray, shape (b,)
+        Its standard deviation, rad/s.
+    states : ndarray, shape (runs, b, m + 2)
+        As those of `Filtered`.
+    """
+
+    rate: Array
+    rate_sigma: float
+    drift: Array
+    drift_sigma: Array
+    states: Array
+
+
+class RateFilter:
+    """The filter of one design: blocks and noise model. It filters any number of runs at once.
+
+    Parameters
+    ----------
+    blocks : Blocks
+    model : NoiseModel
+        Its flicker noise is a bank of Gauss-Markov processes; a ramp and lines are estimated, see
+        `states.block_states`.
+    turn_on_bias : float
+        Standard deviation of the fixed bias, rad/s. By default it is not known at all.
+    rate_sigma : float
+        Standard deviation of what is known of the rate at the start, about 0, rad/s; by default
+        so much that it adds nothing.
+
+    Raises
+    ------
+    ValueError
+        If a standard deviation is negative or not finite.
+    """
+
+    def __init__(
+        self,
+        blocks: Blocks,
+        model: NoiseModel,
+        *,
+        turn_on_bias: float = WIDE,
+        rate_sigma: float = WIDE,
+    ) -> None:
+        if not (math.isfinite(rate_sigma) and rate_sigma >= 0):
+            raise ValueError(f"rate_sigma is {rate_sigma}, expected a number from 0")
+        self.blocks = blocks
+        self._states = block_states(model, blocks, turn_on_bias)
+        m = len(self.names)
+        self._matrices = []
+        for step in self._states.steps:
+            transition, noise = np.zeros((m + 2, m + 2)), np.zeros((m + 2, m + 1))
+            transition[0, 0] = 1.0
+            transition[1:, 1 : m + 1], noise[1:] = step.transition, step.factor
+            self._matrices.append((transition, noise))
+        self._start = np.zeros((m + 2, m + 2))
+        self._start[0, 0] = rate_sigma
+        self._start[1 : m + 1, 1 : m + 1] = self._states.initial
+        self._seen = np.zeros((len(blocks), m + 2))
+        self._seen[:, 0], self._seen[:, -1] = blocks.seen, 1.0
+        self._roots = np.empty((len(blocks), m + 2, m + 2))
+        self._gains = np.empty((len(blocks), m + 2))
+        self._innovation_sigma = np.empty(len(blocks))
+        self._cover()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The m states of the gyro's error, see `states.BlockStates`; the rate is before them."""
+        return self._states.names
+
+    @property
+    def rate_sigma(self) -> Array:
+        """Standard deviation of the rate after each block, rad/s, shape (b,); needs no data."""
+        return _deviation(self._roots, 0)
+
+    def run(self, means: Array) -> Filtered:
+        """Filter runs of one design.
+
+        Parameters
+        ----------
+        means : ndarray, shape (runs, b)
+            Block means, rad/s.
+
+        Returns
+        -------
+        Filtered
+
+        Raises
+        ------
+        ValueError
+            If there is not one mean a block, or one is not finite: a block without a mean is no
+            block (`experiment.block_means`).
+        """
+        if means.ndim != 2 or means.shape[1] != len(self.blocks):
+            raise ValueError(
+                f"the means have the shape {means.shape}, expected {len(self.blocks)} columns"
+            )
+        if not np.isfinite(means).all():
+            raise ValueError("a block mean is not finite; leave its block out")
+        states = np.empty((*means.shape, self._seen.shape[1]))
+        innovation = np.empty_like(means)
+        here = np.zeros((len(means), self._seen.shape[1]))
+        for k, which in enumerate(self._states.which):
+            here = here @ self._matrices[which][0].T
+            innovation[:, k] = means[:, k] - here @ self._seen[k]
+            here = here + np.outer(innovation[:, k], self._gains[k])
+            states[:, k] = here
+        return Filtered(
+            self.blocks.end,
+            states[:, :, 0],
+            self.rate_sigma,
+            states[:, :, -1],
+            _deviation(self._roots, -1),
+            innovation,
+            self._innovation_sigma,
+            states,
+            self._roots,
+        )
+
+    def smooth(self, filtered: Filtered) -> Smoothed:
+        """Smooth what `run` has filtered (Rauch, Tung and Striebel), with roots.
+
+        Parameters
+        ----------
+        filtered : Filtered
+
+        Returns
+        -------
+        Smoothed
+        """
+        states = filtered.states.copy()
+        root = self._roots[-1]
+        sigma = np.empty(len(self.blocks))
+        sigma[-1] = _deviation(root, -1)
+        for k in range(len(self.blocks) - 2, -1, -1):
+            transition, _ = self._matrices[self._states.which[k + 1]]
+            gain, rest = self._backward(k)
+            predicted = filtered.states[:, k] @ transition.T
+            states[:, k] += (states[:, k + 1] - predicted) @ gain.T
+            root = _triangle(np.concatenate([rest, gain @ root], axis=1))
+            sigma[k] = _deviation(root, -1)
+        return Smoothed(
+            states[:, -1, 0],
+            float(self.rate_sigma[-1]),
+            states[:, :, -1],
+            sigma,
+            states,
+        )
+
+    def _cover(self) -> None:
+        """Carry the root of the covariance through the blocks."""
+        root = self._start
+        for k, which in enumerate(self._states.which):
+            transition, noise = self._matrices[which]
+            predicted = np.concatenate([transition @ root, noise], axis=1)
+            before = np.zeros((len(predicted) + 1, predicted.shape[1] + 1))
+            before[0, 0] = self._states.white[k]
+            before[0, 1:] = self._seen[k] @ predicted
+            before[1:, 1:] = predicted
+            after = _triangle(before)
+            self._innovation_sigma[k] = abs(after[0, 0])
+            self._gains[k] = after[1:, 0] / after[0, 0]
+            root = after[1:, 1:]
+            self._roots[k] = root
+
+    def _backward(self, k: int) -> tuple[Array, Array]:
+        """Return the gain of the smoother, and a root of what the next block leaves unknown."""
+        transition, noise = self._matrices[self._states.which[k + 1]]
+        root = self._roots[k]
+        n = len(root)
+        joint = np.zeros((2 * n, n + noise.shape[1]))
+        joint[:n, :n], joint[:n, n:], joint[n:, :n] = transition @ root, noise, root
+        after = _triangle(joint)
+        predicted, shared, rest = after[:n, :n], after[n:, :n], after[n:, n:]
+        # The mean of a block is a combination of the states where nothing drives them: no inverse.
+        scale = np.linalg.norm(predicted, axis=1)
+        unit = np.where(scale > 0.0, scale, 1.0)
+        gain = shared @ np.linalg.pinv(predicted / unit[:, None], rcond=_NOTHING) / unit
+        return gain, rest
+
+
+def _triangle(root: Array) -> Array:
+    """Return a lower triangular root of the same covariance."""
+    return np.asarray(np.linalg.qr(root.T, mode="r")).T
+
+
+def _deviation(roots: Array, state: int) -> Array:
+    """Return the standard deviation of a state from roots, shape (..., n, n)."""
+    return np.asarray(np.linalg.norm(roots[..., state, :], axis=-1))

@@ -1,0 +1,349 @@
+"""How well a gyro can find the Earth's rate, before anything is measured.
+
+The bound is that of generalised least squares over the covariance of the block means (Cramér and
+Rao; for Gaussian noise it is reached): with h what the blocks see of the rate, 1 what they see of
+the fixed bias and C their covariance,
+
+    information of the rate = h^T C^-1 h - (h^T C^-1 1)^2 / (1^T C^-1 1 + 1 / bias variance).
+
+It uses nothing of the filter. White noise alone gives N / sqrt(T) / cos(latitude) for T seconds in
+dwells, where the bias is known; all else only adds to it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cholesky, solve_triangular
+
+from imubench_pipeline.earth_rate.covariance import of_means
+from imubench_pipeline.earth_rate.experiment import Blocks, Experiment
+from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE
+from imubench_pipeline.noise import NoiseModel
+
+Array = NDArray[np.float64]
+
+_TOLERANCE = 1e-3
+"""Relative loss of the standard deviation by longer blocks that is nothing."""
+
+_TRIED = 8
+"""Dwells on which a block length is tried."""
+
+_MOST_BLOCKS = 1536
+"""Blocks up to which the length of one is tried."""
+
+_SUMMED = 64
+"""Dwells that are computed; the information of more grows by what the latter half of them add."""
+
+_CURVE = 40
+"""Numbers of dwells on a curve over the dwell, about."""
+
+
+def cramer_rao(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> Array:
+    """Return the least standard deviation of the rate that the data up to each block allow.
+
+    Parameters
+    ----------
+    blocks : Blocks
+    model : NoiseModel
+        With some noise in every sample: N, or a process that has one.
+    turn_on_bias : float
+        Standard deviation of the fixed bias, rad/s; by default it is not known.
+
+    Returns
+    -------
+    ndarray, shape (b,)
+        rad/s; infinite where the rate cannot be told from the bias.
+
+    Raises
+    ------
+    ValueError
+        If the turn-on bias is negative, or NaN.
+    """
+    return _sigma(information(blocks, model, turn_on_bias))
+
+
+def information(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> Array:
+    """Return the Fisher information of the rate in the data up to each block.
+
+    Parameters
+    ----------
+    blocks : Blocks
+    model : NoiseModel
+    turn_on_bias : float
+        rad/s; see `cramer_rao`.
+
+    Returns
+    -------
+    ndarray, shape (b,)
+        (rad/s)^-2.
+
+    Raises
+    ------
+    ValueError
+        If the turn-on bias is negative, or NaN.
+    """
+    if not turn_on_bias >= 0:
+        raise ValueError(f"turn_on_bias is {turn_on_bias}, expected a number from 0, or infinity")
+    root = cholesky(of_means(model, blocks), lower=True)
+    both = np.column_stack([blocks.seen, np.ones(len(blocks))])
+    # Leading blocks have the leading part of the root.
+    white = solve_triangular(root, both, lower=True)
+    rate = np.cumsum(white[:, 0] ** 2)
+    if turn_on_bias == 0:
+        return rate
+    cross = np.cumsum(white[:, 0] * white[:, 1])
+    bias = np.cumsum(white[:, 1] ** 2) + 1.0 / turn_on_bias**2
+    left = rate - cross**2 / bias
+    return np.asarray(np.where(left > 1e-9 * rate, left, 0.0))
+
+
+def block_length(experiment: Experiment, model: NoiseModel) -> int:
+    """Return the longest block whose means tell as much of the rate as the samples.
+
+    Blocks are shortened, by halves, until a fourth of their length would lower the bound by less
+    than 0.1 %; tried on the first dwells.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    model : NoiseModel
+
+    Returns
+    -------
+    int
+        Samples; at most those of the longest dwell.
+    """
+    tried = Experiment(experiment.dwells[:_TRIED], experiment.rate, experiment.latitude)
+    length = max(dwell.stop - dwell.start for dwell in experiment.dwells)
+    if len({dwell.sense for dwell in tried.dwells}) < 2:
+        return length  # nothing can be told of the rate, from samples either
+    sigmas: dict[int, float] = {}
+
+    def sigma(longest: int) -> float:
+        if longest not in sigmas:
+            sigmas[longest] = float(cramer_rao(tried.blocks(longest), model)[-1])
+        return sigmas[longest]
+
+    while length > 4 and len(tried.blocks(length // 4)) <= _MOST_BLOCKS:
+        if sigma(length // 4) > (1.0 - _TOLERANCE) * sigma(length):
+            break
+        length //= 2
+    return length
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """The least standard deviation of the rate as a run grows.
+
+    Attributes
+    ----------
+    turns : ndarray of int, shape (k,)
+        Turns done, from 1.
+    time : ndarray, shape (k,)
+        End of the dwell after the last turn, s.
+    sigma : ndarray, shape (k,)
+        rad/s.
+    """
+
+    turns: NDArray[np.int64]
+    time: Array
+    sigma: Array
+
+
+@dataclass(frozen=True)
+class DwellCurve:
+    """The least standard deviation of the rate for a given run time, over the dwell.
+
+    Attributes
+    ----------
+    dwells : ndarray of int, shape (k,)
+        How many, rising.
+    dwell : ndarray, shape (k,)
+        Data in each, s.
+    sigma : ndarray, shape (k,)
+        rad/s.
+    """
+
+    dwells: NDArray[np.int64]
+    dwell: Array
+    sigma: Array
+
+    @property
+    def best(self) -> int:
+        """Place of the least standard deviation."""
+        return int(np.argmin(self.sigma))
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """A gyro, a place and a way of turning it, of which the bound is wanted.
+
+    Beyond 64 dwells the information of the rate grows by as much a dwell as before: what turns
+    at a steady pace sees the noise at the frequency of the turns and its odd multiples alone.
+
+    Parameters
+    ----------
+    model : NoiseModel
+    latitude : float
+        rad.
+    turning : float
+        Time that a turn takes, s.
+    rate : float
+        Sampling rate, Hz.
+    turn_on_bias : float
+        Standard deviation of the fixed bias, rad/s; by default it is not known.
+    """
+
+    model: NoiseModel
+    latitude: float
+    turning: float
+    rate: float
+    turn_on_bias: float = math.inf
+
+    def against_time(self, dwell: float, turns: int) -> Prediction:
+        """Return the bound after each turn and dwell.
+
+        Parameters
+        ----------
+        dwell : float
+            Data in each dwell, s.
+        turns : int
+            The last one wanted, from 1.
+
+        Returns
+        -------
+        Prediction
+        """
+        found = self._information(dwell, turns + 1)
+        number = np.arange(1, turns + 1)
+        time = (number + 1) * dwell + number * self.turning
+        return Prediction(number, time, _sigma(found[1:]))
+
+    def turns_needed(self, dwell: float, relative: float) -> int:
+        """Return how many turns give the Earth's rate to a relative standard deviation.
+
+        Parameters
+        ----------
+        dwell : float
+            Data in each dwell, s.
+        relative : float
+            Of the Earth's rate: 0.01 is 1 %.
+
+        Returns
+        -------
+        int
+            The run lasts (turns + 1) dwells and as many turns.
+
+        Raises
+        ------
+        ValueError
+            If it is not above 0.
+        """
+        if not relative > 0:
+            raise ValueError(f"relative is {relative}, expected a number above 0")
+        wanted = (relative * EARTH_RATE) ** -2
+        found = self._information(dwell, _SUMMED)
+        reached = np.flatnonzero(found >= wanted)
+        if len(reached):
+            return int(reached[0])
+        return _SUMMED - 1 + math.ceil((wanted - found[-1]) / _growth(found))
+
+    def time_needed(self, dwell: float, relative: float) -> float:
+        """Return how long a run gives the Earth's rate to a relative standard deviation, s.
+
+        Parameters
+        ----------
+        dwell : float
+            Data in each dwell, s.
+        relative : float
+            Of the Earth's rate: 0.01 is 1 %.
+
+        Returns
+        -------
+        float
+        """
+        turns = self.turns_needed(dwell, relative)
+        return (turns + 1) * dwell + turns * self.turning
+
+    def over_dwell(self, run_time: float) -> DwellCurve:
+        """Return the bound of a run of given length over the dwell, from one turn to short dwells.
+
+        Parameters
+        ----------
+        run_time : float
+            Length of the run, s: all of it is dwell or turning.
+
+        Returns
+        -------
+        DwellCurve
+            Down to dwells of a fourth of the turning time, or of one second.
+
+        Raises
+        ------
+        ValueError
+            If there is no time for two dwells and a turn.
+        """
+        if run_time - self.turning < 2.0 / self.rate:
+            raise ValueError(f"{run_time} s do not hold two dwells and a turn")
+        shortest = max(self.turning / 4.0, 1.0, 2.0 / self.rate)
+        most = max(int((run_time + self.turning) / (shortest + self.turning)), 2)
+        number = np.unique(np.rint(np.geomspace(2, most, _CURVE)).astype(np.int64))
+        dwell = (run_time - (number - 1) * self.turning) / number
+        sigma = [
+            float(_sigma(self._information(one, int(n))[-1:])[0])
+            for one, n in zip(dwell, number, strict=True)
+        ]
+        return DwellCurve(number, dwell, np.array(sigma))
+
+    def heading(self, dwell: float, turns: int) -> Array:
+        """Return the least standard deviation of the heading by gyrocompassing after each turn.
+
+        The axis lies across north, and is turned end for end: half the difference of its readings
+        is w_ie cos(latitude) times the (small) heading error. An error s of that half difference
+        is a heading error s / (w_ie cos(latitude)), the same as `error_budget.Gyrocompass` with
+        two positions; with s = sigma cos(latitude), sigma that of the rate.
+
+        Parameters
+        ----------
+        dwell : float
+            Data in each dwell, s.
+        turns : int
+            The last one wanted, from 1.
+
+        Returns
+        -------
+        ndarray, shape (turns,)
+            rad.
+        """
+        of_axis = self.against_time(dwell, turns).sigma * math.cos(self.latitude)
+        return np.asarray(of_axis / (EARTH_RATE * math.cos(self.latitude)))
+
+    def _information(self, dwell: float, dwells: int) -> Array:
+        """Return the information after each of a number of dwells."""
+        design = Experiment.regular(
+            dwell=dwell,
+            turning=self.turning,
+            dwells=min(dwells, _SUMMED),
+            rate=self.rate,
+            latitude=self.latitude,
+        )
+        blocks = design.blocks(block_length(design, self.model))
+        last = np.flatnonzero(np.diff(blocks.dwell, append=-1))
+        found = information(blocks, self.model, self.turn_on_bias)[last]
+        more = np.arange(1, dwells - len(found) + 1)
+        return np.concatenate([found, found[-1] + _growth(found) * more]) if len(more) else found
+
+
+def _growth(found: Array) -> float:
+    """Return what each of the latter half of the dwells adds on average."""
+    half = len(found) // 2
+    return float(found[-1] - found[-1 - half]) / half
+
+
+def _sigma(found: Array) -> Array:
+    with np.errstate(divide="ignore"):
+        return np.asarray(1.0 / np.sqrt(found))
