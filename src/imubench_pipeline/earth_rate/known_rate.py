@@ -1,10 +1,12 @@
 """Bias tracking with known rate: the filter of the paper, for comparison (003 eq. 15, 16).
 
 It cannot find the Earth's rate. Its measurement y = w_ie - w~ is formed with the rate that is
-wanted: what it tracks is the gyro's error, and the reading less the error so tracked is the rate
-that was put in, whatever that was. Given twice the Earth's rate it "finds" twice the Earth's rate,
-as fast and as surely. The 30 to 60 s in which the paper's runs converge are the filter's own time
-constant. What it is good for is the error of a gyro at rest whose attitude is known.
+wanted: what it tracks is the gyro's error, and the reading less the error so tracked is, on
+average, the rate that was put in, whatever that was. Given twice the Earth's rate it "finds" twice
+the Earth's rate, as fast and as surely; the 30 to 60 s after which the paper's runs agree with the
+true value are the filter's own time constant. The sign of the dwell, which alone tells the rate
+from a bias, is not in it, nor is the latitude. What it is good for is the error of a gyro that
+stands still at a known attitude.
 """
 
 from __future__ import annotations
@@ -36,7 +38,7 @@ class Tracked:
     drift : ndarray, shape (n,)
         Tracked error of the gyro, z_f + z_rrw, rad/s.
     corrected : ndarray, shape (n,)
-        What it calls the Earth's rate: (reading - drift) / (sense cos(latitude)), rad/s.
+        What it calls the Earth's rate: reading less drift, rad/s.
     mean : ndarray, shape (n,)
         Cumulative mean of that, as in the paper's figures 10 to 13, rad/s.
     """
@@ -50,9 +52,9 @@ class Tracked:
 def track(log: Array, experiment: Experiment, model: NoiseModel, known_rate: float) -> Tracked:
     """Track the bias of a gyro with the filter of the paper, which is given the Earth's rate.
 
-    F = diag(e^(-T/T_B), 1), H = [1, 1], R_d = N^2/T, Q_d = T diag(S_B, S_K), P_0 = 0.1 I, x_0 = 0,
-    as printed: the first entry of Q_d is an approximation, and the error begins anew after no turn
-    (turning samples are left out as if there were no time between dwells).
+    F = diag(e^(-T/T_B), 1), H = [1, 1], R_d = N^2/T, Q_d = T diag(S_B, S_K), P_0 = 0.1 I, x_0 = 0
+    as printed, also where that is an approximation (the first entry of Q_d). Samples of turning
+    are left out, as if no time lay between dwells.
 
     Parameters
     ----------
@@ -62,7 +64,7 @@ def track(log: Array, experiment: Experiment, model: NoiseModel, known_rate: flo
     model : NoiseModel
         N, B with T_B, and K are used.
     known_rate : float
-        The rate that the filter is given, rad/s. It returns it.
+        The rate that the filter is given, rad/s, and returns.
 
     Returns
     -------
@@ -76,23 +78,17 @@ def track(log: Array, experiment: Experiment, model: NoiseModel, known_rate: flo
     term = next((one for one in model.terms if isinstance(one, GaussMarkov)), None)
     if model.N == 0 or (model.B > 0 and model.T_B is None):
         raise ValueError("the paper's filter needs N, and a Gauss-Markov process for B")
-    parts = [np.arange(dwell.start, dwell.stop) for dwell in experiment.dwells]
-    sample = np.concatenate(parts)
-    sense = np.repeat(
-        [dwell.sense for dwell in experiment.dwells], [len(part) for part in parts]
-    ).astype(np.float64)
-    there = np.isfinite(log[sample])
-    sample, sense = sample[there], sense[there]
-    seen = sense * math.cos(experiment.latitude)
+    sample = np.concatenate([np.arange(dwell.start, dwell.stop) for dwell in experiment.dwells])
+    sample = sample[np.isfinite(log[sample])]
     interval = 1.0 / experiment.rate
     drift = _tracked(
-        log[sample] - seen * known_rate,
+        log[sample] - known_rate,
         math.exp(-interval / term.T_B) if term else 0.0,
         interval * (term.density if term else 0.0),
         interval * model.K**2,
         model.N**2 / interval,
     )
-    corrected = (log[sample] - drift) / seen
+    corrected = log[sample] - drift
     return Tracked(sample, drift, corrected, np.cumsum(corrected) / np.arange(1, len(sample) + 1))
 
 

@@ -158,8 +158,8 @@ def _estimated(
     return Differences(
         dwells.end[last],
         each,
-        np.sqrt(np.diag(covariance)),
+        np.sqrt(np.maximum(np.diag(covariance), 0.0)),  # a ramp leaves nothing of triples
         rate,
-        np.sqrt(total) / number,
+        np.sqrt(np.maximum(total, 0.0)) / number,
         scatter,
     )

@@ -13,7 +13,7 @@ dwells, where the bias is known; all else only adds to it.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,14 +29,20 @@ Array = NDArray[np.float64]
 _TOLERANCE = 1e-3
 """Relative loss of the standard deviation by longer blocks that is nothing."""
 
-_TRIED = 8
+_TRIED = 4
 """Dwells on which a block length is tried."""
 
-_MOST_BLOCKS = 1536
-"""Blocks up to which the length of one is tried."""
+_MOST_BLOCKS = 2048
+"""Blocks whose covariance is still formed."""
 
 _SUMMED = 64
 """Dwells that are computed; the information of more grows by what the latter half of them add."""
+
+_LEAST_SUMMED = 8
+"""Dwells that are computed where they have so many blocks that 64 would be too many."""
+
+_ROUNDING = 1e-9
+"""Relative error of the information that rounding may make."""
 
 _CURVE = 40
 """Numbers of dwells on a curve over the dwell, about."""
@@ -105,7 +111,7 @@ def block_length(experiment: Experiment, model: NoiseModel) -> int:
     """Return the longest block whose means tell as much of the rate as the samples.
 
     Blocks are shortened, by halves, until a fourth of their length would lower the bound by less
-    than 0.1 %; tried on the first dwells.
+    than 0.1 %; tried on the first four dwells, with 2,048 blocks at most.
 
     Parameters
     ----------
@@ -247,10 +253,11 @@ class Outlook:
             raise ValueError(f"relative is {relative}, expected a number above 0")
         wanted = (relative * EARTH_RATE) ** -2
         found = self._information(dwell, _SUMMED)
-        reached = np.flatnonzero(found >= wanted)
+        reached = np.flatnonzero(found >= wanted * (1.0 - _ROUNDING))
         if len(reached):
             return int(reached[0])
-        return _SUMMED - 1 + math.ceil((wanted - found[-1]) / _growth(found))
+        left = (wanted - found[-1]) / _growth(found)
+        return _SUMMED - 1 + math.ceil(left - _ROUNDING * left)
 
     def time_needed(self, dwell: float, relative: float) -> float:
         """Return how long a run gives the Earth's rate to a relative standard deviation, s.
@@ -331,7 +338,10 @@ class Outlook:
             rate=self.rate,
             latitude=self.latitude,
         )
-        blocks = design.blocks(block_length(design, self.model))
+        longest = block_length(design, self.model)
+        each = -(-design.samples_in_dwells // len(design.dwells) // longest)
+        summed = max(_MOST_BLOCKS // each, _LEAST_SUMMED)
+        blocks = replace(design, dwells=design.dwells[:summed]).blocks(longest)
         last = np.flatnonzero(np.diff(blocks.dwell, append=-1))
         found = information(blocks, self.model, self.turn_on_bias)[last]
         more = np.arange(1, dwells - len(found) + 1)
