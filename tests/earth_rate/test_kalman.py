@@ -2,14 +2,17 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from imubench_pipeline.earth_rate.experiment import Dwell, Experiment
+from imubench_pipeline.earth_rate.experiment import Dwell, Experiment, block_means
 from imubench_pipeline.earth_rate.kalman import RateFilter
 from imubench_pipeline.earth_rate.prediction import block_length, cramer_rao
 from imubench_pipeline.earth_rate.simulation import PAPER_MODEL, paper_run, simulate_runs
 from imubench_pipeline.earth_rate.states import WIDE, block_states
 from imubench_pipeline.noise import NoiseModel, WhiteNoise
-from tests.earth_rate.brute import MODELS, of_blocks
+from tests.earth_rate.brute import MODELS, of_blocks, of_samples
+from tests.earth_rate.test_experiment import experiments
 
 UNEVEN = Experiment(
     (
@@ -122,6 +125,38 @@ def test_errors_and_innovations_are_as_large_as_the_filter_says(name):
     smoothed = one.smooth(found)
     error = (smoothed.drift - runs.drift) / smoothed.drift_sigma
     np.testing.assert_allclose(error.std(axis=0), 1.0, atol=0.08)
+
+
+@given(experiments(), st.sampled_from([*MODELS.values()]), st.sampled_from([0.0, 0.1, 1.0]))
+@settings(max_examples=40, deadline=None)
+def test_it_never_claims_more_than_white_noise_allows(experiment, model, bias):
+    blocks = experiment.blocks(9)
+    least = model.N / np.sqrt(np.cumsum(blocks.count) / blocks.rate) / math.cos(blocks.latitude)
+    claimed = RateFilter(blocks, model, turn_on_bias=bias, rate_sigma=1e4).rate_sigma
+    assert np.all(claimed >= least * (1.0 - 1e-6))
+
+
+@pytest.mark.parametrize(
+    ("name", "tolerance"), [("N+GM+K", 0.005), ("N+F+K", 0.01), ("N+GM+GM", 0.03)]
+)
+def test_missing_samples_do_not_make_it_too_sure(name, tolerance):
+    # The weights of the estimate, on means over the samples present, have an exact variance. A
+    # third is missing; the last model has a process of 0.4 s, at four samples a second.
+    model = MODELS[name]
+    rng = np.random.default_rng(9)
+    log = np.zeros(431)
+    log[rng.random(431) < 0.3] = np.nan
+    log[94:110] = np.nan
+    blocks = block_means([log], UNEVEN, 10).blocks
+    one = RateFilter(blocks, model)
+    weights = one.run(np.eye(len(blocks))).rate[:, -1]
+    rows = np.zeros((len(blocks), 431))
+    for row, start, stop in zip(rows, blocks.start, blocks.stop, strict=True):
+        row[start:stop] = np.isfinite(log[start:stop])
+    rows /= rows.sum(axis=1, keepdims=True)
+    by_samples = weights @ rows[:, blocks.start[0] :]
+    exact = by_samples @ of_samples(model, len(by_samples), 4.0, blocks.duration) @ by_samples
+    assert one.rate_sigma[-1] == pytest.approx(math.sqrt(exact), rel=tolerance)
 
 
 def test_states_have_names():

@@ -309,7 +309,9 @@ def block_means(parts: Iterable[Array], experiment: Experiment, longest: int) ->
 
     The mean is over the samples present. White noise in it counts by their number; the slow noise
     in it is taken as that of a complete block, which is why a block of which more than half is
-    missing is left out. The blocks beside it know how long that hole is.
+    missing is left out; the blocks beside it know how long that hole is. With a third of all
+    samples missing, a standard deviation is right to 1 %, and 3 % too small where most of the
+    noise is a process of a correlation time of two samples.
 
     Parameters
     ----------

@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -268,7 +269,7 @@ class RateFilter:
         sigma[-1] = _deviation(root, -1)
         for k in range(len(self.blocks) - 2, -1, -1):
             transition, _ = self._matrices[self._states.which[k + 1]]
-            gain, rest = self._backward(k)
+            gain, rest = self._backward[k]
             predicted = filtered.states[:, k] @ transition.T
             states[:, k] += (states[:, k + 1] - predicted) @ gain.T
             root = _triangle(np.concatenate([rest, gain @ root], axis=1))
@@ -297,8 +298,12 @@ class RateFilter:
             root = after[1:, 1:]
             self._roots[k] = root
 
-    def _backward(self, k: int) -> tuple[Array, Array]:
-        """Return the gain of the smoother, and a root of what the next block leaves unknown."""
+    @cached_property
+    def _backward(self) -> list[tuple[Array, Array]]:
+        """Gain of the smoother at each block, and a root of what the next one leaves unknown."""
+        return [self._smoothing(k) for k in range(len(self.blocks) - 1)]
+
+    def _smoothing(self, k: int) -> tuple[Array, Array]:
         transition, noise = self._matrices[self._states.which[k + 1]]
         root = self._roots[k]
         n = len(root)
