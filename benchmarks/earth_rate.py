@@ -283,7 +283,8 @@ def outlook() -> None:
         least, of_one_turn = (math.degrees(curve.sigma[place]) for place in (best, 0))
         print(
             f"  best dwell in {minutes:g} min: {curve.dwell[best]:.1f} s ({curve.dwells[best]} "
-            f"dwells), sigma {least:.6f} deg/s; with one turn {of_one_turn:.6f}"
+            f"dwells), sigma {least:.6f} deg/s; with one turn {of_one_turn:.6f}; within 1 % of the "
+            f"best from {curve.nearly_best()[0]:.1f} to {curve.nearly_best()[1]:.1f} s"
         )
     heading = one.heading(28.0, 119)
     print(

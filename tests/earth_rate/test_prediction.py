@@ -105,6 +105,10 @@ def test_drift_asks_for_turns_and_turns_cost_time():
     drifting = NoiseModel(N=PAPER_MODEL.N, K=20 * PAPER_MODEL.K)
     curve = Outlook(drifting, LATITUDE, 2.0, 32.0).over_dwell(600.0)
     assert 0 < curve.best < len(curve.dwell) - 1
+    shortest, longest = curve.nearly_best()
+    assert shortest < curve.dwell[curve.best] < longest
+    near = (curve.dwell >= shortest) & (curve.dwell <= longest)
+    np.testing.assert_array_equal(near, curve.sigma <= 1.01 * curve.sigma.min())
     slower = Outlook(drifting, LATITUDE, 10.0, 32.0).over_dwell(600.0)
     assert slower.dwell[slower.best] > curve.dwell[curve.best]
     np.testing.assert_allclose(curve.dwells * curve.dwell + (curve.dwells - 1) * 2.0, 600.0)

@@ -47,6 +47,9 @@ _ROUNDING = 1e-9
 _CURVE = 40
 """Numbers of dwells on a curve over the dwell, about."""
 
+_BETWEEN = 15
+"""Numbers of dwells about the best of these."""
+
 
 def cramer_rao(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> Array:
     """Return the least standard deviation of the rate that the data up to each block allow.
@@ -183,6 +186,25 @@ class DwellCurve:
         """Place of the least standard deviation."""
         return int(np.argmin(self.sigma))
 
+    def nearly_best(self, loss: float = 0.01) -> tuple[float, float]:
+        """Return the dwells between which little is lost: the best is mostly a broad one.
+
+        Parameters
+        ----------
+        loss : float
+            Relative rise of the standard deviation that counts as little.
+
+        Returns
+        -------
+        (float, float)
+            Shortest and longest dwell of the curve about the best one, s.
+        """
+        little = self.sigma <= (1.0 + loss) * self.sigma[self.best]
+        worse = np.flatnonzero(~little)
+        first = int(np.max(worse[worse < self.best], initial=-1)) + 1
+        last = int(np.min(worse[worse > self.best], initial=len(little))) - 1
+        return float(self.dwell[last]), float(self.dwell[first])
+
 
 @dataclass(frozen=True)
 class Outlook:
@@ -299,12 +321,25 @@ class Outlook:
         shortest = max(self.turning / 4.0, 1.0, 2.0 / self.rate)
         most = max(int((run_time + self.turning) / (shortest + self.turning)), 2)
         number = np.unique(np.rint(np.geomspace(2, most, _CURVE)).astype(np.int64))
+        sigma = self._of_run(run_time, number)
+        best = int(np.argmin(sigma))
+        around = number[max(best - 1, 0)], number[min(best + 1, len(number) - 1)]
+        between = np.rint(np.linspace(*around, _BETWEEN)).astype(np.int64)
+        between = np.setdiff1d(between, number)
+        sigma = np.concatenate([sigma, self._of_run(run_time, between)])
+        number = np.concatenate([number, between])
+        order = np.argsort(number)
+        number = number[order]
         dwell = (run_time - (number - 1) * self.turning) / number
-        sigma = [
-            float(_sigma(self._information(one, int(n))[-1:])[0])
-            for one, n in zip(dwell, number, strict=True)
+        return DwellCurve(number, dwell, sigma[order])
+
+    def _of_run(self, run_time: float, dwells: NDArray[np.int64]) -> Array:
+        """Return the bound of a run that is divided into so many dwells, shape (k,)."""
+        last = [
+            self._information((run_time - (n - 1) * self.turning) / n, n)[-1]
+            for n in dwells.tolist()
         ]
-        return DwellCurve(number, dwell, np.array(sigma))
+        return _sigma(np.array(last))
 
     def heading(self, dwell: float, turns: int) -> Array:
         """Return the least standard deviation of the heading by gyrocompassing after each turn.
