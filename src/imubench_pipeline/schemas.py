@@ -39,10 +39,10 @@ def _figure(parameters: str) -> tuple[Column, ...]:
         _text("unit", "SI unit of value, lower and upper; degC for T_0"),
         _text("status", "ok, not_shown, at_bound, not_identified or absent"),
         _text("reason", "why there is no plain value", required=False),
-        _number("fitted", "as in unit", "what the model has where value is null; no estimate"),
     )
 
 
+_FITTED = _number("fitted", "as in unit", "what the model has where value is null; no estimate")
 _SENSOR = _text("sensor", "name of the sensor file")
 _RECORDING = _text("recording", "name of the recording")
 _CHANNEL = _text("channel", "axis and quantity, gyro_x to accel_z")
@@ -101,15 +101,9 @@ TABLES: dict[str, tuple[Column, ...]] = {
         Column("recommended", pa.bool_(), "-", "the method to use for this channel"),
         _text("model", "the terms of the model, such as N+GM+K"),
         _count("component", "number of a repeated term, from 1", required=True),
-        _text("parameter", "Q, N, B, T_B, K, R; amplitude and frequency of a line"),
-        _number("value", "as in unit", "estimate; null where status says why"),
-        _number("lower", "as in unit", "lower 95 % limit"),
-        _number("upper", "as in unit", "upper 95 % limit"),
-        _text("unit", "SI unit of value, lower and upper"),
-        _text("status", "ok, not_shown, at_bound, not_identified or absent"),
-        _text("reason", "why there is no plain value", required=False),
+        *_figure("Q, N, B, T_B, K, R; amplitude and frequency of a line"),
         _number("duration_needed", "s", "length of a log that gives the value to 10 %"),
-        _number("fitted", "as in unit", "what the model has where value is null; no estimate"),
+        _FITTED,
     ),
     "models": (
         *_KEYS,
@@ -175,6 +169,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         *_KEYS,
         Column("compensated", pa.bool_(), "-", "taken out of the noise: method compensated"),
         *_figure("T_0 (mean temperature), sensitivity, quadratic, lag, bias (at T_0)"),
+        _FITTED,
     ),
     "allan_compensated": (
         *_KEYS,
@@ -188,6 +183,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         *_KEYS,
         _count("order", "of the filter: 1, or that of Butterworth; null: none shows"),
         *_figure("cutoff (-3 dB), N (before the filter), floor (white, behind the filter)"),
+        _FITTED,
     ),
     "drift": (
         _SENSOR,
