@@ -41,8 +41,24 @@ _LOWEST, _HIGHEST, _HIGHEST_STEEP = 1 / 500, 4.0, 1.0
 """Cut-offs that are looked for, parts of the rate; a filter of higher order is there to keep noise
 from folding, and beyond the rate its folds are those of a lower one of first order."""
 
-_CORRELATIONS = (1e2, 3e2, 1e3, 1e4, 1e5)
-"""Correlation times of slow noise beside flicker and random walk, sampling intervals."""
+_CORRELATIONS = (1e2, 1e5)
+"""Shortest and longest correlation time of slow noise, sampling intervals."""
+
+_A_DECADE = 6
+"""Correlation times that are tried."""
+
+_NEAR = 1 / 300
+"""Part of the cut-off from which frequencies count: drift, as with temperature, is not as any noise
+is, and far below the bend it says nothing of it."""
+
+_MOST_SLOW = 4
+"""Terms of slow noise."""
+
+_UNFOLDED = 0.3
+"""Part of the rate up to which there is one such cut-off only: little is folded."""
+
+_BETWEEN = 24
+"""Cut-offs tried on each side, beyond that, for others that the log allows as well."""
 
 _HALF_CHI_SQUARED = 1.9207
 """Log likelihood below its maximum at the ends of a 95 % interval."""
@@ -76,6 +92,8 @@ class Cutoff:
         Density of white noise after it, that of rounding and what else shows, SI.
     gained : float
         BIC of the noise without a filter, less that with it.
+    or_quantization : bool
+        Quantization noise would explain the spectrum as well.
     """
 
     frequency: Parameter
@@ -83,6 +101,7 @@ class Cutoff:
     N: Parameter
     floor: float
     gained: float
+    or_quantization: bool = False
 
 
 def folded_low_pass(frequency: ArrayLike, cutoff: float, rate: float, order: int = 1) -> Array:
@@ -154,16 +173,23 @@ def find_cutoff(
         unknown = Parameter(None, "not_shown", f"the spectrum has {used.sum()} bins only")
         return Cutoff(unknown, None, unknown, 0.0, 0.0)
     fits = _Fits(spectrum.taken(used))
-    powers, without = fits.unfiltered()
     tried = fits.tried(orders)
     rounding = resolution**2 / (12.0 * spectrum.rate)
-    if rounding > 0.0 and tried:
-        fits.rounded = rounding / fits.density(*tried[0].filter)[0] ** 2
+    if tried:
+        near = used & (spectrum.frequency > _NEAR * tried[0].cutoff)
+        if near.sum() >= _FEWEST_BINS:
+            used = near
+            fits = _Fits(spectrum.taken(used))
+        if rounding > 0.0:
+            fits.rounded = rounding / fits.density(*tried[0].filter)[0] ** 2
+        fits.choose_slow(*tried[0].filter)
         tried = fits.tried(orders)
+    N_alone, without, rising = fits.unfiltered()
     gained = 2.0 * (without - tried[0].score) if tried else 0.0
-    if gained < _BEYOND_BIC:
+    beside_rounding = 2.0 * (rising - tried[0].score) if tried else 0.0
+    if gained < _BEYOND_BIC or beside_rounding < -_BEYOND_BIC:
         absent = Parameter(None, "absent", "the spectrum shows no low-pass")
-        return Cutoff(absent, None, Parameter(math.sqrt(powers[0])), 0.0, gained)
+        return Cutoff(absent, None, Parameter(N_alone), 0.0, gained)
     best = tried[0]
     # A floor is taken to be there where it shows only: with it a high cut-off is never told.
     alike = [
@@ -178,7 +204,12 @@ def find_cutoff(
     found_N = [N, *(fits.density(end, one.order, one.floor)[0] for end, one in ends)]
     density = Parameter(N, lower=min(found_N) - error, upper=max(found_N) + error)
     reason = ""
-    if upper > _WIDEST * lower or upper >= 0.999 * fits.highest(best.order):
+    if beside_rounding < _BEYOND_BIC:
+        reason = (
+            "the spectrum rises towards Nyquist, by quantization noise as well as by a low-pass "
+            f"with a cut-off from {lower:.4g} to {upper:.4g} Hz"
+        )
+    elif upper > _WIDEST * lower or upper >= 0.999 * fits.highest(best.order):
         reason = f"the log allows cut-offs from {lower:.4g} to {upper:.4g} Hz"
     elif not fits.explains(*best.filter):
         reason = "the spectrum bends, but not as behind a first-order or Butterworth low-pass"
@@ -189,7 +220,14 @@ def find_cutoff(
         )
     else:
         found = Parameter(best.cutoff, lower=lower, upper=upper)
-    return Cutoff(found, best.order, density, math.hypot(after, math.sqrt(rounding)), gained)
+    return Cutoff(
+        found,
+        best.order,
+        density,
+        math.hypot(after, math.sqrt(rounding)),
+        gained,
+        beside_rounding < _BEYOND_BIC,
+    )
 
 
 @dataclass(frozen=True)
@@ -232,17 +270,47 @@ class _Fits:
         within = (np.arange(_POINTS) + 0.5) / _POINTS
         width = (spectrum.upper - spectrum.lower)[:, None]
         self.frequency = spectrum.lower[:, None] + width * within
-        times = np.array(_CORRELATIONS) / spectrum.rate
+        shortest, longest = (end / spectrum.rate for end in _CORRELATIONS)
+        count = 1 + round(_A_DECADE * math.log10(longest / shortest))
+        times = np.geomspace(shortest, longest, count)
         times = times[(times > whittle.shortest) & (times < whittle.longest)]
-        slow = [whittle.column("F"), whittle.column("K")]
-        slow += [whittle.gauss_markov(float(time)) for time in times]
-        self.slow = np.column_stack(slow)
+        columns = [whittle.column("F"), whittle.column("K")]
+        columns += [whittle.gauss_markov(float(time)) for time in times]
+        self.everything_slow = np.column_stack(columns)
+        self.slow = [0, 1, *range(2, len(columns), _A_DECADE)]  # those that are in the fits
         self.penalty = 0.5 * math.log(len(spectrum.frequency))
         self.rounded = 0.0  # density of rounding, parts of N^2
 
-    def unfiltered(self) -> tuple[Array, float]:
-        """Return the squared densities without a filter, that of white noise first, and -log L."""
-        return self._powers(np.column_stack([self.whittle.column("N"), self.slow]))
+    def choose_slow(self, cutoff: float, order: int, floor: bool) -> None:
+        """Keep the terms of slow noise that the spectrum asks for behind a filter, by BIC.
+
+        A term that is not there can only add to a fit: together they would pull the cut-off.
+        """
+        slow: list[int] = []
+        self.slow = slow
+        best = self.cost(cutoff, order, floor)
+        while len(slow) < _MOST_SLOW:
+            wider = [
+                (self._powers(self._columns(cutoff, order, floor, [*slow, k]))[1], k)
+                for k in range(self.everything_slow.shape[1])
+                if k not in slow
+            ]
+            cost, place = min((c + self.penalty * (1 + (k > 1)), k) for c, k in wider)
+            if cost >= best:
+                break
+            best = cost - self.penalty * (1 + (place > 1))
+            slow.append(place)
+
+    def unfiltered(self) -> tuple[float, float, float]:
+        """Return N without a filter, and half the BIC without and with quantization noise.
+
+        The density of the latter rises towards Nyquist as that of what a steep filter lets fold.
+        """
+        columns = np.column_stack([self.whittle.column("N"), self.everything_slow])
+        plain, cost = self._powers(columns)
+        rounded, less = self._powers(np.column_stack([columns, self.whittle.column("Q")]))
+        less += self.penalty
+        return math.sqrt((plain if cost < less else rounded)[0]), cost, less
 
     def cost(self, cutoff: float, order: int, floor: bool) -> float:
         """Return -log L at a cut-off."""
@@ -294,32 +362,45 @@ class _Fits:
         return judged.verdict == "explained"
 
     def limits(self, cutoff: float, order: int, floor: bool) -> tuple[float, float]:
-        """Return the ends of the 95 % interval, by the profile of the likelihood."""
+        """Return the ends of the 95 % interval, by the profile of the likelihood.
+
+        Above Nyquist the profile may have several hollows: the ends are the outermost.
+        """
         most = self.cost(cutoff, order, floor) + _HALF_CHI_SQUARED
 
         def beyond(x: float) -> float:
             return self.cost(math.exp(x), order, floor) - most
 
-        ends = []
-        for sign, end in ((-1.0, self.lowest), (1.0, self.highest(order))):
+        def end_of(sign: float, end: float) -> float:
             inside = math.log(cutoff)
             step, outside = 1e-3, inside
-            while True:
-                outside = inside + sign * step
-                if sign * (outside - math.log(end)) >= 0.0:
-                    ends.append(end)
-                    break
+            while sign * ((outside := inside + sign * step) - end) < 0.0:
                 if beyond(outside) > 0.0:
-                    ends.append(math.exp(brentq(beyond, inside, outside, xtol=1e-6)))
-                    break
+                    return float(brentq(beyond, inside, outside, xtol=1e-6))
                 inside, step = outside, 2.0 * step
+            return end
+
+        ends = []
+        for sign, end in ((-1.0, self.lowest), (1.0, self.highest(order))):
+            found = end_of(sign, math.log(end))
+            first = max(math.log(end), min(found, math.log(_UNFOLDED * self.rate)))
+            further = np.linspace(first, found, _BETWEEN, endpoint=False)
+            allowed = next((k for k, x in enumerate(further) if beyond(float(x)) < 0.0), None)
+            if allowed is not None:
+                inside = float(further[allowed])
+                outside = float(further[allowed - 1]) if allowed else inside
+                found = brentq(beyond, inside, outside, xtol=1e-6) if allowed else inside
+            ends.append(math.exp(found))
         return ends[0], ends[1]
 
-    def _columns(self, cutoff: float, order: int, floor: bool) -> Array:
+    def _columns(
+        self, cutoff: float, order: int, floor: bool, slow: Sequence[int] | None = None
+    ) -> Array:
         white = folded_low_pass(self.frequency, cutoff, self.rate, order).mean(axis=1)
         flicker, walk = self._slow_gains(LowPass(cutoff, order))
-        slow = self.slow * np.column_stack([flicker, *[walk] * (self.slow.shape[1] - 1)])
-        columns = [white + self.rounded, *slow.T]
+        kept = self.slow if slow is None else slow
+        columns = [white + self.rounded]
+        columns += [self.everything_slow[:, k] * (walk if k else flicker) for k in kept]
         return np.column_stack([*columns, np.ones(len(white))] if floor else columns)
 
     def _slow_gains(self, low_pass: LowPass) -> tuple[Array, Array]:

@@ -98,10 +98,10 @@ def estimate_channel(
         )
         found = fit(bandwidth=bandwidth, rng=stream("posterior"))
         low_pass = low_pass_of(log, found)
-        cutoff = low_pass.frequency.value
-        if bandwidth is None and cutoff is not None:
+        shown = low_pass.order is not None and not low_pass.or_quantization
+        if bandwidth is None and shown:
             # A bend of a per cent, which does not end the band, is many times the error of N.
-            bandwidth = cutoff
+            bandwidth = low_pass.frequency.value or low_pass.frequency.lower
             found = fit(bandwidth=bandwidth, rng=stream("posterior"))
         estimates |= {estimate.method: estimate for estimate in found.estimates}
         into.models += _model_rows(key, found)

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.band import Band
 from imubench_pipeline.estimators.estimate import FAMILY, Estimate, Parameter
@@ -22,32 +23,43 @@ from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.whittle import Terms, Whittle
 
+Array = NDArray[np.float64]
+
 _AT_BOUND = 0.985
 _WIDTH_OF_INTERVAL = 3.92
 _ABSENT = "the data do not ask for it"
+_AMPLITUDES = ("Q", "B", "K")
 _ABSENT_BELOW = f"{_ABSENT}; with 95 % it is below the upper limit"
 
 
 def with_upper_limits(
-    estimate: Estimate, wider: Sequence[Candidate], draws: dict[Terms, Posterior]
+    estimate: Estimate,
+    alike: Sequence[Candidate],
+    wider: Sequence[Candidate],
+    draws: dict[Terms, Posterior],
 ) -> Estimate:
     """Return an estimate with upper limits of the K and B that its model does not have.
 
     Parameters
     ----------
     estimate : Estimate
+    alike : sequence of Candidate
+        The models that the log does not rule out.
     wider : sequence of Candidate
-        The model with a random walk, or with flicker noise, beside its terms.
+        The model with a random walk, or with one bias instability, beside its terms.
     draws : dict of Terms to Posterior
+        Of all of them.
     """
     parameters = dict(estimate.parameters)
-    for candidate in wider:
-        terms = candidate.found.terms
-        for name, letter in (("K", "K"), ("B", "F")):
-            if letter in terms.linear and parameters[name].status == "absent":
-                column = draws[terms].parameters[:, terms.linear.index(letter)]
-                upper = float(np.quantile(column, 0.975))
-                parameters[name] = Parameter(None, "absent", _ABSENT_BELOW, 0.0, upper)
+    for name in ("K", "B"):
+        if parameters[name].status != "absent":
+            continue
+        having = [one for one in (*wider, *alike) if _has(name, one.found.terms)]
+        limits = [
+            float(np.quantile(_draws_of(name, one.found.terms, draws), 0.975)) for one in having
+        ]
+        if limits:
+            parameters[name] = Parameter(None, "absent", _ABSENT_BELOW, 0.0, max(limits))
     return replace(estimate, parameters=parameters)
 
 
@@ -158,29 +170,49 @@ def _interval(
     alike: Sequence[Candidate],
     draws: dict[Terms, Posterior],
 ) -> tuple[float, float]:
-    """Return the 95 % interval of a parameter, over the models that have it, by their AIC."""
-    columns, weights = [], []
+    """Return the 95 % interval of a parameter, over the models ``alike``, by their AIC.
+
+    A model without the term says that it is 0: that moves the lower limit. The upper one is that
+    of the models that have it.
+    """
     terms = chosen.found.terms
+    there: list[tuple[Array, float]] = []
+    without = 0.0
     for candidate in alike:
         other = candidate.found.terms
-        if other != terms and not _comparable(name, terms, other):
-            continue
-        posterior = draws[other]
-        everything = np.column_stack([posterior.parameters, posterior.times, posterior.ramps])
-        columns.append(everything[:, parameter_names(other).index(name)])
         weight = math.exp(0.5 * (chosen.aic - candidate.aic))
-        weights.append(np.full(len(everything), weight / len(everything)))
-    values, mass = np.concatenate(columns), np.concatenate(weights)
-    order = np.argsort(values)
+        if other == terms or _comparable(name, terms, other):
+            there.append((_draws_of(name, other, draws), weight))
+        elif name in _AMPLITUDES and not _has(name, other):
+            without += weight
+    lower = _quantile([(np.zeros(1), without), *there], 0.025)
+    return lower, _quantile(there, 0.975)
+
+
+def _quantile(parts: Sequence[tuple[Array, float]], level: float) -> float:
+    """Return a quantile of draws that come from several models, each with its weight."""
+    values = np.concatenate([part for part, _ in parts])
+    mass = np.concatenate([np.full(len(part), weight / len(part)) for part, weight in parts])
+    order = np.argsort(values, kind="stable")
     share = np.cumsum(mass[order])
-    cuts = np.searchsorted(share / share[-1], [0.025, 0.975])
-    lower, upper = values[order][np.minimum(cuts, len(values) - 1)]
-    return float(lower), float(upper)
+    place = np.searchsorted(share / share[-1], level)
+    return float(values[order][min(int(place), len(values) - 1)])
+
+
+def _draws_of(name: str, terms: Terms, draws: dict[Terms, Posterior]) -> Array:
+    """Return the draws of a parameter of a model."""
+    posterior = draws[terms]
+    everything = np.column_stack([posterior.parameters, posterior.times, posterior.ramps])
+    return np.asarray(everything[:, parameter_names(terms).index(name)])
+
+
+def _has(name: str, terms: Terms) -> bool:
+    return name in parameter_names(terms)
 
 
 def _comparable(name: str, terms: Terms, other: Terms) -> bool:
     """Tell whether a parameter means the same in two models."""
-    if name not in parameter_names(other):
+    if not _has(name, other):
         return False
     if not name.startswith(("B", "T_B")):
         return True

@@ -237,7 +237,7 @@ def fit_spectrum(
             number = max(_FEWEST_DRAWS, round(part * DRAWS))
             draws[terms] = sample(whittle, candidate.found, rng, number)
     estimate = describe("likelihood", whittle, chosen, alike, draws, limit)
-    estimate = with_upper_limits(estimate, wider, draws)
+    estimate = with_upper_limits(estimate, alike, wider, draws)
     papers = next(c for c in candidates if c.found.terms == PAPERS)
     gauss_markov = describe("likelihood_gm", whittle, papers, [papers], draws, limit)
     return Likelihood(
@@ -257,12 +257,14 @@ def fit_spectrum(
 
 
 def _with_one_more(terms: Terms) -> list[Terms]:
-    """Return the models that have a random walk, or flicker noise, that a model has not."""
+    """Return the models that have a random walk, or a bias instability, that a model has not."""
     wider = []
+    terms = replace(terms, ramp=False)
     if "K" not in terms.linear:
         wider.append(replace(terms, linear=terms.linear + "K"))
     if "F" not in terms.linear and terms.gauss_markov == 0:
         wider.append(replace(terms, linear=terms.linear.replace("N", "NF")))
+        wider.append(replace(terms, gauss_markov=1))
     return wider
 
 

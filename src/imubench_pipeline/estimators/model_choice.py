@@ -27,7 +27,8 @@ CANDIDATES = (
     Terms("N", 2),
     Terms("NK", 2),
 )
-"""Models that are always tried; then a ramp and quantization noise are added to the best."""
+"""Models that are always tried; then a ramp and quantization noise are added to the best, the
+latter to all of them where it is favoured."""
 
 
 _LIKE_A_WALK = 1 / 10
@@ -95,8 +96,13 @@ def compare(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
     for terms in CANDIDATES:
         add(terms)
     if quantization:
-        best = min(tried.values(), key=bic).terms
-        add(Terms("Q" + best.linear, best.gauss_markov))
+        found = min(tried.values(), key=bic)
+        rounded = Terms("Q" + found.terms.linear, found.terms.gauss_markov)
+        add(rounded)
+        if rounded in tried and bic(tried[rounded]) < bic(found):
+            # Without quantization noise other terms had to stand for it.
+            for terms in CANDIDATES:
+                add(Terms("Q" + terms.linear, terms.gauss_markov))
     # A single walk often looks like a ramp: a ramp is only believed beside a random walk.
     best = min(tried.values(), key=bic).terms
     linear = best.linear if "K" in best.linear else best.linear + "K"
