@@ -9,7 +9,7 @@ Whittle fit of what they leave; in turn until they settle.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -47,6 +47,9 @@ _BEYOND = 6.0
 _WORTH_TRYING = 2.0
 _MOST_LOST = 2.5
 """Growth of the error of s beyond which the beginning holds what the log says of it."""
+
+_MOVED = 0.3
+"""Part of the standard error of a bin that temperature adds to it, from which that matters."""
 
 _FEWEST_BINS = 24
 
@@ -145,12 +148,21 @@ def fit_temperature(
         found = fit.settle(quadratic)
         verdict = replace(fit.judged(found, rng), lag=verdict.lag)
 
-    def whole(effect: Array) -> Iterator[Array]:
-        if not holes:
-            return iter(blocks())
-        return complete(blocks, spans, _model_of(found), path, effect, rate, rng)
+    def spectra_left() -> tuple[Spectrum, list[LineSpectrum]]:
+        effect, log = found.regressors.effect(found.regression), blocks()
+        if holes:
+            log = complete(blocks, spans, _model_of(found), path, effect, rate, rng)
+        return spectra(shifted(log, path, effect, -1.0), samples, rate, spans)
 
-    return _described(fit, found, verdict, plain, path, whole, band, bandwidth, rng)
+    lines = fit.lines
+    if verdict.compensated:
+        left, lines = spectra_left()
+        if fit.take_fast(left):
+            found = fit.settle(quadratic)
+            verdict = replace(fit.judged(found, rng), compensated=True, reason=verdict.reason)
+            left, lines = spectra_left()
+            fit.take_fast(left)
+    return _described(fit, found, verdict, plain, path, lines, band, bandwidth, rng)
 
 
 @dataclass(frozen=True)
@@ -179,7 +191,6 @@ class _Fit:
         longest_lag: float | None,
     ) -> None:
         series = BlockSeries(spans, block_of(spans))
-        self._samples, self._spans = samples, spans
         self.spectrum: Spectrum
         self.lines: list[LineSpectrum]
         self.spectrum, self.lines = spectra(series.watch(blocks), samples, rate, spans)
@@ -198,9 +209,24 @@ class _Fit:
         )
         self.lags = self.regressors.lags(longest_lag)
 
-    def lines_of(self, blocks: Iterable[Array]) -> list[LineSpectrum]:
-        """Return the spectra in which the lines of another log, as long as this one, show."""
-        return spectra(blocks, self._samples, self.spectrum.rate, self._spans)[1]
+    def take_fast(self, left: Spectrum) -> bool:
+        """Take the high frequencies of what temperature leaves; return whether they are others.
+
+        What temperature shares with the log is known at the low frequencies only (`Coefficients`),
+        and a temperature that jumps has high ones too.
+        """
+        fast = self.spectrum.block != self.series.block
+        before, after = self.spectrum.density[fast], left.density[fast]
+        moved = np.abs(after / before - 1.0) * np.sqrt(self.spectrum.ordinates[fast])
+        if not (moved > _MOVED).any():
+            return False
+        density = self.spectrum.density.copy()
+        density[fast] = after
+        self.spectrum = replace(self.spectrum, density=density)
+        self.chosen = self.spectrum.taken(self.used)
+        self.whittle = self.whittle.of(self.chosen)
+        vars(self).pop("of_the_log", None)
+        return True
 
     def settle(self, quadratic: bool | None) -> _Found:
         """Return the joint fit; the square is tried where nothing is said of it.
@@ -317,14 +343,14 @@ def _described(
     verdict: Verdict,
     plain: Likelihood,
     path: TemperaturePath,
-    whole: Callable[[Array], Iterable[Array]],
+    lines: list[LineSpectrum],
     band: float | None,
     bandwidth: float | None,
     rng: np.random.Generator,
 ) -> ThermalFit:
     """Return the fit as it is told, with the noise that temperature leaves.
 
-    ``whole`` gives the log without holes, for what temperature adds to it.
+    ``lines`` are those of what temperature leaves: it stands out of that noise.
     """
     without, effect = plain, np.zeros(len(path.value))
     mean = fit.spectrum.mean
@@ -334,11 +360,9 @@ def _described(
         weights[fit.used] = fit.chosen.ordinates / found.whittle.density(found.candidates[0].found)
         left = regressors.without(fit.spectrum, found.regression, weights)
         effect = regressors.effect(found.regression)
-        # Temperature stands out of the noise that it leaves: its own lines are none of that.
-        lines = fit.lines_of(shifted(whole(effect), path, effect, -1.0))
         without = likelihood.fit_spectrum(left, lines, band=band, bandwidth=bandwidth, rng=rng)
-    at_centres = [path.at(centres, effect) for centres in fit.series.centres]
-    shift = float(np.concatenate(at_centres).mean())
+    added = [path.means(*place, effect) for place in fit.series.places]
+    shift = float(np.concatenate(added).mean())
     candidates = found.candidates if verdict.compensated else fit.of_the_log
     K = without.estimates[0].parameters["K"]
     noises = [

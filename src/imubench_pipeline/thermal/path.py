@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import ndtri
 
+from imubench_pipeline.thermal.jumps import at_jumps
 from imubench_pipeline.thermal.path_kernels import drawn, propagate
 from imubench_pipeline.thermal.register import Readings, Span, readings
 
@@ -101,6 +102,39 @@ class TemperaturePath:
         found = [np.interp(piece, self.sample[part], values[part]) for piece, part in pieces]
         return np.concatenate(found)
 
+    def means(self, first: int, block: int, count: int, values: Array) -> Array:
+        """Return the means over blocks of what is known at the knots, linear between them.
+
+        Parameters
+        ----------
+        first : int
+            First sample of the first block.
+        block : int
+            Samples in a block.
+        count : int
+            n, number of blocks; they follow each other in one segment.
+        values : ndarray, shape (k,)
+            At the knots, in any unit.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+        """
+        part = self.parts[sum(start <= first for start, _ in self.segments) - 1]
+        edges = first - 0.5 + block * np.arange(count + 1)
+        knots, known = self.sample[part], values[part]
+        # Flat beyond the first and the last knot.
+        x = np.concatenate(
+            ([min(edges[0], knots[0]) - 1.0], knots, [max(edges[-1], knots[-1]) + 1])
+        )
+        y = np.concatenate((known[:1], known, known[-1:]))
+        below = np.concatenate(([0.0], np.cumsum(np.diff(x) * 0.5 * (y[1:] + y[:-1]))))
+        at = np.clip(np.searchsorted(x, edges, side="right") - 1, 0, len(x) - 2)
+        inside = edges - x[at]
+        slope = (y[at + 1] - y[at]) / (x[at + 1] - x[at])
+        integral = below[at] + inside * (y[at] + 0.5 * slope * inside)
+        return np.asarray(np.diff(integral) / block)
+
 
 def temperature_path(
     blocks: Iterable[Array], segments: Sequence[Span], rng: np.random.Generator
@@ -129,10 +163,22 @@ def temperature_path(
     level = float(np.nanmedian(read.mean))
     spread = max(float(np.nanmax(read.high) - np.nanmin(read.low)), read.step, 1e-6)
     evidence = _Evidence(read, level, spread)
-    q, noise = evidence.best()
+    q, noise, height = evidence.best()
+    cut = at_jumps(read)
+    if cut is not read:
+        jumping = _Evidence(cut, level, spread)
+        *found, higher = jumping.best()
+        if higher > height:
+            read, evidence, (q, noise) = cut, jumping, found
     value, variance = np.empty(len(read.begin)), np.empty(len(read.begin))
     draws = np.empty((DRAWS, len(read.begin)))
-    for part in read.parts:
+    for part in read.pieces:
+        if evidence.held(part):
+            # Anywhere in the cell, all the time: as errors of a level go, the most that it may be.
+            value[part], variance[part] = read.mean[part] - level, read.step**2 / 12.0
+            off = read.step * (rng.random((DRAWS, 1)) - 0.5)
+            draws[:, part] = value[part] + off
+            continue
         value[part], variance[part], _, precision, shift = evidence.part(part, q, noise)
         normals = rng.standard_normal((DRAWS, part.stop - part.start, 2))
         draws[:, part] = drawn(evidence.steps(part), q, spread, precision, shift, normals)
@@ -178,6 +224,12 @@ class _Evidence:
         # Within a block x moves on.
         self._floor = max(_FLOOR * read.step, 2.0 * spread / len(count))
 
+    def held(self, part: slice) -> bool:
+        """Return whether a piece between jumps stays in one cell of the register."""
+        read = self._read
+        one = bool(self._cell[part].all() and np.ptp(read.mean[part]) < 0.5 * read.step)
+        return one and part not in read.parts
+
     def steps(self, part: slice) -> Array:
         """Return the time from the block before, in blocks; 1 for the first."""
         centre = self._read.centre[part] / self._width
@@ -214,19 +266,24 @@ class _Evidence:
         )
         return path, spread, evidence + float(height), precision, shift
 
-    def best(self) -> tuple[float, float]:
-        """Return q and the noise that make the readings most likely."""
+    def best(self) -> tuple[float, float, float]:
+        """Return q and the noise that make the readings most likely, and log their evidence."""
         read = self._read
         there = read.mean[read.count > 0]
         rough = float(np.median(np.abs(np.diff(there)))) if len(there) > 1 else 0.0
         least = _QUIETEST * self._spread
         noises = {max(part * read.step, least) for part in _NOISES} | {max(rough, least)}
+        moving = [part for part in read.pieces if not self.held(part)]
+        # A level is anywhere in the spread of all of them.
+        held = len(read.pieces) - len(moving)
+        constant = held * math.log(read.step / self._spread) if held else 0.0
 
         def cost(at: Array) -> float:
             q, noise = self._spread**2 * 10.0 ** float(at[0]), 10.0 ** float(at[1])
             if not (-16.0 < at[0] < 6.0 and 0.99 * least < noise < 10.0 * self._spread):
                 return _NEVER
-            return min(-sum(self.part(part, q, noise)[2] for part in read.parts), _NEVER)
+            found = sum(self.part(part, q, noise)[2] for part in moving)
+            return min(-(found + constant), _NEVER)
 
         starts = [np.array([k, math.log10(noise)]) for k in _SCAN for noise in sorted(noises)]
         first = min(starts, key=cost)
@@ -242,4 +299,5 @@ class _Evidence:
                 "fatol": 0.05,
             },
         )
-        return self._spread**2 * 10.0 ** float(found.x[0]), 10.0 ** float(found.x[1])
+        best = float(found.x[0]), float(found.x[1])
+        return self._spread**2 * 10.0 ** best[0], 10.0 ** best[1], -float(found.fun)

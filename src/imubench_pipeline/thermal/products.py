@@ -68,6 +68,15 @@ class BlockSeries:
         return [np.asarray(sums / self.block) for sums in self._sums if len(sums) >= 2]
 
     @property
+    def places(self) -> list[tuple[int, int, int]]:
+        """First sample, samples in a block, and number of blocks of those parts."""
+        return [
+            (start, self.block, len(sums))
+            for sums, (start, _) in zip(self._sums, self.segments, strict=True)
+            if len(sums) >= 2
+        ]
+
+    @property
     def centres(self) -> list[Array]:
         """Middle of each block of those parts, samples."""
         return [
@@ -106,7 +115,7 @@ class Coefficients:
 
     def __init__(self, spectrum: Spectrum, series: BlockSeries) -> None:
         self._interval = series.block / spectrum.rate
-        self.centres = series.centres
+        self.places, self.centres = series.places, series.centres
         low = spectrum.block == series.block
         self._bins, self._low = len(low), np.flatnonzero(low)
         counts = np.rint(spectrum.ordinates[low]).astype(np.int64)
@@ -141,7 +150,7 @@ class Coefficients:
         ndarray, shape (n,)
             In the unit of the values.
         """
-        return self._of([path.at(centres, values) for centres in self.centres])
+        return self._of([path.means(*place, values) for place in self.places])
 
     def of_time(self, rate: float) -> Array:
         """Return the coefficients of a ramp of 1 a second.

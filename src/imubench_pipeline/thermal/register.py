@@ -27,6 +27,14 @@ _LEVELS = 1 << 16
 _FEWEST_REPEATS = 8.0
 """Readings a level: rarer repeats may be by chance."""
 
+_MOST_PARTS = 256
+"""Steps in the smallest gap, at most, where few levels were read."""
+
+_EXACT = 0.02
+"""Part of a step by which those may miss its multiples."""
+
+_BY_CHANCE = 0.05
+
 _ROUNDED = 0.2
 """Part of a step by which readings in decimals may miss its multiples."""
 
@@ -47,6 +55,8 @@ class Readings:
         Least significant bit of the register, °C; 0: none shows.
     parts : tuple of slice
         Blocks of each segment.
+    pieces : tuple of slice
+        Blocks between which the temperature jumps: the parts, where it does not.
     """
 
     begin: NDArray[np.int64]
@@ -57,6 +67,7 @@ class Readings:
     high: Array
     step: float
     parts: tuple[slice, ...]
+    pieces: tuple[slice, ...]
 
     @property
     def centre(self) -> Array:
@@ -107,6 +118,7 @@ def readings(blocks: Iterable[Array], segments: Sequence[Span]) -> Readings:
         raise ValueError("no temperature is present")
     stops = np.cumsum([len(part) for part in begins])
     empty = count == 0
+    parts = tuple(slice(int(b - len(p)), int(b)) for p, b in zip(begins, stops, strict=True))
     return Readings(
         begin,
         end,
@@ -115,7 +127,8 @@ def readings(blocks: Iterable[Array], segments: Sequence[Span]) -> Readings:
         np.where(empty, np.nan, low),
         np.where(empty, np.nan, high),
         step_of(levels, present),
-        tuple(slice(int(b - len(p)), int(b)) for p, b in zip(begins, stops, strict=True)),
+        parts,
+        parts,
     )
 
 
@@ -150,4 +163,14 @@ def step_of(levels: Array, present: int) -> float:
     missed = np.abs((levels - first) / step - multiples)
     if math.isfinite(step) and float(np.quantile(missed, 0.99)) <= _ROUNDED:
         return step
-    return 0.0
+    return _common_divisor(gaps)
+
+
+def _common_divisor(gaps: Array) -> float:
+    """Return the greatest step of which a few gaps are multiples; 0 where chance would find one."""
+    parts = float(gaps.min()) / np.arange(1, _MOST_PARTS + 1)
+    ratio = gaps[None, :] / parts[:, None]
+    missed = np.abs(ratio - np.rint(ratio)).max(axis=1)
+    if _MOST_PARTS * (2.0 * _EXACT) ** (len(gaps) - 1) > _BY_CHANCE:
+        return 0.0
+    return float(parts[np.argmax(missed < _EXACT)]) if missed.min() < _EXACT else 0.0
