@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pyarrow as pa
+import scipy.fft
 from numpy.typing import NDArray
 from scipy.stats import binomtest
 
@@ -310,8 +311,12 @@ def true_figures(made: Case, found: Found) -> dict[str, float | None]:
     }
 
 
-def bound_of(made: Case) -> float:
-    """Return the Cramér-Rao bound of the sensitivity, SI per K."""
+def bound_of(made: Case) -> tuple[float, float]:
+    """Return the Cramér-Rao bound of the sensitivity, SI per K, and that with a register's levels.
+
+    The first knows the true temperature. Between steps a register says of each level only that it
+    lies within half a bit: the second has an unknown of that variance for each.
+    """
     model = made.model
     assert model.drift is not None  # every case has one
     places = np.geomspace(math.pi / made.samples, math.pi, 400)
@@ -319,7 +324,22 @@ def bound_of(made: Case) -> float:
     density = model.sampled_spectrum(places, made.rate)
     omega = np.pi * np.arange(1, made.samples) / made.samples
     spectrum = np.exp(np.interp(np.log(omega), np.log(places), np.log(density)))
-    return bounds(spectrum, made.truth(), made.rate, model.drift.lag, 0.0)[0]
+    truth, lag, s = made.truth(), model.drift.lag, model.drift.sensitivity
+    bound = bounds(spectrum, truth, made.rate, lag, 0.0)[0]
+    if not isinstance(made.temperature, Steps) or s == 0.0:
+        return bound, bound
+    columns = [behind(truth, made.rate, lag)]
+    if lag > 0.0:
+        columns.append((behind(truth, made.rate, 1.02 * lag) - columns[0]) / (0.02 * lag))
+    known = len(columns)
+    columns += [
+        behind((truth == level).astype(float), made.rate, lag) for level in np.unique(truth)
+    ]
+    kept = np.array([scipy.fft.dct(c - c.mean(), norm="ortho")[1:] for c in columns])
+    information = (kept / spectrum) @ kept.T
+    levels = np.arange(known, len(columns))
+    information[levels, levels] += 12.0 / (s * made.step) ** 2
+    return bound, math.sqrt(np.linalg.inv(information)[0, 0])
 
 
 def decades(one: Array, other: Array) -> float:
@@ -343,6 +363,7 @@ def of_model(number: int) -> list[dict[str, object]]:
     truths, parameters = true_figures(made, found), found.parameters(made.model.noise)
     drift, low_pass = made.model.drift, made.model.low_pass
     assert drift is not None and low_pass is not None  # every case has them
+    bound, with_levels = bound_of(made)
     about: dict[str, object] = {
         "number": number,
         "channel": made.channel,
@@ -359,7 +380,8 @@ def of_model(number: int) -> list[dict[str, object]]:
         "resolution": made.model.resolution,
         "true_sensitivity": drift.sensitivity,
         "true_lag": drift.lag,
-        "sensitivity_bound": bound_of(made),
+        "sensitivity_bound": bound,
+        "sensitivity_bound_levels": with_levels,
         "adev_model": decades(variance, true_variance),
         "adev_again": decades(curve_again.variance, measured.variance),
         "adev_twin": decades(curve_twin.variance, measured.variance),
@@ -427,6 +449,9 @@ def summary(rows: pd.DataFrame) -> Iterator[Line]:
     for step, part in ratio.groupby(s.step.round(4)):
         rms = math.sqrt((part**2).mean())
         yield f"  register of {step:g} K", "", f"{rms:.3f} of {len(part)}"
+    of_levels = ratio * s.sensitivity_bound / s.sensitivity_bound_levels
+    rms = math.sqrt((of_levels**2).mean())
+    yield "  over that of a register's levels", "", f"{rms:.3f}"
     given = models[models.true_sensitivity != 0.0]
     nothing = models[models.true_sensitivity == 0.0]
     yield "temperature taken out, s > 0", "", f"{int(given.compensated.sum())} of {len(given)}"
