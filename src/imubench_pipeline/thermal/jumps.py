@@ -27,7 +27,7 @@ _BEYOND = 8.0
 _AROUND = 16
 """Blocks on each side that are around."""
 
-_FEWEST = 4
+_FEWEST = 5
 """Blocks on each side that a level between jumps has at least."""
 
 _MOST = 64
@@ -96,6 +96,9 @@ def _of_part(read: Readings, part: slice) -> list[tuple[int, int]]:
             continue  # a block beside the jump, or too near to the end
         if jumps and i - jumps[-1][0] < _FEWEST:
             continue  # on the edge of two blocks
+        level = np.median(mean[i + 2 : i + _FEWEST]) - np.median(mean[i - _FEWEST + 1 : i - 1])
+        if not abs(level) > least[i]:
+            continue  # a reading that stands out, or a gap
         before, here, after = mean[i - 1], mean[i], mean[i + 1]
         share = min(max((after - here) / (after - before), 0.0), 1.0)
         first, last = int(read.begin[part][i]), int(read.end[part][i])

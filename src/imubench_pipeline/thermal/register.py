@@ -30,10 +30,8 @@ _FEWEST_REPEATS = 8.0
 _MOST_PARTS = 256
 """Steps in the smallest gap, at most, where few levels were read."""
 
-_EXACT = 0.02
-"""Part of a step by which those may miss its multiples."""
-
-_BY_CHANCE = 0.05
+_BY_CHANCE = 1e-3
+"""Chance above which levels that are multiples of a step say nothing of it."""
 
 _ROUNDED = 0.2
 """Part of a step by which readings in decimals may miss its multiples."""
@@ -160,17 +158,32 @@ def step_of(levels: Array, present: int) -> float:
         multiples = np.rint((levels - first) / step)
         if multiples[-1] > multiples[0]:
             step, first = (float(value) for value in np.polyfit(multiples, levels, 1))
+    if not math.isfinite(step):
+        return 0.0
     missed = np.abs((levels - first) / step - multiples)
-    if math.isfinite(step) and float(np.quantile(missed, 0.99)) <= _ROUNDED:
+    if float(np.quantile(missed, 0.99)) <= _ROUNDED and _chance(gaps, step) < _BY_CHANCE:
         return step
     return _common_divisor(gaps)
 
 
+def _chance(gaps: Array, step: float) -> float:
+    """Return how likely gaps beside the smallest would be as near to multiples by chance."""
+    others = np.delete(gaps, int(gaps.argmin())) / step
+    if not len(others):
+        return 0.0
+    missed = float(np.quantile(np.abs(others - np.rint(others)), 0.99))
+    return min(2.0 * missed, 1.0) ** len(others)
+
+
 def _common_divisor(gaps: Array) -> float:
     """Return the greatest step of which a few gaps are multiples; 0 where chance would find one."""
-    parts = float(gaps.min()) / np.arange(1, _MOST_PARTS + 1)
-    ratio = gaps[None, :] / parts[:, None]
-    missed = np.abs(ratio - np.rint(ratio)).max(axis=1)
-    if _MOST_PARTS * (2.0 * _EXACT) ** (len(gaps) - 1) > _BY_CHANCE:
-        return 0.0
-    return float(parts[np.argmax(missed < _EXACT)]) if missed.min() < _EXACT else 0.0
+    smallest = float(gaps.min())
+    steps = smallest / np.arange(2, _MOST_PARTS + 1)
+    return next(
+        (
+            float(step)
+            for step in steps
+            if len(gaps) > 1 and smallest / step * _chance(gaps, float(step)) < _BY_CHANCE
+        ),
+        0.0,
+    )
