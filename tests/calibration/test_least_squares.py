@@ -8,10 +8,10 @@ from scipy.stats import chi2
 
 from imubench_pipeline.calibration.least_squares import (
     LeastSquares,
-    NotObservableError,
     block_length,
     half_width,
 )
+from imubench_pipeline.calibration.observability import NotObservableError
 from imubench_pipeline.earth_rate.experiment import Dwell, Experiment
 from imubench_pipeline.earth_rate.simulation import simulate_runs
 from imubench_pipeline.noise import NoiseModel

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from imubench_pipeline.calibration.least_squares import NotObservableError
+from imubench_pipeline.calibration.observability import NotObservableError
 from imubench_pipeline.calibration.pointing import Pointing
 from imubench_pipeline.calibration.rate_table import RateTable, calibrate
 from imubench_pipeline.calibration.schedule import Schedule

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 from scipy.stats import chi2, norm
 
+from imubench_pipeline.calibration.observability import NotObservableError
 from imubench_pipeline.earth_rate.covariance import of_means
 from imubench_pipeline.earth_rate.experiment import Blocks, Experiment
 from imubench_pipeline.noise import NoiseModel
@@ -33,10 +34,6 @@ _MOST_BLOCKS = 1024
 
 _RANK = 1e-8
 """Least singular value of whitened regressors of unit length that is not rounding."""
-
-
-class NotObservableError(ValueError):
-    """What is asked for cannot be told from the data, however little noise there is."""
 
 
 @dataclass(frozen=True)

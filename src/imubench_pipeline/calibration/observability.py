@@ -27,3 +27,7 @@ class NotObservable:
     quantity: Quantity
     reason: str
     half_width: float | None = None
+
+
+class NotObservableError(ValueError):
+    """What is asked for cannot be told from the data, however little noise there is."""

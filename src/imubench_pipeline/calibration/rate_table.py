@@ -24,11 +24,10 @@ from scipy.stats import chi2
 from imubench_pipeline.calibration.least_squares import (
     Fit,
     LeastSquares,
-    NotObservableError,
     block_length,
     half_width,
 )
-from imubench_pipeline.calibration.observability import NotObservable
+from imubench_pipeline.calibration.observability import NotObservable, NotObservableError
 from imubench_pipeline.calibration.pointing import Pointing
 from imubench_pipeline.calibration.schedule import Schedule
 from imubench_pipeline.earth_rate.experiment import Blocks, Measured, block_means
