@@ -243,16 +243,11 @@ class RateFilter:
         Smoothed
         """
         states = filtered.states.copy()
-        root = self._filter.roots[-1]
-        sigma = np.empty(len(self.blocks))
-        sigma[-1] = deviation(root, -1)
+        gains, sigma = self._backward
         for k in range(len(self.blocks) - 2, -1, -1):
             transition, _ = self._filter.matrices(k + 1)
-            gain, rest = self._backward[k]
             predicted = filtered.states[:, k] @ transition.T
-            states[:, k] += (states[:, k + 1] - predicted) @ gain.T
-            root = triangle(np.concatenate([rest, gain @ root], axis=1))
-            sigma[k] = deviation(root, -1)
+            states[:, k] += (states[:, k + 1] - predicted) @ gains[k].T
         return Smoothed(
             states[:, -1, 0],
             float(self.rate_sigma[-1]),
@@ -262,11 +257,20 @@ class RateFilter:
         )
 
     @cached_property
-    def _backward(self) -> list[tuple[Array, Array]]:
-        """Gain of the smoother at each block, and a root of what the next one leaves unknown."""
-        return [self._smoothing(k) for k in range(len(self.blocks) - 1)]
+    def _backward(self) -> tuple[Array, Array]:
+        """Gains of the smoother at each block but the last, and deviations of the drift at each."""
+        root = self._filter.roots[-1]
+        gains = np.empty((len(self.blocks) - 1, *root.shape))
+        sigma = np.empty(len(self.blocks))
+        sigma[-1] = deviation(root, -1)
+        for k in range(len(gains) - 1, -1, -1):
+            gains[k], rest = self._smoothing(k)
+            root = triangle(np.concatenate([rest, gains[k] @ root], axis=1))
+            sigma[k] = deviation(root, -1)
+        return gains, sigma
 
     def _smoothing(self, k: int) -> tuple[Array, Array]:
+        """Return the gain at a block, and a root of what the next one leaves unknown."""
         transition, noise = self._filter.matrices(k + 1)
         root = self._filter.roots[k]
         n = len(root)
