@@ -66,7 +66,9 @@ def coarse_alignment(force: Array, rate: Array, site: Site) -> Array:
 def mean_vectors(means: Array, positions: Positions) -> tuple[Array, Array]:
     """Return mean specific force and rate in the body frame of the first position.
 
-    Every position counts alike, however long it is: where they are opposite, biases go.
+    Every position counts alike, however long it is: where they are opposite, biases go. What turns
+    do not reverse stays, such as the bias of the gyro about whose axis they are: where that is
+    large and the axis is not vertical, only fine alignment finds the heading.
 
     Parameters
     ----------

@@ -97,7 +97,7 @@ def information(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.in
         If the turn-on bias is negative, or NaN.
     """
     # Leading blocks have the leading part of the root.
-    root = cholesky(of_means(model, blocks), lower=True)
+    root = cholesky(of_means(model, blocks), lower=True, overwrite_a=True)
     return _of_rate(solve_triangular(root, _seen(blocks), lower=True), turn_on_bias)
 
 
