@@ -65,6 +65,27 @@ def test_intervals_of_both_biases_hold(heading):
             assert 0.93 < inside < 0.97
 
 
+def test_an_interval_without_heading_counts_the_elevation():
+    # The worst heading of all, an elevation that is off: little noise beside it.
+    rng = np.random.default_rng(6)
+    blocks, tilt = RUN.blocks(60), 0.3
+    run = StillRun(
+        blocks,
+        NoiseModel(N=1e-6),
+        Pointing(latitude=-0.9, heading=None, elevation=0.4, elevation_sigma=tilt),
+    )
+    rates = [
+        Pointing(latitude=-0.9, heading=heading, elevation=0.4 + tilt * one).rate
+        for one in rng.standard_normal(2000).tolist()
+        for heading in (0.0, math.pi)
+    ]
+    means = 0.02 + np.array(rates)[:, None] + np.zeros(len(blocks))
+    lower, upper = run.fit(means).fixed_interval()
+    inside = ((lower < 0.02) & (0.02 < upper)).reshape(-1, 2).mean(axis=0)
+    assert np.all(inside > 0.95)
+    assert (upper - lower)[0] < 2.0 * 3.0 * EARTH_RATE
+
+
 def test_a_log_of_the_simulator_gives_its_bias():
     model = SensorModel(noise=PAPER_MODEL, bias=math.radians(0.3))
     pointing = Pointing(latitude=-0.4, heading=0.5)

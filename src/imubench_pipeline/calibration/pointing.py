@@ -74,6 +74,16 @@ class Pointing:
         """Half of the range of the rate over all headings, rad/s: w_ie cos(L) |cos(e)|."""
         return EARTH_RATE * math.cos(self.latitude) * abs(math.cos(self.elevation))
 
+    @property
+    def tilt_sigma(self) -> float:
+        """What the spread of the elevation does to the rate at the worst heading, rad/s.
+
+        To the first order: w_ie (cos(L) |sin(e)| + |sin(L) cos(e)|) times it.
+        """
+        most = abs(math.cos(self.latitude) * math.sin(self.elevation))
+        most += abs(math.sin(self.latitude) * math.cos(self.elevation))
+        return EARTH_RATE * most * self.elevation_sigma
+
     def _moments(self) -> tuple[float, float]:
         level, up = EARTH_RATE * math.cos(self.latitude), EARTH_RATE * math.sin(self.latitude)
         if self.heading is None:

@@ -50,7 +50,10 @@ class StillBias:
     rate_sigma : float
         Standard deviation of that, which both biases have beside their noise, rad/s.
     bound : float or None
-        Where the heading is not known: how far the true rate is from that at most, rad/s.
+        Where the heading is not known: how far the true rate is from that at most at the stated
+        elevation, rad/s.
+    tilt_sigma : float
+        What the spread of the elevation adds to that, at the heading where it is most, rad/s.
     p_value : ndarray, shape (runs,)
         Chance of a scatter of the block means at least as large, where the noise model is right;
         NaN for one block.
@@ -64,6 +67,7 @@ class StillBias:
     rate: float
     rate_sigma: float
     bound: float | None
+    tilt_sigma: float
     p_value: Array
     not_observable: tuple[NotObservable, ...]
 
@@ -110,7 +114,7 @@ class StillBias:
         if self.bound is None:
             half = half_width(level) * math.hypot(noise, self.rate_sigma)
         else:
-            half = half_width(level) * noise + self.bound
+            half = half_width(level) * math.hypot(noise, self.tilt_sigma) + self.bound
         return value - half, value + half
 
 
@@ -165,6 +169,7 @@ class StillRun:
             pointing.rate,
             pointing.rate_sigma,
             pointing.half_width if open_heading else None,
+            pointing.tilt_sigma,
             found.p_value if found.freedom else np.full(len(means), np.nan),
             not_observable(pointing),
         )
