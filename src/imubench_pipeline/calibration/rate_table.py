@@ -226,8 +226,8 @@ class RateTable:
             self._open.append(
                 NotObservable(
                     "asymmetry",
-                    "it takes rates of both senses, and three sizes, 0 among them or not: "
-                    "otherwise it is a bias or a scale factor",
+                    "it takes three rates, and both senses among them: otherwise it is a bias or a "
+                    "scale factor",
                 )
             )
 
