@@ -38,6 +38,7 @@ class SigmaRange:
     pooled : ndarray, shape (...)
         Root of their mean square: the standard deviation of an error whose noise model is one of
         these, no one knows which (law of total variance; the estimates are unbiased with each).
+        Weights that come of another model than the true one add to it, to the second order.
     """
 
     value: Array
