@@ -34,7 +34,6 @@ from imubench_pipeline.earth_rate.simulation import (
     PAPER_MODEL,
     PAPER_PERIOD,
     PAPER_RATE,
-    Runs,
     paper_run,
     simulate_log,
     simulate_runs,
@@ -58,6 +57,11 @@ BIAS = math.radians(0.05)
 """Turn-on bias of the simulated runs, rad/s; the filter is told its standard deviation."""
 
 CHUNK = 250
+"""Runs that are drawn at once."""
+
+PART = 1 << 23
+"""Numbers in the states of the runs that are filtered at once."""
+
 MOST_BLOCKS = 4096
 PUBLISHED = {
     "1": 0.004396,
@@ -71,12 +75,38 @@ PUBLISHED = {
 
 @dataclass
 class Tally:
-    """What the runs of a model have shown."""
+    """What the runs of a model have shown; errors as root mean squares, of the drift centred."""
 
     runs: int
     inside: dict[str, Array]
     mean: dict[str, Array]
-    errors: dict[str, list[Array]]
+    errors: dict[str, Array]
+
+
+@dataclass
+class Moments:
+    """Sums of errors over runs, so that no run has to be kept."""
+
+    number: int = 0
+    total: Array | float = 0.0
+    squares: Array | float = 0.0
+
+    def add(self, errors: Array) -> None:
+        """Count runs, shape (runs, epochs)."""
+        self.number += len(errors)
+        self.total = self.total + errors.sum(axis=0)
+        self.squares = self.squares + (errors**2).sum(axis=0)
+
+    @property
+    def root_mean_square(self) -> Array:
+        """Shape (epochs,)."""
+        return np.sqrt(np.asarray(self.squares) / self.number)
+
+    @property
+    def deviation(self) -> Array:
+        """Standard deviation, shape (epochs,)."""
+        mean = np.asarray(self.total) / self.number
+        return np.sqrt(np.asarray(self.squares) / self.number - mean**2)
 
 
 def tallied(model: NoiseModel, one: RateFilter, runs: int, seed: int, after: slice) -> Tally:
@@ -84,37 +114,44 @@ def tallied(model: NoiseModel, one: RateFilter, runs: int, seed: int, after: sli
     blocks = one.blocks
     freedoms = {"NEES": len(one.names) + 1, "NEES of the rate": 1, "NIS": 1}
     epochs = len(blocks.start[after])
+    at_once = max(PART // (len(blocks) * (len(one.names) + 2)), 1)
     inside = {name: np.zeros(epochs) for name in freedoms}
     mean = {name: np.zeros(epochs) for name in freedoms}
-    errors: dict[str, list[Array]] = {"filter": [], "pairs": [], "A-B-A": [], "drift": []}
+    errors = {name: Moments() for name in ("filter", "pairs", "A-B-A", "drift")}
     for rng in np.random.default_rng(seed).spawn(-(-runs // CHUNK)):
         drawn = simulate_runs(
             model, blocks, earth_rate=EARTH_RATE, turn_on_bias=BIAS, runs=CHUNK, rng=rng
         )
-        found = one.run(drawn.means)
-        for name, squares in of_chunk(found, drawn).items():
-            lower, upper = (float(chi2.ppf(level, freedoms[name])) for level in (0.025, 0.975))
-            there = squares[:, after]
-            inside[name] += ((there > lower) & (there < upper)).sum(axis=0)
-            mean[name] += there.sum(axis=0) / freedoms[name]
-        errors["filter"].append(found.rate - EARTH_RATE)
-        errors["pairs"].append(by_pairs(drawn.means, blocks, model).rate - EARTH_RATE)
-        errors["A-B-A"].append(by_triples(drawn.means, blocks, model).rate - EARTH_RATE)
-        smoothed = one.smooth(found)
-        errors["drift"].append((smoothed.drift - drawn.drift) / smoothed.drift_sigma)
+        for first in range(0, CHUNK, at_once):
+            part = slice(first, first + at_once)
+            means = drawn.means[part]
+            found = one.run(means)
+            for name, squares in of_part(found, drawn.states[part]).items():
+                lower, upper = (float(chi2.ppf(level, freedoms[name])) for level in (0.025, 0.975))
+                there = squares[:, after]
+                inside[name] += ((there > lower) & (there < upper)).sum(axis=0)
+                mean[name] += there.sum(axis=0) / freedoms[name]
+            errors["filter"].add(found.rate - EARTH_RATE)
+            errors["pairs"].add(by_pairs(means, blocks, model).rate - EARTH_RATE)
+            errors["A-B-A"].add(by_triples(means, blocks, model).rate - EARTH_RATE)
+            smoothed = one.smooth(found)
+            errors["drift"].add((smoothed.drift - drawn.drift[part]) / smoothed.drift_sigma)
     total = CHUNK * -(-runs // CHUNK)
     return Tally(
         total,
         {name: count / total for name, count in inside.items()},
         {name: count / total for name, count in mean.items()},
-        errors,
+        {
+            name: one.deviation if name == "drift" else one.root_mean_square
+            for name, one in errors.items()
+        },
     )
 
 
-def of_chunk(found: Filtered, drawn: Runs) -> dict[str, Array]:
+def of_part(found: Filtered, states: Array) -> dict[str, Array]:
     """Return the squares that are compared with their bounds, each of shape (runs, b)."""
     return {
-        "NEES": found.nees(EARTH_RATE, drawn.states),
+        "NEES": found.nees(EARTH_RATE, states),
         "NEES of the rate": found.rate_nees(EARTH_RATE),
         "NIS": found.nis,
     }
@@ -147,8 +184,7 @@ def of_model(name: str, model: NoiseModel, given: argparse.Namespace) -> Iterato
     deviations = {"filter": one.rate_sigma, "pairs": pairs.sigma, "A-B-A": triples.sigma}
     places = {"filter": after, "pairs": slice(0, None), "A-B-A": slice(0, None)}
     for what, sigma in deviations.items():
-        error = np.concatenate(tally.errors[what])
-        ratio = np.sqrt(np.mean(error**2, axis=0)) / sigma
+        ratio = tally.errors[what] / sigma
         inside = ratio[places[what]]
         yield asked(
             f"error over its sigma: {what}",
@@ -156,7 +192,7 @@ def of_model(name: str, model: NoiseModel, given: argparse.Namespace) -> Iterato
             f"{ratio[-1]:.4f} at the end, {inside.min():.3f} to {inside.max():.3f} on the way",
             abs(ratio[-1] - 1.0) < 0.05,
         )
-    drift = np.concatenate(tally.errors["drift"]).std(axis=0)
+    drift = tally.errors["drift"]
     yield asked(
         "error over its sigma: smoothed drift",
         "0.95 to 1.05",

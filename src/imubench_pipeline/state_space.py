@@ -54,3 +54,29 @@ class StateSpace:
         """Return a model of white noise alone."""
         none = np.zeros((0, 0))
         return cls(none, none, np.zeros(0), measurement_noise, np.zeros(0), none)
+
+
+def repeated(transition: Array, noise: Array, times: int) -> tuple[Array, Array]:
+    """Return what a step does when it is done several times, by powers of two.
+
+    Parameters
+    ----------
+    transition : ndarray, shape (m, m)
+    noise : ndarray, shape (m, m)
+        Covariance that a step adds.
+    times : int
+        From 0.
+
+    Returns
+    -------
+    (ndarray, ndarray), shapes (m, m)
+        Phi^times, and the sum of Phi^i noise (Phi^i)^T over i from 0 to times - 1.
+    """
+    whole, added = np.eye(len(transition)), np.zeros_like(noise)
+    while times:
+        if times & 1:
+            whole, added = transition @ whole, transition @ added @ transition.T + noise
+        noise = transition @ noise @ transition.T + noise
+        transition = transition @ transition
+        times >>= 1
+    return whole, added

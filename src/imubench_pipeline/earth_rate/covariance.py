@@ -108,7 +108,8 @@ def of_term(term: Term, blocks: Blocks) -> Array:
             means = first + (n - 1.0) / 2.0
             found = np.minimum.outer(means, means)
             np.fill_diagonal(found, first + (n - 1.0) * (2.0 * n - 1.0) / (6.0 * n))
-            return np.asarray(K**2 * interval * found)
+            found *= K**2 * interval
+            return np.asarray(found)
         case Ramp(R):
             return np.asarray(R**2 * np.outer(blocks.middle, blocks.middle))
         case Sinusoid(amplitude, frequency):
@@ -125,8 +126,13 @@ def _of_gauss_markov(term: GaussMarkov, blocks: Blocks, n: Array) -> Array:
     lost = -math.expm1(-x)
     decayed = -np.expm1(-n * x)
     gain = decayed / (n * lost)
-    lag = np.subtract.outer(blocks.start, blocks.stop - 1)  # rows: the later block
-    earlier = np.tril(np.exp(-x * np.maximum(lag, 0)), -1) * np.outer(gain, gain)
+    variance = 0.5 * term.density * term.T_B
+    found = np.empty((len(n), len(n)))
+    for later in range(len(n)):  # row by row: there may be thousands, and one matrix is enough
+        lag = blocks.start[later] - blocks.stop[:later] + 1
+        found[later, :later] = variance * gain[later] * gain[:later] * np.exp(-x * lag)
+        found[:later, later] = found[later, :later]
     p = math.exp(-x)
     own = (n * (1.0 + p) / lost - 2.0 * p * decayed / lost**2) / n**2
-    return np.asarray(0.5 * term.density * term.T_B * (earlier + earlier.T + np.diag(own)))
+    np.fill_diagonal(found, variance * own)
+    return found

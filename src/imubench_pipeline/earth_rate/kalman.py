@@ -5,11 +5,8 @@ w is a state beside the gyro's own error, seen with the sign of the dwell:
 
     x = [w, z_G ..., z_K],    mean of a block = s cos(latitude) w + mean of (z_G + ... + z_K) + v.
 
-The mean of the states over the block is a state of its own, so that what the states gain during
-the block and what the mean sees of it are correlated as they are (`states`). Covariances do not
-depend on the data: they are computed once for a design, as triangular roots that are turned by QR
-(P. G. Park and T. Kailath 1995). A root keeps its digits from a start of 1 rad/s, which stands for
-no knowledge at all, down to 1e-10 rad/s, where a covariance would have lost them.
+The filter is that of `block_filter`, with one constant and one axis. Its roots keep their digits
+from a start of 1 rad/s, which stands for no knowledge at all, down to 1e-10 rad/s.
 
 References
 ----------
@@ -30,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
+from imubench_pipeline.earth_rate.block_filter import BlockFilter, deviation, triangle
 from imubench_pipeline.earth_rate.experiment import Blocks
 from imubench_pipeline.earth_rate.states import WIDE, block_states
 from imubench_pipeline.noise import NoiseModel
@@ -181,22 +179,9 @@ class RateFilter:
             raise ValueError(f"rate_sigma is {rate_sigma}, expected a number from 0")
         self.blocks = blocks
         self._states = block_states(model, blocks, turn_on_bias)
-        m = len(self.names)
-        self._matrices = []
-        for step in self._states.steps:
-            transition, noise = np.zeros((m + 2, m + 2)), np.zeros((m + 2, m + 1))
-            transition[0, 0] = 1.0
-            transition[1:, 1 : m + 1], noise[1:] = step.transition, step.factor
-            self._matrices.append((transition, noise))
-        self._start = np.zeros((m + 2, m + 2))
-        self._start[0, 0] = rate_sigma
-        self._start[1 : m + 1, 1 : m + 1] = self._states.initial
-        self._seen = np.zeros((len(blocks), m + 2))
-        self._seen[:, 0], self._seen[:, -1] = blocks.seen, 1.0
-        self._roots = np.empty((len(blocks), m + 2, m + 2))
-        self._gains = np.empty((len(blocks), m + 2))
-        self._innovation_sigma = np.empty(len(blocks))
-        self._cover()
+        self._filter = BlockFilter(
+            (self._states,), blocks.seen[:, None, None], np.array([[rate_sigma]])
+        )
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -206,7 +191,7 @@ class RateFilter:
     @property
     def rate_sigma(self) -> Array:
         """Standard deviation of the rate after each block, rad/s, shape (b,); needs no data."""
-        return _deviation(self._roots, 0)
+        return deviation(self._filter.roots, 0)
 
     def run(self, means: Array) -> Filtered:
         """Filter runs of one design.
@@ -232,24 +217,18 @@ class RateFilter:
             )
         if not np.isfinite(means).all():
             raise ValueError("a block mean is not finite; leave its block out")
-        states = np.empty((*means.shape, self._seen.shape[1]))
-        innovation = np.empty_like(means)
-        here = np.zeros((len(means), self._seen.shape[1]))
-        for k, which in enumerate(self._states.which):
-            here = here @ self._matrices[which][0].T
-            innovation[:, k] = means[:, k] - here @ self._seen[k]
-            here = here + np.outer(innovation[:, k], self._gains[k])
-            states[:, k] = here
+        states, innovation = self._filter.run(means[:, :, None])
+        roots = self._filter.roots
         return Filtered(
             self.blocks.end,
             states[:, :, 0],
             self.rate_sigma,
             states[:, :, -1],
-            _deviation(self._roots, -1),
-            innovation,
-            self._innovation_sigma,
+            deviation(roots, -1),
+            innovation[:, :, 0],
+            np.abs(self._filter.innovation_roots[:, 0, 0]),
             states,
-            self._roots,
+            roots,
         )
 
     def smooth(self, filtered: Filtered) -> Smoothed:
@@ -264,16 +243,11 @@ class RateFilter:
         Smoothed
         """
         states = filtered.states.copy()
-        root = self._roots[-1]
-        sigma = np.empty(len(self.blocks))
-        sigma[-1] = _deviation(root, -1)
+        gains, sigma = self._backward
         for k in range(len(self.blocks) - 2, -1, -1):
-            transition, _ = self._matrices[self._states.which[k + 1]]
-            gain, rest = self._backward[k]
+            transition, _ = self._filter.matrices(k + 1)
             predicted = filtered.states[:, k] @ transition.T
-            states[:, k] += (states[:, k + 1] - predicted) @ gain.T
-            root = _triangle(np.concatenate([rest, gain @ root], axis=1))
-            sigma[k] = _deviation(root, -1)
+            states[:, k] += (states[:, k + 1] - predicted) @ gains[k].T
         return Smoothed(
             states[:, -1, 0],
             float(self.rate_sigma[-1]),
@@ -282,47 +256,30 @@ class RateFilter:
             states,
         )
 
-    def _cover(self) -> None:
-        """Carry the root of the covariance through the blocks."""
-        root = self._start
-        for k, which in enumerate(self._states.which):
-            transition, noise = self._matrices[which]
-            predicted = np.concatenate([transition @ root, noise], axis=1)
-            before = np.zeros((len(predicted) + 1, predicted.shape[1] + 1))
-            before[0, 0] = self._states.white[k]
-            before[0, 1:] = self._seen[k] @ predicted
-            before[1:, 1:] = predicted
-            after = _triangle(before)
-            self._innovation_sigma[k] = abs(after[0, 0])
-            self._gains[k] = after[1:, 0] / after[0, 0]
-            root = after[1:, 1:]
-            self._roots[k] = root
-
     @cached_property
-    def _backward(self) -> list[tuple[Array, Array]]:
-        """Gain of the smoother at each block, and a root of what the next one leaves unknown."""
-        return [self._smoothing(k) for k in range(len(self.blocks) - 1)]
+    def _backward(self) -> tuple[Array, Array]:
+        """Gains of the smoother at each block but the last, and deviations of the drift at each."""
+        root = self._filter.roots[-1]
+        gains = np.empty((len(self.blocks) - 1, *root.shape))
+        sigma = np.empty(len(self.blocks))
+        sigma[-1] = deviation(root, -1)
+        for k in range(len(gains) - 1, -1, -1):
+            gains[k], rest = self._smoothing(k)
+            root = triangle(np.concatenate([rest, gains[k] @ root], axis=1))
+            sigma[k] = deviation(root, -1)
+        return gains, sigma
 
     def _smoothing(self, k: int) -> tuple[Array, Array]:
-        transition, noise = self._matrices[self._states.which[k + 1]]
-        root = self._roots[k]
+        """Return the gain at a block, and a root of what the next one leaves unknown."""
+        transition, noise = self._filter.matrices(k + 1)
+        root = self._filter.roots[k]
         n = len(root)
         joint = np.zeros((2 * n, n + noise.shape[1]))
         joint[:n, :n], joint[:n, n:], joint[n:, :n] = transition @ root, noise, root
-        after = _triangle(joint)
+        after = triangle(joint)
         predicted, shared, rest = after[:n, :n], after[n:, :n], after[n:, n:]
         # The mean of a block is a combination of the states where nothing drives them: no inverse.
         scale = np.linalg.norm(predicted, axis=1)
         unit = np.where(scale > 0.0, scale, 1.0)
         gain = shared @ np.linalg.pinv(predicted / unit[:, None], rcond=_NOTHING) / unit
         return gain, rest
-
-
-def _triangle(root: Array) -> Array:
-    """Return a lower triangular root of the same covariance."""
-    return np.asarray(np.linalg.qr(root.T, mode="r")).T
-
-
-def _deviation(roots: Array, state: int) -> Array:
-    """Return the standard deviation of a state from roots, shape (..., n, n)."""
-    return np.asarray(np.linalg.norm(roots[..., state, :], axis=-1))

@@ -21,6 +21,7 @@ from scipy.linalg import cholesky, solve_triangular
 
 from imubench_pipeline.earth_rate.covariance import of_means
 from imubench_pipeline.earth_rate.experiment import Blocks, Experiment
+from imubench_pipeline.earth_rate.whitening import whitened
 from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE
 from imubench_pipeline.noise import NoiseModel
 
@@ -95,12 +96,24 @@ def information(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.in
     ValueError
         If the turn-on bias is negative, or NaN.
     """
+    # Leading blocks have the leading part of the root.
+    root = cholesky(of_means(model, blocks), lower=True, overwrite_a=True)
+    return _of_rate(solve_triangular(root, _seen(blocks), lower=True), turn_on_bias)
+
+
+def _by_states(blocks: Blocks, model: NoiseModel, turn_on_bias: float) -> Array:
+    """Return what `information` does, of many blocks faster."""
+    return _of_rate(whitened(model, blocks, _seen(blocks)), turn_on_bias)
+
+
+def _seen(blocks: Blocks) -> Array:
+    """Return what the means see of the rate, and of a fixed bias."""
+    return np.column_stack([blocks.seen, np.ones(len(blocks))])
+
+
+def _of_rate(white: Array, turn_on_bias: float) -> Array:
     if not turn_on_bias >= 0:
         raise ValueError(f"turn_on_bias is {turn_on_bias}, expected a number from 0, or infinity")
-    root = cholesky(of_means(model, blocks), lower=True)
-    both = np.column_stack([blocks.seen, np.ones(len(blocks))])
-    # Leading blocks have the leading part of the root.
-    white = solve_triangular(root, both, lower=True)
     rate = np.cumsum(white[:, 0] ** 2)
     if turn_on_bias == 0:
         return rate
@@ -134,7 +147,7 @@ def block_length(experiment: Experiment, model: NoiseModel) -> int:
 
     def sigma(longest: int) -> float:
         if longest not in sigmas:
-            sigmas[longest] = float(cramer_rao(tried.blocks(longest), model)[-1])
+            sigmas[longest] = float(_sigma(_by_states(tried.blocks(longest), model, math.inf))[-1])
         return sigmas[longest]
 
     while length > 4 and len(tried.blocks(length // 4)) <= _MOST_BLOCKS:
@@ -378,7 +391,7 @@ class Outlook:
         summed = max(_MOST_BLOCKS // each, _LEAST_SUMMED)
         blocks = replace(design, dwells=design.dwells[:summed]).blocks(longest)
         last = np.flatnonzero(np.diff(blocks.dwell, append=-1))
-        found = information(blocks, self.model, self.turn_on_bias)[last]
+        found = _by_states(blocks, self.model, self.turn_on_bias)[last]
         more = np.arange(1, dwells - len(found) + 1)
         return np.concatenate([found, found[-1] + _growth(found) * more]) if len(more) else found
 

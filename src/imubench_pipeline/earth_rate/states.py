@@ -26,7 +26,7 @@ from imubench_pipeline.noise import (
     Sinusoid,
     Term,
 )
-from imubench_pipeline.state_space import StateSpace
+from imubench_pipeline.state_space import StateSpace, repeated
 
 Array = NDArray[np.float64]
 
@@ -172,21 +172,8 @@ def _step(space: StateSpace, gap: int, size: int) -> Step:
     else:
         found = of_block_means(space, size)
         transition[:], noise[:] = found.transition[:, :m], found.process_noise
-    over, added = _over(space, gap)
+    over, added = repeated(space.transition, space.process_noise, gap)
     return Step(transition @ over, _root(noise + transition @ added @ transition.T))
-
-
-def _over(space: StateSpace, samples: int) -> tuple[Array, Array]:
-    """Return transition and noise over a number of samples, by powers of two."""
-    m = len(space.output)
-    transition, noise = np.eye(m), np.zeros((m, m))
-    power, of_power = space.transition, space.process_noise
-    while samples:
-        if samples & 1:
-            transition, noise = power @ transition, power @ noise @ power.T + of_power
-        power, of_power = power @ power, power @ of_power @ power.T + of_power
-        samples >>= 1
-    return transition, noise
 
 
 def _root(covariance: Array) -> Array:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.state_space import StateSpace
+from imubench_pipeline.state_space import StateSpace, repeated
 
 Array = NDArray[np.float64]
 
@@ -41,10 +41,7 @@ def of_block_means(space: StateSpace, size: int) -> StateSpace:
     step[m, m] = 1.0
     noise = np.zeros((m + 1, m + 1))
     noise[:m, :m] = space.process_noise
-    transition, process_noise = np.eye(m + 1), np.zeros((m + 1, m + 1))
-    for _ in range(size):
-        transition = step @ transition
-        process_noise = step @ process_noise @ step.T + noise
+    transition, process_noise = repeated(step, noise, size)
     transition[:, m] = 0.0  # each sum begins anew
     mean, variance = np.zeros(m + 1), np.zeros((m + 1, m + 1))
     mean[:m], variance[:m, :m] = space.initial_mean, space.initial_variance

@@ -1,0 +1,1 @@
+"""Bias and scale factor of a gyro from rates that are known: at rest, and on a rate table."""

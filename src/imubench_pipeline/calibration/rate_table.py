@@ -1,0 +1,337 @@
+"""Scale factor and bias of a gyro from steady rates of a rate table, and whether a line fits.
+
+    mean of a block = bias + S (table rate + Earth's rate along the axis) + noise
+
+by generalised least squares over all steady rates (`least_squares`): the gyro's drift from one rate
+to the next counts as what the noise model says it is. A line is what IEEE Std 952-1997 fits in its
+scale-factor tests; what it may hide is asked for: a quadratic term, an asymmetry between the two
+senses of rotation, and any departure at all of the rates from the line.
+
+The axis is along that of the table. Then the Earth's rate along it is constant and, not known, it
+is a bias; across it, it averages out over whole turns. An angle a between the two axes lowers the
+scale factor by the factor cos(a), and is not told from it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from imubench_pipeline.calibration.least_squares import (
+    Fit,
+    LeastSquares,
+    block_length,
+    half_width,
+)
+from imubench_pipeline.calibration.observability import NotObservable, NotObservableError
+from imubench_pipeline.calibration.pointing import Pointing
+from imubench_pipeline.calibration.schedule import Schedule
+from imubench_pipeline.earth_rate.experiment import Blocks, Measured, block_means
+from imubench_pipeline.noise import NoiseModel
+
+Array = NDArray[np.float64]
+
+_LEVEL = 1e-12
+"""rad/s of the Earth's rate that may be open."""
+
+_SAME = 1e-9
+"""Relative difference of two rates that is rounding."""
+
+
+@dataclass(frozen=True)
+class Term:
+    """A further term of the line, in runs of one design.
+
+    Attributes
+    ----------
+    value : ndarray, shape (runs,)
+        Of the quadratic term, s/rad; of the asymmetry, a ratio.
+    sigma : float
+        Its standard error by the noise model.
+    """
+
+    value: Array
+    sigma: float
+
+    @property
+    def p_value(self) -> Array:
+        """Chance of a value at least as far from 0 where the line is right, shape (runs,)."""
+        return np.asarray(chi2.sf((self.value / self.sigma) ** 2, 1))
+
+    def interval(self, level: float = 0.95) -> tuple[Array, Array]:
+        """Return confidence limits.
+
+        Parameters
+        ----------
+        level : float
+
+        Returns
+        -------
+        (ndarray, ndarray), shapes (runs,)
+        """
+        half = half_width(level) * self.sigma
+        return self.value - half, self.value + half
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Bias and scale factor in runs of one design.
+
+    Attributes
+    ----------
+    line : Fit
+        Bias, rad/s, at the first sample of the first block, and scale factor.
+    bias_sigma : float
+        Standard error of the bias, with that of the Earth's rate along the axis, rad/s.
+    quadratic : Term or None
+        Coefficient of the square of the rate beside the line, s/rad.
+    asymmetry : Term or None
+        Scale factor of positive less that of negative rates, beside a bias that both share.
+    linearity : ndarray, shape (runs,), or None
+        Chance of a departure of the levels from the line at least as large, where it is right.
+    not_observable : tuple of NotObservable
+        Why there is no value of what is None, and what is a part of what.
+    """
+
+    line: Fit
+    bias_sigma: float
+    quadratic: Term | None
+    asymmetry: Term | None
+    linearity: Array | None
+    not_observable: tuple[NotObservable, ...]
+
+    @property
+    def bias(self) -> Array:
+        """Bias, rad/s, shape (runs,)."""
+        return self.line.value[:, 0]
+
+    @property
+    def scale_factor(self) -> Array:
+        """Indicated over true rate, shape (runs,): 1 and the scale factor's error."""
+        return self.line.value[:, 1]
+
+    @property
+    def scale_factor_sigma(self) -> float:
+        """Its standard error."""
+        return float(self.line.sigma[1])
+
+    def bias_interval(self, level: float = 0.95) -> tuple[Array, Array]:
+        """Return confidence limits of the bias, rad/s.
+
+        Parameters
+        ----------
+        level : float
+
+        Returns
+        -------
+        (ndarray, ndarray), shapes (runs,)
+        """
+        half = half_width(level) * self.bias_sigma
+        return self.bias - half, self.bias + half
+
+    def scale_factor_interval(self, level: float = 0.95) -> tuple[Array, Array]:
+        """Return confidence limits of the scale factor.
+
+        Parameters
+        ----------
+        level : float
+
+        Returns
+        -------
+        (ndarray, ndarray), shapes (runs,)
+        """
+        lower, upper = self.line.interval(level)
+        return lower[:, 1], upper[:, 1]
+
+
+class RateTable:
+    """A recording on a rate table: its blocks, the gyro's noise, and the rates that are known.
+
+    Parameters
+    ----------
+    schedule : Schedule
+    blocks : Blocks
+        Of the schedule's `experiment`.
+    model : NoiseModel
+        Of the gyro, with some noise in every sample.
+    pointing : Pointing, optional
+        Direction of the table's axis, along which the gyro's is; without one the Earth's rate is
+        a part of the bias. Its heading may be left open where the axis is vertical.
+    setting_sigma : float
+        Standard deviation of the table's true rate about the stated one, of each stretch by
+        itself, rad/s.
+
+    Raises
+    ------
+    NotObservableError
+        If there is one rate only: the scale factor cannot be told from the bias.
+    ValueError
+        If the deviation is negative, or the heading is left open where it counts.
+    """
+
+    def __init__(
+        self,
+        schedule: Schedule,
+        blocks: Blocks,
+        model: NoiseModel,
+        pointing: Pointing | None = None,
+        *,
+        setting_sigma: float = 0.0,
+    ) -> None:
+        if not (math.isfinite(setting_sigma) and setting_sigma >= 0):
+            raise ValueError(f"setting_sigma is {setting_sigma}, expected a number from 0")
+        if pointing is not None and pointing.heading is None and pointing.half_width > _LEVEL:
+            raise ValueError(
+                "the heading of the table's axis is not known: give it, or leave the direction out "
+                "and the Earth's rate is a part of the bias"
+            )
+        earth = 0.0 if pointing is None else pointing.rate
+        self._earth_sigma = 0.0 if pointing is None else pointing.rate_sigma
+        rate = schedule.of_blocks(blocks) + earth
+        self._levels = _levels(rate)
+        number = int(self._levels.max()) + 1
+        if number < 2:
+            raise NotObservableError(
+                f"the table has one rate only, {rate[0]:g} rad/s: a scale factor cannot be told "
+                "from a bias; another rate is needed, best of the other sense"
+            )
+        further = setting_sigma**2 * np.equal.outer(blocks.dwell, blocks.dwell)
+        ones = np.ones(len(blocks))
+
+        def squares(*columns: Array) -> LeastSquares:
+            return LeastSquares(blocks, model, np.column_stack(columns), further=further)
+
+        self._line = squares(ones, rate)
+        self._open: list[NotObservable] = []
+        if pointing is None:
+            self._open.append(
+                NotObservable("bias", "the Earth's rate along the axis is a part of the bias")
+            )
+        self._quadratic = self._asymmetry = self._each = None
+        if number > 2:
+            self._quadratic = squares(ones, rate, rate**2)
+            self._each = squares(*np.eye(number)[self._levels].T)
+        else:
+            for name in ("quadratic", "linearity"):
+                self._open.append(
+                    NotObservable(name, "two rates lie on a line whatever the gyro does")
+                )
+        try:
+            self._asymmetry = squares(ones, rate, np.abs(rate) / 2.0)
+        except NotObservableError:
+            self._open.append(
+                NotObservable(
+                    "asymmetry",
+                    "it takes three rates, and both senses among them: otherwise it is a bias or a "
+                    "scale factor",
+                )
+            )
+
+    @property
+    def sigma(self) -> tuple[float, float]:
+        """Standard errors of bias, rad/s, and scale factor; they need no data."""
+        bias, scale = self._line.sigma
+        return math.hypot(bias, self._earth_sigma), float(scale)
+
+    def fit(self, means: Array) -> Calibration:
+        """Estimate bias and scale factor in runs of this design.
+
+        Parameters
+        ----------
+        means : ndarray, shape (runs, b)
+            Block means, rad/s.
+
+        Returns
+        -------
+        Calibration
+
+        Raises
+        ------
+        ValueError
+            If there is not one finite mean a block.
+        """
+        line = self._line.fit(means)
+        linearity = None
+        if self._each is not None:
+            each = self._each.fit(means)
+            more = np.maximum(line.chi_squared - each.chi_squared, 0.0)
+            linearity = np.asarray(chi2.sf(more, line.freedom - each.freedom))
+        return Calibration(
+            line,
+            self.sigma[0],
+            _term(self._quadratic, means),
+            _term(self._asymmetry, means),
+            linearity,
+            tuple(self._open),
+        )
+
+
+def calibrate(
+    log: Array,
+    schedule: Schedule,
+    model: NoiseModel,
+    pointing: Pointing | None = None,
+    *,
+    setting_sigma: float = 0.0,
+) -> tuple[Calibration, Measured]:
+    """Return bias and scale factor of a gyro from a log on a rate table.
+
+    Parameters
+    ----------
+    log : ndarray, shape (n,)
+        rad/s; NaN where a sample is missing.
+    schedule : Schedule
+    model : NoiseModel
+        Of the gyro.
+    pointing : Pointing, optional
+        Direction of the table's axis.
+    setting_sigma : float
+        Of the table's rate, see `RateTable`, rad/s.
+
+    Returns
+    -------
+    Calibration
+        Of one run.
+    Measured
+        The block means, and what was left out.
+
+    Raises
+    ------
+    NotObservableError
+        If there is one rate only.
+    ValueError
+        If the log ends before the schedule does, or too few samples are present.
+    """
+    run = schedule.experiment
+    _ = RateTable(schedule, run.blocks(_of_stretch(schedule)), model, pointing)
+    longest = block_length(
+        run,
+        model,
+        lambda blocks: np.column_stack([np.ones(len(blocks)), schedule.of_blocks(blocks)]),
+    )
+    measured = block_means([log], run, longest)
+    table = RateTable(schedule, measured.blocks, model, pointing, setting_sigma=setting_sigma)
+    return table.fit(measured.means), measured
+
+
+def _of_stretch(schedule: Schedule) -> int:
+    return max(stretch.stop - stretch.start for stretch in schedule.stretches)
+
+
+def _levels(rate: Array) -> NDArray[np.int64]:
+    """Return the number of each rate among the different ones, which rounding does not split."""
+    order = np.argsort(rate, kind="stable")
+    risen = np.diff(rate[order], prepend=rate[order[0]]) > _SAME * np.abs(rate).max()
+    levels = np.empty(len(rate), dtype=np.int64)
+    levels[order] = np.cumsum(risen)
+    return levels
+
+
+def _term(squares: LeastSquares | None, means: Array) -> Term | None:
+    if squares is None:
+        return None
+    return Term(squares.fit(means).value[:, -1], float(squares.sigma[-1]))

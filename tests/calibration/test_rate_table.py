@@ -1,0 +1,154 @@
+import math
+
+import numpy as np
+import pytest
+
+from imubench_pipeline.calibration.observability import NotObservableError
+from imubench_pipeline.calibration.pointing import Pointing
+from imubench_pipeline.calibration.rate_table import RateTable, calibrate
+from imubench_pipeline.calibration.schedule import Schedule
+from imubench_pipeline.earth_rate.simulation import simulate_runs
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.sensor_model.model import SensorModel
+from imubench_pipeline.sensor_model.simulation import simulate
+
+RATES = (0.0, 0.5, -0.5, 1.0, -1.0, 0.0, 0.25)
+STEPS = [(30.0 * i + 5.0, 30.0 * i + 30.0, rate) for i, rate in enumerate(RATES)]
+SCHEDULE = Schedule.from_steps(STEPS, 8.0)
+UP = Pointing(latitude=-0.4, heading=None, elevation=math.pi / 2)
+MODELS = {
+    "N": NoiseModel(N=1e-3),
+    "N+GM+K": NoiseModel(N=1e-3, B=5e-4, T_B=40.0, K=5e-5),
+    "N+F+K": NoiseModel(N=1e-3, B=5e-4, K=5e-5),
+}
+
+
+def runs_of(model, blocks, runs, seed=1, setting=0.0):
+    rng = np.random.default_rng(seed)
+    drawn = simulate_runs(model, blocks, earth_rate=0.0, turn_on_bias=0.0, runs=runs, rng=rng)
+    wrong = setting * rng.standard_normal((runs, len(SCHEDULE.stretches)))
+    return drawn.means + wrong[:, blocks.dwell]
+
+
+@pytest.mark.parametrize("setting", [0.0, 2e-4])
+@pytest.mark.parametrize("name", MODELS)
+def test_intervals_cover_what_they_say(name, setting):
+    model, blocks = MODELS[name], SCHEDULE.experiment.blocks(25)
+    table = RateTable(SCHEDULE, blocks, model, UP, setting_sigma=setting)
+    true = SCHEDULE.of_blocks(blocks) + UP.rate
+    means = runs_of(model, blocks, 4000, setting=setting) + 0.03 + 0.99 * true
+    found = table.fit(means)
+    for at, (lower, upper), sigma in (
+        (0.03, found.bias_interval(), found.bias_sigma),
+        (0.99, found.scale_factor_interval(), found.scale_factor_sigma),
+        (0.0, found.quadratic.interval(), found.quadratic.sigma),
+        (0.0, found.asymmetry.interval(), found.asymmetry.sigma),
+    ):
+        assert 0.935 < np.mean((lower < at) & (at < upper)) < 0.965
+        assert (upper - lower)[0] == pytest.approx(2 * 1.96 * sigma, rel=1e-3)
+    assert found.bias.std() == pytest.approx(found.bias_sigma, rel=0.05)
+    assert found.scale_factor.std() == pytest.approx(found.scale_factor_sigma, rel=0.05)
+    for chance in (found.linearity, found.quadratic.p_value, found.asymmetry.p_value):
+        assert np.mean(chance < 0.05) == pytest.approx(0.05, abs=0.015)
+    assert found.not_observable == ()
+
+
+def test_what_is_not_a_line_is_found():
+    model, blocks = MODELS["N+GM+K"], SCHEDULE.experiment.blocks(25)
+    table = RateTable(SCHEDULE, blocks, model)
+    rate, noise = SCHEDULE.of_blocks(blocks), runs_of(model, blocks, 2000)
+    bent = table.fit(noise + 1.02 * rate + 0.004 * rate**2)
+    assert bent.quadratic.value.mean() == pytest.approx(0.004, abs=4e-5)
+    assert np.mean(bent.quadratic.p_value < 0.05) > 0.95
+    assert np.mean(bent.linearity < 0.05) > 0.9
+    split = table.fit(noise + np.where(rate > 0, 1.002, 0.998) * rate)
+    assert split.asymmetry.value.mean() == pytest.approx(0.004, abs=1e-4)
+    assert split.scale_factor.mean() == pytest.approx(1.0, abs=1e-4)
+    assert np.mean(split.linearity < 0.05) > 0.9
+
+
+def test_white_noise_gives_the_straight_line_of_ordinary_least_squares():
+    blocks = SCHEDULE.experiment.blocks(1000)
+    means = np.random.default_rng(1).standard_normal((1, len(blocks)))
+    found = RateTable(SCHEDULE, blocks, MODELS["N"]).fit(means)
+    slope, offset = np.polyfit(RATES, means[0], 1)
+    assert found.scale_factor[0] == pytest.approx(slope, rel=1e-9)
+    assert found.bias[0] == pytest.approx(offset, rel=1e-9)
+    spread = np.sum((np.array(RATES) - np.mean(RATES)) ** 2)
+    assert found.scale_factor_sigma == pytest.approx(1e-3 / math.sqrt(25.0 * spread), rel=1e-9)
+    # The further terms are those of polynomial and two-slope regression.
+    assert found.quadratic.value[0] == pytest.approx(np.polyfit(RATES, means[0], 2)[0], rel=1e-8)
+    two = np.column_stack([np.ones(7), np.maximum(RATES, 0), np.minimum(RATES, 0)])
+    positive, negative = np.linalg.lstsq(two, means[0], rcond=None)[0][1:]
+    assert found.asymmetry.value[0] == pytest.approx(positive - negative, rel=1e-8)
+
+
+def test_logs_of_the_simulator_give_their_scale_factor():
+    noise = MODELS["N+GM+K"]
+    model = SensorModel(noise=noise, bias=0.02, scale_error=0.003)
+    table = np.interp(
+        np.arange(1680) / 8.0,
+        np.concatenate([(start, stop) for start, stop, _ in STEPS]),
+        np.repeat(RATES, 2),
+    )
+    true = table + UP.rate
+    errors = []
+    for seed in range(40):
+        log = simulate(model, 8.0, 1680, np.random.default_rng(seed), true=lambda a, b: true[a:b])
+        log[100:103] = np.nan
+        found, measured = calibrate(log, SCHEDULE, noise, UP)
+        errors.append((found.scale_factor[0] - 1.003) / found.scale_factor_sigma)
+        # SensorModel has the bias behind the scale factor.
+        errors.append((found.bias[0] - 0.02) / found.bias_sigma)
+    assert measured.missing == 3
+    assert 48.0 < np.sum(np.square(errors)) < 122.0  # 99.5 % of chi-squared of 80
+    by_column = Schedule.from_column(table, 8.0, tolerance=1e-9, shortest=20.0)
+    again, _ = calibrate(log, by_column, noise, UP)
+    assert again.scale_factor[0] == pytest.approx(found.scale_factor[0], abs=1e-4)
+
+
+def test_the_direction_of_the_axis_is_in_the_bias():
+    blocks = SCHEDULE.experiment.blocks(1000)
+    model = NoiseModel(N=1e-6)
+    sure = RateTable(SCHEDULE, blocks, model, Pointing(latitude=0.4, heading=0.9))
+    unsure = RateTable(
+        SCHEDULE, blocks, model, Pointing(latitude=0.4, heading=0.9, heading_sigma=0.3)
+    )
+    means = np.zeros((1, len(blocks)))
+    assert unsure.sigma[0] > 10 * sure.sigma[0]
+    assert unsure.fit(means).scale_factor_sigma == pytest.approx(sure.sigma[1])
+    left_out = RateTable(SCHEDULE, blocks, model).fit(means)
+    assert [one.quantity for one in left_out.not_observable] == ["bias"]
+
+
+def test_one_rate_tells_no_scale_factor():
+    one = Schedule.from_steps([(0, 20, 0.5), (25, 50, 0.5)], 8.0)
+    with pytest.raises(
+        NotObservableError, match=r"one rate only, 0\.5 rad/s: a scale factor cannot"
+    ):
+        calibrate(np.zeros(400), one, MODELS["N"])
+
+
+def test_two_rates_tell_no_more_than_a_line():
+    two = Schedule.from_steps([(0, 20, 0.5), (25, 50, -0.5)], 8.0)
+    found, _ = calibrate(np.zeros(400), two, MODELS["N"], UP)
+    assert found.quadratic is None and found.linearity is None and found.asymmetry is None
+    assert {one.quantity for one in found.not_observable} == {
+        "quadratic",
+        "linearity",
+        "asymmetry",
+    }
+    same_sense = Schedule.from_steps([(0, 20, 0.5), (25, 50, 1.0), (55, 80, 2.0)], 8.0)
+    found, _ = calibrate(np.zeros(640), same_sense, MODELS["N"], UP)
+    assert found.asymmetry is None
+    assert found.quadratic is not None
+
+
+def test_what_cannot_be_is_refused():
+    blocks = SCHEDULE.experiment.blocks(1000)
+    with pytest.raises(ValueError, match="setting_sigma"):
+        RateTable(SCHEDULE, blocks, MODELS["N"], setting_sigma=-1.0)
+    with pytest.raises(ValueError, match="heading of the table's axis"):
+        RateTable(SCHEDULE, blocks, MODELS["N"], Pointing(latitude=0.4, heading=None))
+    with pytest.raises(ValueError, match="the last dwell ends"):
+        calibrate(np.zeros(10), SCHEDULE, MODELS["N"])
