@@ -17,6 +17,8 @@ from imubench_pipeline.simulate import simulate
 from imubench_pipeline.tables import build, write
 from imubench_pipeline.validation import ConfigError
 
+pytestmark = pytest.mark.xdist_group("test_compensation")  # its logs are made once
+
 RATE = 5.0
 SAMPLES = 60_000
 BIAS, SENSITIVITY = 0.02, 1e-3

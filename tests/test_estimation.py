@@ -16,6 +16,8 @@ from imubench_pipeline.results import Key, estimates
 from imubench_pipeline.simulate import channel_rng, simulate
 from imubench_pipeline.tables import build, write
 
+pytestmark = pytest.mark.xdist_group("test_estimation")  # its logs are made once
+
 RATE = 10.0
 SAMPLES = 60_000
 GYRO = NoiseModel(N=1e-3, B=2e-3, T_B=20.0)
