@@ -4,18 +4,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 import pytest
 
-from imubench_pipeline.allan import AllanCurve, allan_variance, of_blocks
+from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.config import EstimateSettings, Run, read_run
 from imubench_pipeline.estimation import Estimation, estimate_channel
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.recording import ChannelLog, LogWriter, channel_logs
+from imubench_pipeline.recording import ChannelLog
 from imubench_pipeline.results import Key, compensated_curves, estimates
 from imubench_pipeline.simulate import simulate
 from imubench_pipeline.tables import build, write
 from imubench_pipeline.validation import ConfigError
+from tests.kept import curve_of, kept
+
+pytestmark = pytest.mark.xdist_group("test_compensation")  # its logs are made once
 
 RATE = 5.0
 SAMPLES = 60_000
@@ -31,21 +33,7 @@ Row = Mapping[str, Any]
 
 def recorded(folder: Path, columns: Mapping[str, np.ndarray], holes: bool = False) -> ChannelLog:
     """The gyro of a recording as the ingest keeps it, with the other columns beside it."""
-    folder.mkdir(parents=True, exist_ok=True)
-    with LogWriter(folder / "log.parquet", dict.fromkeys(columns, pa.float64())) as writer:
-        grid = len(columns["gyro_x"])
-        for start in range(0, grid, 7001):
-            writer.write({name: values[start : start + 7001] for name, values in columns.items()})
-        writer.finish(
-            {
-                "rate": RATE,
-                "grid": grid,
-                "segments": [[0, grid]],
-                "holes": dict.fromkeys(columns, holes),
-                "unusable": [],
-            }
-        )
-    logs = channel_logs(folder)
+    logs = kept(folder, columns, RATE, holes=holes)
     assert list(logs) == ["gyro_x"]
     return logs["gyro_x"]
 
@@ -53,10 +41,6 @@ def recorded(folder: Path, columns: Mapping[str, np.ndarray], holes: bool = Fals
 def samples(sensitivity: float = SENSITIVITY) -> np.ndarray:
     noise = simulate(NOISE, RATE, SAMPLES, np.random.default_rng(20260118))
     return BIAS + noise + sensitivity * (TEMPERATURE - TEMPERATURE.mean())
-
-
-def curve_of(log: ChannelLog) -> AllanCurve:
-    return of_blocks(log.blocks(), log.grid, log.rate, holes=log.holes, segments=log.segments)
 
 
 def estimated(log: ChannelLog, **settings: Any) -> Estimation:

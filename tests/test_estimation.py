@@ -3,18 +3,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 import pytest
 
-from imubench_pipeline.allan import AllanCurve, allan_variance, of_blocks
+from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.compensation import resolution_of
 from imubench_pipeline.config import EstimateSettings, Method
 from imubench_pipeline.estimation import Estimation, estimate_channel
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.recording import ChannelLog, LogWriter, channel_logs
+from imubench_pipeline.recording import ChannelLog
 from imubench_pipeline.results import Key, estimates
 from imubench_pipeline.simulate import channel_rng, simulate
 from imubench_pipeline.tables import build, write
+from tests.kept import curve_of, kept
+
+pytestmark = pytest.mark.xdist_group("test_estimation")  # its logs are made once
 
 RATE = 10.0
 SAMPLES = 60_000
@@ -47,27 +49,10 @@ def samples_of(channel: str, samples: int = SAMPLES) -> np.ndarray:
     return BIAS[channel] + simulate(ACCEL, RATE, samples, rng) + line
 
 
-def recorded(folder: Path, columns: dict[str, np.ndarray], holes: bool = False) -> dict:
-    """Channels of a recording that was kept as it is kept after the ingest."""
-    folder.mkdir(parents=True, exist_ok=True)
-    samples = len(next(iter(columns.values())))
-    with LogWriter(folder / "log.parquet", dict.fromkeys(columns, pa.float64())) as writer:
-        for start in range(0, samples, 7001):
-            writer.write({name: values[start : start + 7001] for name, values in columns.items()})
-        writer.finish(
-            {
-                "rate": RATE,
-                "grid": samples,
-                "segments": [[0, samples]],
-                "holes": dict.fromkeys(columns, holes),
-                "unusable": [],
-            }
-        )
-    return channel_logs(folder)
-
-
-def curve_of(log: ChannelLog) -> AllanCurve:
-    return of_blocks(log.blocks(), log.grid, log.rate, holes=log.holes, segments=log.segments)
+def recorded(
+    folder: Path, columns: dict[str, np.ndarray], holes: bool = False
+) -> dict[str, ChannelLog]:
+    return kept(folder, columns, RATE, holes=holes)
 
 
 def estimated(log: ChannelLog, bandwidth: float | None = None, **settings: Any) -> Estimation:

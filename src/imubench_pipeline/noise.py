@@ -162,12 +162,21 @@ class NoiseModel:
         -------
         ndarray
             (rad/s)² or (m/s²)², in the shape of ``tau``.
+
+        Raises
+        ------
+        ValueError
+            If a rate is given and a cluster holds no sample: it is taken to the nearest number.
         """
         t = np.asarray(tau, dtype=np.float64)
         if rate is None:
             parts = [term.allan_variance(t) for term in self.terms]
         else:
             n = np.rint(t * rate)
+            if (n < 1.0).any():
+                raise ValueError(
+                    f"a cluster of {t.min():g} s holds no sample at {rate:g} Hz, expected one"
+                )
             parts = [term.sampled_allan_variance(n, 1.0 / rate) for term in self.terms]
         return _sum(parts, t)
 

@@ -10,14 +10,13 @@ from pydantic import (
     BeforeValidator,
     Field,
     SerializerFunctionWrapHandler,
-    field_validator,
     model_serializer,
     model_validator,
 )
 
 from imubench_pipeline.conversions import Filter
 from imubench_pipeline.units import UnitError, dimension_of, quantity_to_si, to_si
-from imubench_pipeline.validation import Frequency, Strict, Text
+from imubench_pipeline.validation import Duration, Frequency, Strict, Text
 
 Value = float | tuple[float, ...] | dict[str, float]
 Kind = Literal["typ", "max", "min", "range", "choices", "1sigma", "derived"]
@@ -81,7 +80,7 @@ class PrintedFigure(Strict):
         description="of an rms: stated, the bandwidth is the noise bandwidth, as Bosch, TDK and "
         "ST compute; or it is the cut-off of a filter of first or second order",
     )
-    tau: Text | None = Field(None, description="of an Allan deviation: its averaging time")
+    tau: Duration | None = Field(None, description="of an Allan deviation: its averaging time")
     option: Text | None = Field(
         None,
         description="grade, range or mode of the sensor that alone has this figure; which of "
@@ -92,13 +91,6 @@ class PrintedFigure(Strict):
     source: Literal["primary", "secondary"] | None = Field(
         None, description="null: that of the datasheet"
     )
-
-    @field_validator("tau")
-    @classmethod
-    def _time(cls, tau: str | None) -> str | None:
-        if tau is not None and quantity_to_si(tau, "time") <= 0:
-            raise ValueError("expected a time above 0")
-        return tau
 
     @model_validator(mode="after")
     def _consistent(self) -> PrintedFigure:

@@ -42,7 +42,6 @@ def write_simulated(recording: SimulatedRecording, log: LogFormat, folder: Path)
             f"reader {log.reader!r}"
         )
     rate = quantity_to_si(recording.rate, "frequency")
-    samples = round(quantity_to_si(recording.duration, "time") * rate)
     files: dict[str, dict[str, ColumnSource]] = {}
     sources = {str(name): source for name, source in log.channels.items()}
     if log.temperature is not None:
@@ -56,14 +55,12 @@ def write_simulated(recording: SimulatedRecording, log: LogFormat, folder: Path)
             stack.enter_context(TextLog(folder / name, log, sources, rate, remarks, np.float32))
             for name, sources in files.items()
         ]
-        for block in _blocks(recording, rate, samples):
+        for block in _blocks(recording, rate):
             for writer in writers:
                 writer.write(block)
 
 
-def _blocks(
-    recording: SimulatedRecording, rate: float, samples: int
-) -> Iterator[dict[str, NDArray[np.float64]]]:
+def _blocks(recording: SimulatedRecording, rate: float) -> Iterator[dict[str, NDArray[np.float64]]]:
     """Return the blocks of the channels in SI and, where there is one, of the temperature."""
     try:
         model = imu_model(recording.channels, recording)
@@ -74,7 +71,7 @@ def _blocks(
     return simulate_imu(
         model,
         rate,
-        samples,
+        recording.samples,
         recording.seed,
         (recording.sensor, recording.recording),
         motion=motion,

@@ -22,7 +22,15 @@ from imubench_pipeline.sensor import (
 from imubench_pipeline.sensor_model.profile_forms import FileForm, Surroundings, found_from
 from imubench_pipeline.sensor_model.settings import AxisSettings, ImuSettings, check_axes
 from imubench_pipeline.units import quantity_to_si
-from imubench_pipeline.validation import ConfigError, Frequency, Strict, Text, parse, read_yaml
+from imubench_pipeline.validation import (
+    ConfigError,
+    Duration,
+    Frequency,
+    Strict,
+    Text,
+    parse,
+    read_yaml,
+)
 
 _Around = TypeVar("_Around", bound=Surroundings)
 
@@ -74,16 +82,23 @@ class OfASensor(ImuSettings):
     """What is simulated of one sensor."""
 
     sensor: str = Field(description="name of the sensor file whose log format it is written in")
-    duration: Text = Field(description="length with its unit, such as 10 h")
+    duration: Duration = Field(description="length with its unit, such as 10 h")
     rate: Frequency
     source: Text = Field(description="where the figures are published")
     channels: dict[Channel, SimulatedChannel] = Field(min_length=1)
 
     @model_validator(mode="after")
-    def _units(self) -> Self:
-        quantity_to_si(self.duration, "time")
+    def _samples_and_units(self) -> Self:
+        if self.samples < 1:
+            raise ValueError(f"duration: {self.duration} at {self.rate} hold no sample")
         check_axes(self.channels, "channels")
         return self
+
+    @property
+    def samples(self) -> int:
+        """Length of the log."""
+        rate = quantity_to_si(self.rate, "frequency")
+        return round(quantity_to_si(self.duration, "time") * rate)
 
 
 class SimulatedRecording(OfASensor, Surroundings):
@@ -111,6 +126,17 @@ class Board(Surroundings):
         description="by the name of a published figure: why it differs from what an estimate gives",
     )
     sensors: tuple[OfASensor, ...] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _explains_what_there_is(self) -> Self:
+        channels = (one for sensor in self.sensors for one in sensor.channels.values())
+        figures = {figure.figure for channel in channels for figure in channel.published}
+        if unknown := self.why.keys() - figures:
+            expected = ", ".join(sorted(figures)) or "none: nothing is published"
+            raise ValueError(
+                f"why: {min(unknown)!r} names no published figure; expected {expected}"
+            )
+        return self
 
     def recordings(self, name: str) -> Iterator[SimulatedRecording]:
         """Yield the recording of each sensor.

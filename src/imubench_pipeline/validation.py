@@ -49,9 +49,16 @@ def _frequency(text: str) -> str:
     return text
 
 
+def _duration(text: str) -> str:
+    if not quantity_to_si(text, "time") > 0:
+        raise ValueError("expected a time above 0")
+    return text
+
+
 FractionOfLog = Annotated[float, BeforeValidator(_fraction, json_schema_input_type=float | str)]
 Text = Annotated[str, BeforeValidator(as_text)]
 Frequency = Annotated[Text, AfterValidator(_frequency), Field(examples=["100 Hz"])]
+Duration = Annotated[Text, AfterValidator(_duration), Field(examples=["10 h"])]
 
 
 # The same loader, ten times as fast where it is compiled.

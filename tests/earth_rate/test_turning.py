@@ -302,3 +302,14 @@ def test_the_alternation_is_that_of_the_level() -> None:
     log += 1e-6 * np.arange(len(log)) / RATE
     found = alternation(blocks_of(log, RATE, 30.0), between(EVERY_30 + TURN / 2, 2.0, 600.0))
     assert found.value == pytest.approx(EARTH, rel=1e-3)
+
+
+def test_dwells_without_samples_leave_the_alternation_no_surer() -> None:
+    rng = np.random.default_rng(15)
+    stretches = between(EVERY_30[:9], 0.0, 300.0)
+    z = []
+    for _ in range(200):
+        log = rng.standard_normal(2400)
+        log[8 * 90 :] = np.nan  # three of ten dwells are left
+        z.append(alternation(blocks_of(log, 8.0, 30.0), stretches).z)
+    assert np.std(z) == pytest.approx(1.0, abs=0.2)

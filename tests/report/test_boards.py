@@ -1,3 +1,4 @@
+import json
 from collections.abc import Iterator
 from copy import deepcopy
 from pathlib import Path
@@ -186,6 +187,23 @@ def test_what_is_printed_of_a_datasheet_is_compared_with_the_datasheet(
         "0.5",
         "",
     ]
+
+
+def test_a_sensor_on_two_boards_has_the_figures_of_each(tmp_path: Path) -> None:
+    of_both = (of_board("cheap", board=board) for board in ("pair", "other"))
+    publish(made(*of_both, boards={"pair": BOARD, "other": BOARD}), tmp_path)
+    page = read_pages(tmp_path)["boards.html"]
+    (data,) = (
+        json.loads(one.text) for one in page.scripts if one.attributes.get("class") == "page"
+    )
+    names = ("sensor", "recording", "channel")
+    drawn = [
+        tuple(one.attributes[f"data-{name}"] for name in names)
+        for one in page.elements
+        if one.tag == "figure"
+    ]
+    assert drawn == [("cheap", "sim_other", "gyro_x"), ("cheap", "sim_pair", "gyro_x")]
+    assert drawn == [tuple(one[name] for name in names) for one in data["channels"]]
 
 
 def test_values_are_switched_with_the_units_of_the_page(read: dict[str, Read]) -> None:

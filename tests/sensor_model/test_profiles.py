@@ -19,6 +19,13 @@ def profiles(settings: dict, folder: Path = Path()):
     return profiles_of(parse(Surroundings, settings, "board.yaml"), folder)
 
 
+def test_no_times_have_no_values(tmp_path: Path) -> None:
+    (tmp_path / "turn.csv").write_text("time,gyro_z\n0,1\n1,2\n")
+    motion, _ = profiles({"motion": {"gyro_z": {"form": "file", "file": "turn.csv"}}}, tmp_path)
+    assert motion["gyro_z"].at(np.empty(0)).shape == (0,)
+    assert motion["gyro_z"].at(np.array([0.5])) == pytest.approx([1.5])
+
+
 def test_formulas_are_what_they_say_in_si() -> None:
     t = np.array([0.0, 59.0, 60.0, 3600.0, 21600.0])
     motion, _ = profiles(

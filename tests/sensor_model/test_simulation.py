@@ -13,6 +13,8 @@ from imubench_pipeline.sensor_model.profiles import Constant, DayCycle, Profile,
 from imubench_pipeline.sensor_model.simulation import CHUNK, simulate, simulate_blocks
 from tests.sensor_model import theory
 
+pytestmark = pytest.mark.xdist_group("test_simulation")  # its logs are made once
+
 RATE = 100.0
 MODELS = {
     "white noise behind a cut-off above Nyquist": (

@@ -64,7 +64,7 @@ def test_a_temperature_that_steps_between_segments_is_no_regressor():
     spectrum, _ = spectra(series.watch([log]), SAMPLES, RATE, segments)
     coefficients = Coefficients(spectrum, series)
     levels = np.where(path.sample < 45_000, 20.0, 30.0)
-    assert np.abs(coefficients.of_knots(path, levels)).max() < 1e-9
+    assert np.abs(coefficients.of_knots(path, [levels])).max() < 1e-9
 
 
 def test_what_temperature_adds_to_one_segment_is_not_taken_from_the_next():

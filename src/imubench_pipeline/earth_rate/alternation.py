@@ -89,8 +89,9 @@ def _mean(difference: Array, white: Array) -> Alternation:
     there = np.isfinite(difference)
     if not there.any():
         return Alternation(0.0, math.inf)
-    variance = float(np.nanmean(white)) / len(white)
     n = int(there.sum())
+    # Where dwells have no samples, few of the others are in a difference.
+    variance = float(np.nanmean(white)) / min(len(white), n + 2)
     if n > 2:
         variance = max(variance, _WHITE * float(np.var(difference[there], ddof=1)) / (n + 2))
     return Alternation(float(difference[there].mean()), math.sqrt(variance))

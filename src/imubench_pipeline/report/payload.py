@@ -117,6 +117,7 @@ def channel_payload(view: ChannelView, rate: float, arrays: Arrays) -> dict[str,
     return {
         "channel": view.channel,
         "sensor": view.sensor,
+        "recording": view.recording,
         "simulated": view.simulated,
         "recommended": view.recommended,
         "tau": arrays.log(view.tau),

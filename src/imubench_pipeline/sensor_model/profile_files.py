@@ -119,8 +119,9 @@ class FileSeries:
         ConfigError
             If a number is missing in the file, or its times do not ascend.
         """
-        if len(times):
-            self._reach(float(times[0]), float(times[-1]))
+        if not len(times):
+            return np.empty(0)
+        self._reach(float(times[0]), float(times[-1]))
         return np.interp(times, self._window[_TIME], self._window[name])
 
     def _reach(self, first: float, last: float) -> None:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from imubench_pipeline.sensor import QUANTITIES, quantity_of
 from imubench_pipeline.sensor_model.low_pass import Array
 from imubench_pipeline.sensor_model.profile_files import FileSeries
 from imubench_pipeline.sensor_model.profile_forms import (
@@ -155,14 +156,15 @@ def made(form: Form, name: str, folder: Path, opened: dict[Path, FileSeries]) ->
     UnitError
         If a unit has another dimension.
     """
+    dimension = name if name == "temperature" else QUANTITIES[quantity_of(name)]
     if isinstance(form, FileForm):
         path = folder / form.file
         if path not in opened:
             opened[path] = FileSeries(path)
         column = form.column or name
-        opened[path].take(column, dimension_of_profile(name))
+        opened[path].take(column, dimension)
         return FileColumn(opened[path], column)
-    return _formula(form, dimension_of_profile(name))
+    return _formula(form, dimension)
 
 
 def _formula(form: Formula, dimension: str, *, difference: bool = False) -> Profile:
@@ -189,9 +191,3 @@ def _formula(form: Formula, dimension: str, *, difference: bool = False) -> Prof
     first, *others = form.parts
     added = (_formula(part, dimension, difference=True) for part in others)
     return Sum((_formula(first, dimension), *added))
-
-
-def dimension_of_profile(name: str) -> str:
-    """Return the dimension of a channel, or of ``temperature``."""
-    dimensions: Mapping[str, str] = {"gyro": "angular_rate", "accel": "acceleration"}
-    return dimensions.get(name.split("_", maxsplit=1)[0], "temperature")

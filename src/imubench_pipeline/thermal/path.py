@@ -113,27 +113,29 @@ class TemperaturePath:
             Samples in a block.
         count : int
             n, number of blocks; they follow each other in one segment.
-        values : ndarray, shape (k,)
+        values : ndarray, shape (..., k)
             At the knots, in any unit.
 
         Returns
         -------
-        ndarray, shape (n,)
+        ndarray, shape (..., n)
         """
         part = self.parts[sum(start <= first for start, _ in self.segments) - 1]
         edges = first - 0.5 + block * np.arange(count + 1)
-        knots, known = self.sample[part], values[part]
+        knots, known = self.sample[part], values[..., part]
         # Flat beyond the first and the last knot.
         x = np.concatenate(
             ([min(edges[0], knots[0]) - 1.0], knots, [max(edges[-1], knots[-1]) + 1])
         )
-        y = np.concatenate((known[:1], known, known[-1:]))
-        below = np.concatenate(([0.0], np.cumsum(np.diff(x) * 0.5 * (y[1:] + y[:-1]))))
+        y = np.concatenate((known[..., :1], known, known[..., -1:]), axis=-1)
+        width = np.diff(x)
+        below = np.cumsum(width * 0.5 * (y[..., 1:] + y[..., :-1]), axis=-1)
+        below = np.concatenate((np.zeros_like(y[..., :1]), below), axis=-1)
         at = np.clip(np.searchsorted(x, edges, side="right") - 1, 0, len(x) - 2)
         inside = edges - x[at]
-        slope = (y[at + 1] - y[at]) / (x[at + 1] - x[at])
-        integral = below[at] + inside * (y[at] + 0.5 * slope * inside)
-        return np.asarray(np.diff(integral) / block)
+        slope = (y[..., at + 1] - y[..., at]) / width[at]
+        integral = below[..., at] + inside * (y[..., at] + 0.5 * slope * inside)
+        return np.asarray(np.diff(integral, axis=-1) / block)
 
 
 def temperature_path(

@@ -131,26 +131,33 @@ class Coefficients:
 
     def _of(self, parts: Sequence[Array]) -> Array:
         transformed = [
-            scipy.fft.dct(values - values.mean(), type=2, norm="ortho")[1:] for values in parts
+            scipy.fft.dct(
+                values - values.mean(axis=-1, keepdims=True), type=2, norm="ortho", axis=-1
+            )[..., 1:]
+            for values in parts
         ]
-        return np.asarray(np.concatenate(transformed)[self._kept])
+        return np.asarray(np.concatenate(transformed, axis=-1)[..., self._kept])
 
-    def of_knots(self, path: TemperaturePath, values: Array) -> Array:
-        """Return the coefficients of a regressor that is linear between knots.
+    def of_knots(self, path: TemperaturePath, values: Sequence[Array]) -> Array:
+        """Return the coefficients of regressors that are linear between knots.
+
+        Several together take half the time of one after the other, and less where the length of
+        the log has great prime factors.
 
         Parameters
         ----------
         path : TemperaturePath
             Whose knots they are.
-        values : ndarray, shape (k,)
-            The regressor at the knots.
+        values : sequence of ndarray, shape (k,)
+            The regressors at the knots.
 
         Returns
         -------
-        ndarray, shape (n,)
-            In the unit of the values.
+        ndarray, shape (p, n)
+            A row for each, in the unit of its values.
         """
-        return self._of([path.means(*place, values) for place in self.places])
+        rows = np.array(values)
+        return self._of([path.means(*place, rows) for place in self.places])
 
     def of_time(self, rate: float) -> Array:
         """Return the coefficients of a ramp of 1 a second.

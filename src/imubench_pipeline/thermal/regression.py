@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,6 +23,8 @@ _LONGEST = 1 / 20
 
 _LONGEST_LAG = 1800.0
 _LEAST_ORDINATES = 0.02
+_TOGETHER = 8
+"""Lags whose regressors are in memory together."""
 
 
 @dataclass(frozen=True)
@@ -198,9 +201,29 @@ class Regressors:
         list of ndarray, shape (n,)
             K, or K² of the square; s of the ramp.
         """
-        terms = self._of(self.knots(lag))
-        columns = [self.coefficients.of_knots(self.path, term) for term in terms]
-        return columns + [self._time] * self.ramp
+        columns = self.coefficients.of_knots(self.path, self._of(self.knots(lag)))
+        return [*columns] + [self._time] * self.ramp
+
+    def prepare(self, lags: Sequence[float] | Array) -> None:
+        """Compute the products for several lags together, which takes less time.
+
+        Parameters
+        ----------
+        lags : sequence of float
+            s.
+        """
+        new = [float(lag) for lag in lags if self._key(float(lag)) not in self._full]
+        for first in range(0, len(new), _TOGETHER):
+            some = new[first : first + _TOGETHER]
+            terms = [term for lag in some for term in self._of(self.knots(lag))]
+            columns = self.coefficients.of_knots(self.path, terms).reshape(
+                len(some), self.thermal, -1
+            )
+            for lag, own in zip(some, columns, strict=True):
+                self._full[self._key(lag)] = self.coefficients.products([*own, self._time])
+
+    def _key(self, lag: float) -> tuple[float, bool, float]:
+        return lag, self.quadratic, self.settling
 
     def products(self, lag: float) -> Products:
         """Return the products of log and regressors in the bins used.
@@ -215,11 +238,8 @@ class Regressors:
         Products
         """
         if lag not in self._known:
-            key = (lag, self.quadratic, self.settling)
-            if key not in self._full:
-                columns = self.also(ramp=True).columns(lag)
-                self._full[key] = self.coefficients.products(columns)
-            full, kept = self._full[key], slice(None if self.ramp else self.thermal)
+            self.prepare([lag])
+            full, kept = self._full[self._key(lag)], slice(None if self.ramp else self.thermal)
             cross, gram = full.cross[self.used, kept], full.gram[self.used, kept, kept]
             self._known[lag] = Products(cross, gram)
         return self._known[lag]
@@ -280,6 +300,7 @@ class Regressors:
         -------
         Regression
         """
+        self.prepare(lags)
         fits = [self.at(float(lag), weights) for lag in lags]
         place = int(np.argmax([fit.log_likelihood_gain for fit in fits]))
         best = fits[place]

@@ -234,16 +234,19 @@ def _explained(regressors: Regressors, found: Regression) -> float:
 
 def _fine(regressors: Regressors, weights: Array, lags: Array) -> Array:
     """Return lags that lie densely where the log allows them, s."""
-    gains = np.array([regressors.at(float(lag), weights).log_likelihood_gain for lag in lags])
-    likely = np.flatnonzero(gains > gains.max() - _WITHIN)
-    low, high = lags[max(likely[0] - 1, 0)], lags[min(likely[-1] + 1, len(lags) - 1)]
+    low, high = _about_the_likely(regressors, weights, lags)
     if high == low:
         return np.array([low])
-    even = np.linspace(low, high, _LAGS)
-    gains = np.array([regressors.at(float(lag), weights).log_likelihood_gain for lag in even])
+    low, high = _about_the_likely(regressors, weights, np.linspace(low, high, _LAGS))
+    return np.linspace(low, high, _LAGS)
+
+
+def _about_the_likely(regressors: Regressors, weights: Array, lags: Array) -> tuple[float, float]:
+    """Return the lags of a scan between which, and next to which, the likely ones lie."""
+    regressors.prepare(lags)
+    gains = np.array([regressors.at(float(lag), weights).log_likelihood_gain for lag in lags])
     likely = np.flatnonzero(gains > gains.max() - _WITHIN)
-    low, high = even[max(likely[0] - 1, 0)], even[min(likely[-1] + 1, _LAGS - 1)]
-    return np.asarray(np.linspace(low, high, _LAGS))
+    return float(lags[max(likely[0] - 1, 0)]), float(lags[min(likely[-1] + 1, len(lags) - 1)])
 
 
 def shares(candidates: Sequence[Candidate]) -> list[tuple[Candidate, float]]:
@@ -287,6 +290,7 @@ def _drawn(
 ) -> tuple[Array, Array]:
     """Return draws of beta (d, p) and of the lag (d,)."""
     alike = shares(candidates)
+    regressors.prepare(lags)
     everything = [regressors.products(float(lag)) for lag in lags]
     cross = np.array([products.cross for products in everything])
     gram = np.array([products.gram for products in everything])
@@ -334,7 +338,7 @@ def _path_errors(regressors: Regressors, found: Regression, weights: Array) -> A
     step = max(0.05 * found.lag, 0.5 * float(np.median(np.diff(path.sample))) / regressors.rate)
     by_lag = slope * (regressors.knots(found.lag + step) - knots) / step
     columns = regressors.columns(found.lag)
-    columns.append(regressors.coefficients.of_knots(path, by_lag))
+    columns.extend(regressors.coefficients.of_knots(path, [by_lag]))
     full = np.zeros(len(regressors.used))
     full[regressors.used] = weights
     gram = regressors.coefficients.products(columns).gram
@@ -342,10 +346,12 @@ def _path_errors(regressors: Regressors, found: Regression, weights: Array) -> A
     scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
     # A lag that the log hardly tells must not carry the error of the path away.
     inverse = np.linalg.inv(information / np.outer(scale, scale) + 1e-6 * np.eye(len(scale)))
+    errors = [
+        slope * lagged_path(path, draw - path.value, regressors.rate, found.lag)
+        for draw in path.draws
+    ]
     moved = []
-    for draw in path.draws:
-        error = lagged_path(path, draw - path.value, regressors.rate, found.lag)
-        other = regressors.coefficients.of_knots(path, slope * error)
+    for other in regressors.coefficients.of_knots(path, errors):
         shared = regressors.coefficients.products([*columns, other]).gram[:, :-1, -1]
         moved.append(inverse @ ((full @ shared) / scale) / scale)
     at = np.array(moved)

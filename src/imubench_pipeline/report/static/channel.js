@@ -11,8 +11,11 @@ const termLook = (place) => {
 };
 
 function channelOf(figure) {
-  const { channel, sensor } = figure.dataset;
-  return pageData.channels.find((one) => one.channel === channel && one.sensor === (sensor ?? one.sensor));
+  // A sensor may be on several boards, which one page shows.
+  const { channel, sensor, recording } = figure.dataset;
+  return pageData.channels.find((one) => (
+    one.channel === channel && one.sensor === (sensor ?? one.sensor) && one.recording === (recording ?? one.recording)
+  ));
 }
 
 kinds.allan = (figure) => {
