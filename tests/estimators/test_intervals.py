@@ -1,0 +1,43 @@
+"""Intervals over models: what a log says of a term that the chosen model has, or has not."""
+
+import numpy as np
+import pytest
+
+from imubench_pipeline.estimators.likelihood import Likelihood, fit
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.simulate import simulate
+
+RATE = 10.0
+SAMPLES = 72_000
+
+
+def fitted(model: NoiseModel, seed: int) -> Likelihood:
+    return fit(simulate(model, RATE, SAMPLES, np.random.default_rng(seed)), RATE)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 3])
+def test_a_process_that_is_taken_for_a_walk_is_within_the_limits(seed: int) -> None:
+    # Two hours of a correlation time of five minutes: BIC with its unit root takes the walk.
+    truth = NoiseModel(N=4.7e-4, B=7.8e-4, T_B=300.0)
+    found = fitted(truth, seed)
+    assert found.candidates[0].found.terms.name == "N+K"
+    B, K = (found.estimates[0].parameters[name] for name in ("B", "K"))
+    assert B.status == "absent"
+    assert B.upper is not None
+    assert K.value is not None
+    assert K.upper is not None
+    assert B.upper > truth.B
+    assert K.upper > K.value
+
+
+def test_the_limits_of_what_is_absent_are_those_of_white_noise_alone() -> None:
+    found = fitted(NoiseModel(N=1e-3), 4).estimates[0]
+    for name in ("B", "K"):
+        parameter = found.parameters[name]
+        assert parameter.status == "absent"
+        assert parameter.lower == 0.0
+        assert parameter.upper is not None
+    # A process of B and T_B has at most a part of the density of the white noise: B^2 T_B < N^2.
+    B = found.parameters["B"].upper
+    assert B is not None
+    assert B < 1e-3
