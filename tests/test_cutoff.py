@@ -205,3 +205,43 @@ def test_a_spectrum_of_few_bins_shows_nothing():
     found = cutoff_of(np.random.default_rng(12).standard_normal(20), 100.0)
     assert found.frequency.status == found.N.status == "not_shown"
     assert "bins only" in found.frequency.reason
+
+
+@pytest.mark.parametrize(
+    "part, status", [(0.6, "absent"), (1.0, "not_identified"), (3.0, "absent")]
+)
+def test_quantization_noise_is_no_low_pass(part, status):
+    # White noise and quantization noise rise towards Nyquist as what a steep filter lets fold.
+    rate, samples, N = 50.0, 540_000, 1e-4
+    rng = np.random.default_rng(1)
+    log = N * math.sqrt(rate) * rng.standard_normal(samples)
+    log += part * N * np.diff(rng.standard_normal(samples + 1))
+    found = cutoff_of(log, rate)
+    assert found.frequency.value is None
+    assert found.frequency.status == status
+    assert found.or_quantization == (status == "not_identified")
+    if found.or_quantization:
+        assert "quantization noise as well" in found.frequency.reason
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_interval_spans_all_hollows_of_the_likelihood(seed):
+    # Above Nyquist two cut-offs of second order fold to nearly the same spectrum.
+    rate, cutoff = 40.0, 25.0
+    rng = np.random.default_rng(seed)
+    found = cutoff_of(butterworth(4e-4, cutoff, 2, rate, 1 << 19, rng), rate).frequency
+    assert found.status == "not_identified"
+    assert found.lower < cutoff < found.upper
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_drift_far_below_the_bend_does_not_pull_the_cutoff(seed):
+    rate, cutoff, samples = 20.0, 7.3, 1 << 18
+    rng = np.random.default_rng(seed)
+    noise = first_order(5e-5, cutoff, rate, samples, rng)
+    noise += simulate(NoiseModel(B=4.6e-5), rate, samples, rng)
+    drift = 2e-3 * np.sin(2.0 * np.pi * np.arange(samples) / (0.6 * samples) + 0.7)
+    without, found = (cutoff_of(log, rate).frequency for log in (noise, noise + drift))
+    spread = (without.upper - without.lower) / 3.92
+    assert abs(found.value - without.value) < spread
+    assert abs(found.value - cutoff) < 3.0 * spread
