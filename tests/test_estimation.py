@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.compensation import resolution_of
@@ -383,3 +384,24 @@ def test_a_short_log_behind_a_slow_filter_has_rows(tmp_path: Path) -> None:
     assert {row["method"] for row in found.parameters} == set(ALL)
     for name, rows in tables(found).items():
         build(name, rows)
+
+
+def test_where_a_drift_hides_all_below_a_found_cutoff_no_noise_is_told(tmp_path: Path) -> None:
+    # A chamber in steps, behind a lag: its line has skirts above the noise up to 2 Hz, and a
+    # tenth of the cut-off is 1 Hz.
+    rate, samples, N, cutoff, lag = 25.0, 290_000, 4e-4, 10.2, 200.0
+    rng = np.random.default_rng(5)
+    decay = np.exp(-2.0 * np.pi * cutoff / rate)
+    driven = N * np.sqrt(np.pi * cutoff * (1.0 - decay**2)) * rng.standard_normal(samples)
+    levels = 0.03 * np.array([0.3, -1.0, 0.8, -0.2, 1.0, -0.9, 0.1, 0.7])
+    steps = np.repeat(levels, samples // 8)
+    slow = np.exp(-1.0 / (lag * rate))
+    values = lfilter([1.0], [1.0, -decay], driven) + lfilter([1.0 - slow], [1.0, -slow], steps)
+    (log,) = kept(tmp_path, {"accel_z": values}, rate).values()
+    found = estimated(log, methods=("likelihood",))
+    (of_filter,) = (row for row in found.low_pass if row["parameter"] == "cutoff")
+    assert of_filter["value"] == pytest.approx(cutoff, rel=0.05)
+    # The band above would give a number, of what the filter leaves of N.
+    (white,) = (row for row in found.parameters if row["parameter"] == "N")
+    assert (white["value"], white["status"]) == (None, "not_shown")
+    assert "lines that hide too much" in white["reason"]

@@ -101,11 +101,8 @@ def estimate_channel(
         shown = low_pass.order is not None and not low_pass.or_quantization
         if bandwidth is None and shown:
             # A bend of a per cent, which does not end the band, is many times the error of N.
-            cutoff = low_pass.frequency.value or low_pass.frequency.lower
-            within = fit(bandwidth=cutoff, rng=stream("posterior"))
-            # Lines may leave too little of a spectrum below a tenth of a low cut-off.
-            if within.band is not None:
-                found, bandwidth = within, cutoff
+            bandwidth = low_pass.frequency.value or low_pass.frequency.lower
+            found = fit(bandwidth=bandwidth, rng=stream("posterior"))
         estimates |= {estimate.method: estimate for estimate in found.estimates}
         into.models += _model_rows(key, found)
         into.lines += _line_rows(key, found)

@@ -207,7 +207,12 @@ def fit_spectrum(
     """Estimate the noise parameters from a spectrum (see `fit`)."""
     lines, clear, used, limit = lines_and_band(spectrum, line_spectra, band, bandwidth)
     if used.sum() < _FEWEST_BINS:
-        reason = f"the spectrum has {used.sum()} bins, {_FEWEST_BINS} are needed: too short a log"
+        reason = (
+            f"{used.sum()} bins of the spectrum are left up to {limit.highest:.4g} Hz, {_FEWEST_BINS} "
+            "are needed: too short a log"
+        )
+        if not clear.all():
+            reason += f", or lines that hide too much of it ({(~clear).sum()} bins)"
         nothing = {name: Parameter(None, "not_shown", reason) for name in FAMILY}
         return Likelihood(
             (Estimate("likelihood", nothing), Estimate("likelihood_gm", papers_only(nothing))),
