@@ -78,6 +78,7 @@ _OF_A_RECORDING: Mapping[str, tuple[float, float, float, float, float]] = {
     "reconstruct": (350, 15, 1, 1.3, 0.6),
     "datasheet": (300, 0, 1, 0, 0),
     "error_budget": (300, 0, 3, 0, 0),
+    "earth_rotation": (450, 60, 15, 0, 3),
 }
 
 _OF_ALL: Mapping[str, tuple[float, float, float, float]] = {
@@ -87,6 +88,7 @@ _OF_ALL: Mapping[str, tuple[float, float, float, float]] = {
     "ranking": (300, 0.1, 1, 0.01),
     "fusion": (300, 0.2, 6, 0.01),
     "coverage": (300, 0, 1, 0),
+    "earth_rotation_tables": (300, 0.5, 1, 0.01),
     "exports": (300, 0.5, 1, 0.05),
     "figures": (350, 3, 12, 0.06),
     "report": (350, 3, 2, 0.12),
