@@ -195,8 +195,12 @@ def log_paths(folder: Path) -> list[Path]:
 
 def static_logs(folder: Path) -> dict[str, ChannelLog]:
     """Return the channels that were at rest all the time: none of a sensor that was turned."""
-    kinds = {read_metadata(path).get("kind", "static") for path in log_paths(folder)}
-    return channel_logs(folder) if kinds == {"static"} else {}
+    return channel_logs(folder) if was_at_rest(folder) else {}
+
+
+def was_at_rest(folder: Path) -> bool:
+    """Return whether the sensor of a kept recording was to be at rest all the time."""
+    return all(read_metadata(path).get("kind", "static") == "static" for path in log_paths(folder))
 
 
 def channel_logs(folder: Path) -> dict[str, ChannelLog]:

@@ -131,7 +131,7 @@ def _rankings(site: Site) -> Iterator[dict[str, Any]]:
 
 def _basis(site: Site, row: Row) -> str:
     """Return on which data a sensor is judged, and what puts them in doubt."""
-    own = [v for v in site.views if v.sensor == row["sensor"] and not v.rejected]
+    own = [v for v in site.views if v.sensor == row["sensor"] and v.static]
     devices = {view.row["device"] for view in own}
     chosen = next((view for view in own if view.name == row["recording"]), None)
     if chosen is None:
