@@ -257,21 +257,6 @@ rule earth_rotation:
         steps.run("earth_rotation", input, output, params, wildcards)
 
 
-rule earth_rotation_tables:
-    input:
-        **{table: of_turned(table) for table in TURNED},
-    output:
-        as_files(*TURNED),
-    group:
-        "comparison"
-    resources:
-        **ASKED,
-    params:
-        code=plan.code("earth_rotation_tables"),
-    run:
-        steps.run("earth_rotation_tables", input, output, params, wildcards)
-
-
 rule sensor_tables:
     input:
         **{table: of_sensor(f"{table}.parquet") for table in PARTS},
@@ -298,8 +283,9 @@ rule tables:
             ]
             for table in ANALYSED
         },
+        **{table: of_turned(table) for table in TURNED},
     output:
-        as_files(*ANALYSED),
+        as_files(*ANALYSED, *TURNED),
     group:
         "comparison"
     resources:

@@ -50,7 +50,6 @@ STEPS: Mapping[str, tuple[str, ...]] = {
     "ranking": ("selection", "results"),
     "fusion": ("fusion.of_run",),
     "earth_rotation": ("earth_rate.of_run",),
-    "earth_rotation_tables": ("tables",),
     "coverage": ("coverage", "results"),
     "exports": ("export.of_run",),
     "sensor_tables": ("results",),

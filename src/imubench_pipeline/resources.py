@@ -88,7 +88,6 @@ _OF_ALL: Mapping[str, tuple[float, float, float, float]] = {
     "ranking": (300, 0.1, 1, 0.01),
     "fusion": (300, 0.2, 6, 0.01),
     "coverage": (300, 0, 1, 0),
-    "earth_rotation_tables": (300, 0.5, 1, 0.01),
     "exports": (300, 0.5, 1, 0.05),
     "figures": (350, 3, 12, 0.06),
     "report": (350, 3, 2, 0.12),

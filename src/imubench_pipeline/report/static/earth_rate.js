@@ -1,5 +1,6 @@
 // The figures of gyros that were turned between north and south.
 
+const MANY_TURNS = 60;
 const NORTH = { light: "#0072B2", dark: "#4DA3D9", marker: "triangle-up" };
 const SOUTH = { light: "#D55E00", dark: "#F08A3C", marker: "triangle-down" };
 const TRUE_RATE = { light: "#B3001B", dark: "#FF8F8F", dash: "dash", width: 1.6 };
@@ -31,7 +32,8 @@ kinds.turning = (figure) => {
   const turns = array(turned.turns).map((time) => time / scale.size);
   const there = (values) => values.filter(Number.isFinite);
   const [bottom, top] = [Math.min(...there(low)), Math.max(...there(high))];
-  const marks = uprights(turns, bottom, top);
+  // Many lines would hide the samples: then each turn has a tick at the top.
+  const marks = uprights(turns, turns.length > MANY_TURNS ? top - 0.05 * (top - bottom) : bottom, top);
   const traces = [
     ...band(x, low, high, look, 0.4).map((trace) => ({ ...trace, group: "envelope" })),
     { ...line(x, mean, black(), { hoverinfo: "skip" }), group: "mean" },
