@@ -10,6 +10,7 @@ import json
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from itertools import chain
+from pathlib import Path
 
 from pydantic import BaseModel
 
@@ -78,6 +79,7 @@ class Plan:
         self.boards: dict[str, Board] = simulated.boards
         self._simulated = {(entry.sensor, entry.recording): entry for entry in simulated.recordings}
         self._of_ingest: dict[tuple[str, str], str] = {}
+        self._read_notes: dict[Path, object] = {}
         self.recordings: dict[tuple[str, str], Recording] = {}
         for found in [*self._found_logs(), *self._to_simulate()]:
             other = self.recordings.setdefault((found.sensor, found.name), found)
@@ -159,14 +161,20 @@ class Plan:
         recording = self.recordings[sensor, name]
         if recording.simulated:
             return self._simulated[sensor, name].kind
-        if recording.notes is None:
-            return "static"
         try:
-            notes = read_yaml(recording.notes)
+            notes = self._notes(recording)
         except ConfigError:
             return "static"
         turned = isinstance(notes, Mapping) and notes.get("two_position") is not None
         return "two_position" if turned else "static"
+
+    def _notes(self, recording: Recording) -> object:
+        """Return what the file of notes beside a log holds, which is read once a run."""
+        if recording.notes is None:
+            return {}
+        if recording.notes not in self._read_notes:
+            self._read_notes[recording.notes] = read_yaml(recording.notes) or {}
+        return self._read_notes[recording.notes]
 
     @cached_property
     def turned(self) -> list[tuple[str, str]]:
@@ -175,8 +183,16 @@ class Plan:
 
     def static_of(self, sensor: str) -> list[str]:
         """Return the static recordings of a sensor."""
+        return self._at_rest.get(sensor, [])
+
+    @cached_property
+    def _at_rest(self) -> dict[str, list[str]]:
         turned = set(self.turned)
-        return [name for of, name in self.recordings if of == sensor and (of, name) not in turned]
+        found: dict[str, list[str]] = {}
+        for sensor, name in self.recordings:
+            if (sensor, name) not in turned:
+                found.setdefault(sensor, []).append(name)
+        return found
 
     def earth_rate_settings(self, sensor: str, name: str) -> str:
         """Return what the Earth's rate of a recording depends on beside its samples."""
@@ -209,7 +225,7 @@ class Plan:
             raise ConfigError(recording.error)
         notes = RecordingNotes()
         if recording.notes:
-            notes = parse(RecordingNotes, read_yaml(recording.notes) or {}, str(recording.notes))
+            notes = parse(RecordingNotes, self._notes(recording), str(recording.notes))
         if recording.sensor not in self.sensors:
             expected = self.run.sensors / f"{recording.sensor}.yaml"
             raise ConfigError(

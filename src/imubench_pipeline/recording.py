@@ -171,6 +171,12 @@ class ChannelLog:
         """Yield how the sensor stood, as written, in blocks like those of the samples."""
         return replace(self, channel=POSITION).blocks()
 
+    @property
+    def position_elsewhere(self) -> bool:
+        """How the sensor stood is kept too, but on another clock than this channel."""
+        others = (path for path in log_paths(self.path.parent) if path != self.path)
+        return any(POSITION in pq.read_schema(path).names for path in others)
+
     def mean(self) -> float:
         """Return the mean of the samples present, SI."""
         total, number = 0.0, 0

@@ -148,6 +148,14 @@ def test_segments_of_unknown_distance_are_refused(tmp_path: Path, rest: Path) ->
     assert "2 segments" in run(folder, [rest])["earth_rate"][0]["reason"]
 
 
+def test_a_position_on_another_clock_is_refused(tmp_path: Path, rest: Path) -> None:
+    folder = put(tmp_path / "a", turned_log())
+    (folder / "log.parquet").rename(folder / "log.gyro.parquet")
+    other = put(tmp_path / "b", {"position": np.ones(9)})
+    (other / "log.parquet").rename(folder / "log.position.parquet")
+    assert "a clock of its own" in run(folder, [rest])["earth_rate"][0]["reason"]
+
+
 def test_a_rejected_recording_leaves_nothing(tmp_path: Path, rest: Path) -> None:
     (tmp_path / "a").mkdir()
     assert set(map(len, run(tmp_path / "a", [rest]).values())) == {0}

@@ -149,6 +149,13 @@ def test_a_page_is_written_again_only_where_its_run_changed(made: Site, tmp_path
     assert "recordings/s/unknown.html" not in written
 
 
+def test_a_report_may_hold_nothing_but_such_runs(tmp_path: Path) -> None:
+    publish(site(joined(turned_rows(tmp_path / "kept", "run", []))), tmp_path / "report")
+    found = read_pages(tmp_path / "report")
+    assert {path: page.faults for path, page in found.items() if page.faults} == {}
+    assert "1 recording of 1 sensor" in found["index.html"].text
+
+
 def test_all_pages_stand_in_one_file(made: Site) -> None:
     text = one_file(made)
     assert 'id="page:earth_rate.html"' in text and 'id="page:recordings/s/run.html"' in text

@@ -95,6 +95,13 @@ def earth_rate_of(
         )
         found.earth_rate += _without(names, WHOLE, "not_shown", reason)
         return found
+    if log.position_elsewhere:
+        reason = (
+            "the position has a clock of its own; give it as a column of the file that the gyro is "
+            "in, or leave 'position' out"
+        )
+        found.earth_rate += _without(names, WHOLE, "not_shown", reason)
+        return found
     if source is not None:
         _predict(key, log.rate, declared, source, settings, found)
     samples = _whole(log.blocks(), log.grid)
