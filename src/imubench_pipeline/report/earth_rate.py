@@ -11,6 +11,7 @@ from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.turned import (
     ESTIMATES,
     answer,
+    latitude_text,
     line,
     needs,
     prediction_payload,
@@ -92,7 +93,8 @@ def _predicted(site: Site) -> Iterator[dict[str, Any]]:
             continue
         said.append((view.sensor, found))
         place = f"{view.sensor}-{view.name}"
-        yield found | {"view": view, "place": place, "rows": rows}
+        latitude = latitude_text(view.rows("earth_rate"))
+        yield found | {"view": view, "place": place, "rows": rows, "latitude": latitude}
 
 
 def _drawn(one: Row) -> dict[str, Any]:

@@ -80,6 +80,7 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         "findings": view.findings,
         "lines": [line(row) for row in rows],
         "noise": noise_words(rows),
+        "latitude": latitude_text(rows) if rows else "",
         "parts": parts,
         "has_samples": any(row["channel"] == channel for row in envelope),
         "has_drift": any(row["quantity"] == "drift" for row in view.rows("earth_rate_series")),
@@ -113,9 +114,20 @@ def _summary(view: RecordingView, turning: Sequence[Row], rows: Sequence[Row]) -
     turns = sum(one["what"] == "turn" for one in turning)
     parts.append(f"{counted(turns, 'turn')} between north and south")
     if rows:
-        parts.append(f"at latitude {number_text(math.degrees(rows[0]['latitude']))}°")
+        parts.append(f"at latitude {latitude_text(rows)}")
     kind = "Simulated from known parameters, not measured: " if view.simulated else ""
     return kind + ", ".join(parts) + "."
+
+
+def latitude_text(rows: Sequence[Row]) -> str:
+    """Return the latitude of a recording in degrees.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Of the table ``earth_rate``, at least one.
+    """
+    return f"{number_text(math.degrees(rows[0]['latitude']))}°"
 
 
 def answer(rows: Sequence[Row], system: System) -> str:
