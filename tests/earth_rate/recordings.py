@@ -41,13 +41,15 @@ def put(folder: Path, columns: dict[str, np.ndarray], **about: Any) -> Path:
             {
                 "kind": row["kind"],
                 "rate": RATE,
+                "begins": about.get("begins", 0.0),
                 "grid": samples,
                 "segments": about.pop("segments", [[0, samples]]),
                 "holes": {},
                 "unusable": [],
             }
         )
-    row.pop("segments", None)
+    for name in ("segments", "begins"):
+        row.pop(name, None)
     write_json(asdict(Quality(row, [], {}, None)), folder / "quality.json")
     return folder
 

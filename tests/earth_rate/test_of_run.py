@@ -121,6 +121,19 @@ def test_the_column_with_the_position_decides(tmp_path: Path, rest: Path) -> Non
     assert next(one for one in found["turning"] if one["what"] == "dwell")["sense"] == -1
 
 
+def test_times_count_from_the_first_sample_of_the_recording(tmp_path: Path, rest: Path) -> None:
+    log = {"gyro_x": turned_log()["gyro_x"][: round(120 * RATE)]}
+    plain = run(put(tmp_path / "a", log), [rest])
+    later = run(put(tmp_path / "b", log, begins=60.0), [rest])
+    for table in ("turning", "earth_rate_series"):
+        for one, other in zip(plain[table], later[table], strict=True):
+            for name in {"start", "stop", "time"} & set(one):
+                assert other[name] == one[name] + 60.0
+    assert [row.get("value") for row in plain["earth_rate"]] == [
+        row.get("value") for row in later["earth_rate"]
+    ]
+
+
 def test_a_log_without_turns_says_so(tmp_path: Path, rest: Path) -> None:
     found = run(put(tmp_path / "a", {"gyro_x": turned([], 600.0)}), [rest])
     assert {row["status"] for row in found["earth_rate"]} == {"no_turns"}

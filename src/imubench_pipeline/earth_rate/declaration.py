@@ -56,7 +56,7 @@ class TwoPosition(Strict):
     )
     turning: TimeFromZero = Field("2 s", description="that a turn takes, where it is not seen")
     start: TimeFromZero = Field(
-        "0 s", description="when the first dwell of the schedule begins, from the first sample"
+        "0 s", description="when the first dwell of the schedule begins, from the first sample used"
     )
     first: Literal["north", "south"] | None = Field(
         None, description="where the axis points in the first dwell; null: not known"

@@ -63,6 +63,8 @@ def earth_rate_of(
     declared: TwoPosition,
     source: NoiseSource | None,
     settings: EarthRateSettings,
+    *,
+    begins: float = 0.0,
 ) -> EarthRate:
     """Find the turns of a recording and estimate the Earth's rate from it.
 
@@ -75,6 +77,8 @@ def earth_rate_of(
     source : NoiseSource or None
         Its noise; without it the turns are found, and nothing is estimated.
     settings : EarthRateSettings
+    begins : float
+        Time of the first sample that is used, s from the first of the recording.
 
     Returns
     -------
@@ -125,7 +129,7 @@ def earth_rate_of(
         )
         found.earth_rate += _without(names, WHOLE, "no_turns", reason)
         return found
-    found.turning += _turning_rows(key, turning, samples, log.rate)
+    found.turning += _later(_turning_rows(key, turning, samples, log.rate), begins)
     if source is None:
         reason = (
             "the noise of this sensor is not known: no static recording of it could be used, and "
@@ -146,7 +150,7 @@ def earth_rate_of(
             continue
         extent = {"dwells": len(chosen), "turns": len(chosen) - 1}
         found.earth_rate += _estimates(names | extent, part, courses, source, turning, log.rate)
-        found.earth_rate_series += _series(key, part, courses)
+        found.earth_rate_series += _later(_series(key, part, courses), begins)
     return found
 
 
@@ -194,6 +198,13 @@ def _whole(blocks: Iterator[Array], grid: int) -> Array:
         values[reached : reached + len(block)] = block
         reached += len(block)
     return values
+
+
+def _later(rows: Iterator[Row], begins: float) -> Iterator[Row]:
+    """Yield rows with their times counted from the first sample of the recording."""
+    for row in rows:
+        times = {name: row[name] for name in ("start", "stop", "time") if name in row}
+        yield {**row, **{name: time + begins for name, time in times.items()}}
 
 
 def _dwells(turning: Turning, rate: float) -> Iterator[tuple[FoundDwell, Dwell]]:

@@ -14,7 +14,7 @@ from imubench_pipeline.earth_rate.declaration import TwoPosition
 from imubench_pipeline.earth_rate.noise_source import from_printed, from_static
 from imubench_pipeline.earth_rate.of_recording import WHOLE, earth_rate_of
 from imubench_pipeline.earth_rate.published import Schedule, published_row
-from imubench_pipeline.recording import channel_logs
+from imubench_pipeline.recording import channel_logs, read_metadata
 from imubench_pipeline.results import Key, Quality
 from imubench_pipeline.sensor import Sensor
 from imubench_pipeline.sensor_model.models import axis_model
@@ -62,10 +62,11 @@ def earth_rate_tables(
         sensor, Sensor.model_validate(given["sensor"]), channel
     )
     how = EarthRateSettings.model_validate(given["earth_rate"])
-    found = earth_rate_of(Key(sensor, recording, channel), logs[channel], declared, source, how)
+    key, log = Key(sensor, recording, channel), logs[channel]
+    begins = read_metadata(log.path).get("begins", 0.0)
+    found = earth_rate_of(key, log, declared, source, how, begins=begins)
     rows |= asdict(found)
     if simulated is not None:
-        key = Key(sensor, recording, channel)
         rows["earth_rate_published"] = list(_published(key, simulated, rows["earth_rate"]))
     return rows
 
