@@ -110,6 +110,14 @@ def test_a_run_whose_noise_is_not_known_says_so_and_shows_its_turns(read: dict[s
     assert page.naming("turn 19", "tr") and "What this gyro needs" not in page.text
 
 
+def test_the_start_page_names_what_was_not_found(read: dict[str, Read]) -> None:
+    text = read["index.html"].text
+    assert (
+        "1 turned without an estimate" in text and "The noise of this sensor is not known" in text
+    )
+    assert "two positions" in read["sensors/s.html"].text
+
+
 def test_a_rejected_run_stands_with_its_reason(read: dict[str, Read]) -> None:
     assert "latitude is missing" in read["recordings/s/bad.html"].text
     assert "latitude is missing" in read["earth_rate.html"].text
