@@ -7,7 +7,7 @@ from itertools import chain
 
 from imubench_pipeline.plan import STEPS, Plan
 from imubench_pipeline.resources import asked
-from imubench_pipeline.schemas import COMPARED, OF_ONE_RECORDING, TABLES
+from imubench_pipeline.schemas import COMPARED, OF_ONE_RECORDING, TABLES, TURNED
 from imubench_pipeline.steps import Steps
 from imubench_pipeline.validation import ConfigError
 
@@ -30,7 +30,7 @@ ASKED = asked(plan)  # memory and time on a cluster
 RESULTS = str(plan.run.results)
 FOLDER = RESULTS + "/recordings/{sensor}/{recording}"
 JOINED = sorted(set(TABLES) - set(OF_ONE_RECORDING))
-RANKED = {"ranking", "fusion", "coverage", "coverage_by_vendor"}
+RANKED = {"ranking", "fusion", "coverage", "coverage_by_vendor", *TURNED}
 ESTIMATED = (
     "parameters",
     "models",
@@ -69,6 +69,21 @@ def as_files(*tables):
     ]
 
 
+def of_turned(*tables):
+    return [
+        f"{FOLDER.format(sensor=sensor, recording=recording)}/{table}.parquet"
+        for sensor, recording in plan.turned
+        for table in tables
+    ]
+
+
+def at_rest(file):
+    return lambda w: [
+        f"{FOLDER.format(sensor=w.sensor, recording=recording)}/{file}"
+        for recording in plan.static_of(w.sensor)
+    ]
+
+
 def missing():
     made = [
         *as_files(*JOINED),
@@ -79,6 +94,7 @@ def missing():
             for file in OF_RECORDING
             if not found.held_back
         ),
+        *of_turned(*TURNED),
         *(str(found.path) for found in plan.recordings.values() if found.simulated),
     ]
     return [file for file in made if not os.path.exists(file)]
@@ -225,6 +241,22 @@ rule error_budget:
         steps.run("error_budget", input, output, params, wildcards)
 
 
+rule earth_rotation:
+    input:
+        quality=FOLDER + "/quality.json",
+        static_quality=at_rest("quality.json"),
+        static_parameters=at_rest("parameters.parquet"),
+    output:
+        **{table: f"{FOLDER}/{table}.parquet" for table in TURNED},
+    resources:
+        **ASKED,
+    params:
+        settings=lambda w: plan.earth_rate_settings(w.sensor, w.recording),
+        code=plan.code("earth_rotation"),
+    run:
+        steps.run("earth_rotation", input, output, params, wildcards)
+
+
 rule sensor_tables:
     input:
         **{table: of_sensor(f"{table}.parquet") for table in PARTS},
@@ -251,8 +283,9 @@ rule tables:
             ]
             for table in ANALYSED
         },
+        **{table: of_turned(table) for table in TURNED},
     output:
-        as_files(*ANALYSED),
+        as_files(*ANALYSED, *TURNED),
     group:
         "comparison"
     resources:

@@ -12,7 +12,7 @@ from imubench_pipeline.findings import Finding
 from imubench_pipeline.ingest import ingest_as_planned
 from imubench_pipeline.plan import Plan
 from imubench_pipeline.quality.spectral import band_finding, line_findings
-from imubench_pipeline.recording import ChannelLog, channel_logs
+from imubench_pipeline.recording import ChannelLog, static_logs
 from imubench_pipeline.results import Quality
 from imubench_pipeline.spectrum import spectra
 
@@ -31,7 +31,7 @@ def check(plan: Plan) -> Iterator[tuple[str, str, Quality]]:
         with tempfile.TemporaryDirectory(prefix="imubench.") as folder:
             settings = plan.ingest_settings(sensor, name)
             quality = ingest_as_planned(recording.path, settings, sensor, name, Path(folder))
-            for channel, log in channel_logs(Path(folder)).items():
+            for channel, log in static_logs(Path(folder)).items():
                 for finding in spectral_findings(channel, log, plan.bandwidth(sensor, name)):
                     quality.findings.append(dict(finding.row(sensor, name)))
         yield sensor, name, quality

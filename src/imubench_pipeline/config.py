@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, field_validator
 
+from imubench_pipeline.earth_rate.declaration import TimeFromZero
 from imubench_pipeline.requirements import Axis, Latitude, Time
 from imubench_pipeline.validation import (
     FractionOfLog,
@@ -189,6 +190,27 @@ class FusionSettings(Strict):
     seed: int = Field(20260101, ge=0)
 
 
+class EarthRateSettings(Strict):
+    """The Earth's rate from gyros that were turned, and what it would take."""
+
+    margin: TimeFromZero = Field(
+        "0.5 s", description="left out on both sides of a turn that is seen"
+    )
+    goals: tuple[float, ...] = Field(
+        (1.0, 0.1, 0.01),
+        min_length=1,
+        description="standard deviations that are asked for, as a part of the Earth's rate",
+    )
+    run_time: Time = Field("10 min", description="of a run, for which the best dwell is sought")
+
+    @field_validator("goals")
+    @classmethod
+    def _above_zero(cls, goals: tuple[float, ...]) -> tuple[float, ...]:
+        if min(goals) <= 0:
+            raise ValueError("expected parts above 0, such as 0.01 for 1 %")
+        return goals
+
+
 class ReportSettings(Strict):
     """The report."""
 
@@ -227,6 +249,7 @@ class Run(Strict):
     error_budget: ErrorBudgetSettings = ErrorBudgetSettings()
     exports: ExportSettings = ExportSettings()
     fusion: FusionSettings = FusionSettings()
+    earth_rate: EarthRateSettings = EarthRateSettings()
     report: ReportSettings = ReportSettings()
 
 

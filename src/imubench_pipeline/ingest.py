@@ -18,7 +18,7 @@ from imubench_pipeline.findings import Finding
 from imubench_pipeline.parts import Part, leave_out_knocks, read_part
 from imubench_pipeline.quality.columns import column_findings
 from imubench_pipeline.quality.summary import ColumnSummary
-from imubench_pipeline.readers import TEMPERATURE, RecordingError, log_files, read
+from imubench_pipeline.readers import POSITION, TEMPERATURE, RecordingError, log_files, read
 from imubench_pipeline.recording import channel_logs, log_paths
 from imubench_pipeline.results import Quality
 from imubench_pipeline.sensor import LogFormat, RecordingNotes, UsedPart
@@ -75,7 +75,8 @@ def ingest(
     folder : Path
         Where the Parquet files go; those of an earlier run are replaced.
     provenance : dict
-        Goes into the metadata of every file, as it is.
+        Goes into the metadata of every file, as it is. Its ``kind`` says whether the sensor was at
+        rest: knocks and changes are looked for then alone.
 
     Raises
     ------
@@ -124,11 +125,13 @@ def _ingest(
     parts = [
         read_part(file, notes.use, scratch, number) for number, file in enumerate(read(source, log))
     ]
+    static = provenance.get("kind", "static") == "static"
     findings = [finding for part in parts for finding in part.source.findings]
     bases = [_base(part, log, settings) for part in parts]
     for part, base in zip(parts, bases, strict=True):
-        findings += column_findings(part.columns, base.rate, settings)
-        findings += _knock_findings(part, base.rate, settings, scratch)
+        findings += column_findings(part.columns, base.rate, settings, static=static)
+        if static:  # what is sensed of a turn looks like a knock
+            findings += _knock_findings(part, base.rate, settings, scratch)
     unusable = {finding.channel for finding in findings if finding.severity == "fatal"}
     groups = _shared_bases(parts, bases)
     if len({part.rows for part in parts if not part.stamped}) > 1:
@@ -144,7 +147,7 @@ def _ingest(
             )
         )
     duration = max(base.grid / base.rate for base in bases)
-    if duration < settings.short:
+    if static and duration < settings.short:
         detail = (
             f"the recording lasts {duration:.5g} s: it shows white noise, but bias instability and "
             "random walk take hours"
@@ -249,7 +252,7 @@ def _shared_bases(parts: list[Part], bases: list[timebase.TimeBase]) -> list[lis
 def _summary(
     parts: list[Part], bases: list[timebase.TimeBase], started: str | None
 ) -> dict[str, Any]:
-    measured = [i for i, part in enumerate(parts) if set(part.columns) != {TEMPERATURE}]
+    measured = [i for i, part in enumerate(parts) if set(part.columns) - {TEMPERATURE, POSITION}]
     longest = max(measured, key=lambda index: bases[index].rows)
     base = bases[longest]
     temperature = next(
@@ -306,7 +309,7 @@ def ingest_as_planned(
     given = json.loads(settings)
     notes = RecordingNotes.model_validate(given.get("notes", {}))
     names = {"sensor": sensor, "device": notes.device or recording, "recording": recording}
-    names |= {"kind": "static", "simulated": given["simulated"]}
+    names |= {"kind": given.get("kind", "static"), "simulated": given["simulated"]}
     try:
         if "error" in given:
             raise RecordingError(given["error"])

@@ -21,7 +21,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from imubench_pipeline.readers.batch import TEMPERATURE
-from imubench_pipeline.recording import ChannelLog, channel_logs, log_paths, read_metadata
+from imubench_pipeline.recording import (
+    ChannelLog,
+    channel_logs,
+    log_paths,
+    read_metadata,
+    was_at_rest,
+)
 from imubench_pipeline.results import Key
 
 Array = NDArray[np.float64]
@@ -29,6 +35,9 @@ Row = dict[str, Any]
 
 BUCKETS = 400
 """Stretches of time of an envelope, unless told otherwise."""
+
+BUCKETS_OF_TURNS = 2400
+"""The same of a recording with turns in it, which should be seen."""
 
 MOST_BINS = 120
 """Bins of a histogram at most; at least half as many, where the samples have as many levels."""
@@ -55,7 +64,7 @@ class Overview:
     histogram: list[Row]
 
 
-def overview(folder: Path, sensor: str, recording: str, buckets: int = BUCKETS) -> Overview:
+def overview(folder: Path, sensor: str, recording: str, buckets: int | None = None) -> Overview:
     """Return what the channels of a kept recording look like; no row, where it was rejected.
 
     Channels that cannot be analysed are left out. The temperature has an envelope alone.
@@ -65,11 +74,14 @@ def overview(folder: Path, sensor: str, recording: str, buckets: int = BUCKETS) 
     folder : Path
         Of the recording, with its ``log*.parquet``.
     sensor, recording : str
-    buckets : int
-        Stretches of time of an envelope, at most.
+    buckets : int, optional
+        Stretches of time of an envelope, at most; more where the sensor was turned.
     """
     found = Overview([], [])
-    for log in (*channel_logs(folder).values(), *_temperature(folder)):
+    logs = channel_logs(folder)
+    if buckets is None:
+        buckets = BUCKETS if was_at_rest(folder) else BUCKETS_OF_TURNS
+    for log in (*logs.values(), *_temperature(folder)):
         names = asdict(Key(sensor, recording, log.channel))
         edges = _bucket_edges(log.grid, buckets)
         figures, drawn = _follow(log, edges)

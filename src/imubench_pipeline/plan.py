@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from itertools import chain
+from pathlib import Path
 
 from pydantic import BaseModel
 
@@ -16,7 +18,14 @@ from imubench_pipeline.config import Run, read_run
 from imubench_pipeline.drop_zone import Recording, fingerprint, fingerprints, found_logs
 from imubench_pipeline.provenance import source_digest
 from imubench_pipeline.requirements import Requirement, read_requirements
-from imubench_pipeline.sensor import LogFormat, RecordingNotes, Sensor, merged_log, read_sensors
+from imubench_pipeline.sensor import (
+    Kind,
+    LogFormat,
+    RecordingNotes,
+    Sensor,
+    merged_log,
+    read_sensors,
+)
 from imubench_pipeline.simulated_recordings import (
     Board,
     SimulatedRecording,
@@ -41,6 +50,7 @@ STEPS: Mapping[str, tuple[str, ...]] = {
     "error_budget": ("expected_errors", "results"),
     "ranking": ("selection", "results"),
     "fusion": ("fusion.of_run",),
+    "earth_rotation": ("earth_rate.of_run",),
     "coverage": ("coverage", "results"),
     "exports": ("export.of_run",),
     "sensor_tables": ("results",),
@@ -69,6 +79,7 @@ class Plan:
         self.boards: dict[str, Board] = simulated.boards
         self._simulated = {(entry.sensor, entry.recording): entry for entry in simulated.recordings}
         self._of_ingest: dict[tuple[str, str], str] = {}
+        self._read_notes: dict[Path, object] = {}
         self.recordings: dict[tuple[str, str], Recording] = {}
         for found in [*self._found_logs(), *self._to_simulate()]:
             other = self.recordings.setdefault((found.sensor, found.name), found)
@@ -127,17 +138,80 @@ class Plan:
     def _ingest(self, recording: Recording) -> dict[str, object]:
         settings: dict[str, object] = {
             "simulated": recording.simulated,
+            "kind": self.kind(recording.sensor, recording.name),
             "quality": self.run.quality.model_dump(mode="json"),
         }
         try:
             log, notes = self._written(recording)
             if recording.simulated:
                 log = layout(self._simulated[recording.sensor, recording.name], log)
+            elif notes.two_position is not None:
+                try:
+                    notes.two_position.turned(list(log.channels))
+                except ValueError as error:
+                    raise ConfigError(f"{recording.notes}: two_position.{error}") from None
             written = log.model_dump(mode="json", exclude={"bandwidth"})
-            said = notes.model_dump(mode="json", exclude={"log"})
+            said = notes.model_dump(mode="json", exclude={"log", "two_position"})
             return settings | {"notes": said, "log": written, "files": fingerprints(recording)}
         except ConfigError as error:
             return settings | {"error": str(error)}
+
+    def kind(self, sensor: str, name: str) -> Kind:
+        """Return what was done with the sensor; what its notes were to say, if they are wrong."""
+        recording = self.recordings[sensor, name]
+        if recording.simulated:
+            return self._simulated[sensor, name].kind
+        try:
+            notes = self._notes(recording)
+        except ConfigError:
+            return "static"
+        turned = isinstance(notes, Mapping) and notes.get("two_position") is not None
+        return "two_position" if turned else "static"
+
+    def _notes(self, recording: Recording) -> object:
+        """Return what the file of notes beside a log holds, which is read once a run."""
+        if recording.notes is None:
+            return {}
+        if recording.notes not in self._read_notes:
+            self._read_notes[recording.notes] = read_yaml(recording.notes) or {}
+        return self._read_notes[recording.notes]
+
+    @cached_property
+    def turned(self) -> list[tuple[str, str]]:
+        """Sensor and name of the recordings of gyros that were turned."""
+        return [key for key in self.recordings if self.kind(*key) == "two_position"]
+
+    def static_of(self, sensor: str) -> list[str]:
+        """Return the static recordings of a sensor."""
+        return self._at_rest.get(sensor, [])
+
+    @cached_property
+    def _at_rest(self) -> dict[str, list[str]]:
+        turned = set(self.turned)
+        found: dict[str, list[str]] = {}
+        for sensor, name in self.recordings:
+            if (sensor, name) not in turned:
+                found.setdefault(sensor, []).append(name)
+        return found
+
+    def earth_rate_settings(self, sensor: str, name: str) -> str:
+        """Return what the Earth's rate of a recording depends on beside its samples."""
+        recording = self.recordings[sensor, name]
+        known = self.sensors.get(sensor)
+        settings: dict[str, object] = {
+            "earth_rate": self.run.earth_rate.model_dump(mode="json"),
+            "sensor": known.model_dump(mode="json", exclude_unset=True) if known else None,
+        }
+        if recording.simulated:
+            entry = self._simulated[sensor, name]
+            published = {"channels": {"__all__": {"published", "figures"}}}
+            return _text(settings | {"simulated": entry.model_dump(mode="json", exclude=published)})
+        try:
+            declared = self._written(recording)[1].two_position
+        except ConfigError:
+            return _text(settings)  # it is rejected, and says why
+        told = declared.model_dump(mode="json") if declared else None
+        return _text(settings | {"two_position": told})
 
     def _written(self, recording: Recording) -> tuple[LogFormat, RecordingNotes]:
         """Return how the log of a recording is written, and the notes beside it.
@@ -151,7 +225,7 @@ class Plan:
             raise ConfigError(recording.error)
         notes = RecordingNotes()
         if recording.notes:
-            notes = parse(RecordingNotes, read_yaml(recording.notes) or {}, str(recording.notes))
+            notes = parse(RecordingNotes, self._notes(recording), str(recording.notes))
         if recording.sensor not in self.sensors:
             expected = self.run.sensors / f"{recording.sensor}.yaml"
             raise ConfigError(
@@ -268,6 +342,7 @@ class Plan:
                         "datasheet",
                         "error_budget",
                         "fusion",
+                        "earth_rate",
                     )
                 },
                 "sensors": self._described("vendor", "model", "price_class"),

@@ -20,13 +20,13 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from imubench_pipeline.readers.batch import TEMPERATURE
+from imubench_pipeline.readers.batch import POSITION, TEMPERATURE
 
 ROW_GROUP = 1 << 20
 """Rows of a row group."""
 
 _METADATA = b"imubench"
-_NOT_CHANNELS = {"time", "sample", TEMPERATURE}
+_NOT_CHANNELS = {"time", "sample", TEMPERATURE, POSITION}
 
 
 class LogWriter:
@@ -127,6 +127,8 @@ class ChannelLog:
         Samples are missing: blocks have NaN in their place.
     temperature : bool
         There are readings of the temperature on the same grid.
+    position : bool
+        There is a column on the same grid that says how the sensor stood.
     """
 
     path: Path
@@ -136,6 +138,7 @@ class ChannelLog:
     segments: tuple[tuple[int, int], ...]
     holes: bool
     temperature: bool = False
+    position: bool = False
 
     def blocks(self) -> Iterator[NDArray[np.float64]]:
         """Yield the samples on the uniform grid in SI, in consecutive blocks; NaN where missing."""
@@ -164,6 +167,16 @@ class ChannelLog:
         """Yield the readings of the temperature, °C, in blocks like those of the samples."""
         return replace(self, channel=TEMPERATURE).blocks()
 
+    def positions(self) -> Iterator[NDArray[np.float64]]:
+        """Yield how the sensor stood, as written, in blocks like those of the samples."""
+        return replace(self, channel=POSITION).blocks()
+
+    @property
+    def position_elsewhere(self) -> bool:
+        """How the sensor stood is kept too, but on another clock than this channel."""
+        others = (path for path in log_paths(self.path.parent) if path != self.path)
+        return any(POSITION in pq.read_schema(path).names for path in others)
+
     def mean(self) -> float:
         """Return the mean of the samples present, SI."""
         total, number = 0.0, 0
@@ -186,6 +199,16 @@ def log_paths(folder: Path) -> list[Path]:
     return sorted(folder.glob("log*.parquet"))
 
 
+def static_logs(folder: Path) -> dict[str, ChannelLog]:
+    """Return the channels that were at rest all the time: none of a sensor that was turned."""
+    return channel_logs(folder) if was_at_rest(folder) else {}
+
+
+def was_at_rest(folder: Path) -> bool:
+    """Return whether the sensor of a kept recording was to be at rest all the time."""
+    return all(read_metadata(path).get("kind", "static") == "static" for path in log_paths(folder))
+
+
 def channel_logs(folder: Path) -> dict[str, ChannelLog]:
     """Return the channels of a kept recording that can be analysed, by name, in order."""
     logs: dict[str, ChannelLog] = {}
@@ -203,6 +226,7 @@ def channel_logs(folder: Path) -> dict[str, ChannelLog]:
                 tuple((start, stop) for start, stop in metadata["segments"]),
                 bool(metadata["holes"].get(channel, True)),
                 TEMPERATURE in columns,
+                POSITION in columns,
             )
     order = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
     return {name: logs[name] for name in order if name in logs}

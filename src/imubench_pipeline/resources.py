@@ -78,6 +78,7 @@ _OF_A_RECORDING: Mapping[str, tuple[float, float, float, float, float]] = {
     "reconstruct": (350, 15, 1, 1.3, 0.6),
     "datasheet": (300, 0, 1, 0, 0),
     "error_budget": (300, 0, 3, 0, 0),
+    "earth_rotation": (450, 60, 15, 0, 3),
 }
 
 _OF_ALL: Mapping[str, tuple[float, float, float, float]] = {

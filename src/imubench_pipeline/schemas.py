@@ -2,45 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import pyarrow as pa
 
+from imubench_pipeline.columns import Column
+from imubench_pipeline.columns import count as _count
+from imubench_pipeline.columns import figure as _figure
+from imubench_pipeline.columns import number as _number
+from imubench_pipeline.columns import text as _text
+from imubench_pipeline.earth_rate.columns import EARTH_RATE_TABLES
 
-@dataclass(frozen=True)
-class Column:
-    """One column of a table; ``unit`` is ``-`` for a text, a count or a ratio."""
-
-    name: str
-    type: pa.DataType
-    unit: str
-    meaning: str
-    required: bool = True
-
-
-def _text(name: str, meaning: str, required: bool = True) -> Column:
-    return Column(name, pa.string(), "-", meaning, required)
-
-
-def _number(name: str, unit: str, meaning: str, required: bool = False) -> Column:
-    return Column(name, pa.float64(), unit, meaning, required)
-
-
-def _count(name: str, meaning: str, required: bool = False) -> Column:
-    return Column(name, pa.int64(), "-", meaning, required)
-
-
-def _figure(parameters: str) -> tuple[Column, ...]:
-    return (
-        _text("parameter", parameters),
-        _number("value", "as in unit", "estimate; null where status says why"),
-        _number("lower", "as in unit", "lower 95 % limit"),
-        _number("upper", "as in unit", "upper 95 % limit"),
-        _text("unit", "SI unit of value, lower and upper; degC for T_0"),
-        _text("status", "ok, not_shown, at_bound, not_identified or absent"),
-        _text("reason", "why there is no plain value", required=False),
-    )
-
+__all__ = ["BY_RECORDING", "COMPARED", "OF_ONE_RECORDING", "TABLES", "TURNED", "Column"]
 
 _FITTED = _number("fitted", "as in unit", "what the model has where value is null; no estimate")
 _SENSOR = _text("sensor", "name of the sensor file")
@@ -383,11 +354,15 @@ TABLES: dict[str, tuple[Column, ...]] = {
         Column("assumed", pa.bool_(), "-", "not published by the source: chosen"),
         _text("source", "where the parameters are published"),
     ),
+    **EARTH_RATE_TABLES,
 }
 """Every table a run leaves, by name; all numbers are SI (temperatures in degC)."""
 
 OF_ONE_RECORDING = ("envelope", "histogram")
 """The tables that are kept with each recording and not joined."""
+
+TURNED = tuple(EARTH_RATE_TABLES)
+"""The tables of gyros that were turned: only such recordings have rows."""
 
 BY_RECORDING = (
     "recordings",
@@ -408,6 +383,7 @@ BY_RECORDING = (
     "simulated_truth",
     "published",
     "error_budget",
+    *TURNED,
 )
 """The joined tables in which a recording has rows of its own."""
 

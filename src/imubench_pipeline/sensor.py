@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
+from imubench_pipeline.earth_rate.declaration import TwoPosition
 from imubench_pipeline.printed import Datasheet
 from imubench_pipeline.units import UnitError, conversion, quantity_to_si
 from imubench_pipeline.validation import ConfigError, Frequency, Strict, Text, parse, read_yaml
@@ -18,6 +19,9 @@ QUANTITIES: dict[str, str] = {"gyro": "angular_rate", "accel": "acceleration"}
 
 CHANNELS: tuple[str, ...] = tuple(f"{q}_{axis}" for q in QUANTITIES for axis in "xyz")
 """Every channel: one axis of one quantity."""
+
+Kind = Literal["static", "two_position"]
+"""What was done with a sensor during a recording."""
 
 Channel = Literal["gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"]
 
@@ -53,6 +57,14 @@ class ColumnSource(Strict):
         if self.scale == 0:
             raise ValueError("scale is 0; expected unit per count")
         return self
+
+
+class PositionSource(ColumnSource):
+    """Where the column is found that says how a sensor that is turned stands."""
+
+    unit: str = Field(
+        "1", description="of no importance: two positions are told apart by any two numbers"
+    )
 
 
 class TimeSource(Strict):
@@ -136,6 +148,11 @@ class LogFormat(Strict):
     time: TimeSource | None = Field(None, description="null: no time stamps")
     channels: dict[Channel, ColumnSource] = Field(min_length=1)
     temperature: ColumnSource | None = None
+    position: PositionSource | None = Field(
+        None,
+        description="of a sensor that is turned between two positions: angle, 0 and 1, or +1 where "
+        "the axis points north and -1 south; null: the log does not say",
+    )
     bandwidth: Frequency | None = Field(
         None, description="cut-off of the sensor's own low-pass filter, where known"
     )
@@ -167,7 +184,8 @@ class LogFormat(Strict):
             _check_unit(source.unit, QUANTITIES[quantity_of(channel)], f"channels.{channel}.unit")
         if self.temperature is not None:
             _check_unit(self.temperature.unit, "temperature", "temperature.unit")
-        sources = [*self.channels.values()] + ([self.temperature] if self.temperature else [])
+        beside = [one for one in (self.temperature, self.position) if one is not None]
+        sources = [*self.channels.values(), *beside]
         if any(source.file for source in sources) and not all(source.file for source in sources):
             raise ValueError("some channels name a 'file' and others do not; expected all or none")
         return self
@@ -214,7 +232,17 @@ class RecordingNotes(Strict):
     device: Text | None = Field(None, description="serial number; default: the recording's name")
     started: Text | None = Field(None, description="date and time of the first sample")
     use: UsedPart = UsedPart()
+    two_position: TwoPosition | None = Field(
+        None,
+        description="a gyro that was turned between north and south to find the Earth's rate; "
+        "null: the sensor was at rest all the time",
+    )
     log: dict[str, Any] = Field(default=dict(), description="merged over the sensor's log")
+
+    @property
+    def kind(self) -> Kind:
+        """What was done with the sensor."""
+        return "static" if self.two_position is None else "two_position"
 
 
 def read_sensors(folder: Path) -> dict[str, Sensor]:

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from imubench_pipeline.earth_rate.experiment import Experiment
+from imubench_pipeline.earth_rate.simulation import true_rate
+from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE
 from imubench_pipeline.readers.batch import TEMPERATURE
 from imubench_pipeline.sensor import ColumnSource, LogFormat
 from imubench_pipeline.sensor_model.imu import simulate_imu
 from imubench_pipeline.sensor_model.models import imu_model
-from imubench_pipeline.sensor_model.profiles import profiles_of
-from imubench_pipeline.simulated_recordings import SimulatedRecording
+from imubench_pipeline.sensor_model.profiles import Profile, profiles_of
+from imubench_pipeline.simulate import channel_rng
+from imubench_pipeline.simulated_recordings import SimulatedRecording, SimulatedTurns
 from imubench_pipeline.text_log import TextLog
 from imubench_pipeline.units import quantity_to_si
 from imubench_pipeline.validation import ConfigError
@@ -68,6 +73,11 @@ def _blocks(recording: SimulatedRecording, rate: float) -> Iterator[dict[str, ND
         name = f"{recording.sensor}/{recording.recording}"
         raise ConfigError(f"{name}: channels.{error}") from error
     motion, temperature = profiles_of(recording, Path())
+    if recording.two_position is not None:
+        turned = recording.two_position.turned(list(recording.channels))
+        motion = motion | {
+            turned: _turned(recording, recording.two_position, rate, recording.samples)
+        }
     return simulate_imu(
         model,
         rate,
@@ -77,3 +87,38 @@ def _blocks(recording: SimulatedRecording, rate: float) -> Iterator[dict[str, ND
         motion=motion,
         temperature=temperature,
     )
+
+
+@dataclass(frozen=True)
+class _Samples(Profile):
+    """What is sensed at each sample of a log."""
+
+    values: NDArray[np.float64]
+    rate: float
+
+    def at(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the values of the samples at these times."""
+        return self.values[np.rint(times * self.rate).astype(np.int64)]
+
+
+def _turned(
+    recording: SimulatedRecording, turns: SimulatedTurns, rate: float, samples: int
+) -> _Samples:
+    """Return what the gyro senses that is turned by the clock; each turn is sensed otherwise."""
+    dwell, turning = turns.seconds("dwell"), turns.seconds("turning")
+    design = Experiment.regular(
+        dwell=dwell - turning,
+        turning=turning,
+        dwells=max(round((samples / rate - turns.seconds("start")) / dwell), 1),
+        rate=rate,
+        latitude=turns.latitude_si,
+        first=turns.first_sense or 1,
+    )
+    rng = channel_rng(recording.seed, recording.sensor, recording.recording, "turns")
+    number = len(design.dwells) - 1
+    peaks = rng.choice([-1.0, 1.0], number) * rng.uniform(0.7, 1.3, number)
+    peaks = peaks * quantity_to_si(turns.transient, "angular_rate")
+    true = true_rate(design, EARTH_RATE, peaks)
+    before = np.full(round(turns.seconds("start") * rate), true[0])
+    after = np.full(samples, true[-1])
+    return _Samples(np.concatenate([before, true, after])[:samples], rate)

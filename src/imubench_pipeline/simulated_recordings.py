@@ -8,12 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, Self, TypeVar
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
+from imubench_pipeline.earth_rate.declaration import TwoPosition
 from imubench_pipeline.sensor import (
     QUANTITIES,
     Channel,
     ColumnSource,
+    Kind,
     LogFormat,
     Sensor,
     TimeSource,
@@ -101,11 +103,67 @@ class OfASensor(ImuSettings):
         return round(quantity_to_si(self.duration, "time") * rate)
 
 
+class PublishedRate(Strict):
+    """What a source prints of the Earth's rate that it found."""
+
+    where: Text = Field(description="such as section 6")
+    printed: Text = Field(description="with its unit, as printed")
+    part: Text = Field("whole", description="of the run: whole, or such as 'last 13 min'")
+
+    @field_validator("printed")
+    @classmethod
+    def _a_rate(cls, text: str) -> str:
+        quantity_to_si(text, "angular_rate")
+        return text
+
+
+class SimulatedTurns(TwoPosition):
+    """A gyro that is turned between north and south, by the clock."""
+
+    transient: Text = Field("0 deg/s", description="largest rate that is sensed of a turn, about")
+    assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
+    published: tuple[PublishedRate, ...] = ()
+
+    @field_validator("transient")
+    @classmethod
+    def _a_rate(cls, text: str) -> str:
+        quantity_to_si(text, "angular_rate")
+        return text
+
+    @model_validator(mode="after")
+    def _parts_are_there(self) -> Self:
+        parts = {"whole", *(f"last {text}" for text in self.last)}
+        for one in self.published:
+            if one.part not in parts:
+                raise ValueError(f"published: part is {one.part!r}; expected one of {parts}")
+        return self
+
+    @property
+    def declared(self) -> TwoPosition:
+        """What would stand beside such a log."""
+        return TwoPosition(**{name: getattr(self, name) for name in TwoPosition.model_fields})
+
+
 class SimulatedRecording(OfASensor, Surroundings):
     """A recording that is made before the run, from known figures."""
 
     recording: str = Field(pattern=_NAMES, description="starts with sim_")
     seed: int
+    two_position: SimulatedTurns | None = None
+
+    @model_validator(mode="after")
+    def _one_is_turned(self) -> Self:
+        if self.two_position is not None:
+            try:
+                self.two_position.turned(list(self.channels))
+            except ValueError as error:
+                raise ValueError(f"two_position.{error}") from error
+        return self
+
+    @property
+    def kind(self) -> Kind:
+        """What is done with the sensor."""
+        return "static" if self.two_position is None else "two_position"
 
 
 class Simulated(Strict):
@@ -278,7 +336,9 @@ def layout(recording: SimulatedRecording, log: LogFormat) -> LogFormat:
     temperature = None
     if recording.temperature is not None:
         temperature = log.temperature or _free_column(list(channels.values()), log.time)
-    return log.model_copy(update={"channels": channels, "temperature": temperature})
+    return log.model_copy(
+        update={"channels": channels, "temperature": temperature, "position": None}
+    )
 
 
 def _free_column(channels: Sequence[ColumnSource], time: TimeSource | None) -> ColumnSource:

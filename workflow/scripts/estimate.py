@@ -5,7 +5,7 @@ from pathlib import Path
 
 from imubench_pipeline.config import EstimateSettings
 from imubench_pipeline.estimation import Estimation, estimate_channel
-from imubench_pipeline.recording import channel_logs
+from imubench_pipeline.recording import static_logs
 from imubench_pipeline.results import Key, Quality, curves
 from imubench_pipeline.tables import write
 
@@ -17,7 +17,7 @@ def estimation(
     given = json.loads(settings)
     found = Estimation()
     measured = curves(allan, Quality.read(quality))
-    for channel, log in channel_logs(quality.parent).items():
+    for channel, log in static_logs(quality.parent).items():
         key = Key(sensor, recording, channel)
         how = EstimateSettings.model_validate(given["estimate"])
         estimate_channel(key, log, measured[channel], how, given["bandwidth"], found)

@@ -159,6 +159,26 @@ def simulate_log(
     ndarray, shape (samples,)
         rad/s.
     """
+    true = true_rate(experiment, earth_rate, transient)
+    return simulate(model, experiment.rate, len(true), rng, true=lambda a, b: true[a:b])
+
+
+def true_rate(experiment: Experiment, earth_rate: float, transient: ArrayLike) -> Array:
+    """Return what a gyro without errors senses in an experiment.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    earth_rate : float
+        rad/s.
+    transient : array_like
+        Peak of what is sensed of the turns, rad/s: one, or one a turn.
+
+    Returns
+    -------
+    ndarray, shape (samples,)
+        rad/s, to the end of the last dwell.
+    """
     dwells = experiment.dwells
     peaks = np.broadcast_to(np.asarray(transient, dtype=np.float64), len(dwells) - 1)
     seen = earth_rate * math.cos(experiment.latitude)
@@ -177,4 +197,4 @@ def simulate_log(
             angle = 0.5 * math.pi * (1.0 - np.cos(math.pi * part))
             true[before.stop : dwell.start] = before.sense * seen * np.cos(angle)
         true[before.stop : dwell.start] += peaks[i - 1] * np.sin(math.pi * part) ** 2
-    return simulate(model, experiment.rate, len(true), rng, true=lambda a, b: true[a:b])
+    return true

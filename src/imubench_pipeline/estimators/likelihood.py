@@ -208,8 +208,8 @@ def fit_spectrum(
     lines, clear, used, limit = lines_and_band(spectrum, line_spectra, band, bandwidth)
     if used.sum() < _FEWEST_BINS:
         reason = (
-            f"{used.sum()} bins of the spectrum are left up to {limit.highest:.4g} Hz, {_FEWEST_BINS} "
-            "are needed: too short a log"
+            f"{used.sum()} bins of the spectrum are left up to {limit.highest:.4g} Hz, "
+            f"{_FEWEST_BINS} are needed: too short a log"
         )
         if not clear.all():
             reason += f", or lines that hide too much of it ({(~clear).sum()} bins)"

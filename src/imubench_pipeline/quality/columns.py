@@ -9,7 +9,7 @@ from imubench_pipeline.config import QualitySettings
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.quality import levels, plausibility, stationarity
 from imubench_pipeline.quality.summary import LARGEST, ColumnSummary
-from imubench_pipeline.readers.batch import TEMPERATURE
+from imubench_pipeline.readers.batch import POSITION, TEMPERATURE
 from imubench_pipeline.sensor import QUANTITIES, quantity_of
 from imubench_pipeline.units import SI_UNITS, from_si
 
@@ -18,7 +18,11 @@ _USUAL = {"gyro": ("deg/s", "°/s"), "accel": ("mg", "mg")}
 
 
 def column_findings(
-    columns: Mapping[str, ColumnSummary], rate: float, settings: QualitySettings
+    columns: Mapping[str, ColumnSummary],
+    rate: float,
+    settings: QualitySettings,
+    *,
+    static: bool = True,
 ) -> list[Finding]:
     """Return what the columns of one file tell; a channel that cannot be used is fatal.
 
@@ -29,12 +33,16 @@ def column_findings(
     rate : float
         Hz; the times of the findings follow from it.
     settings : QualitySettings
+    static : bool
+        The sensor was to be at rest; where it was turned, changes are what was meant.
     """
     findings: list[Finding] = []
     usable: dict[str, ColumnSummary] = {}
     for channel, column in columns.items():
         if channel == TEMPERATURE:
             findings += _temperature(column)
+            continue
+        if channel == POSITION:
             continue
         fatal = _unusable(channel, column, settings)
         findings += [fatal] if fatal else []
@@ -43,7 +51,8 @@ def column_findings(
             usable[channel] = column
     for channel, column in usable.items():
         findings += _values(channel, column, rate, settings)
-        findings += _changes(channel, column, rate, settings)
+        if static:
+            findings += _changes(channel, column, rate, settings)
     findings += _repeated(usable, settings)
     findings += _implausible(usable, rate)
     return findings

@@ -7,7 +7,7 @@ from importlib import import_module
 from itertools import islice
 from pathlib import Path
 
-from imubench_pipeline.readers.batch import TEMPERATURE, Batch, LogFile, RecordingError
+from imubench_pipeline.readers.batch import POSITION, TEMPERATURE, Batch, LogFile, RecordingError
 from imubench_pipeline.readers.compressed import (
     holds_text,
     is_archive,
@@ -37,6 +37,7 @@ SEVERAL_CLOCKS: tuple[Reader, ...] = ("rosbag", "ubx")
 """The readers of files in which each ``variable`` is recorded by itself."""
 
 __all__ = [
+    "POSITION",
     "SEVERAL_CLOCKS",
     "TEMPERATURE",
     "Batch",
@@ -92,6 +93,8 @@ def read(path: Path, log: LogFormat) -> list[LogFile]:
     sources = {str(name): source for name, source in log.channels.items()}
     if log.temperature is not None:
         sources[TEMPERATURE] = log.temperature
+    if log.position is not None:
+        sources[POSITION] = log.position
     present = _present(path, log)
     together: dict[tuple[Path, str], dict[str, ColumnSource]] = {}
     for name, source in sources.items():

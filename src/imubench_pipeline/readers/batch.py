@@ -18,6 +18,8 @@ from imubench_pipeline.units import conversion
 TEMPERATURE = "temperature"
 """Name of the temperature column of a recording."""
 
+POSITION = "position"
+"""Name of the column that says how a sensor that is turned stands."""
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Seconds in a unit of time stamps."""
@@ -104,6 +106,8 @@ class LogFile(ABC):
     def to_si(self, name: str, raw: NDArray[np.float64]) -> NDArray[np.float64]:
         """Convert the figures of a column as written to SI: scale * (raw - offset), then unit."""
         source = self.sources[name]
+        if name == POSITION:
+            return source.scale * (raw - source.offset)
         dimension = TEMPERATURE if name == TEMPERATURE else QUANTITIES[quantity_of(name)]
         factor, zero = conversion(source.unit, dimension)
         if source.offset:

@@ -15,6 +15,7 @@ from plotly.offline import get_plotlyjs
 
 from imubench_pipeline.provenance import source_digest
 from imubench_pipeline.report.boards import boards_page
+from imubench_pipeline.report.earth_rate import earth_rate_page
 from imubench_pipeline.report.fusion import fusion_page
 from imubench_pipeline.report.glossary import glossary
 from imubench_pipeline.report.html import environment
@@ -25,6 +26,7 @@ from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.start import datasheets_page, recordings_page, start_page
 from imubench_pipeline.report.static_figures.files import figure_text
 from imubench_pipeline.report.static_figures.theory import theory_figure
+from imubench_pipeline.report.turned import turned_page
 from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
 from imubench_pipeline.tables import read, write_content
 
@@ -32,7 +34,17 @@ _KEYS = "pages.json"
 _SETTINGS = "settings.json"
 _FOLDERS = ("recordings", "sensors", "devices")
 _STATIC = Path(__file__).with_name("static")
-_SCRIPTS = ("numbers", "terms", "tables", "plot", "overlay", "channel", "decisions", "start")
+_SCRIPTS = (
+    "numbers",
+    "terms",
+    "tables",
+    "plot",
+    "overlay",
+    "channel",
+    "earth_rate",
+    "decisions",
+    "start",
+)
 _LIBRARIES = (
     "imubench_pipeline",
     "numpy",
@@ -50,7 +62,8 @@ Progress = Callable[[str], None]
 def pages(site: Site) -> Iterator[Page]:
     """Yield the pages of the report, the start page last: it stands for the finished report."""
     for view in site.views:
-        yield recording_page(site, view)
+        turned = not view.rejected and not view.static
+        yield turned_page(site, view) if turned else recording_page(site, view)
     for sensor in site.sensors:
         yield sensor_page(site, sensor)
     for path in dict.fromkeys(view.device_page for view in site.views):
@@ -61,6 +74,8 @@ def pages(site: Site) -> Iterator[Page]:
     yield fusion_page(site)
     if site.settings.get("boards"):
         yield boards_page(site)
+    if site.turned:
+        yield earth_rate_page(site)
     yield Page(
         "theory.html",
         "theory.html.jinja",

@@ -36,13 +36,17 @@ _RATE_FROM = {"stamps": "from the stamps", "stated": "as stated"}
 def recording_page(site: Site, view: RecordingView) -> Page:
     """Return the page of a recording."""
     folder = site.results / "recordings" / view.sensor / view.name
+    key = recording_key(site, view, folder)
+    return Page(view.page, "recording.html.jinja", key, lambda: _context(site, view, folder))
+
+
+def recording_key(site: Site, view: RecordingView, folder: Path) -> str:
+    """Return the digest of what the page of a recording shows; ``folder`` is the recording's."""
     samples = [folder / f"{table}.parquet" for table in ("envelope", "histogram")]
     own = [path.read_bytes() for path in samples if path.is_file()]
     published = [row for row in site.rows("coverage") if row["sensor"] == view.sensor]
-    key = site.key_of(
-        view.key, view.device_page, site.looks.get(view.sensor), published, _metadata(folder), *own
-    )
-    return Page(view.page, "recording.html.jinja", key, lambda: _context(site, view, folder))
+    look = site.looks.get(view.sensor)
+    return site.key_of(view.key, view.device_page, look, published, metadata_of(folder), *own)
 
 
 def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
@@ -74,8 +78,8 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         "has_temperature": "temperature" in samples["envelope"],
         "budget": budgets[0] if budgets else None,
         "budget_words": budget_words(site.settings["settings"]["error_budget"]),
-        "provenance": list(_provenance(view, channels, folder)),
-        "sources": _metadata(folder).get("sources", []),
+        "provenance": list(provenance(view, channels, folder)),
+        "sources": metadata_of(folder).get("sources", []),
         "command": shlex.join(
             [
                 *("snakemake", "-c2", "--forcerun", "ingest", "--"),
@@ -205,15 +209,17 @@ def _model_words(channel: ChannelView) -> str:
     return " ".join(filter(None, [text, *(sentence(n) for n in notes), sentence(band)]))
 
 
-def _metadata(folder: Path) -> Mapping[str, Any]:
+def metadata_of(folder: Path) -> Mapping[str, Any]:
+    """Return the metadata of the log in a folder of a recording; nothing where there is none."""
     paths = log_paths(folder)
     return read_metadata(paths[0]) if paths else {}
 
 
-def _provenance(
+def provenance(
     view: RecordingView, channels: Sequence[ChannelView], folder: Path
 ) -> Iterator[tuple[str, str]]:
-    row, kept = view.row, _metadata(folder)
+    """Yield where a recording comes from, as names and texts; ``folder`` is the recording's."""
+    row, kept = view.row, metadata_of(folder)
     yield "Recording", f"{row['sensor']} / {row['recording']}"
     yield "Device", str(row["device"])
     yield "Kind", row["kind"] + (", simulated" if row["simulated"] else "")

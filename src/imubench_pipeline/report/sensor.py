@@ -49,7 +49,7 @@ def _sensor(site: Site, sensor: str, own: Sequence[RecordingView]) -> dict[str, 
         "standings": list(_standings(site, sensor)),
         "devices": list(_devices(own)),
         "forest": FOREST,
-        "several": sum(not view.rejected for view in own) > 1,
+        "several": sum(view.static for view in own) > 1,
         "parameter_tables": list(together.tables()),
         "pooled": pooled,
         "pooled_filters": {

@@ -25,6 +25,7 @@ NAVIGATION = (
     ("datasheets.html", "Datasheets"),
     ("fusion.html", "Fusion"),
     ("boards.html", "Boards"),
+    ("earth_rate.html", "Earth’s rate"),
     ("theory.html", "Theory"),
     ("made.html", "How this was made"),
 )
@@ -113,6 +114,11 @@ class Site:
                 view.device_page = _device_page(*device)
         return views
 
+    @cached_property
+    def turned(self) -> list[RecordingView]:
+        """The recordings of gyros that were turned between north and south."""
+        return [view for view in self.views if view.row["kind"] == "two_position"]
+
     def device_page_of(self, row: Row) -> str | None:
         """Return the page of the device of a row that names a recording."""
         return self._device_pages.get((row["sensor"], row["recording"]))
@@ -124,8 +130,11 @@ class Site:
     @property
     def navigation(self) -> list[tuple[str, str]]:
         """The pages that every page leads to, with their names."""
-        boards = bool(self.settings.get("boards"))
-        return [one for one in NAVIGATION if boards or one[0] != "boards.html"]
+        there = {
+            "boards.html": bool(self.settings.get("boards")),
+            "earth_rate.html": bool(self.turned),
+        }
+        return [one for one in NAVIGATION if there.get(one[0], True)]
 
     @cached_property
     def sensors(self) -> list[str]:
@@ -192,7 +201,7 @@ class Site:
     @cached_property
     def common(self) -> str:
         """Digest of what every page shows: settings, names, code."""
-        return _digest(self.settings, self.names, self.code, self.version)
+        return _digest(self.settings, self.names, self.navigation, self.code, self.version)
 
     @cached_property
     def key(self) -> str:

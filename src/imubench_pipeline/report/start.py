@@ -18,6 +18,7 @@ from imubench_pipeline.report.words import (
     listed_names,
     requirement_verdict,
     requirement_words,
+    sentence,
 )
 
 _LONGEST_PART = 1 / 9
@@ -40,6 +41,7 @@ def _start(site: Site) -> dict[str, Any]:
         "warned": [{"view": view, "found": _grouped(view.warnings)} for view in warned],
         "warning_count": f"{counted(sum(len(v.warnings) for v in warned), 'warning')} in "
         f"{counted(len(warned), 'recording')}",
+        "not_found": list(_not_found(site)),
         "changed": site.changed_devices(),
         "rankings": ranked,
         "forest": FOREST,
@@ -54,6 +56,14 @@ def _start(site: Site) -> dict[str, Any]:
             **together.page,
         },
     }
+
+
+def _not_found(site: Site) -> Iterator[dict[str, Any]]:
+    """Yield the recordings of turned gyros of which nothing could be estimated, and why."""
+    for view in site.turned:
+        rows = view.rows("earth_rate")
+        if rows and all(row["value"] is None for row in rows):
+            yield {"view": view, "reason": sentence(rows[0]["reason"])}
 
 
 def summary(views: Sequence[RecordingView], several: bool = True) -> str:
@@ -131,7 +141,7 @@ def _rankings(site: Site) -> Iterator[dict[str, Any]]:
 
 def _basis(site: Site, row: Row) -> str:
     """Return on which data a sensor is judged, and what puts them in doubt."""
-    own = [v for v in site.views if v.sensor == row["sensor"] and not v.rejected]
+    own = [v for v in site.views if v.sensor == row["sensor"] and v.static]
     devices = {view.row["device"] for view in own}
     chosen = next((view for view in own if view.name == row["recording"]), None)
     if chosen is None:

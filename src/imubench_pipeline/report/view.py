@@ -155,6 +155,11 @@ class RecordingView:
         return bool(self.row["status"] == "rejected")
 
     @property
+    def static(self) -> bool:
+        """Whether it could be used, and its sensor was at rest all the time."""
+        return not self.rejected and bool(self.row["kind"] != "two_position")
+
+    @property
     def key(self) -> str:
         """Digest of all that the tables say of it."""
         return self.keys()[self.sensor, self.name]

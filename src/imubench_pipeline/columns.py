@@ -1,0 +1,48 @@
+"""A column of a table: its name with type, unit and meaning."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pyarrow as pa
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a table; ``unit`` is ``-`` for a text, a count or a ratio."""
+
+    name: str
+    type: pa.DataType
+    unit: str
+    meaning: str
+    required: bool = True
+
+
+def text(name: str, meaning: str, required: bool = True) -> Column:
+    """Return a column of texts."""
+    return Column(name, pa.string(), "-", meaning, required)
+
+
+def number(name: str, unit: str, meaning: str, required: bool = False) -> Column:
+    """Return a column of numbers."""
+    return Column(name, pa.float64(), unit, meaning, required)
+
+
+def count(name: str, meaning: str, required: bool = False) -> Column:
+    """Return a column of counts."""
+    return Column(name, pa.int64(), "-", meaning, required)
+
+
+def figure(
+    parameters: str, statuses: str = "ok, not_shown, at_bound, not_identified or absent"
+) -> tuple[Column, ...]:
+    """Return what every table says of an estimated figure."""
+    return (
+        text("parameter", parameters),
+        number("value", "as in unit", "estimate; null where status says why"),
+        number("lower", "as in unit", "lower 95 % limit"),
+        number("upper", "as in unit", "upper 95 % limit"),
+        text("unit", "SI unit of value, lower and upper; degC for T_0"),
+        text("status", statuses),
+        text("reason", "why there is no plain value", required=False),
+    )

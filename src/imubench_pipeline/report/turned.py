@@ -1,0 +1,349 @@
+"""The page of a recording of a gyro that was turned between north and south."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE
+from imubench_pipeline.report.payload import Arrays, samples_payload
+from imubench_pipeline.report.practical import (
+    System,
+    duration_text,
+    limit_digits,
+    number_text,
+    page_unit,
+)
+from imubench_pipeline.report.recording import metadata_of, provenance, recording_key
+from imubench_pipeline.report.site import Page, Site
+from imubench_pipeline.report.view import RecordingView, Row
+from imubench_pipeline.report.words import counted, sentence
+from imubench_pipeline.tables import read
+
+METHOD_TERMS = {
+    "pairs": "by_pairs",
+    "triples": "by_triples",
+    "filter": "rate_filter",
+    "smoother": "rate_smoother",
+    "known_rate": "known_rate",
+}
+"""Term of the glossary of each method."""
+
+METHOD_WORDS = {
+    "pairs": "pairs of dwells",
+    "triples": "A-B-A differences",
+    "filter": "filter, rate unknown",
+    "smoother": "smoother, rate unknown",
+    "known_rate": "bias tracking with known rate",
+}
+ESTIMATES = ("filter", "pairs", "triples")
+"""The methods that find the rate, the one to use first; the smoother's is that of the filter."""
+
+
+def turned_page(site: Site, view: RecordingView) -> Page:
+    """Return the page of a recording whose sensor was turned.
+
+    Parameters
+    ----------
+    site : Site
+    view : RecordingView
+        One that was not rejected.
+    """
+    folder = site.results / "recordings" / view.sensor / view.name
+    key = recording_key(site, view, folder)
+    return Page(view.page, "turned.html.jinja", key, lambda: _context(site, view, folder))
+
+
+def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
+    arrays = Arrays()
+    rows = view.rows("earth_rate")
+    channel = rows[0]["channel"] if rows else ""
+    whole = [row for row in rows if row["part"] == "whole"]
+    turning = view.rows("turning")
+    parts = list(dict.fromkeys(row["part"] for row in rows if row["value"] is not None))
+    path = folder / "envelope.parquet"
+    envelope = read("envelope", [path]).to_pylist() if path.is_file() else []
+    prediction = view.rows("earth_rate_prediction")
+    return {
+        "view": view,
+        "name": site.names[view.sensor],
+        "sensor_page": site.sensor_page(view.sensor),
+        "channel": channel,
+        "summary": _summary(view, turning, rows),
+        "answer": answer(whole, site.system),
+        "doubts": [sentence(row["doubts"]) for row in turning if row["what"] == "doubt"],
+        "findings": view.findings,
+        "lines": [line(row) for row in rows],
+        "noise": noise_words(rows),
+        "latitude": latitude_text(rows) if rows else "",
+        "parts": parts,
+        "has_samples": any(row["channel"] == channel for row in envelope),
+        "has_drift": any(row["quantity"] == "drift" for row in view.rows("earth_rate_series")),
+        "published": list(published_lines(view.rows("earth_rate_published"))),
+        "needs": needs(prediction),
+        "has_prediction": bool(prediction),
+        "stretches": list(_stretches(turning)),
+        "provenance": list(provenance(view, [], folder)),
+        "sources": metadata_of(folder).get("sources", []),
+        "command": shlex.join(
+            [
+                *("snakemake", "-c2", "--forcerun", "ingest", "--"),
+                f"{site.results_name}/recordings/{view.sensor}/{view.name}/earth_rate.parquet",
+            ]
+        ),
+        "page": {
+            "looks": {},
+            "channels": [],
+            "findings": [],
+            "samples": samples_payload(envelope, [], arrays),
+            "turned": _payload(view, rows, turning, arrays),
+            "prediction": prediction_payload(prediction, arrays),
+            "arrays": arrays.texts,
+        },
+    }
+
+
+def _summary(view: RecordingView, turning: Sequence[Row], rows: Sequence[Row]) -> str:
+    row = view.row
+    parts = [f"{duration_text(row['duration'])} at {number_text(row['rate'])} Hz"]
+    turns = sum(one["what"] == "turn" for one in turning)
+    parts.append(f"{counted(turns, 'turn')} between north and south")
+    if rows:
+        parts.append(f"at latitude {latitude_text(rows)}")
+    kind = "Simulated from known parameters, not measured: " if view.simulated else ""
+    return kind + ", ".join(parts) + "."
+
+
+def latitude_text(rows: Sequence[Row]) -> str:
+    """Return the latitude of a recording in degrees.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Of the table ``earth_rate``, at least one.
+    """
+    return f"{number_text(math.degrees(rows[0]['latitude']))}°"
+
+
+def answer(rows: Sequence[Row], system: System) -> str:
+    """Return what was found in a sentence: the filter's estimate, or why there is none.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Of the table ``earth_rate``, of the whole recording.
+    system : str
+    """
+    found = {row["method"]: row for row in rows}
+    best = found.get("filter")
+    if best is None:
+        return "Nothing was found of the turns of this recording."
+    if best["value"] is None:
+        return sentence(best["reason"] or "")
+    unit = page_unit("gyro", "adev", system)
+    value, truth = (unit.text(best[name], 4) for name in ("value", "truth"))
+    limit = unit.text(best["upper"] - best["value"], 2)
+    text = (
+        f"The filter finds an Earth's rate of {value} ± {limit} {unit.sign} (95 %); it is {truth} "
+        f"{unit.sign}, {number_text(abs(best['off_sigma']), 2)} standard deviations away."
+    )
+    if abs(best["off_sigma"]) > _FAR:
+        text += (
+            " So far off is not noise: a wrong sense, axis or latitude, a sensor that is warming "
+            "up, or another noise than at rest."
+        )
+    return text + (f" {sentence(best['reason'])}" if best["reason"] else "")
+
+
+_FAR = 4.0
+"""Standard deviations beyond which an estimate is not what noise makes of it."""
+
+
+def line(row: Row) -> dict[str, Any]:
+    """Return a line of the table of estimates.
+
+    Parameters
+    ----------
+    row : mapping
+        Of the table ``earth_rate``.
+    """
+    return {
+        **row,
+        "term": METHOD_TERMS[row["method"]],
+        "words": METHOD_WORDS[row["method"]],
+        "digits": limit_digits(row["lower"], row["upper"], 4),
+        "off": "–" if row["off_sigma"] is None else f"{number_text(row['off_sigma'], 2)} σ",
+        "why": sentence(row["reason"] or ""),
+        "use": row["method"] == "filter" and row["status"] == "ok",
+    }
+
+
+def noise_words(rows: Sequence[Row]) -> str:
+    """Return by which noise model the estimates are weighed, in a sentence.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Of the table ``earth_rate``, of one recording.
+    """
+    known = next((row for row in rows if row["model"]), None)
+    return f"Noise model: {known['model']}, from {known['model_from']}." if known else ""
+
+
+def published_lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
+    """Yield the lines of the table of what a source prints of its runs.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Of the table ``earth_rate_published``.
+    """
+    for row in rows:
+        yield {
+            **row,
+            "length": duration_text(row["duration"]),
+            "off": f"{number_text(row['off_sigma'], 3)} σ",
+        }
+
+
+def needs(rows: Sequence[Row]) -> dict[str, Any] | None:
+    """Return what it takes to find the Earth's rate, for a table and a sentence.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Of the table ``earth_rate_prediction``, of one recording.
+    """
+    goals = [row for row in rows if row["of"] == "goal"]
+    if not goals:
+        return None
+    curve = [row for row in rows if row["of"] == "dwell"]
+    best = next(row for row in curve if row["best"])
+    nearly = [row["dwell"] for row in curve if row["nearly_best"]]
+    return {
+        "dwell": duration_text(goals[0]["dwell"]),
+        "goals": [
+            {
+                "goal": f"{number_text(100.0 * row['goal'], 3)} %",
+                "turns": f"{row['turns']:,}".replace(",", " "),
+                "time": duration_text(row["time"]),
+                "seconds": row["time"],
+                "sigma": row["sigma"],
+                "heading": _heading(row["heading"]),
+            }
+            for row in goals
+        ],
+        "best": (
+            f"In a run of {duration_text(best['time'])} the best dwell has "
+            f"{number_text(best['dwell'], 3)} s of data ({counted(best['turns'], 'turn')}): it "
+            f"gives the Earth's rate to {number_text(100.0 * best['relative'], 3)} %. From "
+            f"{number_text(min(nearly), 3)} s to {number_text(max(nearly), 3)} s it is less than "
+            "1 % worse."
+        ),
+    }
+
+
+_SMALL = 0.5
+"""Largest standard deviation of a heading, rad, of which the formula for small angles tells."""
+
+
+def _heading(heading: float) -> str:
+    if heading > _SMALL:
+        return f"above {number_text(math.degrees(_SMALL), 2)}°"
+    return f"{number_text(math.degrees(heading), 3)}°"
+
+
+def _stretches(turning: Sequence[Row]) -> Iterator[dict[str, Any]]:
+    """Yield dwells, turns and knocks in the order of time."""
+    listed = [row for row in turning if row["start"] is not None]
+    for row in sorted(listed, key=lambda row: (row["start"], row["what"])):
+        position = {1: "north", -1: "south"}.get(row["sense"], "")
+        yield {**row, "position": position}
+
+
+def _payload(
+    view: RecordingView, rows: Sequence[Row], turning: Sequence[Row], arrays: Arrays
+) -> dict[str, Any]:
+    """Return what the figures of dwells and estimates are drawn from."""
+    dwells = [row for row in turning if row["what"] == "dwell"]
+    series = view.rows("earth_rate_series")
+    return {
+        "channel": rows[0]["channel"] if rows else "",
+        "truth": rows[0]["truth"] if rows else None,
+        "latitude": rows[0]["latitude"] if rows else None,
+        "simulated": view.simulated,
+        "dwells": {
+            "start": arrays.exact([row["start"] for row in dwells]),
+            "stop": arrays.exact([row["stop"] for row in dwells]),
+            "mean": arrays.exact(_numbers(dwells, "mean")),
+            "north": [row["sense"] == 1 for row in dwells],
+        },
+        "turns": arrays.exact([row["time"] for row in turning if row["what"] == "turn"]),
+        "found_by": [row["found_by"] for row in turning if row["what"] == "turn"],
+        "parts": {
+            part: {
+                "range": _range([row for row in series if row["part"] == part], rows[0]["truth"]),
+                "courses": _courses([row for row in series if row["part"] == part], arrays),
+            }
+            for part in dict.fromkeys(row["part"] for row in series)
+        },
+    }
+
+
+def _courses(series: Sequence[Row], arrays: Arrays) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for name in dict.fromkeys((row["quantity"], row["method"]) for row in series):
+        own = [row for row in series if (row["quantity"], row["method"]) == name]
+        found["drift" if name[0] == "drift" else name[1]] = {
+            "name": "drift" if name[0] == "drift" else METHOD_WORDS[name[1]],
+            "time": arrays.exact([row["time"] for row in own]),
+            "value": arrays.exact(_numbers(own, "value")),
+            "sigma": arrays.exact(_numbers(own, "sigma")),
+        }
+    return found
+
+
+def _range(series: Sequence[Row], truth: float) -> list[float]:
+    """Return what a figure of the estimates shows of the rate: the first ones are far off."""
+    rates = [row for row in series if row["quantity"] == "rate"]
+    if not rates:
+        return [0.0, 2.0 * truth]
+    first, last = rates[0]["time"], max(row["time"] for row in rates)
+    later = [row for row in rates if row["time"] >= first + 0.12 * (last - first)]
+    high = max(abs(row["value"] - truth) + 2.0 * (row["sigma"] or 0.0) for row in later)
+    return [truth - 1.1 * high, truth + 1.1 * high]
+
+
+def prediction_payload(rows: Sequence[Row], arrays: Arrays) -> dict[str, Any]:
+    """Return what the figures of the prediction are drawn from.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Of the table ``earth_rate_prediction``, of one recording.
+    arrays : Arrays
+    """
+    goals = [row["goal"] for row in rows if row["of"] == "goal"]
+    found: dict[str, Any] = {"goals": goals, "truth": EARTH_RATE}
+    for of, x in (("time", "time"), ("dwell", "dwell")):
+        own = [row for row in rows if row["of"] == of and row["sigma"] is not None]
+        own.sort(key=lambda row: float(row[x]))
+        found[of] = {
+            "x": arrays.exact([row[x] for row in own]),
+            "sigma": arrays.exact([row["sigma"] for row in own]),
+            "turns": [row["turns"] for row in own],
+            "run": own[0]["time"] if own else None,
+            "length": own[0]["dwell"] if own else None,
+            "best": next((k for k, row in enumerate(own) if row["best"]), None),
+            "nearly": [row["dwell"] for row in own if row["nearly_best"]],
+        }
+    return found
+
+
+def _numbers(rows: Sequence[Mapping[str, Any]], name: str) -> list[float]:
+    return [np.nan if row[name] is None else row[name] for row in rows]

@@ -1,0 +1,242 @@
+"""What a run finds in kept recordings of a gyro that was turned."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from imubench_pipeline.earth_rate.columns import EARTH_RATE_TABLES
+from imubench_pipeline.earth_rate.noise_source import from_static
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.tables import build
+from tests.earth_rate.recordings import (
+    EVERY_30,
+    PRINTED,
+    SENSOR,
+    put,
+    put_at_rest,
+    run,
+    turned_log,
+)
+from tests.earth_rate.runs import EARTH, PAPER, RATE, turned
+
+OWN: dict[str, Any] = {"device": "7", "simulated": False}
+
+
+def by_method(rows: list[dict[str, Any]], part: str = "whole") -> dict[str, dict[str, Any]]:
+    return {row["method"]: row for row in rows if row["part"] == part}
+
+
+@pytest.fixture(scope="module")
+def rest(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return put_at_rest(tmp_path_factory.mktemp("s") / "night")
+
+
+def test_the_rate_is_found_within_what_is_said_of_it(tmp_path: Path, rest: Path) -> None:
+    found = run(put(tmp_path / "a", turned_log()), [rest], last=["5 min"])
+    for table in EARTH_RATE_TABLES:
+        build(table, found[table])  # the columns and their types are those of the table
+    rows = by_method(found["earth_rate"])
+    for method in ("pairs", "triples", "filter", "smoother"):
+        row = rows[method]
+        assert row["status"] == "ok" and abs(row["off_sigma"]) < 3.0
+        assert row["lower"] < row["value"] < row["upper"]
+        assert row["sigma"] >= row["white"] > 0.0
+        assert row["sigma"] == pytest.approx(PAPER.N / math.sqrt(570.0), rel=0.1)
+    assert rows["filter"]["sigma"] <= rows["pairs"]["sigma"] * 1.001
+    assert rows["filter"]["dwells"] == 20 and rows["filter"]["turns"] == 19
+    assert rows["filter"]["model_from"] == "static recording night; method likelihood"
+    given = rows["known_rate"]
+    assert (
+        given["status"] == "given" and "sigma" not in given and "whatever rate" in given["reason"]
+    )
+    last = by_method(found["earth_rate"], "last 5 min")["pairs"]
+    assert last["dwells"] == 10
+    assert last["sigma"] == pytest.approx(rows["pairs"]["sigma"] * math.sqrt(2), rel=0.05)
+    turns = [row for row in found["turning"] if row["what"] == "turn"]
+    np.testing.assert_allclose([row["time"] for row in turns], np.add(EVERY_30, 0.75), atol=0.5)
+    senses = [row["sense"] for row in found["turning"] if row["what"] == "dwell"]
+    assert senses == [1, -1] * 10
+
+
+def test_the_courses_end_with_the_estimates(tmp_path: Path, rest: Path) -> None:
+    found = run(put(tmp_path / "a", turned_log()), [rest])
+    rows = by_method(found["earth_rate"])
+    for method, row in rows.items():
+        own = [one for one in found["earth_rate_series"]
+               if (one["method"], one["quantity"]) == (method, "rate")]  # fmt: skip
+        assert own[-1]["value"] == row["value"] and own[-1]["sigma"] == row.get("sigma")
+        assert [one["time"] for one in own] == sorted(one["time"] for one in own)
+    # Before the second position is seen the filter says nothing.
+    of_filter = [one for one in found["earth_rate_series"]
+                 if (one["method"], one["quantity"]) == ("filter", "rate")]  # fmt: skip
+    assert of_filter[0]["time"] > 30.0
+    drift = [one for one in found["earth_rate_series"] if one["quantity"] == "drift"]
+    assert drift and all(abs(one["value"] - 0.002) < 6 * one["sigma"] + 1e-3 for one in drift)
+
+
+def test_sixty_seconds_never_know_the_rate_better_than_white_noise_allows(
+    tmp_path: Path, rest: Path
+) -> None:
+    log = {"gyro_x": turned([29.0], 60.0)}
+    found = run(put(tmp_path / "a", log), [rest], latitude="40 deg")
+    least = PAPER.N / math.sqrt(60.0) / math.cos(math.radians(40.0))
+    rows = by_method(found["earth_rate"])
+    for method in ("pairs", "filter", "smoother"):
+        assert rows[method]["sigma"] > least > 0.38 * EARTH
+    assert rows["triples"]["status"] == "not_shown"
+    assert "no three dwells" in rows["triples"]["reason"]
+    assert all(one["sigma"] > least for one in found["earth_rate_series"]
+               if one["quantity"] == "rate" and one["sigma"] is not None)  # fmt: skip
+
+
+def test_a_known_bias_and_a_drift_enter_the_filter(tmp_path: Path, rest: Path) -> None:
+    folder = put(tmp_path / "a", {"gyro_x": turned_log()["gyro_x"][: round(90 * RATE)]})
+    plain, known, drifting = (
+        by_method(run(folder, [rest], **more)["earth_rate"])["filter"]["sigma"]
+        for more in ({}, {"turn_on_bias": "1 deg/h"}, {"drift": "10000 deg/h/h"})
+    )
+    assert known < plain < drifting
+
+
+def test_a_sense_that_is_not_known_is_said(tmp_path: Path, rest: Path) -> None:
+    found = run(put(tmp_path / "a", turned_log(first=-1)), [rest], first=None)
+    row = by_method(found["earth_rate"])["pairs"]
+    assert row["status"] == "ambiguous" and row["value"] < 0.0
+    assert "state 'first: north' or 'first: south'" in row["reason"]
+    assert any("assumed" in one["doubts"] for one in found["turning"] if one["what"] == "doubt")
+
+
+def test_the_column_with_the_position_decides(tmp_path: Path, rest: Path) -> None:
+    log = turned_log(peak=0.0, first=-1)
+    turns = np.searchsorted(EVERY_30, np.arange(len(log["gyro_x"])) / RATE)
+    folder = put(tmp_path / "a", log | {"position": -((-1.0) ** turns)})
+    found = run(folder, [rest], first=None)
+    row = by_method(found["earth_rate"])["filter"]
+    assert row["status"] == "ok" and abs(row["off_sigma"]) < 3.5
+    turn = next(one for one in found["turning"] if one["what"] == "turn")
+    assert turn["found_by"] == "column"
+    assert next(one for one in found["turning"] if one["what"] == "dwell")["sense"] == -1
+
+
+def test_times_count_from_the_first_sample_of_the_recording(tmp_path: Path, rest: Path) -> None:
+    log = {"gyro_x": turned_log()["gyro_x"][: round(120 * RATE)]}
+    plain = run(put(tmp_path / "a", log), [rest])
+    later = run(put(tmp_path / "b", log, begins=60.0), [rest])
+    for table in ("turning", "earth_rate_series"):
+        for one, other in zip(plain[table], later[table], strict=True):
+            for name in {"start", "stop", "time"} & set(one):
+                assert other[name] == one[name] + 60.0
+    assert [row.get("value") for row in plain["earth_rate"]] == [
+        row.get("value") for row in later["earth_rate"]
+    ]
+
+
+def test_a_log_without_turns_says_so(tmp_path: Path, rest: Path) -> None:
+    found = run(put(tmp_path / "a", {"gyro_x": turned([], 600.0)}), [rest])
+    assert {row["status"] for row in found["earth_rate"]} == {"no_turns"}
+    assert "nothing shows that the log was turned every 30 s" in found["earth_rate"][0]["reason"]
+    assert "check 'dwell' and 'channel'" in found["earth_rate"][0]["reason"]
+    assert found["earth_rate_series"] == [] and found["earth_rate_prediction"]
+
+
+def test_a_position_that_never_changes_says_so(tmp_path: Path, rest: Path) -> None:
+    log = turned_log()
+    found = run(put(tmp_path / "a", log | {"position": np.ones(len(log["gyro_x"]))}), [rest])
+    assert "the log never turns" in found["earth_rate"][0]["reason"]
+
+
+def test_a_log_that_is_too_short_says_so(tmp_path: Path, rest: Path) -> None:
+    short = {"gyro_x": turned_log()["gyro_x"][: round(40 * RATE)]}
+    found = run(put(tmp_path / "a", short), [rest])
+    assert "less than two dwells of 30 s" in found["earth_rate"][0]["reason"]
+
+
+def test_segments_of_unknown_distance_are_refused(tmp_path: Path, rest: Path) -> None:
+    log = turned_log()
+    half = len(log["gyro_x"]) // 2
+    folder = put(tmp_path / "a", log, segments=[[0, half], [half, 2 * half]])
+    assert "2 segments" in run(folder, [rest])["earth_rate"][0]["reason"]
+
+
+def test_a_position_on_another_clock_is_refused(tmp_path: Path, rest: Path) -> None:
+    folder = put(tmp_path / "a", turned_log())
+    (folder / "log.parquet").rename(folder / "log.gyro.parquet")
+    other = put(tmp_path / "b", {"position": np.ones(9)})
+    (other / "log.parquet").rename(folder / "log.position.parquet")
+    assert "a clock of its own" in run(folder, [rest])["earth_rate"][0]["reason"]
+
+
+def test_a_rejected_recording_leaves_nothing(tmp_path: Path, rest: Path) -> None:
+    (tmp_path / "a").mkdir()
+    assert set(map(len, run(tmp_path / "a", [rest]).values())) == {0}
+
+
+def test_without_a_static_recording_the_turns_are_found_and_nothing_is_estimated(
+    tmp_path: Path,
+) -> None:
+    found = run(put(tmp_path / "a", turned_log()), [])
+    assert {row["status"] for row in found["earth_rate"]} == {"no_model"}
+    assert "add a static log of this sensor" in found["earth_rate"][0]["reason"]
+    assert sum(row["what"] == "turn" for row in found["turning"]) == 19
+    assert found["earth_rate_prediction"] == []
+
+
+def test_the_datasheet_answers_where_no_static_recording_does(tmp_path: Path) -> None:
+    sensor = SENSOR | {"datasheet": PRINTED | {"document": "sheet 1"}}
+    found = run(put(tmp_path / "a", turned_log()), [], sensor=sensor)
+    row = by_method(found["earth_rate"])["filter"]
+    assert row["status"] == "ok" and row["model"] == "N"
+    assert row["model_from"].startswith(
+        "typical figures of the datasheet of s: sheet 1, not measured"
+    )
+    assert by_method(found["earth_rate"])["known_rate"]["status"] == "given"
+
+
+def test_the_device_itself_answers_before_others_and_long_logs_before_short(
+    tmp_path: Path,
+) -> None:
+    def put_one(name: str, N: float, **about: Any) -> Path:
+        return put_at_rest(tmp_path / name, NoiseModel(N=N), **about)
+
+    other = put_one("other", 1e-4, device="8", duration=9e5)
+    short = put_one("short", 2e-4, duration=10.0)
+    long = put_one("long", 3e-4, duration=20.0)
+    made = put_one("sim_x", 4e-4, simulated=True, duration=9e9)
+    bad = put_one("bad", 5e-4, status="rejected", duration=9e9)
+    accel = put_at_rest(tmp_path / "accel", NoiseModel(N=6e-4), channel="accel_x", duration=9e9)
+    axis = put_at_rest(tmp_path / "axis", NoiseModel(N=7e-4), channel="gyro_y", device="9")
+
+    def chosen(*folders: Path) -> tuple[float, str]:
+        found = from_static(folders, OWN, "gyro_x")
+        assert found is not None
+        return found.model.N, found.words
+
+    assert chosen(other, short, long, made, bad, accel)[0] == 3e-4
+    assert chosen(other, made) == (
+        1e-4,
+        "static recording other, of another device, 8; method likelihood",
+    )
+    assert chosen(made)[1] == "static recording sim_x, simulated; method likelihood"
+    assert "of its gyro_y, as gyro_x has no estimate there" in chosen(axis, bad)[1]
+    assert from_static([bad, accel], OWN, "gyro_x") is None
+
+
+def test_what_it_takes(tmp_path: Path, rest: Path) -> None:
+    rows = run(put(tmp_path / "a", turned_log()), [rest])["earth_rate_prediction"]
+    goals = {row["goal"]: row for row in rows if row["of"] == "goal"}
+    assert list(goals) == [1.0, 0.1, 0.01]
+    # N / sqrt(T) / cos(latitude) alone takes (0.0122 / 0.1 / 0.00418)^2 s for 10 %.
+    white = (PAPER.N / (0.1 * EARTH)) ** 2
+    assert white < goals[0.1]["time"] < 1.5 * white
+    assert goals[0.01]["time"] == pytest.approx(100 * goals[0.1]["time"], rel=0.15)
+    assert goals[0.1]["heading"] == pytest.approx(0.1)
+    assert goals[0.1]["dwell"] == 28.5
+    course = [row["sigma"] for row in rows if row["of"] == "time"]
+    assert course == sorted(course, reverse=True) and len(course) > 30
+    curve = [row for row in rows if row["of"] == "dwell"]
+    (best,) = (row for row in curve if row["best"])
+    assert best["sigma"] == min(row["sigma"] for row in curve) and best["nearly_best"]
+    assert best["sigma"] < min(curve[0]["sigma"], curve[-1]["sigma"])

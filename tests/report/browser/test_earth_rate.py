@@ -1,0 +1,105 @@
+"""The pages of gyros that were turned, as a reader sees them."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from imubench_pipeline.report.publish import publish
+from imubench_pipeline.tables import write
+from tests.report.browser.reader import TOO_WIDE, Open, Reader, axis_title, toggle, traces
+from tests.report.browser.test_accessibility import faults
+from tests.report.tables import joined, site
+from tests.report.test_earth_rate import some
+
+ARC = 180.0 / math.pi * 3600.0
+"""°/h in a rad/s."""
+
+RUN = "recordings/s/run.html"
+
+
+@pytest.fixture(scope="module")
+def rows(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, list[dict[str, Any]]]]:
+    kept = tmp_path_factory.mktemp("kept")
+    several = some(kept)
+    results = tmp_path_factory.mktemp("results")
+    envelope = [
+        {"sensor": "s", "recording": "run", "channel": "gyro_x", "start": 1.5 * i,
+         "end": 1.5 * (i + 1), "samples": 48, "low": -1e-3, "high": 2e-3, "mean": 1e-4 * (i % 7)}
+        for i in range(400)
+    ]  # fmt: skip
+    write("envelope", envelope, results / "recordings/s/run/envelope.parquet")
+    publish(site(joined(*several), results), results / "report")
+    return results / "report", several[1]
+
+
+def named(drawn: list[dict[str, Any]], text: str) -> dict[str, Any]:
+    (one,) = (one for one in drawn if one["text"] and text in str(one["text"][0]))
+    return one
+
+
+def test_every_figure_is_drawn_and_nothing_is_too_wide(read: Open, rows: Any) -> None:
+    for path, figures in ((RUN, 6), ("earth_rate.html", 3), ("recordings/s/unknown.html", 0)):
+        reader: Reader = read(rows[0], path)
+        assert reader.draw_all() == figures, path
+        assert reader.page.evaluate(TOO_WIDE) == [], path
+    narrow: Reader = read(rows[0], RUN, width=400)
+    assert narrow.page.evaluate(TOO_WIDE) == []
+
+
+@pytest.mark.parametrize("path", [RUN, "earth_rate.html"])
+def test_nothing_hinders_a_reader(path: str, read: Open, rows: Any) -> None:
+    reader: Reader = read(rows[0], path)
+    reader.draw_all()
+    reader.page.evaluate("document.querySelectorAll('details').forEach(one => (one.open = true))")
+    assert faults(reader.page) == []
+    reader.page.emulate_media(color_scheme="dark")
+    assert faults(reader.page, runOnly=["color-contrast"]) == []
+
+
+def test_the_estimates_over_time_are_those_of_the_tables(read: Open, rows: Any) -> None:
+    folder, found = rows
+    figure = read(folder, RUN).figure("earth_rate", part="whole")
+    assert axis_title(figure, "y") == "Earth’s rate (°/h)"
+    drawn = named(traces(figure), "filter, rate unknown")
+    wanted = ("whole", "filter", "rate")
+    series = [row for row in found["earth_rate_series"]
+              if (row["part"], row["method"], row["quantity"]) == wanted]  # fmt: skip
+    np.testing.assert_allclose(drawn["y"], [row["value"] * ARC for row in series], rtol=1e-5)
+    np.testing.assert_allclose(drawn["x"], [row["time"] / 60 for row in series], rtol=1e-5)
+    bands = [one for one in traces(figure) if one["fill"] == "tonexty"]
+    upper = [(row["value"] + 2 * row["sigma"]) * ARC for row in series]
+    np.testing.assert_allclose(bands[0]["y"], upper, rtol=1e-5)
+    count = len(traces(figure))
+    toggle(figure, "bias tracking with known rate (given the rate: no estimate)").uncheck()
+    assert len(traces(figure)) == count - 1
+
+
+def test_turning_points_stand_where_they_were_found(read: Open, rows: Any) -> None:
+    folder, found = rows
+    figure = read(folder, RUN).figure("turning")
+    marks = named(traces(figure), "turn 1 at")
+    times = [row["time"] / 60 for row in found["turning"] if row["what"] == "turn"]
+    np.testing.assert_allclose(marks["x"], times, rtol=1e-5)
+    assert axis_title(figure, "y") == "gyro x (°/s)" and axis_title(figure, "x") == "time (min)"
+
+
+def test_the_best_dwell_is_the_least_of_the_curve(read: Open, rows: Any) -> None:
+    folder, found = rows
+    figure = read(folder, RUN).figure("bound", over="dwell")
+    best = named(traces(figure), "best: ")
+    (row,) = (one for one in found["earth_rate_prediction"] if one.get("best"))
+    assert best["x"] == [pytest.approx(row["dwell"], rel=1e-5)]
+    assert best["y"] == [pytest.approx(row["sigma"] * ARC, rel=1e-5)]
+    assert axis_title(figure, "x") == "data in each dwell (s)"
+
+
+def test_published_estimates_are_drawn_in_the_chosen_unit(read: Open, rows: Any) -> None:
+    reader: Reader = read(rows[0], "earth_rate.html")
+    figure = reader.figure("published_rates")
+    assert named(traces(figure), "published")["x"] == [pytest.approx(1.745, rel=1e-5)]
+    reader.page.locator("select[data-quantity=gyro]").select_option("°/s")
+    assert axis_title(figure, "x") == "Earth’s rate (°/s)"
+    assert named(traces(figure), "published")["x"] == [pytest.approx(1.745 / 3600, rel=1e-5)]

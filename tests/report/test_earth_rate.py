@@ -1,0 +1,180 @@
+"""The pages of gyros that were turned between north and south."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from imubench_pipeline.report import publish as publishing
+from imubench_pipeline.report.earth_rate import published_words
+from imubench_pipeline.report.publish import one_file, publish
+from imubench_pipeline.report.site import Site
+from imubench_pipeline.report.turned import answer, needs
+from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
+from imubench_pipeline.tables import build
+from tests.earth_rate.recordings import put, put_at_rest, run, turned_log
+from tests.report.pages import Read, lost_links, read_pages
+from tests.report.tables import DEGREE, Rows, joined, recording_rows, rejected_rows, site
+
+HOUR = DEGREE / 3600
+ABOUT: dict[str, Any] = {"device": "7", "kind": "two_position", "simulated": False, "status": "ok",
+                         "rate": 32.0, "rate_from": "stated", "duration": 600.0,
+                         "samples": 19_200}  # fmt: skip
+PUBLISHED: dict[str, Any] = {
+    "channel": "gyro_x",
+    "part": "whole",
+    "place": "section 6",
+    "printed": "0.0004846 deg/s",
+    "published": 1.745 * HOUR,
+    "truth": 15.04 * HOUR,
+    "duration": 720.0,
+    "white": 1.845 * HOUR,
+    "sigma": 1.915 * HOUR,
+    "sigma_filter": 1.9 * HOUR,
+    "off_sigma": -6.94,
+    "verdict": "beyond the noise",
+    "simulated": 14.1 * HOUR,
+    "simulated_filter": 14.2 * HOUR,
+    "assumed": "latitude",
+}
+
+
+def turned_rows(folder: Path, recording: str, static: list[Path], **declared: Any) -> Rows:
+    """The rows of a recording of a gyro that was turned, as a run leaves them."""
+    found = run(put(folder / recording, turned_log()), static, **declared)
+    names = {"sensor": "s", "recording": recording}
+    return {"recordings": [names | ABOUT]} | found
+
+
+def some(folder: Path) -> list[Rows]:
+    rest = put_at_rest(folder / "night")
+    good = turned_rows(folder, "run", [rest], last=["5 min"])
+    good["earth_rate_published"] = [{"sensor": "s", "recording": "run"} | PUBLISHED]
+    return [
+        recording_rows("s", "night"),
+        good,
+        turned_rows(folder, "unknown", []),
+        rejected_rows("s", "bad", "bad.yaml: latitude is missing", kind="two_position"),
+    ]
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _quick() -> Iterator[None]:
+    """What is large and the same in every report is left out."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            publishing, "figure_text", lambda figure: "data:image/svg+xml;base64,PHN2Zy8+"
+        )
+        patch.setattr(publishing, "theory_figure", lambda system: None)
+        patch.setattr(publishing, "get_plotlyjs", lambda: "var Plotly = {};")
+        yield
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Site:
+    return site(joined(*some(tmp_path_factory.mktemp("kept"))))
+
+
+@pytest.fixture(scope="module")
+def read(made: Site, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Read]:
+    folder = tmp_path_factory.mktemp("report")
+    publish(made, folder)
+    found = read_pages(folder)
+    tables = set(TABLES) - set(OF_ONE_RECORDING)
+    besides = {f"../tables/{name}.{kind}" for name in tables for kind in ("csv", "parquet")}
+    besides |= {f"figures/allan_gyro_x.{kind}" for kind in ("svg", "pdf")}
+    assert {path: page.faults for path, page in found.items() if page.faults} == {}
+    assert lost_links(found, folder, besides) == set()
+    return found
+
+
+def test_the_page_of_a_run_says_what_was_found(read: dict[str, Read]) -> None:
+    page = read["recordings/s/run.html"]
+    assert "The filter finds an Earth's rate of" in page.text
+    assert "19 turns between north and south, at latitude 0°" in page.text
+    assert "left out of the Allan variance" in page.text
+    assert "It cannot be used to find the rate" in page.text
+    kinds = {one.attributes.get("data-kind") for one in page.elements if one.tag == "figure"}
+    assert kinds == {"dwells", "earth_rate", "bound"}  # of samples none are kept here
+    parts = [one.attributes.get("data-part") for one in page.elements
+             if one.attributes.get("data-kind") == "earth_rate"]  # fmt: skip
+    assert parts == ["whole", "last 5 min"]
+    courses = page.data["turned"]["parts"]["whole"]["courses"]
+    assert set(courses) == {"pairs", "triples", "filter", "smoother", "known_rate", "drift"}
+
+
+def test_a_run_whose_noise_is_not_known_says_so_and_shows_its_turns(read: dict[str, Read]) -> None:
+    page = read["recordings/s/unknown.html"]
+    assert "The noise of this sensor is not known" in page.text
+    assert page.naming("turn 19", "tr") and "What this gyro needs" not in page.text
+
+
+def test_the_start_page_names_what_was_not_found(read: dict[str, Read]) -> None:
+    text = read["index.html"].text
+    assert (
+        "1 turned without an estimate" in text and "The noise of this sensor is not known" in text
+    )
+    assert "two positions" in read["sensors/s.html"].text
+
+
+def test_a_rejected_run_stands_with_its_reason(read: dict[str, Read]) -> None:
+    assert "latitude is missing" in read["recordings/s/bad.html"].text
+    assert "latitude is missing" in read["earth_rate.html"].text
+
+
+def test_the_page_of_all_runs(read: dict[str, Read]) -> None:
+    page = read["earth_rate.html"]
+    assert len(page.naming("run", "tr")) >= 2
+    assert "0 published estimates lie within what the noise" in page.text
+    assert "run by −6.94 σ" in page.text and "0.0004846 deg/s" in page.text
+    for goal in ("100 %", "10 %", "1 %"):
+        assert page.naming(goal, "td")
+    assert page.data["published"][0]["published"] == PUBLISHED["published"]
+
+
+def test_every_page_leads_there_only_where_there_are_such_runs(
+    read: dict[str, Read], tmp_path: Path
+) -> None:
+    assert all("Earth’s rate" in page.text for page in read.values())
+    publish(site(joined(recording_rows("s", "night"))), tmp_path)
+    assert "earth_rate.html" not in read_pages(tmp_path)
+    assert "earth_rate.html" not in (tmp_path / "index.html").read_text()
+
+
+def test_a_page_is_written_again_only_where_its_run_changed(made: Site, tmp_path: Path) -> None:
+    publish(made, tmp_path)
+    tables = dict(made.tables)
+    again = Site(tables, made.settings, made.results, made.code)
+    assert publish(again, tmp_path) == []
+    rows = tables["earth_rate"].to_pylist()
+    rows[0]["value"] *= 1.01
+    changed = Site(
+        tables | {"earth_rate": build("earth_rate", rows)}, made.settings, made.results, made.code
+    )
+    written = {path for path in publish(changed, tmp_path) if path.endswith(".html")}
+    assert "recordings/s/run.html" in written and "earth_rate.html" in written
+    assert "recordings/s/unknown.html" not in written
+
+
+def test_a_report_may_hold_nothing_but_such_runs(tmp_path: Path) -> None:
+    publish(site(joined(turned_rows(tmp_path / "kept", "run", []))), tmp_path / "report")
+    found = read_pages(tmp_path / "report")
+    assert {path: page.faults for path, page in found.items() if page.faults} == {}
+    assert "1 recording of 1 sensor" in found["index.html"].text
+
+
+def test_all_pages_stand_in_one_file(made: Site) -> None:
+    text = one_file(made)
+    assert 'id="page:earth_rate.html"' in text and 'id="page:recordings/s/run.html"' in text
+
+
+def test_sentences() -> None:
+    row = {"method": "filter", "value": 30 * HOUR, "upper": 32 * HOUR, "truth": 15.04 * HOUR,
+           "off_sigma": 15.0, "reason": None}  # fmt: skip
+    assert "15 standard deviations away" in answer([row], "practical")
+    assert "So far off is not noise" in answer([row], "practical")
+    assert answer([], "practical") == "Nothing was found of the turns of this recording."
+    lines = [PUBLISHED | {"recording": "a", "off": "1 σ", "verdict": "within the noise"}]
+    assert published_words(lines) == ("All 1 published estimates lie within what the noise allows.")
+    assert published_words([]) == "" and needs([]) is None
