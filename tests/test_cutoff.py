@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.signal import lfilter
 
-from imubench_pipeline.cutoff import find_cutoff, folded_low_pass
+from imubench_pipeline.cutoff import find_cutoff
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.sensor_model.low_pass import LowPass
 from imubench_pipeline.sensor_model.model import SensorModel
@@ -64,7 +64,9 @@ def test_folds_are_those_of_the_sampled_covariance(order, cutoff):
     ]
     terms = [2.0 * c * np.cos(2.0 * np.pi * f * k / rate) for k, c in enumerate(covariance)]
     expected = (np.sum(terms, axis=0) - covariance[0]) / rate
-    assert folded_low_pass(f, cutoff, rate, order) == pytest.approx(expected, rel=2e-3, abs=1e-6)
+    assert LowPass(cutoff, order).folded_power(f, rate) == pytest.approx(
+        expected, rel=2e-3, abs=1e-6
+    )
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
 from imubench_pipeline.estimators.estimate import Parameter
@@ -27,9 +27,6 @@ Array = NDArray[np.float64]
 
 _POINTS = 6
 """Frequencies of a bin over which a density is averaged."""
-
-_FOLDS = 8
-"""Folds on each side that are added one by one; those beyond are an integral."""
 
 _SLOW_FOLDS = 3
 """Folds on each side of slow noise, of which little is left there."""
@@ -102,38 +99,6 @@ class Cutoff:
     floor: float
     gained: float
     or_quantization: bool = False
-
-
-def folded_low_pass(frequency: ArrayLike, cutoff: float, rate: float, order: int = 1) -> Array:
-    """Return the power gain of white noise behind a low-pass, sampled.
-
-    For n = 1 the sum over the folds is (pi f_c / f_s) sinh(2 pi f_c / f_s) / (cosh(2 pi f_c / f_s)
-    - cos(2 pi f / f_s)), the spectrum of a sampled Gauss-Markov process.
-
-    Parameters
-    ----------
-    frequency : array_like
-        Hz, up to Nyquist.
-    cutoff : float
-        f_c, Hz.
-    rate : float
-        f_s, Hz.
-    order : int
-        n.
-    """
-    f = np.asarray(frequency, dtype=np.float64)
-    if order == 1:
-        h = 2.0 * np.pi * cutoff / rate
-        # Both over e^h, which may be great.
-        decay = math.exp(-h)
-        sine, cosine = 0.5 * -math.expm1(-2.0 * h), 0.5 * (1.0 + decay**2)
-        return np.asarray(0.5 * h * sine / (cosine - decay * np.cos(2.0 * np.pi * f / rate)))
-    folds = int(_FOLDS + math.ceil(4.0 * cutoff / rate))
-    k = np.arange(-folds, folds + 1) * rate
-    total = LowPass(cutoff, order).power(f[..., None] + k).sum(axis=-1)
-    # Folds beyond: the integral of (f / f_c)^(-2 n) on both sides.
-    rest = (folds + 0.5) * rate / cutoff
-    return np.asarray(total + 2.0 * cutoff / rate * rest ** (1 - 2 * order) / (2 * order - 1))
 
 
 def find_cutoff(
@@ -396,8 +361,9 @@ class _Fits:
     def _columns(
         self, cutoff: float, order: int, floor: bool, slow: Sequence[int] | None = None
     ) -> Array:
-        white = folded_low_pass(self.frequency, cutoff, self.rate, order).mean(axis=1)
-        flicker, walk = self._slow_gains(LowPass(cutoff, order))
+        low_pass = LowPass(cutoff, order)
+        white = low_pass.folded_power(self.frequency, self.rate).mean(axis=1)
+        flicker, walk = self._slow_gains(low_pass)
         kept = self.slow if slow is None else slow
         columns = [white + self.rounded]
         columns += [self.everything_slow[:, k] * (walk if k else flicker) for k in kept]

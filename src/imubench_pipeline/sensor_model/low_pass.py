@@ -14,6 +14,9 @@ Array = NDArray[np.float64]
 
 _HIGHEST_ORDER = 10
 
+_FOLDS = 8
+"""Folds on each side that are added one by one; those beyond are an integral."""
+
 
 @dataclass(frozen=True)
 class LowPass:
@@ -99,6 +102,38 @@ class LowPass:
         square = np.square(np.asarray(frequency, dtype=np.float64) / self.cutoff)
         # Products: numpy takes ten times as long for a power above 2.
         return np.asarray(1.0 / (1.0 + math.prod([square] * self.order)))
+
+    def folded_power(self, frequency: ArrayLike, rate: float) -> Array:
+        """Return the power gain of white noise behind the filter, sampled.
+
+        For n = 1 the sum over the folds is (pi f_c / f_s) sinh(2 pi f_c / f_s) / (cosh(2 pi f_c /
+        f_s) - cos(2 pi f / f_s)), the spectrum of a sampled Gauss-Markov process.
+
+        Parameters
+        ----------
+        frequency : array_like
+            Hz, up to Nyquist.
+        rate : float
+            f_s, Hz.
+
+        Returns
+        -------
+        ndarray
+            In the shape of the frequencies.
+        """
+        f = np.asarray(frequency, dtype=np.float64)
+        if self.order == 1:
+            h = 2.0 * np.pi * self.cutoff / rate
+            # Both over e^h, which may be great.
+            decay = math.exp(-h)
+            sine, cosine = 0.5 * -math.expm1(-2.0 * h), 0.5 * (1.0 + decay**2)
+            return np.asarray(0.5 * h * sine / (cosine - decay * np.cos(2.0 * np.pi * f / rate)))
+        folds = int(_FOLDS + math.ceil(4.0 * self.cutoff / rate))
+        k = np.arange(-folds, folds + 1) * rate
+        total = self.power(f[..., None] + k).sum(axis=-1)
+        # Folds beyond: the integral of (f / f_c)^(-2 n) on both sides.
+        rest, steep = (folds + 0.5) * rate / self.cutoff, 2 * self.order - 1
+        return np.asarray(total + 2.0 * self.cutoff / rate / (rest**steep * steep))
 
     def response(self, frequency: float) -> complex:
         """Return H: gain and phase of a sinusoid.
