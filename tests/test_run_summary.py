@@ -127,10 +127,19 @@ onerror:
 """
 
 
+# As from a terminal: a shell that runs something in its background lets it ignore interrupts.
+SNAKEMAKE = """
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from snakemake.cli import main
+main()
+"""
+
+
 def snakemake(folder: Path, command: str, *flags: str) -> list[str]:
     (folder / "Snakefile").write_text(WORKFLOW.replace("{command}", command))
     done = subprocess.run(
-        [sys.executable, "-m", "snakemake", "-c1", "--keep-going", *flags],
+        [sys.executable, "-c", SNAKEMAKE, "-c1", "--keep-going", *flags],
         cwd=folder, capture_output=True, text=True, check=False, timeout=120,
     )  # fmt: skip
     assert done.returncode == 1
