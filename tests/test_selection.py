@@ -128,6 +128,20 @@ def test_what_the_log_does_not_tell_is_not_enough_data() -> None:
     assert "K of gyro_x is not identified" in found["s"]["reason"]
 
 
+def test_a_log_of_which_nothing_is_known_is_no_sensor_without_noise() -> None:
+    silent = Estimate("likelihood", {"N": Parameter(None, "not_shown", "too short a log")})
+    asked = requirement(("heading", "100 s", "0.3 deg"))
+    found = ranking({"mute": {"gyro_x": silent}, "s": {"gyro_x": white(1e-5)}}, asked)
+    assert found["mute"]["verdict"] == "not enough data"
+    assert found["mute"]["sigma"] is None
+    assert "nothing is known of the noise of gyro_x: too short a log" in found["mute"]["reason"]
+    assert (found["s"]["rank"], found["mute"]["rank"]) == (1, None)
+    # One axis of several: the others answer, and it is said.
+    found = ranking({"s": {"gyro_x": white(1e-5), "gyro_y": silent}}, asked)
+    assert found["s"]["sigma"] is not None
+    assert "gyro_y does not count" in found["s"]["reason"]
+
+
 def test_the_limit_with_the_least_margin_decides_and_the_source_is_named() -> None:
     asked = requirement(("heading", "100 s", "0.1 deg"), ("position", "100 s", "1 km"))
     sensor = {"gyro_x": white(5e-5), "accel_x": white(1e-3)}

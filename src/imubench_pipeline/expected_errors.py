@@ -154,9 +154,11 @@ def error_rows(
     seed : int
         Of the run; each channel has a stream of its own.
     """
+    # Of a log too short for any estimate nothing is known: that is not a sensor without noise.
+    known = {channel: estimate for channel, estimate in estimates.items() if estimate.model.terms}
     drawn = {
         channel: draw_models(estimate, draws, channel_rng(seed, *names.values(), channel, "budget"))
-        for channel, estimate in estimates.items()
+        for channel, estimate in known.items()
     }
     for question in questions:
         asked: dict[str, Any] = {
@@ -169,16 +171,15 @@ def error_rows(
             "unit": SI_UNITS[DIMENSIONS[question.error]],
         }
         missing = [
-            quantity
+            _missing(quantity, estimates)
             for quantity in question.needs
-            if not any(quantity_of(channel) == quantity for channel in estimates)
+            if not any(quantity_of(channel) == quantity for channel in known)
         ]
         if missing:
-            reason = f"no {' and no '.join(_NAMES[one] for one in missing)} in the recording"
-            yield asked | {"source": "total", "reason": reason}
+            yield asked | {"source": "total", "reason": "; ".join(missing)}
             continue
         chosen = {
-            quantity: _axis(question, quantity, estimates) if quantity in question.needs else None
+            quantity: _axis(question, quantity, known) if quantity in question.needs else None
             for quantity in ("gyro", "accel")
         }
         models = [estimates[c].model if c else _NOTHING for c in chosen.values()]
@@ -195,11 +196,38 @@ def error_rows(
                 "lower": min(lower, found.total),
                 "upper": max(upper, found.total),
                 "reached_after": question.reached(*models),
-                "reason": "; ".join([*found.assumptions, *_doubts(chosen, estimates)]) or None,
+                "reason": "; ".join(
+                    [
+                        *found.assumptions,
+                        *_doubts(chosen, estimates),
+                        *_unknown(question, estimates),
+                    ]
+                )
+                or None,
             }
         )
         for contribution in sorted(found.contributions, key=lambda one: -one.sigma):
             yield asked | chosen | {"source": contribution.source, "sigma": contribution.sigma}
+
+
+def _missing(quantity: str, estimates: Mapping[str, Estimate]) -> str:
+    """Return why there is no noise of a quantity to answer with."""
+    silent = [channel for channel in estimates if quantity_of(channel) == quantity]
+    if not silent:
+        return f"no {_NAMES[quantity]} in the recording"
+    return f"nothing is known of the noise of {', '.join(silent)}: {_why(estimates[silent[0]])}"
+
+
+def _unknown(question: Question, estimates: Mapping[str, Estimate]) -> Iterator[str]:
+    """Yield the axes that could not answer."""
+    for channel, estimate in estimates.items():
+        if quantity_of(channel) in question.needs and not estimate.model.terms:
+            yield f"{channel} does not count: nothing is known of its noise ({_why(estimate)})"
+
+
+def _why(estimate: Estimate) -> str:
+    reasons = (parameter.reason for parameter in estimate.parameters.values())
+    return next((reason for reason in reasons if reason), "its log does not show it")
 
 
 def _axis(question: Question, quantity: str, estimates: Mapping[str, Estimate]) -> str:

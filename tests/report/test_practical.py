@@ -83,6 +83,8 @@ def test_a_number_is_rounded_as_decimal_arithmetic_rounds_it(value: float, digit
         (999_951.0, 4, "1×10⁶"),
         (-1.2345e-12, 3, "−1.23×10⁻¹²"),
         (6.02214e23, 2, "6×10²³"),
+        (math.inf, 4, "∞"),
+        (-math.inf, 4, "−∞"),
     ],
 )
 def test_numbers_as_they_are_printed(value: float, digits: int, text: str) -> None:

@@ -27,6 +27,8 @@ def number_text(value: float, digits: int = 4) -> str:
 
     A number in the middle of two is rounded away from zero, as the scripts of the pages do.
     """
+    if math.isinf(value):
+        return "∞" if value > 0 else "−∞"
     exact = Decimal(value)
     rounded = Context(prec=digits, rounding=ROUND_HALF_UP).create_decimal(exact)
     if rounded == 0 or _LEAST_PLAIN <= abs(rounded) < _MOST_PLAIN:
