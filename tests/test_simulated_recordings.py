@@ -383,6 +383,16 @@ def test_a_layout_has_the_channels_of_the_recording_alone() -> None:
     assert set(layout(recording_of(), log).channels) == {"gyro_x"}
 
 
+def test_a_layout_has_the_rate_of_the_recording_where_one_is_stated() -> None:
+    channels = {"gyro_x": X | {"column": "wx"}}
+    stated = LogFormat.model_validate({"rate": "400 Hz", "channels": channels})
+    stamped = LogFormat.model_validate({"time": {"column": "t", "unit": "s"}, "channels": channels})
+    recording = recording_of()
+    assert recording.rate != "400 Hz"
+    assert layout(recording, stated).rate == recording.rate
+    assert layout(recording, stamped).rate is None
+
+
 def test_the_register_of_temperature_has_steps(tmp_path: Path) -> None:
     stepped = recording_of(
         channels={"gyro_x": {"drift": {"sensitivity": "1 deg/s/K", "reference": "20 degC"}}},

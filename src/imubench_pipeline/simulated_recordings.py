@@ -323,7 +323,7 @@ def profile_files(recording: SimulatedRecording) -> list[Path]:
 
 
 def layout(recording: SimulatedRecording, log: LogFormat) -> LogFormat:
-    """Return how the log of a simulated recording is written: with the columns that it has.
+    """Return how the log of a simulated recording is written: with its columns and its rate.
 
     Parameters
     ----------
@@ -336,8 +336,10 @@ def layout(recording: SimulatedRecording, log: LogFormat) -> LogFormat:
     temperature = None
     if recording.temperature is not None:
         temperature = log.temperature or _free_column(list(channels.values()), log.time)
+    # Where the sensor's logs are read with a stated rate, this one is read with its own.
+    rate = None if log.rate is None else recording.rate
     return log.model_copy(
-        update={"channels": channels, "temperature": temperature, "position": None}
+        update={"channels": channels, "temperature": temperature, "position": None, "rate": rate}
     )
 
 
