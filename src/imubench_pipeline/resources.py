@@ -79,6 +79,7 @@ _OF_A_RECORDING: Mapping[str, tuple[float, float, float, float, float]] = {
     "datasheet": (300, 0, 1, 0, 0),
     "error_budget": (300, 0, 3, 0, 0),
     "earth_rotation": (450, 60, 15, 0, 3),
+    "calibration": (450, 60, 5, 0, 1),
 }
 
 _OF_ALL: Mapping[str, tuple[float, float, float, float]] = {
