@@ -7,7 +7,13 @@ from itertools import chain
 
 from imubench_pipeline.plan import STEPS, Plan
 from imubench_pipeline.resources import asked
-from imubench_pipeline.schemas import CALIBRATED, COMPARED, OF_ONE_RECORDING, TABLES, TURNED
+from imubench_pipeline.schemas import (
+    CALIBRATED,
+    COMPARED,
+    OF_ONE_RECORDING,
+    TABLES,
+    TURNED,
+)
 from imubench_pipeline.steps import Steps
 from imubench_pipeline.validation import ConfigError
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE
+from imubench_pipeline.report.calibration import of_all
 from imubench_pipeline.report.payload import Arrays
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.turned import (
@@ -28,11 +29,11 @@ def earth_rate_page(site: Site) -> Page:
     ----------
     site : Site
     """
-    keys = [view.key for view in site.turned]
+    views = [*site.turned, *site.calibrated]
     return Page(
         "earth_rate.html",
         "earth_rate.html.jinja",
-        site.key_of(keys, [view.page for view in site.turned]),
+        site.key_of([view.key for view in views], [view.page for view in views]),
         lambda: _context(site),
     )
 
@@ -53,6 +54,8 @@ def _context(site: Site) -> dict[str, Any]:
         "published": published,
         "verdict": published_words(published),
         "needs": predicted,
+        "calibrations": of_all(site),
+        "not_calibrated": [view for view in site.calibrated if view.rejected],
         "page": {
             "looks": {},
             "channels": [],
