@@ -68,7 +68,7 @@ def _not_found(site: Site) -> Iterator[dict[str, Any]]:
 
 
 def _not_calibrated(site: Site) -> Iterator[dict[str, Any]]:
-    """Yield the recordings on a rate table or with a stated direction that gave nothing, and why."""
+    """Yield the recordings on a rate table or with a stated direction without a result, and why."""
     for view in site.calibrated:
         rows = view.rows("calibration")
         if rows and all(row["value"] is None for row in rows):
