@@ -11,6 +11,7 @@ from imubench_pipeline.schemas import (
     CALIBRATED,
     COMPARED,
     OF_ONE_RECORDING,
+    OUTLOOK,
     TABLES,
     TURNED,
 )
@@ -36,7 +37,15 @@ ASKED = asked(plan)  # memory and time on a cluster
 RESULTS = str(plan.run.results)
 FOLDER = RESULTS + "/recordings/{sensor}/{recording}"
 JOINED = sorted(set(TABLES) - set(OF_ONE_RECORDING))
-RANKED = {"ranking", "fusion", "coverage", "coverage_by_vendor", *TURNED, *CALIBRATED}
+RANKED = {
+    "ranking",
+    "fusion",
+    "coverage",
+    "coverage_by_vendor",
+    *TURNED,
+    *CALIBRATED,
+    *OUTLOOK,
+}
 ESTIMATED = (
     "parameters",
     "models",
@@ -83,6 +92,14 @@ def of_experiments(recordings, *tables):
     ]
 
 
+def of_outlooks(*tables):
+    return [
+        f"{RESULTS}/sensors/{sensor}/{table}.parquet"
+        for sensor in FOLDERS
+        for table in tables
+    ]
+
+
 def at_rest(file):
     return lambda w: [
         f"{FOLDER.format(sensor=w.sensor, recording=recording)}/{file}"
@@ -100,6 +117,7 @@ def missing():
             for file in OF_RECORDING
             if not found.held_back
         ),
+        *of_outlooks(*OUTLOOK),
         *of_experiments(plan.turned, *TURNED),
         *of_experiments(plan.calibrated, *CALIBRATED),
         *(str(found.path) for found in plan.recordings.values() if found.simulated),
@@ -280,6 +298,23 @@ rule calibration:
         steps.run("calibration", input, output, params, wildcards)
 
 
+rule outlook:
+    input:
+        quality=at_rest("quality.json"),
+        parameters=at_rest("parameters.parquet"),
+    output:
+        **{table: f"{RESULTS}/sensors/{{sensor}}/{table}.parquet" for table in OUTLOOK},
+    group:
+        "comparison"
+    resources:
+        **ASKED,
+    params:
+        settings=lambda w: plan.outlook_settings(w.sensor),
+        code=plan.code("outlook"),
+    run:
+        steps.run("outlook", input, output, params, wildcards)
+
+
 rule sensor_tables:
     input:
         **{table: of_sensor(f"{table}.parquet") for table in PARTS},
@@ -306,10 +341,14 @@ rule tables:
             ]
             for table in ANALYSED
         },
-        **{table: of_experiments(plan.turned, table) for table in TURNED},
+        **{
+            table: of_experiments(plan.turned if table in TURNED else [], table)
+            + (of_outlooks(table) if table in OUTLOOK else [])
+            for table in (*TURNED, "alignment")
+        },
         **{table: of_experiments(plan.calibrated, table) for table in CALIBRATED},
     output:
-        as_files(*ANALYSED, *TURNED, *CALIBRATED),
+        as_files(*ANALYSED, *TURNED, *CALIBRATED, "alignment"),
     group:
         "comparison"
     resources:

@@ -56,6 +56,7 @@ STEPS: Mapping[str, tuple[str, ...]] = {
     "fusion": ("fusion.of_run",),
     "earth_rotation": ("earth_rate.of_run",),
     "calibration": ("calibration.of_run",),
+    "outlook": ("alignment.of_sensor",),
     "coverage": ("coverage", "results"),
     "exports": ("export.of_run",),
     "sensor_tables": ("results",),
@@ -233,6 +234,12 @@ class Plan:
             return _text(settings)  # it is rejected, and says why
         told = notes.model_dump(mode="json", include=set(_EXPERIMENTS), exclude_none=True)
         return _text(settings | told)
+
+    def outlook_settings(self, sensor: str) -> str:
+        """Return what is predicted of a sensor at rest depends on beside its noise."""
+        known = self.sensors.get(sensor)
+        dumped = known.model_dump(mode="json", exclude_unset=True) if known else None
+        return _text({"earth_rate": self.run.earth_rate.model_dump(mode="json"), "sensor": dumped})
 
     def _written(self, recording: Recording) -> tuple[LogFormat, RecordingNotes]:
         """Return how the log of a recording is written, and the notes beside it.

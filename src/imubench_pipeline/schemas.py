@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pyarrow as pa
 
+from imubench_pipeline.alignment.columns import ALIGNMENT_TABLES
 from imubench_pipeline.calibration.columns import CALIBRATION_TABLES
 from imubench_pipeline.columns import Column
 from imubench_pipeline.columns import count as _count
@@ -17,6 +18,7 @@ __all__ = [
     "CALIBRATED",
     "COMPARED",
     "OF_ONE_RECORDING",
+    "OUTLOOK",
     "TABLES",
     "TURNED",
     "Column",
@@ -365,6 +367,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
     ),
     **EARTH_RATE_TABLES,
     **CALIBRATION_TABLES,
+    **ALIGNMENT_TABLES,
 }
 """Every table a run leaves, by name; all numbers are SI (temperatures in degC)."""
 
@@ -376,6 +379,9 @@ TURNED = tuple(EARTH_RATE_TABLES)
 
 CALIBRATED = tuple(CALIBRATION_TABLES)
 """The tables of gyros on a rate table, or at rest where it is known how they point."""
+
+OUTLOOK = ("alignment", "earth_rate_prediction")
+"""The tables of what each sensor at rest could find; the second has rows of turned gyros, too."""
 
 BY_RECORDING = (
     "recordings",
@@ -398,6 +404,7 @@ BY_RECORDING = (
     "error_budget",
     *TURNED,
     *CALIBRATED,
+    "alignment",
 )
 """The joined tables in which a recording has rows of its own."""
 

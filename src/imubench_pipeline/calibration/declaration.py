@@ -40,6 +40,7 @@ Angle = Annotated[Text, _of("angle"), Field(examples=["30 deg"])]
 AngleFromZero = Annotated[Text, _from_zero("angle"), Field(examples=["0.5 deg"])]
 Rate = Annotated[Text, _of("angular_rate"), Field(examples=["-10 deg/s"])]
 RateFromZero = Annotated[Text, _from_zero("angular_rate"), Field(examples=["0.05 deg/s"])]
+AccelerationFromZero = Annotated[Text, _from_zero("acceleration"), Field(examples=["20 mg"])]
 
 
 class Direction(Strict):
