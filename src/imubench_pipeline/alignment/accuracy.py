@@ -4,7 +4,8 @@ The triad is level, its nose to the north: the accuracy of the heading is that o
 positions are opposite about the vertical, with as much data each. Coarse alignment is that of means
 (`coarse`), fine that of the filter (`fine`). As a check triads are simulated from the exact
 distribution of their block means, aligned coarsely and then by the filter; the root mean square of
-their errors over the standard deviation that the filter states is 1 where that is right.
+their errors over the standard deviation that the filter states is 1 where that is right. Where the
+heading is not small enough for that, small angles about the true attitude are compared.
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ class Accuracy:
     sigma : ndarray, shape (3,)
         Of roll, pitch and heading, rad.
     errors : ndarray, shape (3,), or None
-        Rms of simulated errors over these; NaN where that of the heading is not small.
+        Rms of simulated errors over these; NaN where there is no heading.
     simulated : int
         Triads of that check.
     """
@@ -141,8 +142,6 @@ def _errors(
         start = coarse_alignment(*mean_vectors(drawn.means, fine.positions), site)
         found = fine.run(drawn.means, start)
         return np.asarray(np.sqrt(np.mean(euler_angles(found.attitude) ** 2, axis=0)) / sigma)
-    # The heading is not small: roll and pitch alone are told, about the true attitude.
-    found = fine.run(drawn.means)
-    # Level and to the north: roll and pitch are off by the angles about north and east.
-    off = np.sqrt(np.mean(found.psi[:, -1, :2] ** 2, axis=0))
-    return np.array([off[0] / sigma[0], off[1] / sigma[1], math.nan])
+    # Level and to the north: attitude is off by the angles about north, east and down.
+    ratios = np.sqrt(np.mean(fine.run(drawn.means).psi[:, -1] ** 2, axis=0)) / sigma
+    return np.where([True, True, sigma[2] < OPEN], ratios, math.nan)

@@ -133,7 +133,14 @@ class Site:
     @property
     def finds_rates(self) -> bool:
         """Whether there is anything for the page of the Earth's rate."""
-        return bool(self.turned or self.calibrated)
+        return bool(self.turned or self.calibrated or self.predicted)
+
+    @cached_property
+    def predicted(self) -> list[RecordingView]:
+        """The recordings at rest by whose noise it is predicted what their sensor could find."""
+        rows = self.rows("earth_rate_prediction")
+        there = {(row["sensor"], row["recording"]) for row in rows}
+        return [view for view in self.views if view.static and (view.sensor, view.name) in there]
 
     def device_page_of(self, row: Row) -> str | None:
         """Return the page of the device of a row that names a recording."""

@@ -48,3 +48,37 @@ kinds.table_residuals = () => {
     layout: { xaxis: linearAxis(`rate of the table (${unit.sign})`), yaxis: linearAxis(`reading less line (${fine.sign})`) },
   };
 };
+
+const ALIGNED = {
+  "1 level": { light: "#5a636b", dark: "#a9b1b8", marker: "square" },
+  "2 level": { light: "#9A6B00", dark: "#E0A82E", marker: "diamond" },
+  "1 heading": { light: "#D55E00", dark: "#F08A3C", marker: "triangle-up" },
+  "2 heading": { light: "#0072B2", dark: "#4DA3D9", marker: "circle" },
+};
+
+kinds.alignment = (figure) => {
+  const courses = pageData.alignments[figure.dataset.sensor];
+  const all = courses.map((one) => [array(one.time), array(one.sigma)]);
+  const traces = [];
+  const groups = [];
+  courses.forEach((one, i) => {
+    const key = `${one.positions} ${one.angle} ${one.method}`;
+    const look = { ...ALIGNED[`${one.positions} ${one.angle}`], dash: one.method === "fine" ? "solid" : "dot", width: one.method === "fine" ? 2 : 1.4 };
+    const [time, sigma] = all[i];
+    const what = one.angle === "level" ? "roll and pitch" : "heading";
+    const where = one.positions === 1 ? "one position" : "two positions";
+    traces.push({
+      type: "scatter", mode: "lines+markers", group: key, x: time, y: sigma,
+      line: { color: colourOf(look), width: look.width, dash: look.dash }, marker: { color: colourOf(look), symbol: look.marker, size: 5 },
+      text: time.map((at, k) => `${what}, ${where}, ${one.method}, ${numberText(at, 4)} s: <b>${numberText(sigma[k], 3)}°</b>`), hovertemplate: "%{text}<extra></extra>",
+    });
+    groups.push({ key, label: `${what}, ${where}, ${one.method}`, on: true, look });
+  });
+  return {
+    traces, groups,
+    layout: {
+      xaxis: logAxis("time at rest (s)", logRange(all.flatMap(([time]) => time), 0.05)),
+      yaxis: logAxis("σ (°)", logRange(all.flatMap(([, sigma]) => sigma), 0.1)),
+    },
+  };
+};
