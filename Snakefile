@@ -5,7 +5,7 @@ import gc
 import os
 from itertools import chain
 
-from imubench_pipeline.plan import STEPS, Plan
+from imubench_pipeline.plan import Plan
 from imubench_pipeline.resources import asked
 from imubench_pipeline.schemas import (
     CALIBRATED,
@@ -15,6 +15,7 @@ from imubench_pipeline.schemas import (
     TABLES,
     TURNED,
 )
+from imubench_pipeline.step_modules import STEPS
 from imubench_pipeline.steps import Steps
 from imubench_pipeline.validation import ConfigError
 

@@ -34,6 +34,7 @@ from imubench_pipeline.simulated_recordings import (
     profile_files,
     read_simulated,
 )
+from imubench_pipeline.step_modules import STEPS
 from imubench_pipeline.units import quantity_to_si
 from imubench_pipeline.validation import ConfigError, parse, read_yaml
 
@@ -43,28 +44,6 @@ _EXPERIMENTS = ("two_position", "rate_table", "pointing")
 
 _ANY_LOG = {"rate": "1 Hz", "channels": {"gyro_x": {"column": 1, "unit": "rad/s"}}}
 """Stands for the layout of a sensor's logs where that does not matter."""
-
-STEPS: Mapping[str, tuple[str, ...]] = {
-    "simulate": ("simulated_logs",),
-    "ingest": ("ingest", "overview", "results"),
-    "allan": ("allan", "recording", "results"),
-    "estimate": ("estimation",),
-    "reconstruct": ("reconstruction",),
-    "datasheet": ("datasheet", "results"),
-    "error_budget": ("expected_errors", "results"),
-    "ranking": ("selection", "results"),
-    "fusion": ("fusion.of_run",),
-    "earth_rotation": ("earth_rate.of_run",),
-    "calibration": ("calibration.of_run",),
-    "outlook": ("alignment.of_sensor",),
-    "coverage": ("coverage", "results"),
-    "exports": ("export.of_run",),
-    "sensor_tables": ("results",),
-    "tables": ("tables",),
-    "figures": ("report.static_figures.of_run",),
-    "report": ("report.publish",),
-}
-"""The modules that each step runs: their edit runs the step again."""
 
 
 class Plan:

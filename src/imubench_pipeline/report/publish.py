@@ -71,8 +71,8 @@ _PAGES: Mapping[str, Callable[[Site, RecordingView], Page]] = {
 def pages(site: Site) -> Iterator[Page]:
     """Yield the pages of the report, the start page last: it stands for the finished report."""
     for view in site.views:
-        kind = "static" if view.rejected else view.row["kind"]
-        yield _PAGES.get(kind, recording_page)(site, view)
+        page = recording_page if view.rejected else _PAGES.get(view.row["kind"], recording_page)
+        yield page(site, view)
     for sensor in site.sensors:
         yield sensor_page(site, sensor)
     for path in dict.fromkeys(view.device_page for view in site.views):
