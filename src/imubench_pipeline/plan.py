@@ -217,8 +217,10 @@ class Plan:
     def outlook_settings(self, sensor: str) -> str:
         """Return what is predicted of a sensor at rest depends on beside its noise."""
         known = self.sensors.get(sensor)
-        dumped = known.model_dump(mode="json", exclude_unset=True) if known else None
-        return _text({"earth_rate": self.run.earth_rate.model_dump(mode="json"), "sensor": dumped})
+        biases = {key: {"bias_repeatability", "offset"} for key in ("gyro", "accel")}
+        printed = known.datasheet.model_dump(mode="json", include=biases) if known else {}
+        settings = self.run.earth_rate.model_dump(mode="json")
+        return _text({"earth_rate": settings, "datasheet": printed})
 
     def _written(self, recording: Recording) -> tuple[LogFormat, RecordingNotes]:
         """Return how the log of a recording is written, and the notes beside it.

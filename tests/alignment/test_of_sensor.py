@@ -18,7 +18,7 @@ from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.results import Key, parameter_rows
 from imubench_pipeline.tables import build, write
-from tests.earth_rate.recordings import SENSOR, put
+from tests.earth_rate.recordings import put
 
 SITE = Site(latitude=math.radians(45.0))
 GYRO, ACCELEROMETER = NoiseModel(N=1e-6), NoiseModel(N=1e-3)
@@ -47,11 +47,11 @@ def six(gyro: float = 1e-6, accelerometer: float = 1e-3) -> dict[str, NoiseModel
 
 
 def outlook(
-    folders: list[Path], sensor: dict[str, Any] = SENSOR, **changes: Any
+    folders: list[Path], datasheet: dict[str, Any] | None = None, **changes: Any
 ) -> dict[str, list[dict[str, Any]]]:
     settings = {
         "earth_rate": EarthRateSettings(**changes).model_dump(mode="json"),
-        "sensor": sensor,
+        "datasheet": datasheet or {},
     }
     found = outlook_tables(folders, "s", json.dumps(settings))
     for table, rows in found.items():
@@ -111,7 +111,7 @@ def test_the_biases_are_printed_or_assumed(tmp_path: Path) -> None:
     folder = put_triad(tmp_path / "night", six())
     printed = {"gyro": {"offset": [{"value": 3, "unit": "deg/s", "kind": "max"},
                                    {"value": 1, "unit": "deg/s", "kind": "typ"}]}}  # fmt: skip
-    row = outlook([folder], SENSOR | {"datasheet": printed})["alignment"][0]
+    row = outlook([folder], printed)["alignment"][0]
     assert row["gyro_bias"] == pytest.approx(math.radians(1.0))
     assert row["gyro_bias_from"] == "offset 1 deg/s (typ), datasheet"
     assert row["accelerometer_bias"] == pytest.approx(0.02 * 9.80665)

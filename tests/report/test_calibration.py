@@ -7,10 +7,12 @@ from typing import Any
 
 import pytest
 
+from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.report import publish as publishing
 from imubench_pipeline.report.calibration import answer, earth_words, scatter_words
 from imubench_pipeline.report.publish import publish
 from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
+from tests.alignment.test_of_sensor import outlook, put_triad
 from tests.calibration.recordings import STEPS, UP, at_rest, on_table, run
 from tests.earth_rate.recordings import put, put_at_rest
 from tests.report.pages import Read, lost_links, read_pages
@@ -19,6 +21,7 @@ from tests.report.tables import Rows, joined, recording_rows, rejected_rows, sit
 ABOUT: dict[str, Any] = {"device": "7", "kind": "rate_table", "simulated": False, "status": "ok",
                          "rate": 32.0, "rate_from": "stated", "duration": 410.0,
                          "samples": 13_120}  # fmt: skip
+GYRO = NoiseModel(N=3e-5)
 EAST = {"latitude": "45 deg", "elevation": "10 deg"}
 
 
@@ -30,8 +33,10 @@ def some(folder: Path) -> list[Rows]:
     declared = {"steps": STEPS, "axis": UP}
     names = [{"sensor": "s", "recording": name} | ABOUT for name in ("table", "unknown")]
     unknown = put(folder / "unknown", {"gyro_x": on_table()}, kind="rate_table")
+    sound = put_triad(folder / "sound", {"gyro_x": GYRO, "accel_z": NoiseModel(N=1e-3)})
     return [
         recording_rows("s", "night"),
+        recording_rows("s", "sound") | outlook([sound]),
         {"recordings": [names[0]]} | run(table, [rest], rate_table=declared),
         {"recordings": [names[1]]} | run(unknown, [], rate_table=declared),
         recording_rows("s", "still") | run(still, [rest], pointing=EAST),
@@ -92,6 +97,24 @@ def test_the_page_of_all_has_them(read: dict[str, Read]) -> None:
     assert "Turned between north and south" not in page.text
     assert page.naming("table", "tr") and page.naming("still", "tr")
     assert "rate_table.steps: missing" in page.text
+
+
+def test_each_sensor_has_its_alignment_and_its_needs(read: dict[str, Read]) -> None:
+    page = read["earth_rate.html"]
+    assert "Attitude and heading at rest" in page.text and "What it would take" in page.text
+    assert "At latitude 45° (earth_rate: latitude)" in page.text
+    assert "20 mg (earth_rate.accelerometer_bias), assumed" in page.text
+    assert "no gyro y and z, accelerometer x and y: the axes that are there stand" in page.text
+    assert "Check: 400 simulated triads" in page.text
+    assert "Where a heading is not to be had: What is not known of the gyros" in page.text
+    (line,) = [one for one in page.naming("two opposite positions", "tr") if "60 min" in one.text
+               and "fine" in one.text]  # fmt: skip
+    assert "not to be had" not in line.text
+    for goal in ("100 %", "10 %", "1 %"):
+        assert page.naming(goal, "td")
+    drawn = page.data["alignments"]["s"]
+    kinds = {(one["positions"], one["angle"], one["method"]) for one in drawn}
+    assert (1, "heading", "fine") not in kinds and (2, "heading", "fine") in kinds
 
 
 def test_what_gave_nothing_stands_on_the_start_page(read: dict[str, Read]) -> None:

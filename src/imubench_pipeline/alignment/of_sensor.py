@@ -22,9 +22,9 @@ from imubench_pipeline.config import EarthRateSettings
 from imubench_pipeline.earth_rate.needs import prediction_rows
 from imubench_pipeline.earth_rate.prediction import Outlook
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.printed import QuantityDatasheet
+from imubench_pipeline.printed import Datasheet, QuantityDatasheet
 from imubench_pipeline.results import Quality, recommended_estimates
-from imubench_pipeline.sensor import QUANTITIES, Sensor
+from imubench_pipeline.sensor import QUANTITIES
 from imubench_pipeline.simulate import channel_rng
 from imubench_pipeline.units import quantity_to_si
 
@@ -146,8 +146,8 @@ def outlook_tables(folders: Sequence[Path], sensor: str, settings: str) -> dict[
         return rows
     rows["earth_rate_prediction"] = list(_predicted(sensor, noise, how))
     if any(name.startswith("accel_") for name in noise.models):
-        known = Sensor.model_validate(given["sensor"]) if given["sensor"] else None
-        rows["alignment"] = list(_aligned(sensor, noise, known, how))
+        printed = Datasheet.model_validate(given["datasheet"])
+        rows["alignment"] = list(_aligned(sensor, noise, printed, how))
     return rows
 
 
@@ -163,11 +163,11 @@ def _predicted(sensor: str, noise: Noise, how: EarthRateSettings) -> Iterator[Ro
 
 
 def _aligned(
-    sensor: str, noise: Noise, known: Sensor | None, how: EarthRateSettings
+    sensor: str, noise: Noise, printed: Datasheet, how: EarthRateSettings
 ) -> Iterator[Row]:
     gyros, accelerometers = noise.three("gyro"), noise.three("accel")
-    gyro_bias, gyro_words = _bias(known, "gyro", how)
-    accelerometer_bias, accelerometer_words = _bias(known, "accel", how)
+    gyro_bias, gyro_words = _bias(printed, "gyro", how)
+    accelerometer_bias, accelerometer_words = _bias(printed, "accel", how)
     triad = Triad(
         gyros=tuple(gyros.values()),
         accelerometers=tuple(accelerometers.values()),
@@ -205,10 +205,10 @@ def _aligned(
         yield row
 
 
-def _bias(sensor: Sensor | None, quantity: str, how: EarthRateSettings) -> tuple[float, str]:
+def _bias(printed: Datasheet, quantity: str, how: EarthRateSettings) -> tuple[float, str]:
     """Return the standard deviation of the fixed bias in SI, and what it is from."""
     dimension = QUANTITIES[quantity]
-    sheet: QuantityDatasheet | None = getattr(sensor.datasheet, quantity) if sensor else None
+    sheet: QuantityDatasheet | None = getattr(printed, quantity)
     for name, kind in product(("bias_repeatability", "offset"), _TYPICAL):
         for figure in sheet.printed(name) if sheet else ():
             value = figure.on_axis("x")
