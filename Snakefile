@@ -5,9 +5,17 @@ import gc
 import os
 from itertools import chain
 
-from imubench_pipeline.plan import STEPS, Plan
+from imubench_pipeline.plan import Plan
 from imubench_pipeline.resources import asked
-from imubench_pipeline.schemas import COMPARED, OF_ONE_RECORDING, TABLES, TURNED
+from imubench_pipeline.schemas import (
+    CALIBRATED,
+    COMPARED,
+    OF_ONE_RECORDING,
+    OUTLOOK,
+    TABLES,
+    TURNED,
+)
+from imubench_pipeline.step_modules import STEPS
 from imubench_pipeline.steps import Steps
 from imubench_pipeline.validation import ConfigError
 
@@ -30,7 +38,15 @@ ASKED = asked(plan)  # memory and time on a cluster
 RESULTS = str(plan.run.results)
 FOLDER = RESULTS + "/recordings/{sensor}/{recording}"
 JOINED = sorted(set(TABLES) - set(OF_ONE_RECORDING))
-RANKED = {"ranking", "fusion", "coverage", "coverage_by_vendor", *TURNED}
+RANKED = {
+    "ranking",
+    "fusion",
+    "coverage",
+    "coverage_by_vendor",
+    *TURNED,
+    *CALIBRATED,
+    *OUTLOOK,
+}
 ESTIMATED = (
     "parameters",
     "models",
@@ -69,10 +85,18 @@ def as_files(*tables):
     ]
 
 
-def of_turned(*tables):
+def of_experiments(recordings, *tables):
     return [
         f"{FOLDER.format(sensor=sensor, recording=recording)}/{table}.parquet"
-        for sensor, recording in plan.turned
+        for sensor, recording in recordings
+        for table in tables
+    ]
+
+
+def of_outlooks(*tables):
+    return [
+        f"{RESULTS}/sensors/{sensor}/{table}.parquet"
+        for sensor in FOLDERS
         for table in tables
     ]
 
@@ -94,7 +118,9 @@ def missing():
             for file in OF_RECORDING
             if not found.held_back
         ),
-        *of_turned(*TURNED),
+        *of_outlooks(*OUTLOOK),
+        *of_experiments(plan.turned, *TURNED),
+        *of_experiments(plan.calibrated, *CALIBRATED),
         *(str(found.path) for found in plan.recordings.values() if found.simulated),
     ]
     return [file for file in made if not os.path.exists(file)]
@@ -251,10 +277,43 @@ rule earth_rotation:
     resources:
         **ASKED,
     params:
-        settings=lambda w: plan.earth_rate_settings(w.sensor, w.recording),
+        settings=lambda w: plan.experiment_settings(w.sensor, w.recording),
         code=plan.code("earth_rotation"),
     run:
         steps.run("earth_rotation", input, output, params, wildcards)
+
+
+rule calibration:
+    input:
+        quality=FOLDER + "/quality.json",
+        static_quality=at_rest("quality.json"),
+        static_parameters=at_rest("parameters.parquet"),
+    output:
+        **{table: f"{FOLDER}/{table}.parquet" for table in CALIBRATED},
+    resources:
+        **ASKED,
+    params:
+        settings=lambda w: plan.experiment_settings(w.sensor, w.recording),
+        code=plan.code("calibration"),
+    run:
+        steps.run("calibration", input, output, params, wildcards)
+
+
+rule outlook:
+    input:
+        quality=at_rest("quality.json"),
+        parameters=at_rest("parameters.parquet"),
+    output:
+        **{table: f"{RESULTS}/sensors/{{sensor}}/{table}.parquet" for table in OUTLOOK},
+    group:
+        "comparison"
+    resources:
+        **ASKED,
+    params:
+        settings=lambda w: plan.outlook_settings(w.sensor),
+        code=plan.code("outlook"),
+    run:
+        steps.run("outlook", input, output, params, wildcards)
 
 
 rule sensor_tables:
@@ -283,9 +342,14 @@ rule tables:
             ]
             for table in ANALYSED
         },
-        **{table: of_turned(table) for table in TURNED},
+        **{
+            table: of_experiments(plan.turned if table in TURNED else [], table)
+            + (of_outlooks(table) if table in OUTLOOK else [])
+            for table in (*TURNED, "alignment")
+        },
+        **{table: of_experiments(plan.calibrated, table) for table in CALIBRATED},
     output:
-        as_files(*ANALYSED, *TURNED),
+        as_files(*ANALYSED, *TURNED, *CALIBRATED, "alignment"),
     group:
         "comparison"
     resources:

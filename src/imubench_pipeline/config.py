@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, field_validator
 
+from imubench_pipeline.calibration.declaration import AccelerationFromZero, RateFromZero
 from imubench_pipeline.earth_rate.declaration import TimeFromZero
 from imubench_pipeline.requirements import Axis, Latitude, Time
 from imubench_pipeline.validation import (
@@ -201,7 +202,19 @@ class EarthRateSettings(Strict):
         min_length=1,
         description="standard deviations that are asked for, as a part of the Earth's rate",
     )
-    run_time: Time = Field("10 min", description="of a run, for which the best dwell is sought")
+    run_time: Time = Field("1 h", description="of a run, for which the best dwell is sought")
+    latitude: Latitude = Field(
+        "45 deg", description="where sensors at rest are to find the Earth's rate, and north"
+    )
+    gyro_bias: RateFromZero = Field(
+        "0.5 deg/s",
+        description="standard deviation of the fixed bias of gyros whose datasheet prints none",
+    )
+    accelerometer_bias: AccelerationFromZero = Field(
+        "20 mg",
+        description="standard deviation of that of accelerometers, likewise",
+    )
+    draws: int = Field(60, ge=20, description="noise models that give the range of a sigma")
 
     @field_validator("goals")
     @classmethod

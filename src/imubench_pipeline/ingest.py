@@ -18,7 +18,14 @@ from imubench_pipeline.findings import Finding
 from imubench_pipeline.parts import Part, leave_out_knocks, read_part
 from imubench_pipeline.quality.columns import column_findings
 from imubench_pipeline.quality.summary import ColumnSummary
-from imubench_pipeline.readers import POSITION, TEMPERATURE, RecordingError, log_files, read
+from imubench_pipeline.readers import (
+    POSITION,
+    TABLE_RATE,
+    TEMPERATURE,
+    RecordingError,
+    log_files,
+    read,
+)
 from imubench_pipeline.recording import channel_logs, log_paths
 from imubench_pipeline.results import Quality
 from imubench_pipeline.sensor import LogFormat, RecordingNotes, UsedPart
@@ -252,7 +259,8 @@ def _shared_bases(parts: list[Part], bases: list[timebase.TimeBase]) -> list[lis
 def _summary(
     parts: list[Part], bases: list[timebase.TimeBase], started: str | None
 ) -> dict[str, Any]:
-    measured = [i for i, part in enumerate(parts) if set(part.columns) - {TEMPERATURE, POSITION}]
+    beside = {TEMPERATURE, POSITION, TABLE_RATE}
+    measured = [i for i, part in enumerate(parts) if set(part.columns) - beside]
     longest = max(measured, key=lambda index: bases[index].rows)
     base = bases[longest]
     temperature = next(

@@ -23,6 +23,7 @@ from imubench_pipeline.sensor import (
     LogFormat,
     RecordingNotes,
     Sensor,
+    kind_of,
     merged_log,
     read_sensors,
 )
@@ -33,32 +34,16 @@ from imubench_pipeline.simulated_recordings import (
     profile_files,
     read_simulated,
 )
+from imubench_pipeline.step_modules import STEPS
 from imubench_pipeline.units import quantity_to_si
 from imubench_pipeline.validation import ConfigError, parse, read_yaml
 
 _OF_INGEST = ("quality.json", "envelope.parquet", "histogram.parquet")
+_EXPERIMENTS = ("two_position", "rate_table", "pointing")
+"""Keys of the notes that the ingest does not depend on."""
+
 _ANY_LOG = {"rate": "1 Hz", "channels": {"gyro_x": {"column": 1, "unit": "rad/s"}}}
 """Stands for the layout of a sensor's logs where that does not matter."""
-
-STEPS: Mapping[str, tuple[str, ...]] = {
-    "simulate": ("simulated_logs",),
-    "ingest": ("ingest", "overview", "results"),
-    "allan": ("allan", "recording", "results"),
-    "estimate": ("estimation",),
-    "reconstruct": ("reconstruction",),
-    "datasheet": ("datasheet", "results"),
-    "error_budget": ("expected_errors", "results"),
-    "ranking": ("selection", "results"),
-    "fusion": ("fusion.of_run",),
-    "earth_rotation": ("earth_rate.of_run",),
-    "coverage": ("coverage", "results"),
-    "exports": ("export.of_run",),
-    "sensor_tables": ("results",),
-    "tables": ("tables",),
-    "figures": ("report.static_figures.of_run",),
-    "report": ("report.publish",),
-}
-"""The modules that each step runs: their edit runs the step again."""
 
 
 class Plan:
@@ -145,13 +130,15 @@ class Plan:
             log, notes = self._written(recording)
             if recording.simulated:
                 log = layout(self._simulated[recording.sensor, recording.name], log)
-            elif notes.two_position is not None:
+            else:
                 try:
-                    notes.two_position.turned(list(log.channels))
+                    notes.check_gyro(log)
                 except ValueError as error:
-                    raise ConfigError(f"{recording.notes}: two_position.{error}") from None
+                    raise ConfigError(f"{recording.notes}: {error}") from None
+            if settings["kind"] != "rate_table":
+                log = log.model_copy(update={"table_rate": None})
             written = log.model_dump(mode="json", exclude={"bandwidth"})
-            said = notes.model_dump(mode="json", exclude={"log", "two_position"})
+            said = notes.model_dump(mode="json", exclude={"log", *_EXPERIMENTS})
             return settings | {"notes": said, "log": written, "files": fingerprints(recording)}
         except ConfigError as error:
             return settings | {"error": str(error)}
@@ -162,11 +149,9 @@ class Plan:
         if recording.simulated:
             return self._simulated[sensor, name].kind
         try:
-            notes = self._notes(recording)
+            return kind_of(self._notes(recording))
         except ConfigError:
             return "static"
-        turned = isinstance(notes, Mapping) and notes.get("two_position") is not None
-        return "two_position" if turned else "static"
 
     def _notes(self, recording: Recording) -> object:
         """Return what the file of notes beside a log holds, which is read once a run."""
@@ -187,15 +172,31 @@ class Plan:
 
     @cached_property
     def _at_rest(self) -> dict[str, list[str]]:
-        turned = set(self.turned)
         found: dict[str, list[str]] = {}
         for sensor, name in self.recordings:
-            if (sensor, name) not in turned:
+            if self.kind(sensor, name) == "static":
                 found.setdefault(sensor, []).append(name)
         return found
 
-    def earth_rate_settings(self, sensor: str, name: str) -> str:
-        """Return what the Earth's rate of a recording depends on beside its samples."""
+    @cached_property
+    def calibrated(self) -> list[tuple[str, str]]:
+        """Sensor and name of the recordings on a rate table, or with a direction that is stated."""
+        return [key for key in self.recordings if self._calibrates(*key)]
+
+    def _calibrates(self, sensor: str, name: str) -> bool:
+        if self.kind(sensor, name) == "rate_table":
+            return True
+        recording = self.recordings[sensor, name]
+        if recording.simulated:
+            return self._simulated[sensor, name].pointing is not None
+        try:
+            notes = self._notes(recording)
+        except ConfigError:
+            return False
+        return isinstance(notes, Mapping) and notes.get("pointing") is not None
+
+    def experiment_settings(self, sensor: str, name: str) -> str:
+        """Return what is found of a turned or a stated axis depends on beside the samples."""
         recording = self.recordings[sensor, name]
         known = self.sensors.get(sensor)
         settings: dict[str, object] = {
@@ -207,11 +208,19 @@ class Plan:
             published = {"channels": {"__all__": {"published", "figures"}}}
             return _text(settings | {"simulated": entry.model_dump(mode="json", exclude=published)})
         try:
-            declared = self._written(recording)[1].two_position
+            notes = self._written(recording)[1]
         except ConfigError:
             return _text(settings)  # it is rejected, and says why
-        told = declared.model_dump(mode="json") if declared else None
-        return _text(settings | {"two_position": told})
+        told = notes.model_dump(mode="json", include=set(_EXPERIMENTS), exclude_none=True)
+        return _text(settings | told)
+
+    def outlook_settings(self, sensor: str) -> str:
+        """Return what is predicted of a sensor at rest depends on beside its noise."""
+        known = self.sensors.get(sensor)
+        biases = {key: {"bias_repeatability", "offset"} for key in ("gyro", "accel")}
+        printed = known.datasheet.model_dump(mode="json", include=biases) if known else {}
+        settings = self.run.earth_rate.model_dump(mode="json")
+        return _text({"earth_rate": settings, "datasheet": printed})
 
     def _written(self, recording: Recording) -> tuple[LogFormat, RecordingNotes]:
         """Return how the log of a recording is written, and the notes beside it.

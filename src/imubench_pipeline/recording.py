@@ -20,13 +20,13 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from imubench_pipeline.readers.batch import POSITION, TEMPERATURE
+from imubench_pipeline.readers.batch import POSITION, TABLE_RATE, TEMPERATURE
 
 ROW_GROUP = 1 << 20
 """Rows of a row group."""
 
 _METADATA = b"imubench"
-_NOT_CHANNELS = {"time", "sample", TEMPERATURE, POSITION}
+_NOT_CHANNELS = {"time", "sample", TEMPERATURE, POSITION, TABLE_RATE}
 
 
 class LogWriter:
@@ -129,6 +129,8 @@ class ChannelLog:
         There are readings of the temperature on the same grid.
     position : bool
         There is a column on the same grid that says how the sensor stood.
+    table_rate : bool
+        There is a column on the same grid with the rate of the table that the sensor stood on.
     """
 
     path: Path
@@ -139,6 +141,7 @@ class ChannelLog:
     holes: bool
     temperature: bool = False
     position: bool = False
+    table_rate: bool = False
 
     def blocks(self) -> Iterator[NDArray[np.float64]]:
         """Yield the samples on the uniform grid in SI, in consecutive blocks; NaN where missing."""
@@ -170,6 +173,10 @@ class ChannelLog:
     def positions(self) -> Iterator[NDArray[np.float64]]:
         """Yield how the sensor stood, as written, in blocks like those of the samples."""
         return replace(self, channel=POSITION).blocks()
+
+    def table_rates(self) -> Iterator[NDArray[np.float64]]:
+        """Yield the rate of the table, rad/s, in blocks like those of the samples."""
+        return replace(self, channel=TABLE_RATE).blocks()
 
     @property
     def position_elsewhere(self) -> bool:
@@ -227,6 +234,7 @@ def channel_logs(folder: Path) -> dict[str, ChannelLog]:
                 bool(metadata["holes"].get(channel, True)),
                 TEMPERATURE in columns,
                 POSITION in columns,
+                TABLE_RATE in columns,
             )
     order = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
     return {name: logs[name] for name in order if name in logs}

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pyarrow as pa
 
+from imubench_pipeline.alignment.columns import ALIGNMENT_TABLES
+from imubench_pipeline.calibration.columns import CALIBRATION_TABLES
 from imubench_pipeline.columns import Column
 from imubench_pipeline.columns import count as _count
 from imubench_pipeline.columns import figure as _figure
@@ -11,7 +13,16 @@ from imubench_pipeline.columns import number as _number
 from imubench_pipeline.columns import text as _text
 from imubench_pipeline.earth_rate.columns import EARTH_RATE_TABLES
 
-__all__ = ["BY_RECORDING", "COMPARED", "OF_ONE_RECORDING", "TABLES", "TURNED", "Column"]
+__all__ = [
+    "BY_RECORDING",
+    "CALIBRATED",
+    "COMPARED",
+    "OF_ONE_RECORDING",
+    "OUTLOOK",
+    "TABLES",
+    "TURNED",
+    "Column",
+]
 
 _FITTED = _number("fitted", "as in unit", "what the model has where value is null; no estimate")
 _SENSOR = _text("sensor", "name of the sensor file")
@@ -27,7 +38,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _SENSOR,
         _text("device", "specimen of the sensor; by default the recording's name"),
         _RECORDING,
-        _text("kind", "static or two_position"),
+        _text("kind", "static, two_position or rate_table"),
         _text("started", "date and time of the first sample, where known", required=False),
         Column("simulated", pa.bool_(), "-", "made from known parameters, not measured"),
         _text("status", "ok or rejected"),
@@ -355,6 +366,8 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _text("source", "where the parameters are published"),
     ),
     **EARTH_RATE_TABLES,
+    **CALIBRATION_TABLES,
+    **ALIGNMENT_TABLES,
 }
 """Every table a run leaves, by name; all numbers are SI (temperatures in degC)."""
 
@@ -363,6 +376,12 @@ OF_ONE_RECORDING = ("envelope", "histogram")
 
 TURNED = tuple(EARTH_RATE_TABLES)
 """The tables of gyros that were turned: only such recordings have rows."""
+
+CALIBRATED = tuple(CALIBRATION_TABLES)
+"""The tables of gyros on a rate table, or at rest where it is known how they point."""
+
+OUTLOOK = ("alignment", "earth_rate_prediction")
+"""The tables of what each sensor at rest could find; the second has rows of turned gyros, too."""
 
 BY_RECORDING = (
     "recordings",
@@ -384,6 +403,8 @@ BY_RECORDING = (
     "published",
     "error_budget",
     *TURNED,
+    *CALIBRATED,
+    "alignment",
 )
 """The joined tables in which a recording has rows of its own."""
 

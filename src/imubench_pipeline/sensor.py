@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
+from imubench_pipeline.calibration.declaration import AtRest, OnRateTable
 from imubench_pipeline.earth_rate.declaration import TwoPosition
 from imubench_pipeline.printed import Datasheet
 from imubench_pipeline.units import UnitError, conversion, quantity_to_si
@@ -20,7 +21,7 @@ QUANTITIES: dict[str, str] = {"gyro": "angular_rate", "accel": "acceleration"}
 CHANNELS: tuple[str, ...] = tuple(f"{q}_{axis}" for q in QUANTITIES for axis in "xyz")
 """Every channel: one axis of one quantity."""
 
-Kind = Literal["static", "two_position"]
+Kind = Literal["static", "two_position", "rate_table"]
 """What was done with a sensor during a recording."""
 
 Channel = Literal["gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"]
@@ -153,6 +154,11 @@ class LogFormat(Strict):
         description="of a sensor that is turned between two positions: angle, 0 and 1, or +1 where "
         "the axis points north and -1 south; null: the log does not say",
     )
+    table_rate: ColumnSource | None = Field(
+        None,
+        description="of a sensor on a rate table: the rate of the table, of the gyro's sign; null: "
+        "the notes beside the log have the steps",
+    )
     bandwidth: Frequency | None = Field(
         None, description="cut-off of the sensor's own low-pass filter, where known"
     )
@@ -184,8 +190,10 @@ class LogFormat(Strict):
             _check_unit(source.unit, QUANTITIES[quantity_of(channel)], f"channels.{channel}.unit")
         if self.temperature is not None:
             _check_unit(self.temperature.unit, "temperature", "temperature.unit")
-        beside = [one for one in (self.temperature, self.position) if one is not None]
-        sources = [*self.channels.values(), *beside]
+        if self.table_rate is not None:
+            _check_unit(self.table_rate.unit, "angular_rate", "table_rate.unit")
+        beside = (self.temperature, self.position, self.table_rate)
+        sources = [*self.channels.values(), *(one for one in beside if one is not None)]
         if any(source.file for source in sources) and not all(source.file for source in sources):
             raise ValueError("some channels name a 'file' and others do not; expected all or none")
         return self
@@ -237,12 +245,70 @@ class RecordingNotes(Strict):
         description="a gyro that was turned between north and south to find the Earth's rate; "
         "null: the sensor was at rest all the time",
     )
+    rate_table: OnRateTable | None = Field(
+        None,
+        description="a gyro on a rate table, for scale factor and bias; null: it was on none",
+    )
+    pointing: AtRest | None = Field(
+        None,
+        description="where the axis of a gyro at rest points, for its bias without what the Earth "
+        "adds; null: not known",
+    )
     log: dict[str, Any] = Field(default=dict(), description="merged over the sensor's log")
 
-    @property
-    def kind(self) -> Kind:
-        """What was done with the sensor."""
-        return "static" if self.two_position is None else "two_position"
+    @model_validator(mode="after")
+    def _one_kind(self) -> RecordingNotes:
+        stated = [
+            key
+            for key in ("two_position", "rate_table", "pointing")
+            if getattr(self, key) is not None
+        ]
+        if len(stated) > 1:
+            raise ValueError(
+                f"found {' and '.join(stated)}; expected one of them: a recording is of one kind"
+            )
+        return self
+
+    def check_gyro(self, log: LogFormat) -> None:
+        """Check that the gyro of an experiment is in the log, and all that it takes.
+
+        Parameters
+        ----------
+        log : LogFormat
+            How the log is written.
+
+        Raises
+        ------
+        ValueError
+            If it is not; the text begins with the key.
+        """
+        channels = [str(name) for name in log.channels]
+        for key in ("two_position", "rate_table", "pointing"):
+            try:
+                if key == "two_position" and self.two_position is not None:
+                    self.two_position.turned(channels)
+                if key == "rate_table" and self.rate_table is not None:
+                    self.rate_table.gyro(channels, column=log.table_rate is not None)
+                if key == "pointing" and self.pointing is not None:
+                    self.pointing.gyro(channels)
+            except ValueError as error:
+                raise ValueError(f"{key}.{error}") from None
+
+
+def kind_of(notes: object) -> Kind:
+    """Return what notes make of a recording, though they may be wrong otherwise.
+
+    Parameters
+    ----------
+    notes : object
+        What the file beside the log holds.
+    """
+    if isinstance(notes, Mapping):
+        if notes.get("two_position") is not None:
+            return "two_position"
+        if notes.get("rate_table") is not None:
+            return "rate_table"
+    return "static"
 
 
 def read_sensors(folder: Path) -> dict[str, Sensor]:

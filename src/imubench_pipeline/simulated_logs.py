@@ -19,7 +19,8 @@ from imubench_pipeline.sensor_model.imu import simulate_imu
 from imubench_pipeline.sensor_model.models import imu_model
 from imubench_pipeline.sensor_model.profiles import Profile, profiles_of
 from imubench_pipeline.simulate import channel_rng
-from imubench_pipeline.simulated_recordings import SimulatedRecording, SimulatedTurns
+from imubench_pipeline.simulated_experiments import SimulatedTable, SimulatedTurns
+from imubench_pipeline.simulated_recordings import SimulatedRecording
 from imubench_pipeline.text_log import TextLog
 from imubench_pipeline.units import quantity_to_si
 from imubench_pipeline.validation import ConfigError
@@ -73,11 +74,9 @@ def _blocks(recording: SimulatedRecording, rate: float) -> Iterator[dict[str, ND
         name = f"{recording.sensor}/{recording.recording}"
         raise ConfigError(f"{name}: channels.{error}") from error
     motion, temperature = profiles_of(recording, Path())
-    if recording.two_position is not None:
-        turned = recording.two_position.turned(list(recording.channels))
-        motion = motion | {
-            turned: _turned(recording, recording.two_position, rate, recording.samples)
-        }
+    gyro = recording.experimental
+    if gyro is not None:
+        motion = motion | {gyro: _sensed(recording, rate)}
     return simulate_imu(
         model,
         rate,
@@ -99,6 +98,28 @@ class _Samples(Profile):
     def at(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the values of the samples at these times."""
         return self.values[np.rint(times * self.rate).astype(np.int64)]
+
+
+def _sensed(recording: SimulatedRecording, rate: float) -> _Samples:
+    """Return what the gyro of an experiment senses."""
+    if recording.two_position is not None:
+        return _turned(recording, recording.two_position, rate, recording.samples)
+    if recording.rate_table is not None:
+        return _on_table(recording.rate_table, rate, recording.samples)
+    assert recording.pointing is not None  # there is no other experiment
+    return _Samples(np.full(recording.samples, recording.pointing.true.rate), rate)
+
+
+def _on_table(table: SimulatedTable, rate: float, samples: int) -> _Samples:
+    """Return what the gyro indicates of the table, which goes straight from one rate to the next.
+
+    Its scale factor is in it.
+    """
+    times = [time for step in table.steps for time in step.seconds]
+    rates = np.repeat([quantity_to_si(step.rate, "angular_rate") for step in table.steps], 2)
+    true = np.interp(np.arange(samples) / rate, times, rates)
+    earth = 0.0 if table.axis is None else table.axis.pointing.rate
+    return _Samples(table.scale_factor * (true + earth), rate)
 
 
 def _turned(

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, Self, TypeVar
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
-from imubench_pipeline.earth_rate.declaration import TwoPosition
 from imubench_pipeline.sensor import (
     QUANTITIES,
     Channel,
@@ -19,10 +18,12 @@ from imubench_pipeline.sensor import (
     LogFormat,
     Sensor,
     TimeSource,
+    kind_of,
     quantity_of,
 )
 from imubench_pipeline.sensor_model.profile_forms import FileForm, Surroundings, found_from
 from imubench_pipeline.sensor_model.settings import AxisSettings, ImuSettings, check_axes
+from imubench_pipeline.simulated_experiments import SimulatedRest, SimulatedTable, SimulatedTurns
 from imubench_pipeline.units import quantity_to_si
 from imubench_pipeline.validation import (
     ConfigError,
@@ -103,67 +104,57 @@ class OfASensor(ImuSettings):
         return round(quantity_to_si(self.duration, "time") * rate)
 
 
-class PublishedRate(Strict):
-    """What a source prints of the Earth's rate that it found."""
-
-    where: Text = Field(description="such as section 6")
-    printed: Text = Field(description="with its unit, as printed")
-    part: Text = Field("whole", description="of the run: whole, or such as 'last 13 min'")
-
-    @field_validator("printed")
-    @classmethod
-    def _a_rate(cls, text: str) -> str:
-        quantity_to_si(text, "angular_rate")
-        return text
-
-
-class SimulatedTurns(TwoPosition):
-    """A gyro that is turned between north and south, by the clock."""
-
-    transient: Text = Field("0 deg/s", description="largest rate that is sensed of a turn, about")
-    assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
-    published: tuple[PublishedRate, ...] = ()
-
-    @field_validator("transient")
-    @classmethod
-    def _a_rate(cls, text: str) -> str:
-        quantity_to_si(text, "angular_rate")
-        return text
-
-    @model_validator(mode="after")
-    def _parts_are_there(self) -> Self:
-        parts = {"whole", *(f"last {text}" for text in self.last)}
-        for one in self.published:
-            if one.part not in parts:
-                raise ValueError(f"published: part is {one.part!r}; expected one of {parts}")
-        return self
-
-    @property
-    def declared(self) -> TwoPosition:
-        """What would stand beside such a log."""
-        return TwoPosition(**{name: getattr(self, name) for name in TwoPosition.model_fields})
-
-
 class SimulatedRecording(OfASensor, Surroundings):
     """A recording that is made before the run, from known figures."""
 
     recording: str = Field(pattern=_NAMES, description="starts with sim_")
     seed: int
     two_position: SimulatedTurns | None = None
+    rate_table: SimulatedTable | None = None
+    pointing: SimulatedRest | None = None
 
     @model_validator(mode="after")
-    def _one_is_turned(self) -> Self:
-        if self.two_position is not None:
+    def _one_experiment(self) -> Self:
+        stated = [key for key, one in self._experiments.items() if one is not None]
+        if len(stated) > 1:
+            raise ValueError(f"found {' and '.join(stated)}; expected one of them")
+        for key in stated:
             try:
-                self.two_position.turned(list(self.channels))
+                gyro = self.experimental
             except ValueError as error:
-                raise ValueError(f"two_position.{error}") from error
+                raise ValueError(f"{key}.{error}") from error
+            if gyro in self.motion:
+                raise ValueError(f"motion.{gyro}: {key} says how it moves; expected one of the two")
         return self
+
+    @property
+    def _experiments(self) -> dict[str, object]:
+        return {
+            "two_position": self.two_position,
+            "rate_table": self.rate_table,
+            "pointing": self.pointing,
+        }
+
+    @property
+    def experimental(self) -> str | None:
+        """The gyro of its experiment; None where it has none.
+
+        Raises
+        ------
+        ValueError
+            If it is not stated, or not simulated.
+        """
+        channels = [str(name) for name in self.channels]
+        if self.two_position is not None:
+            return self.two_position.turned(channels)
+        if self.rate_table is not None:
+            return self.rate_table.gyro(channels, column=False)
+        return None if self.pointing is None else self.pointing.gyro(channels)
 
     @property
     def kind(self) -> Kind:
         """What is done with the sensor."""
-        return "static" if self.two_position is None else "two_position"
+        return kind_of(self._experiments)
 
 
 class Simulated(Strict):
@@ -339,7 +330,13 @@ def layout(recording: SimulatedRecording, log: LogFormat) -> LogFormat:
     # Where the sensor's logs are read with a stated rate, this one is read with its own.
     rate = None if log.rate is None else recording.rate
     return log.model_copy(
-        update={"channels": channels, "temperature": temperature, "position": None, "rate": rate}
+        update={
+            "channels": channels,
+            "temperature": temperature,
+            "position": None,
+            "table_rate": None,
+            "rate": rate,
+        }
     )
 
 

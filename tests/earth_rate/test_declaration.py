@@ -107,7 +107,7 @@ def test_a_log_with_such_notes_is_rejected_and_says_why(
     row = ingested(plan, tmp_path)
     assert (row["status"], row["kind"]) == ("rejected", "two_position")
     assert said in row["reason"]
-    json.loads(plan.earth_rate_settings("s", "a"))
+    json.loads(plan.experiment_settings("s", "a"))
 
 
 def test_several_gyros_need_the_one_that_was_turned(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Real runs of Snakemake with gyros that were turned between north and south."""
+"""Real runs of Snakemake with gyros that were turned, on a rate table, or at rest."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import yaml
 
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.simulate import simulate
+from tests.calibration.recordings import BIAS, SCALE, STEPS, UP, on_table
 from tests.earth_rate.runs import turned
 from tests.workflow.project import Job, Project, linked
 
@@ -19,6 +20,7 @@ pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("workflow")]
 RATE = 32.0
 NOISE = NoiseModel(N=2e-4)
 NOTES = {"latitude": "40 deg", "dwell": "30 s", "turning": "1.5 s", "first": "north"}
+POINTING = {"latitude": "40 deg", "heading": "90 deg", "heading_sigma": "1 deg"}
 DEGREES = 180.0 / math.pi
 
 
@@ -52,6 +54,10 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Project:
     put_log(made, "minute", turned([29.0], 60.0, noise=NOISE), two_position=NOTES)
     put_log(made, "still", rest[: round(300 * RATE)], two_position=NOTES)
     put_log(made, "nowhere", run_of(3.0, 7), two_position={"dwell": "30 s"})
+    table = on_table(8, model=NOISE)
+    put_log(made, "table", table, device="serial 7", rate_table={"steps": STEPS, "axis": UP})
+    put_log(made, "no_steps", table, rate_table={"settling": "1 s"})
+    put_log(made, "pointing", rest[:30_000] + BIAS, device="serial 7", pointing=POINTING)
     done = made.run()
     assert done.returncode == 0, done.stdout + done.stderr
     return made
@@ -91,9 +97,16 @@ def test_a_turned_gyro_stays_out_of_what_is_for_static_logs(project: Project) ->
         "minute": ("two_position", "ok"),
         "still": ("two_position", "ok"),
         "nowhere": ("two_position", "rejected"),
+        "table": ("rate_table", "ok"),
+        "no_steps": ("rate_table", "rejected"),
+        "pointing": ("static", "ok"),
     }
     for table in ("allan", "parameters", "error_budget", "fixed_bias", "pooled"):
-        assert {row.get("recording") for row in project.table(table)} <= {"rest", None}, table
+        assert {row.get("recording") for row in project.table(table)} <= {
+            "rest",
+            "pointing",
+            None,
+        }, table
 
 
 def test_what_is_wrong_stands_in_tables_and_pages(project: Project) -> None:
@@ -107,6 +120,32 @@ def test_what_is_wrong_stands_in_tables_and_pages(project: Project) -> None:
     assert 'data-kind="turning"' in (report / "recordings/gyro/run.html").read_text()
 
 
+def test_a_rate_table_gives_scale_factor_and_bias(project: Project) -> None:
+    found = {row["parameter"]: row for row in project.table("calibration")
+             if row["recording"] == "table"}  # fmt: skip
+    for name, true in (("scale_factor", SCALE), ("bias", BIAS)):
+        assert found[name]["status"] == "ok"
+        assert found[name]["lower"] < true < found[name]["upper"]
+        assert found[name]["model_from"] == "static recording rest; method likelihood"
+    assert len(project.table("calibration_points")) == len(STEPS)
+    page = (project.results / "report/recordings/gyro/table.html").read_text()
+    assert 'data-kind="table_residuals"' in page
+    (reason,) = (row["reason"] for row in project.table("recordings")
+                 if row["recording"] == "no_steps")  # fmt: skip
+    assert "no_steps.yaml: rate_table.steps: missing; expected the steady rates" in reason
+    assert "rate_table.steps: missing" in (project.results / "report/earth_rate.html").read_text()
+
+
+def test_a_direction_gives_a_static_recording_a_bias(project: Project) -> None:
+    found = {row["parameter"]: row for row in project.table("calibration")
+             if row["recording"] == "pointing"}  # fmt: skip
+    assert found["bias"]["lower"] < BIAS < found["bias"]["upper"]
+    assert found["earth_rate"]["status"] == "not_observable"
+    assert any(row["recording"] == "pointing" for row in project.table("allan"))
+    page = (project.results / "report/recordings/gyro/pointing.html").read_text()
+    assert "Bias without the Earth’s rate" in page
+
+
 def test_a_second_run_has_nothing_to_do_and_notes_run_their_own(project: Project) -> None:
     assert project.job_list() == set()
     path = project.folder / "logs/gyro/run.yaml"
@@ -116,6 +155,19 @@ def test_a_second_run_has_nothing_to_do_and_notes_run_their_own(project: Project
     changed = project.job_list()
     path.write_text(before)
     assert changed == {("earth_rotation", "gyro/run"), ("tables", ""), *_joined()}
+
+
+def test_steps_and_directions_run_their_own_again(project: Project) -> None:
+    for name, key, change in (
+        ("table", "rate_table", {"steps": STEPS, "axis": UP, "settling": "3 s"}),
+        ("pointing", "pointing", POINTING | {"heading": "80 deg"}),
+    ):
+        path = project.folder / f"logs/gyro/{name}.yaml"
+        before = path.read_text()
+        path.write_text(yaml.safe_dump({"device": "serial 7", key: change}))
+        changed = project.job_list()
+        path.write_text(before)
+        assert changed == {("calibration", f"gyro/{name}"), ("tables", ""), *_joined()}
 
 
 def _joined() -> set[Job]:

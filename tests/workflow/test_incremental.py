@@ -35,7 +35,12 @@ INPUTS = ("logs", "sensors", "requirements")
 def steps_of(*recordings: str, since: str = "ingest") -> set[Job]:
     """The steps of recordings, and what joins them."""
     steps = {(step, of) for step in STEPS[STEPS.index(since) :] for of in recordings}
-    return steps | joined(*recordings)
+    noise = STEPS.index(since) <= STEPS.index("estimate")
+    return steps | joined(*recordings) | (outlooks(*recordings) if noise else set())
+
+
+def outlooks(*recordings: str) -> set[Job]:
+    return {("outlook", of.partition("/")[0]) for of in recordings}
 
 
 def joined(*recordings: str) -> set[Job]:
@@ -156,7 +161,7 @@ def test_logs_replaced_by_older_ones_of_their_size_run_their_own_steps(project: 
 
 def test_a_removed_log_runs_what_joins_the_others(project: Project) -> None:
     (project.folder / "logs/one/a.csv").unlink()
-    assert project.job_list() == joined(*ONE)
+    assert project.job_list() == joined(*ONE) | outlooks(*ONE)
 
 
 def test_a_renamed_log_is_a_new_one(project: Project) -> None:

@@ -26,6 +26,8 @@ EARTH_RATE_TABLES: dict[str, tuple[Column, ...]] = {
             "too_short or not_shown",
         ),
         number("sigma", _RATE, "standard deviation of value, by the noise model"),
+        number("sigma_lower", _RATE, "lower 95 % limit of sigma: the noise model is an estimate"),
+        number("sigma_upper", _RATE, "upper 95 % limit of sigma"),
         number("white", _RATE, "the least that it can be, N / sqrt(T) / cos(latitude)"),
         number("truth", _RATE, "the Earth's rate", required=True),
         number("off_sigma", "-", "value less truth, in sigma"),
@@ -64,6 +66,7 @@ EARTH_RATE_TABLES: dict[str, tuple[Column, ...]] = {
     "earth_rate_prediction": (
         *_KEYS,
         text("of", "goal: what it takes; time: as a run grows; dwell: a run divided in dwells"),
+        number("latitude", "rad", "where", required=True),
         number("dwell", "s", "data in each dwell", required=True),
         count("turns", "of the run", required=True),
         number("time", "s", "length of the run", required=True),

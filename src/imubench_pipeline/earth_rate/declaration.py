@@ -7,10 +7,9 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from imubench_pipeline.requirements import Latitude, Time
+from imubench_pipeline.stated_gyro import Gyro, stated_gyro
 from imubench_pipeline.units import quantity_to_si
 from imubench_pipeline.validation import Strict, Text
-
-Gyro = Literal["gyro_x", "gyro_y", "gyro_z"]
 
 
 def _not_negative(text: str) -> str:
@@ -147,14 +146,4 @@ class TwoPosition(Strict):
             If it is not among them, or is not stated and the log has another number of gyros
             than one; the text begins with the key.
         """
-        gyros = [name for name in channels if name.startswith("gyro_")]
-        if self.channel in gyros:
-            return self.channel
-        found = ", ".join(gyros) or "no gyro"
-        if self.channel is not None:
-            raise ValueError(f"channel: found {self.channel!r}; the log has {found}")
-        if len(gyros) != 1:
-            raise ValueError(
-                f"channel: missing; expected the gyro whose axis was turned, the log has {found}"
-            )
-        return gyros[0]
+        return stated_gyro(self.channel, channels, "was turned")

@@ -40,6 +40,11 @@ def prediction_rows(
     ValueError
         If the run time does not hold two dwells and a turn.
     """
+    for row in _rows(outlook, dwell, goals, run_time):
+        yield {"latitude": outlook.latitude, **row}
+
+
+def _rows(outlook: Outlook, dwell: float, goals: Sequence[float], run_time: float) -> Iterator[Row]:
     most = 1
     for goal in sorted(goals, reverse=True):
         turns = outlook.turns_needed(dwell, goal)

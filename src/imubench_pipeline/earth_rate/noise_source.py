@@ -12,11 +12,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from imubench_pipeline.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.results import Quality, estimates, recommended_estimates
 from imubench_pipeline.sensor import Sensor
 from imubench_pipeline.sensor_model.from_datasheet import from_datasheet
+from imubench_pipeline.simulate import channel_rng
 from imubench_pipeline.validation import ConfigError
+
+_SEED = 20260101
+"""Of the drawn models: each recording and channel has a stream of its own."""
 
 
 @dataclass(frozen=True)
@@ -31,11 +36,14 @@ class NoiseSource:
         The papers' N, B, T_B and K of the same source, for their filter; it may lack some.
     words : str
         Where it is from.
+    drawn : tuple of NoiseModel
+        Drawn from the limits of its parameters; none where it has no limits.
     """
 
     model: NoiseModel
     papers: NoiseModel
     words: str
+    drawn: tuple[NoiseModel, ...] = ()
 
     def with_drift(self, drift: float) -> NoiseModel:
         """Return the model with a steady drift of a standard deviation beside its own, rad/s^2.
@@ -44,11 +52,24 @@ class NoiseSource:
         ----------
         drift : float
         """
-        return replace(self.model, R=(self.model.R**2 + drift**2) ** 0.5) if drift else self.model
+        return _drifting(self.model, drift)
+
+    def drawn_with_drift(self, drift: float) -> list[NoiseModel]:
+        """Return the drawn models with the same drift beside their own, rad/s^2.
+
+        Parameters
+        ----------
+        drift : float
+        """
+        return [_drifting(one, drift) for one in self.drawn]
+
+
+def _drifting(model: NoiseModel, drift: float) -> NoiseModel:
+    return replace(model, R=(model.R**2 + drift**2) ** 0.5) if drift else model
 
 
 def from_static(
-    folders: Sequence[Path], own: Mapping[str, Any], channel: str
+    folders: Sequence[Path], own: Mapping[str, Any], channel: str, draws: int = 0
 ) -> NoiseSource | None:
     """Return the noise of a gyro from the static recordings of its sensor.
 
@@ -60,6 +81,8 @@ def from_static(
         Row of the table ``recordings`` of the recording that was turned.
     channel : str
         The gyro that was turned; another gyro of the sensor answers where it has no estimate.
+    draws : int
+        Models that are drawn from the limits of the estimate.
 
     Returns
     -------
@@ -89,7 +112,9 @@ def from_static(
             every = {estimate.method: estimate for estimate in estimates(parameters)[name]}
             papers = every.get("likelihood_gm", best[name]).model
             words = f"{_words(row, own, name, channel)}; method {best[name].method}"
-            return NoiseSource(best[name].model, papers, words)
+            rng = channel_rng(_SEED, row["sensor"], row["recording"], name)
+            drawn = tuple(draw_models(best[name], draws, rng))
+            return NoiseSource(best[name].model, papers, words, drawn)
     return None
 
 

@@ -26,6 +26,7 @@ from imubench_pipeline.earth_rate.found import FoundDwell, Turning
 from imubench_pipeline.earth_rate.needs import prediction_rows
 from imubench_pipeline.earth_rate.noise_source import NoiseSource
 from imubench_pipeline.earth_rate.prediction import Outlook
+from imubench_pipeline.earth_rate.ranges import sigma_ranges
 from imubench_pipeline.earth_rate.turning import find_turning
 from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE
 from imubench_pipeline.recording import ChannelLog
@@ -149,7 +150,10 @@ def earth_rate_of(
             found.earth_rate += _without(names, part, "too_short", str(error))
             continue
         extent = {"dwells": len(chosen), "turns": len(chosen) - 1}
-        found.earth_rate += _estimates(names | extent, part, courses, source, turning, log.rate)
+        drawn = source.drawn_with_drift(declared.drift_si)
+        ranges = sigma_ranges(courses.measured.blocks, model, drawn, declared.turn_on_bias_si)
+        rows = _estimates(names | extent, part, courses, source, turning, log.rate)
+        found.earth_rate += [row | ranges.get(row["method"], {}) for row in rows]
         found.earth_rate_series += _later(_series(key, part, courses), begins)
     return found
 
@@ -262,7 +266,7 @@ def _estimates(
     source: NoiseSource,
     turning: Turning,
     rate: float,
-) -> Iterator[Row]:
+) -> Iterator[dict[str, Any]]:
     measured, blocks = courses.measured, courses.measured.blocks
     about = names | {
         "part": part,

@@ -58,10 +58,10 @@ def earth_rate_tables(
         declared = TwoPosition.model_validate(given["two_position"])
     own = Quality.read(folder / "quality.json").recording
     channel = declared.turned(list(logs))
-    source = from_static(static, own, channel) or from_printed(
+    how = EarthRateSettings.model_validate(given["earth_rate"])
+    source = from_static(static, own, channel, how.draws) or from_printed(
         sensor, Sensor.model_validate(given["sensor"]), channel
     )
-    how = EarthRateSettings.model_validate(given["earth_rate"])
     key, log = Key(sensor, recording, channel), logs[channel]
     begins = read_metadata(log.path).get("begins", 0.0)
     found = earth_rate_of(key, log, declared, source, how, begins=begins)

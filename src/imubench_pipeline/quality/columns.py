@@ -9,7 +9,7 @@ from imubench_pipeline.config import QualitySettings
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.quality import levels, plausibility, stationarity
 from imubench_pipeline.quality.summary import LARGEST, ColumnSummary
-from imubench_pipeline.readers.batch import POSITION, TEMPERATURE
+from imubench_pipeline.readers.batch import POSITION, TABLE_RATE, TEMPERATURE
 from imubench_pipeline.sensor import QUANTITIES, quantity_of
 from imubench_pipeline.units import SI_UNITS, from_si
 
@@ -42,7 +42,7 @@ def column_findings(
         if channel == TEMPERATURE:
             findings += _temperature(column)
             continue
-        if channel == POSITION:
+        if channel in (POSITION, TABLE_RATE):
             continue
         fatal = _unusable(channel, column, settings)
         findings += [fatal] if fatal else []

@@ -7,7 +7,14 @@ from importlib import import_module
 from itertools import islice
 from pathlib import Path
 
-from imubench_pipeline.readers.batch import POSITION, TEMPERATURE, Batch, LogFile, RecordingError
+from imubench_pipeline.readers.batch import (
+    POSITION,
+    TABLE_RATE,
+    TEMPERATURE,
+    Batch,
+    LogFile,
+    RecordingError,
+)
 from imubench_pipeline.readers.compressed import (
     holds_text,
     is_archive,
@@ -39,6 +46,7 @@ SEVERAL_CLOCKS: tuple[Reader, ...] = ("rosbag", "ubx")
 __all__ = [
     "POSITION",
     "SEVERAL_CLOCKS",
+    "TABLE_RATE",
     "TEMPERATURE",
     "Batch",
     "LogFile",
@@ -95,6 +103,8 @@ def read(path: Path, log: LogFormat) -> list[LogFile]:
         sources[TEMPERATURE] = log.temperature
     if log.position is not None:
         sources[POSITION] = log.position
+    if log.table_rate is not None:
+        sources[TABLE_RATE] = log.table_rate
     present = _present(path, log)
     together: dict[tuple[Path, str], dict[str, ColumnSource]] = {}
     for name, source in sources.items():

@@ -21,6 +21,9 @@ TEMPERATURE = "temperature"
 POSITION = "position"
 """Name of the column that says how a sensor that is turned stands."""
 
+TABLE_RATE = "table_rate"
+"""Name of the column with the rate of the table that a sensor stands on."""
+
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Seconds in a unit of time stamps."""
 
@@ -108,7 +111,8 @@ class LogFile(ABC):
         source = self.sources[name]
         if name == POSITION:
             return source.scale * (raw - source.offset)
-        dimension = TEMPERATURE if name == TEMPERATURE else QUANTITIES[quantity_of(name)]
+        others = {TEMPERATURE: "temperature", TABLE_RATE: "angular_rate"}
+        dimension = others[name] if name in others else QUANTITIES[quantity_of(name)]
         factor, zero = conversion(source.unit, dimension)
         if source.offset:
             raw = raw - source.offset

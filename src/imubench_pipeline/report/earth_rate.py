@@ -6,6 +6,8 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE
+from imubench_pipeline.report.alignment import alignments
+from imubench_pipeline.report.calibration import of_all
 from imubench_pipeline.report.payload import Arrays
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.turned import (
@@ -28,11 +30,11 @@ def earth_rate_page(site: Site) -> Page:
     ----------
     site : Site
     """
-    keys = [view.key for view in site.turned]
+    views = [*site.turned, *site.calibrated, *site.predicted]
     return Page(
         "earth_rate.html",
         "earth_rate.html.jinja",
-        site.key_of(keys, [view.page for view in site.turned]),
+        site.key_of([view.key for view in views], [view.page for view in views]),
         lambda: _context(site),
     )
 
@@ -46,6 +48,7 @@ def _context(site: Site) -> dict[str, Any]:
         for one in published_lines(view.rows("earth_rate_published"))
     ]
     predicted = list(_predicted(site))
+    aligned = alignments(site, arrays)
     return {
         "truth": EARTH_RATE,
         "runs": runs,
@@ -53,6 +56,9 @@ def _context(site: Site) -> dict[str, Any]:
         "published": published,
         "verdict": published_words(published),
         "needs": predicted,
+        "alignments": aligned,
+        "calibrations": of_all(site),
+        "not_calibrated": [view for view in site.calibrated if view.rejected],
         "page": {
             "looks": {},
             "channels": [],
@@ -60,6 +66,7 @@ def _context(site: Site) -> dict[str, Any]:
             "predictions": {
                 one["place"]: prediction_payload(one["rows"], arrays) for one in predicted
             },
+            "alignments": {one["view"].sensor: one["drawn"] for one in aligned},
             "arrays": arrays.texts,
         },
     }
@@ -86,14 +93,14 @@ def _run(site: Site, view: RecordingView) -> dict[str, Any]:
 def _predicted(site: Site) -> Iterator[dict[str, Any]]:
     """Yield what each sensor would need, once where several recordings say the same."""
     said: list[tuple[str, Any]] = []
-    for view in site.turned:
+    for view in [*site.turned, *site.predicted]:
         rows = view.rows("earth_rate_prediction")
         found = needs(rows)
         if found is None or (view.sensor, found) in said:
             continue
         said.append((view.sensor, found))
         place = f"{view.sensor}-{view.name}"
-        latitude = latitude_text(view.rows("earth_rate"))
+        latitude = latitude_text(rows)
         yield found | {"view": view, "place": place, "rows": rows, "latitude": latitude}
 
 

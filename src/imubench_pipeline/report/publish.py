@@ -20,6 +20,7 @@ from imubench_pipeline.report.fusion import fusion_page
 from imubench_pipeline.report.glossary import glossary
 from imubench_pipeline.report.html import environment
 from imubench_pipeline.report.practical import units_of_pages
+from imubench_pipeline.report.rate_table import table_page
 from imubench_pipeline.report.recording import recording_page
 from imubench_pipeline.report.sensor import device_page, sensor_page
 from imubench_pipeline.report.site import Page, Site
@@ -27,6 +28,7 @@ from imubench_pipeline.report.start import datasheets_page, recordings_page, sta
 from imubench_pipeline.report.static_figures.files import figure_text
 from imubench_pipeline.report.static_figures.theory import theory_figure
 from imubench_pipeline.report.turned import turned_page
+from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
 from imubench_pipeline.tables import read, write_content
 
@@ -42,6 +44,7 @@ _SCRIPTS = (
     "overlay",
     "channel",
     "earth_rate",
+    "calibration",
     "decisions",
     "start",
 )
@@ -58,12 +61,18 @@ _LIBRARIES = (
 
 Progress = Callable[[str], None]
 
+_PAGES: Mapping[str, Callable[[Site, RecordingView], Page]] = {
+    "two_position": turned_page,
+    "rate_table": table_page,
+}
+"""Makes the page of a recording that is not static, by its kind."""
+
 
 def pages(site: Site) -> Iterator[Page]:
     """Yield the pages of the report, the start page last: it stands for the finished report."""
     for view in site.views:
-        turned = not view.rejected and not view.static
-        yield turned_page(site, view) if turned else recording_page(site, view)
+        page = recording_page if view.rejected else _PAGES.get(view.row["kind"], recording_page)
+        yield page(site, view)
     for sensor in site.sensors:
         yield sensor_page(site, sensor)
     for path in dict.fromkeys(view.device_page for view in site.views):
@@ -74,7 +83,7 @@ def pages(site: Site) -> Iterator[Page]:
     yield fusion_page(site)
     if site.settings.get("boards"):
         yield boards_page(site)
-    if site.turned:
+    if site.finds_rates:
         yield earth_rate_page(site)
     yield Page(
         "theory.html",

@@ -10,6 +10,7 @@ from typing import Any
 from imubench_pipeline.estimators.estimate import PARAMETERS
 from imubench_pipeline.recording import log_paths, read_metadata
 from imubench_pipeline.report import thermal
+from imubench_pipeline.report.calibration import at_rest
 from imubench_pipeline.report.datasheets import curve_distances, delta_rows
 from imubench_pipeline.report.meaning import budget_tables, budget_words
 from imubench_pipeline.report.parameters import methods_table
@@ -76,6 +77,7 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         "notes": [row for row in numbered if row["severity"] == "note"],
         "channels": [_channel(site, view, one, samples) for one in channels],
         "has_temperature": "temperature" in samples["envelope"],
+        "at_rest": at_rest(view, site.system),
         "budget": budgets[0] if budgets else None,
         "budget_words": budget_words(site.settings["settings"]["error_budget"]),
         "provenance": list(provenance(view, channels, folder)),

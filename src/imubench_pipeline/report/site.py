@@ -119,6 +119,29 @@ class Site:
         """The recordings of gyros that were turned between north and south."""
         return [view for view in self.views if view.row["kind"] == "two_position"]
 
+    @cached_property
+    def calibrated(self) -> list[RecordingView]:
+        """The recordings on a rate table, or at rest with a direction that is stated."""
+        rows = self.rows("calibration")
+        there = {(row["sensor"], row["recording"]) for row in rows}
+        return [
+            view
+            for view in self.views
+            if view.row["kind"] == "rate_table" or (view.sensor, view.name) in there
+        ]
+
+    @property
+    def finds_rates(self) -> bool:
+        """Whether there is anything for the page of the Earth's rate."""
+        return bool(self.turned or self.calibrated or self.predicted)
+
+    @cached_property
+    def predicted(self) -> list[RecordingView]:
+        """The recordings at rest by whose noise it is predicted what their sensor could find."""
+        rows = self.rows("earth_rate_prediction")
+        there = {(row["sensor"], row["recording"]) for row in rows}
+        return [view for view in self.views if view.static and (view.sensor, view.name) in there]
+
     def device_page_of(self, row: Row) -> str | None:
         """Return the page of the device of a row that names a recording."""
         return self._device_pages.get((row["sensor"], row["recording"]))
@@ -132,7 +155,7 @@ class Site:
         """The pages that every page leads to, with their names."""
         there = {
             "boards.html": bool(self.settings.get("boards")),
-            "earth_rate.html": bool(self.turned),
+            "earth_rate.html": self.finds_rates,
         }
         return [one for one in NAVIGATION if there.get(one[0], True)]
 

@@ -42,6 +42,7 @@ def _start(site: Site) -> dict[str, Any]:
         "warning_count": f"{counted(sum(len(v.warnings) for v in warned), 'warning')} in "
         f"{counted(len(warned), 'recording')}",
         "not_found": list(_not_found(site)),
+        "not_calibrated": list(_not_calibrated(site)),
         "changed": site.changed_devices(),
         "rankings": ranked,
         "forest": FOREST,
@@ -62,6 +63,14 @@ def _not_found(site: Site) -> Iterator[dict[str, Any]]:
     """Yield the recordings of turned gyros of which nothing could be estimated, and why."""
     for view in site.turned:
         rows = view.rows("earth_rate")
+        if rows and all(row["value"] is None for row in rows):
+            yield {"view": view, "reason": sentence(rows[0]["reason"])}
+
+
+def _not_calibrated(site: Site) -> Iterator[dict[str, Any]]:
+    """Yield the recordings on a rate table or with a stated direction without a result, and why."""
+    for view in site.calibrated:
+        rows = view.rows("calibration")
         if rows and all(row["value"] is None for row in rows):
             yield {"view": view, "reason": sentence(rows[0]["reason"])}
 

@@ -80,6 +80,7 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         "findings": view.findings,
         "lines": [line(row) for row in rows],
         "noise": noise_words(rows),
+        "has_range": any(row["sigma_lower"] is not None for row in rows),
         "latitude": latitude_text(rows) if rows else "",
         "parts": parts,
         "has_samples": any(row["channel"] == channel for row in envelope),
@@ -125,7 +126,7 @@ def latitude_text(rows: Sequence[Row]) -> str:
     Parameters
     ----------
     rows : sequence of mapping
-        Of the table ``earth_rate``, at least one.
+        Of a table with the latitude, at least one.
     """
     return f"{number_text(math.degrees(rows[0]['latitude']))}°"
 

@@ -157,7 +157,7 @@ class RecordingView:
     @property
     def static(self) -> bool:
         """Whether it could be used, and its sensor was at rest all the time."""
-        return not self.rejected and bool(self.row["kind"] != "two_position")
+        return not self.rejected and self.row["kind"] not in ("two_position", "rate_table")
 
     @property
     def key(self) -> str:

@@ -1,0 +1,130 @@
+"""What the page of the Earth's rate says of how well sensors at rest find their attitude."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from imubench_pipeline.report.payload import Arrays
+from imubench_pipeline.report.practical import duration_text, number_text, page_unit
+from imubench_pipeline.report.site import Site
+from imubench_pipeline.report.view import Row
+from imubench_pipeline.report.words import sentence
+
+_SHOWN = (60.0, 600.0, 3600.0)
+"""Times of the table, s; the figure has more."""
+
+_POSITIONS = {1: "one position", 2: "two opposite positions"}
+_ANGLES = ("roll", "pitch", "heading")
+
+
+def alignments(site: Site, arrays: Arrays) -> list[dict[str, Any]]:
+    """Return what is said of each sensor with gyros and accelerometers.
+
+    Parameters
+    ----------
+    site : Site
+    arrays : Arrays
+        Takes what the figures are drawn from.
+    """
+    found = []
+    for view in site.views:
+        rows = view.rows("alignment")
+        if rows:
+            about = rows[0]
+            unit, fine = page_unit("gyro", "adev", site.system), page_unit("accel", "adev", "si")
+            found.append(
+                {
+                    "view": view,
+                    "latitude": f"{number_text(math.degrees(about['latitude']))}°",
+                    "biases": (
+                        f"Fixed biases of {unit.text(about['gyro_bias'], 3)} {unit.sign} "
+                        f"({about['gyro_bias_from']}) and "
+                        f"{fine.text(about['accelerometer_bias'], 3)} {fine.sign} "
+                        f"({about['accelerometer_bias_from']})."
+                    ),
+                    "axes": _axes(about),
+                    "lines": [_line(row) for row in rows if row["time"] in _SHOWN],
+                    "none": list(
+                        dict.fromkeys(sentence(row["reason"]) for row in rows if row["reason"])
+                    ),
+                    "check": _check(rows),
+                    "drawn": _drawn(rows, arrays),
+                }
+            )
+    return found
+
+
+def _axes(row: Row) -> str:
+    """Return which axes stand for others that the log has not, in a sentence."""
+    told = []
+    for name, words in (("gyros", "gyro"), ("accelerometers", "accelerometer")):
+        pairs = [one.split(": ") for one in row[name].split(", ")]
+        lent = [axis for axis, channel in pairs if not channel.endswith(f"_{axis}")]
+        if lent:
+            told.append(f"{words} {' and '.join(lent)}")
+    if not told:
+        return ""
+    return f"The log has no {', '.join(told)}: the axes that are there stand for them."
+
+
+def _line(row: Row) -> dict[str, Any]:
+    return {
+        "position": _POSITIONS[row["positions"]],
+        "method": row["method"],
+        "time": duration_text(row["time"]),
+        **{name: _angle(row[name]) for name in _ANGLES},
+    }
+
+
+def _angle(value: float | None) -> str:
+    return "not to be had" if value is None else f"{number_text(math.degrees(value), 3)}°"
+
+
+def _check(rows: Sequence[Row]) -> str:
+    """Return what simulated triads say of the standard deviations, in a sentence."""
+    told = []
+    for row in rows:
+        if row["simulated"] is None:
+            continue
+        ratios = {name: row[f"error_{name}"] for name in _ANGLES}
+        said = ", ".join(
+            f"{name} {number_text(ratio, 3)}" for name, ratio in ratios.items() if ratio is not None
+        )
+        told.append(f"in {_POSITIONS[row['positions']]} {said}")
+    if not told:
+        return ""
+    number = next(row["simulated"] for row in rows if row["simulated"] is not None)
+    last = duration_text(max(row["time"] for row in rows))
+    return (
+        f"Check: {number} simulated triads of this noise, aligned for {last} by the filter; rms "
+        f"of their errors over the predicted σ: {'; '.join(told)}."
+    )
+
+
+def _drawn(rows: Sequence[Row], arrays: Arrays) -> list[dict[str, Any]]:
+    """Return the courses of the figure: level is the worse of roll and pitch."""
+    found = []
+    for positions in _POSITIONS:
+        for method in ("coarse", "fine"):
+            own = [r for r in rows if r["positions"] == positions and r["method"] == method]
+            values = {
+                "heading": [r["heading"] for r in own],
+                "level": [max(r["roll"], r["pitch"]) for r in own],
+            }
+            for angle, sigma in values.items():
+                kept = [(row["time"], one) for row, one in zip(own, sigma, strict=True) if one]
+                if kept:
+                    found.append(
+                        {
+                            "positions": positions,
+                            "method": method,
+                            "angle": angle,
+                            "time": arrays.exact([time for time, _ in kept]),
+                            "sigma": arrays.exact(np.degrees([one for _, one in kept]).tolist()),
+                        }
+                    )
+    return found

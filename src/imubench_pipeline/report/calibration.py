@@ -1,0 +1,254 @@
+"""What a rate table, or rest with a known direction, tells of a gyro, in lines and sentences."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from imubench_pipeline.report.practical import (
+    System,
+    limit_digits,
+    number_text,
+    page_unit,
+)
+from imubench_pipeline.report.site import Site
+from imubench_pipeline.report.view import RecordingView, Row
+from imubench_pipeline.report.words import sentence
+
+WORDS = {
+    "bias": "bias at the start",
+    "present_bias": "bias at the end",
+    "scale_factor": "scale factor",
+    "quadratic": "quadratic term",
+    "asymmetry": "asymmetry",
+    "linearity": "any departure from the line",
+    "earth_rate": "the Earth's rate",
+    "heading": "heading",
+}
+"""Name of each figure on a page."""
+
+_PPM = 1e6
+_OF_RATIO = {"scale_factor": "", "asymmetry": " ppm", "quadratic": " ppm per °/s"}
+_DOUBTED = 0.05
+"""Chance below which a straight line is doubted."""
+
+
+def answer(rows: Sequence[Row], system: System) -> str:
+    """Return scale factor and bias in a sentence, or why there are none.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Of the table ``calibration``, of one recording.
+    system : str
+    """
+    found = {row["parameter"]: row for row in rows}
+    bias = found.get("bias")
+    if bias is None:
+        return "Nothing was found of this recording."
+    if bias["value"] is None:
+        return sentence(bias["reason"] or "")
+    unit = page_unit("gyro", "adev", system)
+    text = f"The bias is {_around(bias, unit.text)} {unit.sign} (95 %)"
+    scale = found.get("scale_factor")
+    if scale is not None and scale["value"] is not None:
+        error = {name: _PPM * (scale[name] - 1.0) for name in ("value", "lower", "upper")}
+        text = f"The scale factor is off by {_around(error, number_text)} ppm. " + text
+    text += ". "
+    straight = found.get("linearity")
+    if straight is not None and straight["chance"] is not None:
+        doubted = straight["chance"] < _DOUBTED
+        text += (
+            "A straight line does not fit: noise alone departs"
+            if doubted
+            else "A straight line fits: noise alone departs"
+        )
+        text += f" as far from it with a chance of {number_text(100 * straight['chance'], 2)} %."
+    return text.strip()
+
+
+def _around(row: Row, said: Any) -> str:
+    half = (row["upper"] - row["lower"]) / 2.0
+    digits = limit_digits(row["lower"], row["upper"], 3)
+    return f"{said(row['value'], digits)} ± {said(half, 2)}"
+
+
+def lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
+    """Yield the lines of the table of what was found; a figure that is no rate as text.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Of the table ``calibration``, of one recording.
+    """
+    for row in rows:
+        if row["status"] == "not_observable" and row["parameter"] in ("earth_rate", "heading"):
+            continue
+        one = {
+            **row,
+            "words": WORDS[row["parameter"]],
+            "digits": limit_digits(row["lower"], row["upper"], 4),
+            "is_rate": row["unit"] == "rad/s",
+            "percent": None
+            if row["chance"] is None
+            else f"{number_text(100.0 * row['chance'], 2)} %",
+            "why": sentence(row["reason"] or ""),
+        }
+        yield one | _texts(row)
+
+
+def _texts(row: Row) -> dict[str, str]:
+    """Return a ratio with its limits as text."""
+    name = row["parameter"]
+    if row["value"] is None or name not in _OF_RATIO:
+        return dict.fromkeys(("text", "limits", "sigma_text", "truth_text"), "–")
+    if name == "scale_factor":
+        digits = limit_digits(row["lower"], row["upper"], 4)
+        value, low, high, true = (
+            "–" if row[key] is None else number_text(row[key], digits)
+            for key in ("value", "lower", "upper", "truth")
+        )
+        sigma = f"{number_text(_PPM * row['sigma'], 3)} ppm"
+    else:
+        per = _PPM * (math.radians(1.0) if name == "quadratic" else 1.0)
+        value, low, high, true, sigma = (
+            "–" if row[key] is None else number_text(per * row[key], 3)
+            for key in ("value", "lower", "upper", "truth", "sigma")
+        )
+    return {
+        "text": value + _OF_RATIO[name],
+        "limits": f"{low} to {high}",
+        "sigma_text": sigma,
+        "truth_text": true,
+    }
+
+
+def not_observable(rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """Return what a recording cannot tell, each with the reason.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Of the table ``calibration``, of one recording.
+    """
+    return [
+        {"words": WORDS[row["parameter"]], "why": sentence(row["reason"]), **row}
+        for row in rows
+        if row["status"] == "not_observable"
+    ]
+
+
+def noise_words(rows: Sequence[Row]) -> str:
+    """Return by which noise model figures are weighed, in a sentence.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Of the table ``calibration``, of one recording.
+    """
+    known = next((row for row in rows if row["model"]), None)
+    return f"Noise model: {known['model']}, from {known['model_from']}." if known else ""
+
+
+def scatter_words(rows: Sequence[Row]) -> str:
+    """Return whether the scatter is that of the noise model, in a sentence.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Of the table ``calibration``, of one recording.
+    """
+    chance = next((row["scatter"] for row in rows if row["scatter"] is not None), None)
+    if chance is None:
+        return ""
+    text = f"{number_text(100.0 * chance, 2)} %"
+    if chance < _DOUBTED / 5.0:
+        return (
+            "The means scatter more than the noise model allows: that much or more has a chance of "
+            f"{text}. The noise was another one, or the sensor was warming up or moved: the limits "
+            "are too narrow."
+        )
+    return f"The scatter of the means is that of the noise model: as much or more in {text}."
+
+
+def earth_words(rows: Sequence[Row], system: System) -> str:
+    """Return what was taken off for the rotation of the Earth, in a sentence.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Of the table ``calibration``, of one recording.
+    system : str
+    """
+    row = next((row for row in rows if row["earth_rate"] is not None), None)
+    if row is None:
+        return "What the Earth's rotation adds along the axis is a part of the bias."
+    unit = page_unit("gyro", "adev", system)
+    text = (
+        f"The Earth's rate along the axis, {unit.text(row['earth_rate'], 4)} {unit.sign} (latitude "
+        f"{_degrees(row['latitude'])}, {_direction(row)}), is taken off"
+    )
+    if row["half_width"]:
+        text += f"; with no heading it is within ± {unit.text(row['half_width'], 3)} {unit.sign}"
+    elif row["earth_rate_sigma"]:
+        text += (
+            f"; by the direction it is sure to {unit.text(row['earth_rate_sigma'], 2)} {unit.sign} "
+            "(1σ)"
+        )
+    return text + "."
+
+
+def _direction(row: Row) -> str:
+    elevation = f"elevation {_degrees(row['elevation'])}"
+    if row["heading"] is not None:
+        return f"heading {_degrees(row['heading'])}, {elevation}"
+    return elevation if abs(math.cos(row["elevation"])) < 1e-6 else f"{elevation}, no heading"
+
+
+def _degrees(angle: float) -> str:
+    return f"{number_text(math.degrees(angle))}°"
+
+
+def at_rest(view: RecordingView, system: System) -> dict[str, Any] | None:
+    """Return what the page of a static recording says of its bias; None without a direction.
+
+    Parameters
+    ----------
+    view : RecordingView
+    system : str
+    """
+    rows = [row for row in view.rows("calibration") if row["run"] == "at_rest"]
+    if not rows:
+        return None
+    return {
+        "channel": rows[0]["channel"],
+        "lines": [one for one in lines(rows) if one["status"] != "not_observable"],
+        "open": not_observable(rows),
+        "noise": noise_words(rows),
+        "scatter": scatter_words(rows),
+        "earth": earth_words(rows, system),
+    }
+
+
+def of_all(site: Site) -> dict[str, list[dict[str, Any]]]:
+    """Return the lines of the page that has all calibrated recordings, by kind of run.
+
+    Parameters
+    ----------
+    site : Site
+    """
+    found: dict[str, list[dict[str, Any]]] = {"rate_table": [], "at_rest": []}
+    for view in site.calibrated:
+        rows = view.rows("calibration")
+        if not rows:
+            continue
+        found[rows[0]["run"]].append(
+            {
+                "view": view,
+                "lines": {one["parameter"]: one for one in lines(rows)},
+                "answer": answer(rows, site.system),
+                "earth": earth_words(rows, site.system),
+            }
+        )
+    return found

@@ -1,0 +1,86 @@
+"""The page of a recording of a gyro on a rate table."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from imubench_pipeline.report.calibration import (
+    answer,
+    earth_words,
+    lines,
+    noise_words,
+    not_observable,
+    scatter_words,
+)
+from imubench_pipeline.report.payload import Arrays
+from imubench_pipeline.report.practical import duration_text, number_text
+from imubench_pipeline.report.recording import metadata_of, provenance, recording_key
+from imubench_pipeline.report.site import Page, Site
+from imubench_pipeline.report.view import RecordingView, Row
+from imubench_pipeline.report.words import counted
+
+
+def table_page(site: Site, view: RecordingView) -> Page:
+    """Return the page of a recording on a rate table.
+
+    Parameters
+    ----------
+    site : Site
+    view : RecordingView
+        One that was not rejected.
+    """
+    folder = site.results / "recordings" / view.sensor / view.name
+    key = recording_key(site, view, folder)
+    return Page(view.page, "rate_table.html.jinja", key, lambda: _context(site, view, folder))
+
+
+def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
+    rows = view.rows("calibration")
+    points = view.rows("calibration_points")
+    return {
+        "view": view,
+        "name": site.names[view.sensor],
+        "sensor_page": site.sensor_page(view.sensor),
+        "summary": _summary(view, points),
+        "answer": answer(rows, site.system),
+        "lines": list(lines(rows)),
+        "open": not_observable(rows),
+        "noise": noise_words(rows),
+        "scatter": scatter_words(rows),
+        "earth": earth_words(rows, site.system),
+        "points": points,
+        "findings": view.findings,
+        "provenance": list(provenance(view, [], folder)),
+        "sources": metadata_of(folder).get("sources", []),
+        "command": shlex.join(
+            [
+                *("snakemake", "-c2", "--forcerun", "ingest", "--"),
+                f"{site.results_name}/recordings/{view.sensor}/{view.name}/calibration.parquet",
+            ]
+        ),
+        "page": {"looks": {}, "channels": [], "findings": [], **_payload(points)},
+    }
+
+
+def _payload(points: Sequence[Row]) -> dict[str, Any]:
+    arrays = Arrays()
+    names = ("table_rate", "mean", "line", "residual", "sigma")
+    table = {name: arrays.exact([row[name] for row in points]) for name in names}
+    return {
+        "table": table | {"number": [row["number"] for row in points]},
+        "arrays": arrays.texts,
+    }
+
+
+def _summary(view: RecordingView, points: Sequence[Row]) -> str:
+    row = view.row
+    parts = [f"{duration_text(row['duration'])} at {number_text(row['rate'])} Hz"]
+    if points:
+        most = math.degrees(max(abs(one["table_rate"]) for one in points))
+        parts.append(f"{counted(len(points), 'steady rate')} up to {number_text(most)} °/s")
+    kind = "Simulated from known parameters, not measured: " if view.simulated else ""
+    return kind + ", ".join(parts) + "."
