@@ -75,6 +75,7 @@ def test_a_run_leaves_tables_and_a_report(project: Project) -> None:
         "recordings.html",
         "datasheets.html",
         "fusion.html",
+        "earth_rate.html",
         "theory.html",
         "made.html",
         "sensors/one.html",
