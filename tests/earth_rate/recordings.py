@@ -30,6 +30,7 @@ EVERY_30 = [29.0 + 30.0 * k for k in range(19)]
 
 def put(folder: Path, columns: dict[str, np.ndarray], **about: Any) -> Path:
     """Keep a recording in a folder, whose name is its name."""
+    unusable = about.pop("unusable", [])
     row = {"sensor": "s", "device": "7", "recording": folder.name, "kind": "two_position",
            "simulated": False, "status": "ok", "rate": RATE} | about  # fmt: skip
     samples = len(next(iter(columns.values())))
@@ -45,7 +46,7 @@ def put(folder: Path, columns: dict[str, np.ndarray], **about: Any) -> Path:
                 "grid": samples,
                 "segments": about.pop("segments", [[0, samples]]),
                 "holes": {},
-                "unusable": [],
+                "unusable": unusable,
             }
         )
     for name in ("segments", "begins"):

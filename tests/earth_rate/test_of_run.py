@@ -169,6 +169,17 @@ def test_a_position_on_another_clock_is_refused(tmp_path: Path, rest: Path) -> N
     assert "a clock of its own" in run(folder, [rest])["earth_rate"][0]["reason"]
 
 
+@pytest.mark.parametrize("stated", [{"channel": "gyro_x"}, {}])
+def test_a_gyro_that_cannot_be_used_is_said_beside_what_can(
+    tmp_path: Path, rest: Path, stated: dict[str, str]
+) -> None:
+    log = {"accel_x": np.zeros(1000)}
+    found = run(put(tmp_path / "a", log, unusable=["gyro_x"]), [rest], **stated)
+    assert {row["status"] for row in found["earth_rate"]} == {"not_shown"}
+    assert all("gyro_x cannot be used" in row["reason"] for row in found["earth_rate"])
+    build("earth_rate", found["earth_rate"])
+
+
 def test_a_rejected_recording_leaves_nothing(tmp_path: Path, rest: Path) -> None:
     (tmp_path / "a").mkdir()
     assert set(map(len, run(tmp_path / "a", [rest]).values())) == {0}

@@ -48,7 +48,9 @@ def calibration_tables(
     given = json.loads(settings)
     declared, simulated = _declared(given)
     # Of several gyros the notes name one: the ingest has seen to it.
-    channel: str = declared.channel or next(name for name in logs if name.startswith("gyro_"))
+    metadata = read_metadata(next(iter(logs.values())).path)
+    gyros = (name for name in [*logs, *metadata["unusable"]] if name.startswith("gyro_"))
+    channel: str = declared.channel or next(gyros)
     if channel not in logs:
         key = asdict(Key(sensor, recording, channel))
         rows["calibration"] = list(unusable(key, isinstance(declared, OnRateTable)))
@@ -61,7 +63,7 @@ def calibration_tables(
         Key(sensor, recording, channel),
         logs[channel],
         source,
-        read_metadata(logs[channel].path).get("begins", 0.0),
+        metadata.get("begins", 0.0),
         _truth(simulated, channel),
     )
     if isinstance(declared, OnRateTable):

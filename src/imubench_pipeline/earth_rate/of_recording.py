@@ -307,6 +307,20 @@ def _figure(course: Course, turning: Turning) -> dict[str, Any]:
     return row
 
 
+def unusable(names: Mapping[str, Any], declared: TwoPosition) -> Iterator[Row]:
+    """Yield the rows of a recording whose turned gyro cannot be used, though others of it can.
+
+    Parameters
+    ----------
+    names : mapping
+        Sensor, recording and channel.
+    declared : TwoPosition
+    """
+    reason = f"{names['channel']} cannot be used; the findings of the recording say why"
+    about = {"latitude": declared.latitude_si, "model": None, "model_from": None}
+    yield from _without({**names, **about}, WHOLE, "not_shown", reason)
+
+
 def _without(names: dict[str, Any], part: str, status: str, reason: str) -> Iterator[Row]:
     """Yield the rows of a part of which nothing can be estimated."""
     for method in METHODS:

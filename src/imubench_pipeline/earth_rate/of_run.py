@@ -12,7 +12,7 @@ from imubench_pipeline.config import EarthRateSettings
 from imubench_pipeline.earth_rate.columns import EARTH_RATE_TABLES
 from imubench_pipeline.earth_rate.declaration import TwoPosition
 from imubench_pipeline.earth_rate.noise_source import from_printed, from_static
-from imubench_pipeline.earth_rate.of_recording import WHOLE, earth_rate_of
+from imubench_pipeline.earth_rate.of_recording import WHOLE, earth_rate_of, unusable
 from imubench_pipeline.earth_rate.published import Schedule, published_row
 from imubench_pipeline.recording import channel_logs, read_metadata
 from imubench_pipeline.results import Key, Quality
@@ -57,14 +57,18 @@ def earth_rate_tables(
     else:
         declared = TwoPosition.model_validate(given["two_position"])
     own = Quality.read(folder / "quality.json").recording
-    channel = declared.turned(list(logs))
+    metadata = read_metadata(next(iter(logs.values())).path)
+    channel = declared.turned([*logs, *metadata["unusable"]])
+    if channel not in logs:
+        key = Key(sensor, recording, channel)
+        rows["earth_rate"] = list(unusable(asdict(key), declared))
+        return rows
     how = EarthRateSettings.model_validate(given["earth_rate"])
     source = from_static(static, own, channel, how.draws) or from_printed(
         sensor, Sensor.model_validate(given["sensor"]), channel
     )
     key, log = Key(sensor, recording, channel), logs[channel]
-    begins = read_metadata(log.path).get("begins", 0.0)
-    found = earth_rate_of(key, log, declared, source, how, begins=begins)
+    found = earth_rate_of(key, log, declared, source, how, begins=metadata.get("begins", 0.0))
     rows |= asdict(found)
     if simulated is not None:
         rows["earth_rate_published"] = list(_published(key, simulated, rows["earth_rate"]))
