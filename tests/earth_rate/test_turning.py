@@ -265,6 +265,22 @@ def test_handling_at_the_ends_is_no_turn() -> None:
     assert any("handling at the ends" in doubt for doubt in found.doubts)
 
 
+def test_a_knock_at_an_end_is_left_out_within_the_log() -> None:
+    log = turned(EVERY_30, 600.0)
+    bump(log, 0.0, 0.5, 6.0)
+    bump(log, 599.5, 0.5, 6.0)
+    found = find_turning(log, RATE, 30.0, first_sense=1)
+    assert found.knocks[0][0] == 0.0 and found.knocks[-1][1] == 600.0
+
+
+def test_noise_has_no_handling_at_the_ends() -> None:
+    noise = NoiseModel(N=PAPER.N)
+    for seed in range(60):
+        log = turned([], 300.0, noise=noise, seed=seed)
+        events = transients(blocks_of(log, RATE, 30.0, noise), log, RATE)
+        assert not [event for event in events if event.likelihood > CLEAR], seed
+
+
 def test_noise_that_is_not_the_models_is_a_doubt() -> None:
     model = NoiseModel(N=10.0 * PAPER.N)
     found = find_turning(turned(EVERY_30, 600.0), RATE, 30.0, first_sense=1, model=model)

@@ -135,6 +135,7 @@ def find_turning(
     stretches, more = _stretches(turns, knocks, plan)
     doubts += more
     knocks = sorted([*knocks, *_lone(outliers(blocks, log, rate), turns, knocks)])
+    knocks = [(max(start, 0.0), min(stop, plan.duration)) for start, stop in knocks]
     signs = without(blocks, knocks)
     size = alternation(signs, stretches)
     first, more = _first_sense(first_sense, column_sense, sense_by_rate, size.z)
