@@ -109,6 +109,22 @@ def test_a_sense_that_is_not_known_is_said(tmp_path: Path, rest: Path) -> None:
     assert any("assumed" in one["doubts"] for one in found["turning"] if one["what"] == "doubt")
 
 
+def test_turns_that_the_schedule_alone_says_are_a_doubt(tmp_path: Path, rest: Path) -> None:
+    # Half the noise: the level alternates by some 5 standard errors, and no turn is seen.
+    noise = NoiseModel(N=PAPER.N / 2.0)
+    log = {"gyro_x": turned(EVERY_30, 600.0, peak=0.0, noise=noise)}
+    folder = put(tmp_path / "a", log)
+    doubted = by_method(run(folder, [rest])["earth_rate"])
+    assert {doubted[name]["status"] for name in ("pairs", "filter")} == {"ambiguous"}
+    assert "19 of 19 turns rest on the schedule" in doubted["filter"]["reason"]
+    assert "state 'trust_schedule: true'" in doubted["filter"]["reason"]
+    assert doubted["known_rate"]["status"] == "given"
+    trusted = by_method(run(folder, [rest], trust_schedule=True)["earth_rate"])["filter"]
+    assert trusted["status"] == "ok" and "19 of 19" in trusted["reason"]
+    seen = by_method(run(put(tmp_path / "b", turned_log()), [rest])["earth_rate"])["filter"]
+    assert seen["status"] == "ok" and "reason" not in seen
+
+
 def test_the_column_with_the_position_decides(tmp_path: Path, rest: Path) -> None:
     log = turned_log(peak=0.0, first=-1)
     turns = np.searchsorted(EVERY_30, np.arange(len(log["gyro_x"])) / RATE)

@@ -220,6 +220,18 @@ def test_a_log_that_never_turns_is_refused(seed: int) -> None:
     assert len(trusted.dwells) == 60
 
 
+def test_hardly_a_log_at_rest_alternates_with_the_schedule() -> None:
+    noise, taken = NoiseModel(N=PAPER.N), []
+    for seed in range(300):
+        log = turned([], 600.0, noise=noise, rate=8.0, seed=seed)
+        try:
+            taken.append(find_turning(log, 8.0, 30.0, first_sense=1))
+        except ValueError as error:
+            assert "standard errors" in str(error)
+    assert len(taken) <= 1
+    assert all(abs(found.alternation.z) > 2.8 for found in taken)
+
+
 @pytest.mark.parametrize("duration", [59.0, 20.0, 0.0])
 def test_a_log_shorter_than_two_dwells_is_refused(duration: float) -> None:
     with pytest.raises(ValueError, match="less than two dwells of 30 s"):

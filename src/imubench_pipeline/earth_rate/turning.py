@@ -76,7 +76,7 @@ def find_turning(
     it; then the estimate is positive by construction, and its sign says nothing. Neither its sign
     nor its size is used otherwise.
 
-    Without a transient, the log must alternate by 3 standard errors, whatever the sign: runs in
+    Without a transient, the log must alternate by 3 standard errors with the schedule: runs in
     which chance hides the alternation are then refused, which favours large estimates.
     ``trust_schedule`` takes the schedule's word instead.
 
