@@ -264,7 +264,7 @@ def _estimates(
     part: str,
     courses: Courses,
     source: NoiseSource,
-    unsure: Row,
+    unsure: dict[str, Any],
     rate: float,
 ) -> Iterator[Row]:
     measured, blocks = courses.measured, courses.measured.blocks
@@ -282,7 +282,7 @@ def _estimates(
         yield about | _figure(course, unsure)
 
 
-def _unsure(turning: Turning, trusted: bool) -> Row:
+def _unsure(turning: Turning, trusted: bool) -> dict[str, Any]:
     """Return status and reason of estimates of which sign or turns are not known."""
     reasons = []
     by_schedule, turns = turning.by_schedule, len(turning.turns)
@@ -308,7 +308,7 @@ def _unsure(turning: Turning, trusted: bool) -> Row:
     return {"status": "ambiguous" if doubtful else "ok", "reason": "; ".join(reasons)}
 
 
-def _figure(course: Course, unsure: Row) -> dict[str, Any]:
+def _figure(course: Course, unsure: dict[str, Any]) -> dict[str, Any]:
     row: dict[str, Any] = {"method": course.method, "parameter": "earth_rate"}
     if course.reason is not None:
         return row | {"status": "not_shown", "reason": course.reason}
