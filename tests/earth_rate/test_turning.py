@@ -267,6 +267,23 @@ def test_arguments_out_of_range_are_refused(wrong: dict[str, object]) -> None:
         find_turning(turned(EVERY_30[:3], 120.0), **given)
 
 
+@pytest.mark.parametrize("declared", [45.0, 60.0, 90.0])
+def test_turns_at_a_quicker_pace_than_declared_are_taken(declared: float) -> None:
+    found = find_turning(turned(EVERY_30, 600.0), RATE, declared, first_sense=1)
+    assert times(found) == pytest.approx(EVERY_30, abs=0.3)
+    assert found.knocks == ()
+    assert f"the usual dwell is 30.0 s, not {declared:g} s" in found.doubts
+
+
+def test_handling_that_keeps_no_pace_makes_no_dwell_shorter() -> None:
+    starts = 60.0 * np.arange(1, 20)
+    log = turned(starts, 1200.0)
+    for start, after in zip(starts[:-1], np.tile([15.0, 31.0, 44.0], 6), strict=True):
+        bump(log, start + after, TURN, 3.0)
+    found = find_turning(log, RATE, 60.0, first_sense=1)
+    assert not [doubt for doubt in found.doubts if "usual dwell" in doubt]
+
+
 def test_handling_at_the_ends_is_no_turn() -> None:
     log = turned(EVERY_30, 600.0)
     bump(log, 0.5, 2.0, 6.0)

@@ -15,6 +15,7 @@ from imubench_pipeline.earth_rate.choice_of_turns import (
     choose,
     closest,
     may_be_silent,
+    shorter_dwell,
 )
 from imubench_pipeline.earth_rate.found import Turn
 from imubench_pipeline.earth_rate.transients import CLEAR, Blocks, Event
@@ -82,6 +83,16 @@ def by_sight(
         If nothing shows that the log was turned, and the schedule is not trusted.
     """
     chosen = choose(events, plan.dwell, plan.tolerance, plan.duration)
+    declared = plan.dwell
+    pace = shorter_dwell(events, chosen, declared)
+    if pace is not None:
+        plan = replace(
+            plan,
+            dwell=pace,
+            tolerance=plan.tolerance * pace / declared,
+            turning=min(plan.turning, 0.4 * pace),
+        )
+        chosen = choose(events, plan.dwell, plan.tolerance, plan.duration)
     expected = max(1.0, round((plan.duration - plan.start) / plan.dwell) - 1.0)
     doubts: list[str] = []
     if len(chosen) >= _ENOUGH * expected:
@@ -96,9 +107,9 @@ def by_sight(
     silent = sum(turn.found_by == "schedule" for turn in seen)
     if silent:
         doubts.append(f"{silent} of {len(seen)} turns rest on the schedule: nothing shows them")
-    usual = float(np.median(np.diff([turn.time for turn in seen]))) if len(seen) > 1 else plan.dwell
-    if abs(usual / plan.dwell - 1.0) > 0.25:
-        doubts.append(f"the usual dwell is {usual:.1f} s, not {plan.dwell:g} s")
+    usual = float(np.median(np.diff([turn.time for turn in seen]))) if len(seen) > 1 else declared
+    if abs(usual / declared - 1.0) > 0.25:
+        doubts.append(f"the usual dwell is {usual:.1f} s, not {declared:g} s")
     return seen, disturbances(quick), doubts
 
 
