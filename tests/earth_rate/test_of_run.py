@@ -92,6 +92,16 @@ def test_sixty_seconds_never_know_the_rate_better_than_white_noise_allows(
                if one["quantity"] == "rate" and one["sigma"] is not None)  # fmt: skip
 
 
+def test_the_sign_of_the_latitude_changes_nothing(tmp_path: Path, rest: Path) -> None:
+    folder = put(tmp_path / "a", turned_log())
+    north, south = (
+        by_method(run(folder, [rest], latitude=at)["earth_rate"]) for at in ("40 deg", "-40 deg")
+    )
+    for method, row in north.items():
+        assert row["value"] == south[method]["value"]
+        assert row.get("sigma") == south[method].get("sigma")
+
+
 def test_a_known_bias_and_a_drift_enter_the_filter(tmp_path: Path, rest: Path) -> None:
     folder = put(tmp_path / "a", {"gyro_x": turned_log()["gyro_x"][: round(90 * RATE)]})
     plain, known, drifting = (
