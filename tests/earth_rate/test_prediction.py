@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from imubench_pipeline.earth_rate.experiment import Experiment
 from imubench_pipeline.earth_rate.kalman import RateFilter
+from imubench_pipeline.earth_rate.needs import prediction_rows
 from imubench_pipeline.earth_rate.pairs import by_pairs
 from imubench_pipeline.earth_rate.prediction import (
     Outlook,
@@ -90,6 +91,22 @@ def test_the_time_that_white_noise_needs(relative):
     if turns > 1:
         sigma = outlook.against_time(28.0, turns).sigma
         assert sigma[-1] <= relative * EARTH_RATE * (1 + 1e-9) < sigma[-2]
+
+
+@pytest.mark.parametrize("turns", [1, 5, 63, 64, 300])
+def test_what_is_reached_is_the_end_of_the_course(turns):
+    outlook = Outlook(PAPER_MODEL, LATITUDE, 2.0, 8.0)
+    assert outlook.sigma_after(28.0, turns) == pytest.approx(
+        outlook.against_time(28.0, turns).sigma[-1], rel=0.01
+    )
+
+
+def test_long_dwells_reach_more_than_was_asked_for():
+    outlook = Outlook(PAPER_MODEL, LATITUDE, 2.0, 8.0)
+    rows = list(prediction_rows(outlook, 3600.0, [1.0], 1e4))
+    (goal,) = (row for row in rows if row["of"] == "goal")
+    assert goal["turns"] == 1 and goal["sigma"] == pytest.approx(rows[1]["sigma"], rel=0.01)
+    assert goal["sigma"] < 0.5 * EARTH_RATE
 
 
 def test_with_white_noise_one_turn_is_best():

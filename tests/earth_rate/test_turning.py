@@ -220,6 +220,18 @@ def test_a_log_that_never_turns_is_refused(seed: int) -> None:
     assert len(trusted.dwells) == 60
 
 
+def test_hardly_a_log_at_rest_alternates_with_the_schedule() -> None:
+    noise, taken = NoiseModel(N=PAPER.N), []
+    for seed in range(300):
+        log = turned([], 600.0, noise=noise, rate=8.0, seed=seed)
+        try:
+            taken.append(find_turning(log, 8.0, 30.0, first_sense=1))
+        except ValueError as error:
+            assert "standard errors" in str(error)
+    assert len(taken) <= 1
+    assert all(abs(found.alternation.z) > 2.8 for found in taken)
+
+
 @pytest.mark.parametrize("duration", [59.0, 20.0, 0.0])
 def test_a_log_shorter_than_two_dwells_is_refused(duration: float) -> None:
     with pytest.raises(ValueError, match="less than two dwells of 30 s"):
@@ -255,6 +267,23 @@ def test_arguments_out_of_range_are_refused(wrong: dict[str, object]) -> None:
         find_turning(turned(EVERY_30[:3], 120.0), **given)
 
 
+@pytest.mark.parametrize("declared", [45.0, 60.0, 90.0])
+def test_turns_at_a_quicker_pace_than_declared_are_taken(declared: float) -> None:
+    found = find_turning(turned(EVERY_30, 600.0), RATE, declared, first_sense=1)
+    assert times(found) == pytest.approx(EVERY_30, abs=0.3)
+    assert found.knocks == ()
+    assert f"the usual dwell is 30.0 s, not {declared:g} s" in found.doubts
+
+
+def test_handling_that_keeps_no_pace_makes_no_dwell_shorter() -> None:
+    starts = 60.0 * np.arange(1, 20)
+    log = turned(starts, 1200.0)
+    for start, after in zip(starts[:-1], np.tile([15.0, 31.0, 44.0], 6), strict=True):
+        bump(log, start + after, TURN, 3.0)
+    found = find_turning(log, RATE, 60.0, first_sense=1)
+    assert not [doubt for doubt in found.doubts if "usual dwell" in doubt]
+
+
 def test_handling_at_the_ends_is_no_turn() -> None:
     log = turned(EVERY_30, 600.0)
     bump(log, 0.5, 2.0, 6.0)
@@ -263,6 +292,22 @@ def test_handling_at_the_ends_is_no_turn() -> None:
     assert times(found) == pytest.approx(EVERY_30, abs=0.3)
     assert found.dwells[0].start > 2.5 and found.dwells[-1].stop < 597.0
     assert any("handling at the ends" in doubt for doubt in found.doubts)
+
+
+def test_a_knock_at_an_end_is_left_out_within_the_log() -> None:
+    log = turned(EVERY_30, 600.0)
+    bump(log, 0.0, 0.5, 6.0)
+    bump(log, 599.5, 0.5, 6.0)
+    found = find_turning(log, RATE, 30.0, first_sense=1)
+    assert found.knocks[0][0] == 0.0 and found.knocks[-1][1] == 600.0
+
+
+def test_noise_has_no_handling_at_the_ends() -> None:
+    noise = NoiseModel(N=PAPER.N)
+    for seed in range(60):
+        log = turned([], 300.0, noise=noise, seed=seed)
+        events = transients(blocks_of(log, RATE, 30.0, noise), log, RATE)
+        assert not [event for event in events if event.likelihood > CLEAR], seed
 
 
 def test_noise_that_is_not_the_models_is_a_doubt() -> None:

@@ -169,12 +169,34 @@ def test_all_pages_stand_in_one_file(made: Site) -> None:
     assert 'id="page:earth_rate.html"' in text and 'id="page:recordings/s/run.html"' in text
 
 
+def _best_of(tried: list[float], nearly: list[float], best: float) -> str:
+    rows: list[dict[str, Any]] = [
+        {"of": "goal", "goal": 1.0, "dwell": 28.0, "turns": 1, "time": 58.0, "sigma": 1.0,
+         "heading": 0.1}
+    ]  # fmt: skip
+    rows += [
+        {"of": "dwell", "dwell": dwell, "turns": 1, "time": 600.0, "relative": 0.1,
+         "best": dwell == best, "nearly_best": dwell in nearly}
+        for dwell in tried
+    ]  # fmt: skip
+    found = needs(rows)
+    assert found is not None
+    return str(found["best"])
+
+
 def test_sentences() -> None:
     row = {"method": "filter", "value": 30 * HOUR, "upper": 32 * HOUR, "truth": 15.04 * HOUR,
            "off_sigma": 15.0, "reason": None}  # fmt: skip
     assert "15 standard deviations away" in answer([row], "practical")
     assert "So far off is not noise" in answer([row], "practical")
     assert answer([], "practical") == "Nothing was found of the turns of this recording."
+    assert _best_of([300.0, 20.0, 5.0], [300.0], 300.0).endswith(
+        " It is the longest that was tried."
+    )
+    assert "tried; down to 20 s it is less" in _best_of([300.0, 20.0, 5.0], [300.0, 20.0], 300.0)
+    assert "shortest that was tried; up to 20 s" in _best_of([300.0, 20.0, 5.0], [20.0, 5.0], 5.0)
+    assert "From 19 s to 21 s" in _best_of([300.0, 21.0, 20.0, 19.0, 5.0], [21.0, 20.0, 19.0], 20.0)
+    assert "All others" in _best_of([300.0, 20.0, 5.0], [20.0], 20.0)
     lines = [PUBLISHED | {"recording": "a", "off": "1 σ", "verdict": "within the noise"}]
     assert published_words(lines) == ("All 1 published estimates lie within what the noise allows.")
     assert published_words([]) == "" and needs([]) is None

@@ -44,6 +44,9 @@ _SCATTER, _SCATTER_OF_STEPS = 0.4, 0.15
 _WEAK, _OFTEN = math.log(2.0), 0.02
 """Strength of a turn that is hardly seen, and the part of the turns that may be so."""
 
+_PACE, _EVEN = 5, 0.75
+"""So many transients, so many of whose intervals are alike, keep a pace of their own."""
+
 _SILENT = 0.05
 """Chance of a turn that is not seen from which a gap is filled by the schedule."""
 
@@ -103,6 +106,46 @@ def choose(events: Sequence[Event], dwell: float, tolerance: float, duration: fl
         cost = np.minimum(0.5 * weak**2, np.where(clear, _UNLIKE, np.inf))
         chosen = _best(time, gain - cost, dwell, tolerance, duration)
     return chosen
+
+
+def shorter_dwell(events: Sequence[Event], chosen: Sequence[int], dwell: float) -> float | None:
+    """Return the dwell that clear transients keep, where it is far shorter than the nominal one.
+
+    Where turns come at twice the pace that is declared, each second one would be a knock, evenly
+    halfway. Knocks and handling do not keep a pace.
+
+    Parameters
+    ----------
+    events : sequence of Event
+        In order of time.
+    chosen : sequence of int
+        Places of the turns, by the nominal dwell.
+    dwell : float
+        Nominal, s.
+
+    Returns
+    -------
+    float or None
+        s; None where the transients that are no turns are few, weaker, or at odd places.
+    """
+    turns = [events[k] for k in chosen]
+    if len(turns) < 2:
+        return None
+    usual, scatter = strength(turns)
+    alike = [
+        event
+        for event in events
+        if event.kind == "transient"
+        and event.likelihood > CLEAR
+        and not event.haste
+        and event.strength > usual - 2.0 * scatter
+    ]
+    if len(alike) < max(_PACE, 1.5 * len(turns)):
+        return None
+    interval = np.diff([event.time for event in alike])
+    pace = float(np.median(interval))
+    even = float(np.mean(np.abs(interval - pace) < 0.2 * pace))
+    return pace if pace < 0.75 * dwell and even >= _EVEN else None
 
 
 def _learnt(time: Array, dwell: float, tolerance: float) -> tuple[float, float]:

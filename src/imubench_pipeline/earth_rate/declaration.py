@@ -48,7 +48,9 @@ class TwoPosition(Strict):
         range, or turning takes half of the dwell or more.
     """
 
-    latitude: Latitude = Field(description="of the place, with its unit; south is negative")
+    latitude: Latitude = Field(
+        description="of the place, with its unit; south is negative, to no effect"
+    )
     dwell: Time = Field(description="nominal, from the start of one turn to the start of the next")
     channel: Gyro | None = Field(
         None, description="that was turned; null: the only gyro of the log"

@@ -113,6 +113,11 @@ class Turning:
     alternation: Alternation
     doubts: tuple[str, ...] = ()
 
+    @property
+    def by_schedule(self) -> int:
+        """How many turns rest on the schedule alone."""
+        return sum(turn.found_by == "schedule" for turn in self.turns)
+
     def senses(self, samples: int, rate: float) -> NDArray[np.int8]:
         """Return the sense of each sample, 0 where it is not to be used.
 

@@ -50,7 +50,8 @@ def _rows(outlook: Outlook, dwell: float, goals: Sequence[float], run_time: floa
         turns = outlook.turns_needed(dwell, goal)
         most = max(most, turns)
         time = (turns + 1) * dwell + turns * outlook.turning
-        sigma = goal * EARTH_RATE
+        # What is reached: the last turn that is needed may give far more than was asked for.
+        sigma = outlook.sigma_after(dwell, turns)
         yield {"of": "goal", "goal": goal} | _row(dwell, turns, time, sigma)
     course = outlook.against_time(dwell, min(max(most, 2), _MOST_TURNS))
     shown = np.unique(np.rint(np.geomspace(1, len(course.turns), _POINTS)).astype(np.int64)) - 1

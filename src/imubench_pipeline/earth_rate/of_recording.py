@@ -39,6 +39,9 @@ Row = Mapping[str, Any]
 WHOLE = "whole"
 """Name of the part that is all of a recording."""
 
+_NEARLY_ALL = 0.9
+"""Part of the turns on the schedule alone from which nothing but the level shows any."""
+
 _LIMIT = 1.96
 """Standard deviations of a 95 % limit."""
 
@@ -152,7 +155,8 @@ def earth_rate_of(
         extent = {"dwells": len(chosen), "turns": len(chosen) - 1}
         drawn = source.drawn_with_drift(declared.drift_si)
         ranges = sigma_ranges(courses.measured.blocks, model, drawn, declared.turn_on_bias_si)
-        rows = _estimates(names | extent, part, courses, source, turning, log.rate)
+        unsure = _unsure(turning, declared.trust_schedule)
+        rows = _estimates(names | extent, part, courses, source, unsure, log.rate)
         found.earth_rate += [row | ranges.get(row["method"], {}) for row in rows]
         found.earth_rate_series += _later(_series(key, part, courses), begins)
     return found
@@ -264,7 +268,7 @@ def _estimates(
     part: str,
     courses: Courses,
     source: NoiseSource,
-    turning: Turning,
+    unsure: dict[str, Any],
     rate: float,
 ) -> Iterator[dict[str, Any]]:
     measured, blocks = courses.measured, courses.measured.blocks
@@ -279,10 +283,36 @@ def _estimates(
         "block": courses.longest / rate,
     }
     for course in courses.courses:
-        yield about | _figure(course, turning)
+        yield about | _figure(course, unsure)
 
 
-def _figure(course: Course, turning: Turning) -> dict[str, Any]:
+def _unsure(turning: Turning, trusted: bool) -> dict[str, Any]:
+    """Return status and reason of estimates of which sign or turns are not known."""
+    reasons = []
+    by_schedule, turns = turning.by_schedule, len(turning.turns)
+    unseen = by_schedule >= _NEARLY_ALL * turns
+    if unseen:
+        reasons.append(
+            f"{by_schedule} of {turns} turns rest on the schedule: nothing else shows that it was "
+            f"turned, and its level alternates by {abs(turning.alternation.z):.1f} standard errors"
+        )
+        if not trusted:
+            reasons.append(
+                "chance alone does so in one log of some 400 that were never turned; if this one "
+                "was turned by the clock, state 'trust_schedule: true'"
+            )
+    if turning.ambiguous:
+        reasons.append(
+            "where the axis points first is not known, and taken for north: the sign may be the "
+            "other one; state 'first: north' or 'first: south'"
+        )
+    if not reasons:
+        return {}
+    doubtful = turning.ambiguous or (unseen and not trusted)
+    return {"status": "ambiguous" if doubtful else "ok", "reason": "; ".join(reasons)}
+
+
+def _figure(course: Course, unsure: dict[str, Any]) -> dict[str, Any]:
     row: dict[str, Any] = {"method": course.method, "parameter": "earth_rate"}
     if course.reason is not None:
         return row | {"status": "not_shown", "reason": course.reason}
@@ -291,20 +321,14 @@ def _figure(course: Course, turning: Turning) -> dict[str, Any]:
         return row | {"value": value, "status": "given", "reason": _GIVEN}
     sigma = float(course.sigma[-1])
     row |= {
+        "status": "ok",
         "value": value,
         "lower": value - _LIMIT * sigma,
         "upper": value + _LIMIT * sigma,
         "sigma": sigma,
         "off_sigma": (value - EARTH_RATE) / sigma,
-        "status": "ok",
     }
-    if turning.ambiguous:
-        row["status"] = "ambiguous"
-        row["reason"] = (
-            "where the axis points first is not known, and taken for north: the sign may be the "
-            "other one; state 'first: north' or 'first: south'"
-        )
-    return row
+    return row | unsure
 
 
 def unusable(names: Mapping[str, Any], declared: TwoPosition) -> Iterator[Row]:

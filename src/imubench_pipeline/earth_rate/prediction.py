@@ -307,6 +307,13 @@ class Outlook:
         left = (wanted - found[-1]) / _growth(found)
         return _SUMMED - 1 + math.ceil(left - _ROUNDING * left)
 
+    def sigma_after(self, dwell: float, turns: int) -> float:
+        """Return the bound after a number of turns and the dwell after the last, rad/s."""
+        found = self._information(dwell, _SUMMED)
+        beyond = max(turns + 1 - _SUMMED, 0)
+        last = found[min(turns, _SUMMED - 1)] + (_growth(found) * beyond if beyond else 0.0)
+        return float(_sigma(np.array([last]))[0])
+
     def time_needed(self, dwell: float, relative: float) -> float:
         """Return how long a run gives the Earth's rate to a relative standard deviation, s.
 

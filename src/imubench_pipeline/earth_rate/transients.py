@@ -158,7 +158,8 @@ def blocks_of(log: Array, rate: float, dwell: float, model: NoiseModel | None = 
     mean[there] = np.nansum(rows[there], axis=1) / count[there]
     width = round(min(_LEVEL, 0.7 * dwell) / length) // 2 * 2 + 1
     level = np.full(len(rows), np.nan)
-    level[there] = median_filter(mean[there], width, mode="nearest")
+    # "nearest" would repeat the first block: its noise would be the level, and all after it off.
+    level[there] = median_filter(mean[there], width, mode="reflect")
     weight = np.sqrt(count / size)
     residual = np.where(there, (mean - level) * weight, 0.0)
     own = _spread(residual[there])

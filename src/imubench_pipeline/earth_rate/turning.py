@@ -76,7 +76,7 @@ def find_turning(
     it; then the estimate is positive by construction, and its sign says nothing. Neither its sign
     nor its size is used otherwise.
 
-    Without a transient, the log must alternate by 3 standard errors, whatever the sign: runs in
+    Without a transient, the log must alternate by 3 standard errors with the schedule: runs in
     which chance hides the alternation are then refused, which favours large estimates.
     ``trust_schedule`` takes the schedule's word instead.
 
@@ -135,6 +135,7 @@ def find_turning(
     stretches, more = _stretches(turns, knocks, plan)
     doubts += more
     knocks = sorted([*knocks, *_lone(outliers(blocks, log, rate), turns, knocks)])
+    knocks = [(max(start, 0.0), min(stop, plan.duration)) for start, stop in knocks]
     signs = without(blocks, knocks)
     size = alternation(signs, stretches)
     first, more = _first_sense(first_sense, column_sense, sense_by_rate, size.z)

@@ -242,11 +242,25 @@ def needs(rows: Sequence[Row]) -> dict[str, Any] | None:
         "best": (
             f"In a run of {duration_text(best['time'])} the best dwell has "
             f"{number_text(best['dwell'], 3)} s of data ({counted(best['turns'], 'turn')}): it "
-            f"gives the Earth's rate to {number_text(100.0 * best['relative'], 3)} %. From "
-            f"{number_text(min(nearly), 3)} s to {number_text(max(nearly), 3)} s it is less than "
-            "1 % worse."
+            f"gives the Earth's rate to {number_text(100.0 * best['relative'], 3)} %. "
+            + _about_best(best["dwell"], [row["dwell"] for row in curve], nearly)
         ),
     }
+
+
+def _about_best(best: float, tried: Sequence[float], nearly: Sequence[float]) -> str:
+    """Return which dwells are as good as the best, in a sentence; at an edge of the search so."""
+    low, high = (number_text(limit, 3) for limit in (min(nearly), max(nearly)))
+    if best in (max(tried), min(tried)):
+        longest = best == max(tried)
+        text = f"It is the {'longest' if longest else 'shortest'} that was tried"
+        if low == high:
+            return f"{text}."
+        limit = f"down to {low}" if longest else f"up to {high}"
+        return f"{text}; {limit} s it is less than 1 % worse."
+    if low == high:
+        return "All others that were tried are worse by 1 % or more."
+    return f"From {low} s to {high} s it is less than 1 % worse."
 
 
 _SMALL = 0.5

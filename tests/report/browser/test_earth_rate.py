@@ -103,3 +103,32 @@ def test_published_estimates_are_drawn_in_the_chosen_unit(read: Open, rows: Any)
     reader.page.locator("select[data-quantity=gyro]").select_option("°/s")
     assert axis_title(figure, "x") == "Earth’s rate (°/s)"
     assert named(traces(figure), "published")["x"] == [pytest.approx(1.745 / 3600, rel=1e-5)]
+
+
+def test_a_gap_in_the_samples_is_left_open(
+    read: Open, rows: Any, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    run = {name: [dict(row) for row in found] for name, found in rows[1].items()}
+    empty = next(row for row in run["turning"] if (row["what"], row.get("number")) == ("dwell", 4))
+    empty["mean"] = None
+    gap = range(60, 80)
+    envelope = [
+        {"sensor": "s", "recording": "run", "channel": "gyro_x", "start": 1.5 * i,
+         "end": 1.5 * (i + 1), "samples": 0 if i in gap else 48}
+        | {name: None if i in gap else value
+           for name, value in (("low", -1e-3), ("high", 2e-3), ("mean", 5e-4))}
+        for i in range(400)
+    ]  # fmt: skip
+    results = tmp_path_factory.mktemp("gap")
+    write("envelope", envelope, results / "recordings/s/run/envelope.parquet")
+    publish(site(joined(run), results), results / "report")
+    reader: Reader = read(results / "report", RUN)
+    assert reader.draw_all() == 6
+    (shape,) = (one for one in traces(reader.figure("turning")) if one["fill"] == "toself")
+    ends = [k for k, at in enumerate(shape["x"]) if at is None]
+    assert len(ends) == 2
+    assert max(shape["x"][: ends[0]]) == pytest.approx(59.5 * 1.5 / 60)
+    assert min(shape["x"][ends[0] + 1 : ends[1]]) == pytest.approx(80.5 * 1.5 / 60)
+    north = named(traces(reader.figure("dwells", part="whole")), "north")
+    south = named(traces(reader.figure("dwells", part="whole")), "south")
+    assert len(north["x"]) + len(south["x"]) == 19

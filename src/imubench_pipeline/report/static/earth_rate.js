@@ -72,7 +72,7 @@ kinds.dwells = (figure) => {
   );
   const groups = [];
   for (const [key, look, wanted] of [["north", NORTH, true], ["south", SOUTH, false]]) {
-    const own = middle.map((_, i) => i).filter((i) => turned.dwells.north[i] === wanted);
+    const own = middle.map((_, i) => i).filter((i) => turned.dwells.north[i] === wanted && Number.isFinite(mean[i]));
     traces.push({
       group: key, type: "scatter", mode: "markers", x: own.map((i) => middle[i]), y: own.map((i) => mean[i]),
       marker: { color: colourOf(look), symbol: look.marker, size: 6 },

@@ -4,6 +4,7 @@
 const SUPERSCRIPTS = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
 
 function numberText(value, digits) {
+  if (!Number.isFinite(value)) return "–";
   const rounded = Number(value.toPrecision(digits));
   let text;
   if (rounded === 0 || (Math.abs(rounded) >= 1e-4 && Math.abs(rounded) < 1e6)) {

@@ -66,7 +66,21 @@ function line(x, y, look, more = {}) {
 
 function band(x, low, high, look, opacity = 0.18) {
   const edge = { type: "scatter", mode: "lines", x, hoverinfo: "skip", line: { width: 0, color: colourOf(look) } };
-  return [{ ...edge, y: low }, { ...edge, y: high, fill: "tonexty", fillcolor: faint(colourOf(look), opacity) }];
+  const fillcolor = faint(colourOf(look), opacity);
+  const there = x.map((_, i) => Number.isFinite(low[i]) && Number.isFinite(high[i]));
+  if (there.every(Boolean)) return [{ ...edge, y: low }, { ...edge, y: high, fill: "tonexty", fillcolor }];
+  // "tonexty" would join the two sides of a gap: each stretch is a shape by itself.
+  const shapes = { x: [], y: [] };
+  for (let first = 0; first < x.length; first += 1) {
+    if (!there[first]) continue;
+    let stop = first;
+    while (there[stop]) stop += 1;
+    const own = x.slice(first, stop);
+    shapes.x.push(...own, ...[...own].reverse(), null);
+    shapes.y.push(...low.slice(first, stop), ...high.slice(first, stop).reverse(), null);
+    first = stop;
+  }
+  return [{ ...edge, ...shapes, fill: "toself", fillcolor }];
 }
 
 function tickText(value) {
