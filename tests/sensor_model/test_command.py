@@ -218,6 +218,21 @@ def test_other_formats_and_other_notes_are_left_alone(tmp_path: Path, capsys) ->
     assert (tmp_path / "log.yaml").read_text() == "device: mine\n"
 
 
+def test_notes_of_another_log_are_kept_while_it_is_there(tmp_path: Path, capsys) -> None:
+    text, binary = tmp_path / "log.csv", tmp_path / "log.parquet"
+    given = ["bno055", "--duration", "1 s"]
+    assert simulate(*given, "--out", text) == 0
+    before = text.with_suffix(".yaml").read_bytes()
+    capsys.readouterr()
+    assert simulate(*given, "--out", binary) == 2
+    assert "log.yaml: says how log.csv is written" in capsys.readouterr().err
+    assert text.with_suffix(".yaml").read_bytes() == before and not binary.exists()
+    assert simulate(*given, "--out", text) == 0
+    text.unlink()
+    assert simulate(*given, "--out", binary) == 0
+    assert b"reader: arrow" in binary.with_suffix(".yaml").read_bytes()
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -255,6 +270,7 @@ def test_a_log_of_every_sensor_file_is_read(tmp_path: Path) -> None:
             assert set(found[0].columns) == {*axes, "temperature"}
             for column, values in found[0].columns.items():
                 np.testing.assert_allclose(values, 30.0 if column == "temperature" else 0.25)
+            path.unlink()  # its notes are protected while it is there
 
 
 def test_nothing_is_left_of_a_log_that_could_not_be_finished(
