@@ -189,9 +189,14 @@ def test_drift_and_cut_off_are_those_of_the_run(tmp_path: Path, capsys) -> None:
     ("arguments", "said"),
     [
         (["nosuch", "--hours", "1"], "no such sensor file; there are: adis16405"),
-        (["bno055", "--hours", "0"], "samples"),
-        (["bno055", "--hours", "nan"], "samples"),
-        (["bno055", "--hours", "1", "--rate", "100"], "not a number with its unit"),
+        (["bno055", "--hours", "0"], "--hours 0: 0 s at 100 Hz are 0 samples; expected 1 to"),
+        (["bno055", "--hours", "-0.5"], "--hours -0.5: -1800 s at 100 Hz are -180000 samples"),
+        (["bno055", "--hours", "nan"], "--hours nan: expected a length of 1 to"),
+        (["bno055", "--duration", "1 ms"], "--duration 1 ms: 0.001 s at 100 Hz are 0 samples"),
+        (["bno055", "--duration", "5"], "--duration: '5' is not a number with its unit"),
+        (["bno055", "--hours", "1", "--rate", "100"], "--rate: '100' is not a number with its"),
+        (["bno055", "--hours", "1", "--rate", "100 deg"], "--rate: 'deg' is no unit of frequency"),
+        (["bno055", "--hours", "1", "--temperature", "25"], "--temperature: '25' is not a number"),
         (["bno055", "--hours", "1", "--temperature", "3 m"], "no unit of temperature"),
         (["bno055", "--hours", "1", "--temperature", "no.csv"], "no.csv: no such file"),
         (["bno055", "--hours", "1", "--channels", "gyro_q"], "no channel 'gyro_q'"),
@@ -236,7 +241,7 @@ def test_notes_of_another_log_are_kept_while_it_is_there(tmp_path: Path, capsys)
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"axes": {"gyro_x": {"bias": "3 m"}}}, "axes.gyro_x: 'm' is no unit"),
+        ({"axes": {"gyro_x": {"bias": "3 m"}}}, "axes.gyro_x.bias: 'm' is no unit"),
         ({"axes": {"gyro_x": {"low_pass": {"cutoff": "0 Hz"}}}}, "frequency above zero"),
         ({"axes": {"gyro_x": {"N": "-1 deg/sqrt(h)"}}}, "N is -"),
         ({"axes": {}}, "axes"),
