@@ -161,14 +161,25 @@ def test_a_published_figure_is_taken_to_si_in_the_dimension_of_its_parameter(
         (with_channel(assumed=["noise"]), "gyro_x: assumed: 'noise' is no figure"),
         (
             with_channel(published=[PUBLISHED | {"means": "0.6 deg/sqrt(h)"}]),
-            "sensors.0: channels.gyro_x: 'deg/sqrt.h.' is no unit of angular rate",
+            "sensors.0: channels.gyro_x.published.0.means: 'deg/sqrt.h.' is no unit of",
         ),
         (
             with_channel(published=[PUBLISHED | {"parameter": "sensitivity"}]),
-            "channels.gyro_x: 'deg/s' is no unit",
+            "channels.gyro_x.published.0.means: 'deg/s' is no unit",
         ),
-        (with_channel(drift={"sensitivity": "1 deg/s"}), "channels.gyro_x: 'deg/s' is no unit"),
-        (with_channel(further=[{"B": "1 deg/s", "T_B": "1 m"}]), "channels.gyro_x: 'm' is no unit"),
+        (with_channel(N="1 deg/s"), "channels.gyro_x.N: 'deg/s' is no unit of gyro density"),
+        (
+            with_channel(drift={"sensitivity": "1 deg/s"}),
+            "channels.gyro_x.drift.sensitivity: 'deg/s' is no unit",
+        ),
+        (
+            with_channel(further=[{"B": "1 deg/s", "T_B": "1 m"}]),
+            "channels.gyro_x.further.0.T_B: 'm' is no unit",
+        ),
+        (
+            with_channel(sinusoids=[{"amplitude": "1 deg", "frequency": "1 Hz"}]),
+            "channels.gyro_x.sinusoids.0.amplitude: 'deg' is no unit",
+        ),
         ({"sensors": [OF_S | {"duration": "0 s"}]},
          "sensors.0.duration: found '0 s'; expected a time above 0"),
         ({"sensors": [OF_S | {"duration": "-1 h"}]}, "sensors.0.duration: found '-1 h'"),
@@ -230,7 +241,10 @@ def test_a_recording_that_is_simulated_twice_is_refused(tmp_path: Path) -> None:
 
 def test_a_board_that_is_not_there_is_named(tmp_path: Path) -> None:
     path = written(tmp_path, boards=["boards/none.yaml"])
-    with pytest.raises(ConfigError, match=r"boards/none.yaml: no such file"):
+    with pytest.raises(
+        ConfigError,
+        match=r"simulated.yaml: boards: .*/boards/none.yaml: no such file; expected the",
+    ):
         read_simulated(path, SENSORS)
 
 
@@ -264,7 +278,8 @@ def test_a_file_of_a_profile_that_is_not_there_names_file_and_key(tmp_path: Path
     with pytest.raises(ConfigError) as error:
         simulated(tmp_path, temperature=lost)
     board, file = tmp_path / "boards/pair.yaml", tmp_path / "boards/warm.csv"
-    assert str(error.value) == f"{board}: temperature.file: {file}: no such file"
+    said = f"{board}: temperature.file: {file}: no such file; expected a CSV or Parquet file"
+    assert str(error.value).startswith(said)
     with pytest.raises(ConfigError, match=r"pair.yaml: motion.gyro_x.file: .*no such file"):
         simulated(tmp_path, motion={"gyro_x": lost})
     alone = OF_S | {"recording": "sim_a", "seed": 1, "motion": {"gyro_x": lost | {"file": "m"}}}

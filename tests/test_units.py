@@ -255,6 +255,23 @@ def test_quantity_with_its_unit() -> None:
         quantity_to_si("100 s", "frequency")
 
 
+@pytest.mark.parametrize(
+    ("dimension", "said"),
+    [
+        ("angle", "deg, mrad or rad, written like '48 deg'"),
+        ("time", "s, min, h, ms, us or ns, written like '10 s'"),
+        ("temperature", "degC or K, written like '25 degC'"),
+        ("frequency", "Hz or kHz, written like '100 Hz'"),
+        ("gyro_ramp", "deg/h/h or deg/s^2, written like '1 deg/h/h'"),
+    ],
+)
+def test_a_number_without_unit_is_told_how_it_is_written(dimension: str, said: str) -> None:
+    with pytest.raises(UnitError) as error:
+        quantity_to_si("48", dimension)
+    assert str(error.value).endswith(f"such as {said}")
+    assert quantity_to_si(said.split("'")[1], dimension) != 0.0
+
+
 def test_the_printed_pair_of_a_data_sheet() -> None:
     # ADIS16470: 0.008 °/s/√Hz, one-sided, and 0.34 °/√h
     density = to_si(0.008, "°/s/√Hz", "gyro_density")

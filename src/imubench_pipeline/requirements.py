@@ -36,7 +36,10 @@ def _time(text: str) -> str:
 
 def _latitude(text: str) -> str:
     if not abs(quantity_to_si(text, "angle")) < 1.5707:
-        raise ValueError("expected a latitude between the poles")
+        raise ValueError(
+            "expected a latitude between the poles: there cos φ is 0, and a gyro in a horizontal "
+            "axis senses nothing of the Earth's rate"
+        )
     return text
 
 

@@ -24,7 +24,7 @@ from imubench_pipeline.sensor import (
 from imubench_pipeline.sensor_model.profile_forms import FileForm, Surroundings, found_from
 from imubench_pipeline.sensor_model.settings import AxisSettings, ImuSettings, check_axes
 from imubench_pipeline.simulated_experiments import SimulatedRest, SimulatedTable, SimulatedTurns
-from imubench_pipeline.units import quantity_to_si
+from imubench_pipeline.units import naming, quantity_to_si
 from imubench_pipeline.validation import (
     ConfigError,
     Duration,
@@ -70,8 +70,9 @@ class SimulatedChannel(AxisSettings):
     def check(self, channel: str) -> None:
         """Raise UnitError if a unit has another dimension than its figure."""
         super().check(channel)
-        for figure in self.published:
-            figure.si(quantity_of(channel))
+        for number, figure in enumerate(self.published):
+            with naming(f"published.{number}.means: "):
+                figure.si(quantity_of(channel))
 
     @model_validator(mode="after")
     def _known(self) -> Self:
@@ -247,6 +248,11 @@ def read_simulated(path: Path | None, sensors: Mapping[str, Sensor]) -> ToSimula
         recordings.append(_found_from(entry, path, f"recordings.{number}."))
     boards: dict[str, Board] = {}
     for file in given.boards:
+        if not (path.parent / file).is_file():
+            raise ConfigError(
+                f"{path}: boards: {path.parent / file}: no such file; expected the file of a "
+                "board, named from the folder of the file that names it"
+            )
         board = _board(path.parent / file, sensors)
         if file.stem in boards:
             raise ConfigError(f"{path}: boards: two are named {file.stem}; expected other names")
@@ -293,7 +299,10 @@ def _found_from(around: _Around, path: Path, key: str = "") -> _Around:
     }
     for name, form in forms.items():
         if isinstance(form, FileForm) and not (path.parent / form.file).is_file():
-            raise ConfigError(f"{path}: {key}{name}.file: {path.parent / form.file}: no such file")
+            raise ConfigError(
+                f"{path}: {key}{name}.file: {path.parent / form.file}: no such file; expected a "
+                "CSV or Parquet file, named from the folder of the file that names it"
+            )
     return around.model_copy(
         update={
             "temperature": found_from(around.temperature, path.parent),

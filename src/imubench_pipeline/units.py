@@ -7,6 +7,8 @@ The registry is ours: angles have a dimension of their own, so that °/s and Hz,
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -52,7 +54,7 @@ _EXAMPLES: dict[str, str] = {
     "acceleration": "m/s^2, g, mg or ug",
     "temperature": "degC or K",
     "frequency": "Hz or kHz",
-    "time": "s, ms, us or ns",
+    "time": "s, min, h, ms, us or ns",
     "angle": "deg, mrad or rad",
     "velocity": "m/s or km/h",
     "length": "m, km or cm",
@@ -76,6 +78,14 @@ _EXAMPLES: dict[str, str] = {
     "gyro_sensitivity": "LSB/(deg/s)",
     "accel_sensitivity": "LSB/g or LSB/mg",
 }
+
+_WRITTEN: dict[str, str] = {
+    "temperature": "25 degC",
+    "frequency": "100 Hz",
+    "time": "10 s",
+    "angle": "48 deg",
+}
+"""How a quantity is written, where 1 of its first unit is an odd example."""
 
 _DEFINITIONS = """
 nano- = 1e-9 = n-
@@ -105,6 +115,15 @@ foot_per_second = foot / second = fps
 
 class UnitError(ValueError):
     """A unit that is not known, or that has another dimension than the one expected."""
+
+
+@contextmanager
+def naming(key: str) -> Iterator[None]:
+    """Put a key in front of the text of a UnitError."""
+    try:
+        yield
+    except UnitError as error:
+        raise UnitError(f"{key}{error}") from error
 
 
 @lru_cache(maxsize=1)
@@ -320,8 +339,9 @@ def difference_to_si(text: str, dimension: str) -> float:
 def _number_and_unit(text: str, dimension: str) -> tuple[float, str]:
     match = _QUANTITY.match(str(text))
     if not match:
+        first = re.split(r", | or ", _EXAMPLES[dimension])[0]
         raise UnitError(
             f"{text!r} is not a number with its unit; {_expected(dimension)}, "
-            f"written like '100 {SI_UNITS[dimension]}'"
+            f"written like {_WRITTEN.get(dimension, f'1 {first}')!r}"
         )
     return float(match[1]), match[2]

@@ -203,6 +203,15 @@ def test_what_is_wrong_is_named(tmp_path: Path, text: str | bytes, message: str)
         columns(path, log_format(comment="//"))
 
 
+@pytest.mark.parametrize("column", ["angle", 3])
+def test_a_position_that_is_missing_is_mended_where_it_is_stated(
+    tmp_path: Path, column: str | int
+) -> None:
+    path = written(tmp_path, "wx,ax\n" + ROWS)
+    with pytest.raises(RecordingError, match=r"for position; .* in the notes beside the log or"):
+        columns(path, log_format(position={"column": column}))
+
+
 @pytest.mark.parametrize("place", [100, 0.5])
 def test_compressed_data_corrupt_inside_reject(
     tmp_path: Path, rng: np.random.Generator, place: float

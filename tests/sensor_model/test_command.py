@@ -189,9 +189,14 @@ def test_drift_and_cut_off_are_those_of_the_run(tmp_path: Path, capsys) -> None:
     ("arguments", "said"),
     [
         (["nosuch", "--hours", "1"], "no such sensor file; there are: adis16405"),
-        (["bno055", "--hours", "0"], "samples"),
-        (["bno055", "--hours", "nan"], "samples"),
-        (["bno055", "--hours", "1", "--rate", "100"], "not a number with its unit"),
+        (["bno055", "--hours", "0"], "--hours 0: 0 s at 100 Hz are 0 samples; expected 1 to"),
+        (["bno055", "--hours", "-0.5"], "--hours -0.5: -1800 s at 100 Hz are -180000 samples"),
+        (["bno055", "--hours", "nan"], "--hours nan: expected a length of 1 to"),
+        (["bno055", "--duration", "1 ms"], "--duration 1 ms: 0.001 s at 100 Hz are 0 samples"),
+        (["bno055", "--duration", "5"], "--duration: '5' is not a number with its unit"),
+        (["bno055", "--hours", "1", "--rate", "100"], "--rate: '100' is not a number with its"),
+        (["bno055", "--hours", "1", "--rate", "100 deg"], "--rate: 'deg' is no unit of frequency"),
+        (["bno055", "--hours", "1", "--temperature", "25"], "--temperature: '25' is not a number"),
         (["bno055", "--hours", "1", "--temperature", "3 m"], "no unit of temperature"),
         (["bno055", "--hours", "1", "--temperature", "no.csv"], "no.csv: no such file"),
         (["bno055", "--hours", "1", "--channels", "gyro_q"], "no channel 'gyro_q'"),
@@ -218,10 +223,25 @@ def test_other_formats_and_other_notes_are_left_alone(tmp_path: Path, capsys) ->
     assert (tmp_path / "log.yaml").read_text() == "device: mine\n"
 
 
+def test_notes_of_another_log_are_kept_while_it_is_there(tmp_path: Path, capsys) -> None:
+    text, binary = tmp_path / "log.csv", tmp_path / "log.parquet"
+    given = ["bno055", "--duration", "1 s"]
+    assert simulate(*given, "--out", text) == 0
+    before = text.with_suffix(".yaml").read_bytes()
+    capsys.readouterr()
+    assert simulate(*given, "--out", binary) == 2
+    assert "log.yaml: says how log.csv is written" in capsys.readouterr().err
+    assert text.with_suffix(".yaml").read_bytes() == before and not binary.exists()
+    assert simulate(*given, "--out", text) == 0
+    text.unlink()
+    assert simulate(*given, "--out", binary) == 0
+    assert b"reader: arrow" in binary.with_suffix(".yaml").read_bytes()
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"axes": {"gyro_x": {"bias": "3 m"}}}, "axes.gyro_x: 'm' is no unit"),
+        ({"axes": {"gyro_x": {"bias": "3 m"}}}, "axes.gyro_x.bias: 'm' is no unit"),
         ({"axes": {"gyro_x": {"low_pass": {"cutoff": "0 Hz"}}}}, "frequency above zero"),
         ({"axes": {"gyro_x": {"N": "-1 deg/sqrt(h)"}}}, "N is -"),
         ({"axes": {}}, "axes"),
@@ -255,6 +275,7 @@ def test_a_log_of_every_sensor_file_is_read(tmp_path: Path) -> None:
             assert set(found[0].columns) == {*axes, "temperature"}
             for column, values in found[0].columns.items():
                 np.testing.assert_allclose(values, 30.0 if column == "temperature" else 0.25)
+            path.unlink()  # its notes are protected while it is there
 
 
 def test_nothing_is_left_of_a_log_that_could_not_be_finished(

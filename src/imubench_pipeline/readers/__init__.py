@@ -14,6 +14,7 @@ from imubench_pipeline.readers.batch import (
     Batch,
     LogFile,
     RecordingError,
+    stated_in,
 )
 from imubench_pipeline.readers.compressed import (
     holds_text,
@@ -150,7 +151,7 @@ def _file_of(path: Path, present: list[Path] | None, source: ColumnSource, name:
     if len(nested) != 1:
         raise RecordingError(
             f"{path.name}: no file {source.file!r} for {name}; the folder has "
-            f"{_names(path, present)}; mend 'file' of {name} in the sensor file"
+            f"{_names(path, present)}; mend 'file' of {name} in {stated_in(name)}"
         )
     return nested[0]
 

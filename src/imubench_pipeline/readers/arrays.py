@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.readers.array_table import DATES, NUMBERS, Column, Table, UnusableError
 from imubench_pipeline.readers.array_time import ArrayTime
-from imubench_pipeline.readers.batch import Batch, LogFile, RecordingError
+from imubench_pipeline.readers.batch import Batch, LogFile, RecordingError, stated_in
 
 _BLOCK_ROWS = 1 << 18
 _BLOCK_BYTES = 1 << 26
@@ -218,11 +218,11 @@ def _place(tables: dict[str, Table], column: str | int, variable: str | None, ke
         has = _listed(table.labels) or f"{table.width} columns without names: give a number"
         raise UnusableError(
             f"no column {column!r} for {key}; {table.shown} has {has}; mend 'column' of {key} in "
-            "the sensor file"
+            f"{stated_in(key)}"
         )
     raise UnusableError(
         f"no variable or column {column!r} for {key}; the file has "
-        f"{_contents(tables, labels=True)}; mend 'column' of {key} in the sensor file"
+        f"{_contents(tables, labels=True)}; mend 'column' of {key} in {stated_in(key)}"
     )
 
 
@@ -257,7 +257,7 @@ def _table(tables: dict[str, Table], variable: str | None, key: str) -> Table:
             )
         raise UnusableError(
             f"no variable {variable!r} for {key}; the file has {_contents(tables)}; mend "
-            f"'variable' of {key} in the sensor file"
+            f"'variable' of {key} in {stated_in(key)}"
         )
     usable = [table for table in tables.values() if table.fault is None]
     # A number such as the rate may stand beside the samples.
@@ -280,7 +280,7 @@ def _numbered(table: Table, column: int, key: str) -> _Place:
         names = f" ({_listed(table.labels)})" if table.labels else ""
         raise UnusableError(
             f"no column {column} for {key}; {table.shown} has {table.width} columns{samples}"
-            f"{names}; mend 'column' of {key} in the sensor file"
+            f"{names}; mend 'column' of {key} in {stated_in(key)}"
         )
     return table, column - 1
 

@@ -30,6 +30,17 @@ SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _HALF_REASON = 700
 
 
+def stated_in(key: str) -> str:
+    """Return where it is to be mended from which column a channel, or what is beside, is read.
+
+    Parameters
+    ----------
+    key : str
+    """
+    notes = "the notes beside the log or " if key == POSITION else ""
+    return f"{notes}the sensor file"
+
+
 class RecordingError(ValueError):
     """A recording that cannot be used; the text is the reason, with what to mend.
 

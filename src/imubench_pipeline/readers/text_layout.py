@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from imubench_pipeline.readers.batch import RecordingError
+from imubench_pipeline.readers.batch import RecordingError, stated_in
 from imubench_pipeline.readers.complete_lines import first_lines
 from imubench_pipeline.readers.text_cells import Decimal, are_figures, is_datum, is_number
 from imubench_pipeline.readers.text_header import are_units, completed, is_heading, likely_header
@@ -90,13 +90,13 @@ class TextLayout:
                 raise RecordingError(
                     f"{self.file}: no column {column} for {key}; found {len(self.names)} columns "
                     f"({found}) with delimiter {self.split}; mend 'column' of {key}, or "
-                    "'delimiter', in the sensor file"
+                    f"'delimiter', in {stated_in(key)}"
                 )
             return column - 1
         if column not in self.names:
             raise RecordingError(
                 f"{self.file}: no column {column!r} for {key}; found {found} with delimiter "
-                f"{self.split}; mend 'column' of {key} in the sensor file"
+                f"{self.split}; mend 'column' of {key} in {stated_in(key)}"
             )
         if self.names.count(column) > 1:
             raise RecordingError(

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from imubench_pipeline.units import UnitError, quantity_to_si
+from imubench_pipeline.units import UnitError, naming, quantity_to_si
 from imubench_pipeline.validation import ConfigError, parse, read_yaml
 
 if TYPE_CHECKING:
@@ -88,14 +88,8 @@ def _run(given: argparse.Namespace) -> None:
     origin, sensor = _origin(given)
     log = None if sensor is None else sensor.log
     rate = _rate(given.rate, log)
-    duration = (
-        quantity_to_si(given.duration, "time") if given.hours is None else 3600.0 * given.hours
-    )
-    samples = round(duration * rate) if math.isfinite(duration) else 0
-    if not 1 <= samples <= _MOST:
-        raise ConfigError(
-            f"{duration:g} s at {rate:g} Hz are {samples} samples; expected 1 to {_MOST}"
-        )
+    duration = _duration(given.duration, given.hours, rate)
+    samples = round(duration * rate)
     motion, temperature = _profiles(given, origin)
     columns = [*origin.imu.axes, *([TEMPERATURE] if temperature is not None else [])]
     form = layout(given.out, columns, rate, log)
@@ -199,13 +193,33 @@ def _origin(given: argparse.Namespace) -> tuple[Origin, Any]:
 
 def _rate(text: str | None, log: Any) -> float:
     if text is not None:
-        rate = quantity_to_si(text, "frequency")
+        with naming("--rate: "):
+            rate = quantity_to_si(text, "frequency")
         if rate <= 0:
             raise ConfigError(f"--rate {text}: expected a frequency above 0")
         return rate
     if log is None or log.rate_hz is None:
         raise ConfigError("the sensor file states no rate; expected --rate such as '100 Hz'")
     return float(log.rate_hz)
+
+
+def _duration(text: str | None, hours: float | None, rate: float) -> float:
+    """Return the length of the log in s."""
+    if text is not None:
+        with naming("--duration: "):
+            duration = quantity_to_si(text, "time")
+        option = f"--duration {text}"
+    else:
+        assert hours is not None  # one of them is required
+        duration, option = 3600.0 * hours, f"--hours {hours:g}"
+    if not math.isfinite(duration):
+        raise ConfigError(f"{option}: expected a length of 1 to {_MOST} samples")
+    samples = round(duration * rate)
+    if not 1 <= samples <= _MOST:
+        raise ConfigError(
+            f"{option}: {duration:g} s at {rate:g} Hz are {samples} samples; expected 1 to {_MOST}"
+        )
+    return duration
 
 
 def _profiles(
@@ -238,7 +252,8 @@ def _profiles(
     elif path.suffix in (".csv", ".parquet", ".txt"):
         warm = {"form": "file", "file": str(path)}
     else:
-        quantity_to_si(given.temperature, "temperature")
+        with naming("--temperature: "):
+            quantity_to_si(given.temperature, "temperature")
         warm = given.temperature
     around = parse(Surroundings, {"temperature": warm}, given.temperature)
     _, temperature = profiles_of(around, folder)

@@ -23,6 +23,7 @@ from imubench_pipeline.validation import ConfigError
 _HEADING = re.compile(r"^\s*(\w+)\s*(?:[\[(]\s*(.+?)\s*[\])])?\s*$")
 _TIME = "time"
 _ROWS = 1 << 16
+_AS_TEXT = "commas between columns, points before decimals, and one line of names"
 
 
 class FileSeries:
@@ -44,7 +45,7 @@ class FileSeries:
         self._headings = self._read_headings()
         self._taken: dict[str, tuple[str, float, float]] = {}
         self.take(_TIME, "time")
-        self._batches: Iterator[pa.RecordBatch] | None = None
+        self._batches: Iterator[tuple[int, pa.RecordBatch]] | None = None
         self._window: dict[str, Array] = {}
         self._trimmed = False
 
@@ -90,8 +91,8 @@ class FileSeries:
             If the file has no rows, a number is missing in it, or its times do not ascend.
         """
         first, last = np.nan, np.nan
-        for batch in self._read():
-            times = self._columns(batch, last)[_TIME]
+        for row, batch in self._read():
+            times = self._columns(batch, row, last)[_TIME]
             if len(times):
                 first = times[0] if np.isnan(first) else first
                 last = times[-1]
@@ -133,10 +134,11 @@ class FileSeries:
         parts = [self._window]
         reached = float(self._window[_TIME][-1]) if len(self._window[_TIME]) else -np.inf
         while not reached >= last:
-            batch = next(self._batches, None)
-            if batch is None:
+            found = next(self._batches, None)
+            if found is None:
                 break
-            columns = self._columns(batch, reached)
+            row, batch = found
+            columns = self._columns(batch, row, reached)
             if len(columns[_TIME]):
                 parts.append(self._from(columns, first))
                 reached = float(columns[_TIME][-1])
@@ -151,7 +153,8 @@ class FileSeries:
         self._trimmed = self._trimmed or begin > 0
         return {name: values[begin:] for name, values in columns.items()}
 
-    def _columns(self, batch: pa.RecordBatch, before: float) -> dict[str, Array]:
+    def _columns(self, batch: pa.RecordBatch, row: int, before: float) -> dict[str, Array]:
+        """Return the columns of a batch in SI; ``row`` is the number of its first row."""
         found = {}
         for name, (heading, factor, offset) in self._taken.items():
             column = batch.column(heading)
@@ -159,19 +162,30 @@ class FileSeries:
                 raise ConfigError(f"{self.path}: column {heading!r} is text; expected numbers")
             raw = column.cast(pa.float64()).to_numpy(zero_copy_only=False)
             if not np.isfinite(raw).all():
+                at = row + int(np.argmin(np.isfinite(raw)))
                 raise ConfigError(
-                    f"{self.path}: column {heading!r}: a number is missing; expected one a row"
+                    f"{self.path}: column {heading!r}: a number is missing in row {at}; expected "
+                    "one a row: leave out the row, or fill it in"
                 )
             found[name] = raw * factor + offset
-        steps = np.diff(found[_TIME], prepend=before if np.isfinite(before) else -np.inf)
-        if not (steps > 0).all():
-            at = found[_TIME][int(np.argmin(steps > 0))]
-            raise ConfigError(f"{self.path}: the times do not ascend at {at:g} s")
+        times = np.concatenate(([before if np.isfinite(before) else -np.inf], found[_TIME]))
+        rises = np.diff(times) > 0
+        if not rises.all():
+            at = int(np.argmin(rises))
+            raise ConfigError(
+                f"{self.path}: the times do not ascend in row {row + at}: {times[at + 1]:g} s "
+                f"after {times[at]:g} s; expected each row later than the one before: put the rows "
+                "in order, each time once"
+            )
         return found
 
     def _read_headings(self) -> dict[str, tuple[str, str | None]]:
         found = {}
         for heading, unit in self._schema():
+            if self.path.suffix != ".parquet" and (";" in heading or "\t" in heading):
+                raise ConfigError(
+                    f"{self.path}: found the line of names {heading!r}; expected {_AS_TEXT}"
+                )
             match = _HEADING.match(heading)
             if match:
                 found[match[1]] = (heading, match[2] or unit)
@@ -191,14 +205,29 @@ class FileSeries:
                 with pacsv.open_csv(self.path) as reader:
                     schema = reader.schema
         except FileNotFoundError:
-            raise ConfigError(f"{self.path}: no such file") from None
+            raise ConfigError(
+                f"{self.path}: no such file; expected a CSV or Parquet file with columns such as "
+                "'time [s]': mend its name"
+            ) from None
         except (OSError, pa.ArrowException) as error:
-            raise ConfigError(f"{self.path}: cannot be read: {error}") from error
+            raise self._unreadable(error) from error
         stated = [(field.metadata or {}).get(b"unit") for field in schema]
         units = [None if unit is None else unit.decode("utf-8", "replace") for unit in stated]
         return list(zip(schema.names, units, strict=True))
 
-    def _read(self) -> Iterator[pa.RecordBatch]:
+    def _unreadable(self, error: Exception) -> ConfigError:
+        text = self.path.suffix != ".parquet" and isinstance(error, pa.ArrowException)
+        expected = f"; expected {_AS_TEXT}" if text else ""
+        return ConfigError(f"{self.path}: cannot be read: {error}{expected}")
+
+    def _read(self) -> Iterator[tuple[int, pa.RecordBatch]]:
+        """Yield batches, each with the number of its first row, the one under the names being 1."""
+        row = 1
+        for batch in self._batches_of_file():
+            yield row, batch
+            row += len(batch)
+
+    def _batches_of_file(self) -> Iterator[pa.RecordBatch]:
         headings = [heading for heading, _, _ in self._taken.values()]
         try:
             if self.path.suffix == ".parquet":
@@ -212,4 +241,4 @@ class FileSeries:
                 with pacsv.open_csv(self.path, convert_options=chosen) as reader:
                     yield from reader
         except (OSError, pa.ArrowException) as error:
-            raise ConfigError(f"{self.path}: cannot be read: {error}") from error
+            raise self._unreadable(error) from error

@@ -55,7 +55,7 @@ class StepsForm(Strict):
             )
         times = [quantity_to_si(time, "time") for time in self.times]
         if times != sorted(set(times)):
-            raise ValueError("the times do not ascend")
+            raise ValueError("the times do not ascend; expected each later than the one before")
         return self
 
 

@@ -26,7 +26,7 @@ from typing import Annotated, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from imubench_pipeline.sensor import QUANTITIES, Channel, quantity_of
-from imubench_pipeline.units import UnitError, difference_to_si, quantity_to_si
+from imubench_pipeline.units import UnitError, difference_to_si, naming, quantity_to_si
 from imubench_pipeline.validation import Frequency, Strict, Text
 
 
@@ -38,10 +38,7 @@ class ProcessSettings(Strict):
 
     def si(self, quantity: str) -> dict[str, float]:
         """Return its figures in SI."""
-        return {
-            "B": quantity_to_si(self.B, QUANTITIES[quantity]),
-            "T_B": quantity_to_si(self.T_B, "time"),
-        }
+        return _in_si({"B": (self.B, QUANTITIES[quantity]), "T_B": (self.T_B, "time")})
 
 
 class LineSettings(Strict):
@@ -52,10 +49,12 @@ class LineSettings(Strict):
 
     def si(self, quantity: str) -> dict[str, float]:
         """Return its figures in SI."""
-        return {
-            "amplitude": quantity_to_si(self.amplitude, QUANTITIES[quantity]),
-            "frequency": quantity_to_si(self.frequency, "frequency"),
-        }
+        return _in_si(
+            {
+                "amplitude": (self.amplitude, QUANTITIES[quantity]),
+                "frequency": (self.frequency, "frequency"),
+            }
+        )
 
 
 class DriftSettings(Strict):
@@ -68,17 +67,14 @@ class DriftSettings(Strict):
 
     def si(self, quantity: str) -> dict[str, float]:
         """Return its figures in SI, the reference in degC."""
-        figures = {
-            "sensitivity": (self.sensitivity, f"{quantity}_temperature_coefficient"),
-            "reference": (self.reference, "temperature"),
-            "quadratic": (self.quadratic, f"{quantity}_temperature_curvature"),
-            "lag": (self.lag, "time"),
-        }
-        return {
-            name: quantity_to_si(text, dimension)
-            for name, (text, dimension) in figures.items()
-            if text is not None
-        }
+        return _in_si(
+            {
+                "sensitivity": (self.sensitivity, f"{quantity}_temperature_coefficient"),
+                "reference": (self.reference, "temperature"),
+                "quadratic": (self.quadratic, f"{quantity}_temperature_curvature"),
+                "lag": (self.lag, "time"),
+            }
+        )
 
 
 class LowPassSettings(Strict):
@@ -129,22 +125,21 @@ class AxisSettings(Strict):
             "resolution": plain,
             "full_scale": plain,
         }
-        return {
-            name: quantity_to_si(text, dimension)
-            for name, dimension in dimensions.items()
-            if (text := getattr(self, name)) is not None
-        }
+        return _in_si({name: (getattr(self, name), of) for name, of in dimensions.items()})
 
     def check(self, channel: str) -> None:
-        """Raise UnitError if a unit has another dimension than its figure."""
+        """Raise UnitError, with the key, if a unit has another dimension than its figure."""
         quantity = quantity_of(channel)
         self.si(channel)
-        for process in self.further:
-            process.si(quantity)
-        for line in self.sinusoids:
-            line.si(quantity)
+        for number, process in enumerate(self.further):
+            with naming(f"further.{number}."):
+                process.si(quantity)
+        for number, line in enumerate(self.sinusoids):
+            with naming(f"sinusoids.{number}."):
+                line.si(quantity)
         if self.drift is not None:
-            self.drift.si(quantity)
+            with naming("drift."):
+                self.drift.si(quantity)
 
 
 def _matrix(rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
@@ -188,9 +183,19 @@ class ModelSettings(ImuSettings):
 
 
 def check_axes(axes: Mapping[Channel, AxisSettings], key: str) -> None:
-    """Raise ValueError, with key and channel, if a unit has another dimension than its figure."""
+    """Raise ValueError, with the key of the figure, if a unit has another dimension than it."""
     for channel, axis in axes.items():
         try:
             axis.check(channel)
         except UnitError as error:
-            raise ValueError(f"{key}.{channel}: {error}") from error
+            raise ValueError(f"{key}.{channel}.{error}") from error
+
+
+def _in_si(figures: Mapping[str, tuple[str | None, str]]) -> dict[str, float]:
+    """Return the figures that are there in SI, of text and dimension by their keys."""
+    found = {}
+    for key, (text, dimension) in figures.items():
+        if text is not None:
+            with naming(f"{key}: "):
+                found[key] = quantity_to_si(text, dimension)
+    return found

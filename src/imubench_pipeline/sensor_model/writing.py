@@ -25,6 +25,8 @@ from imubench_pipeline.validation import ConfigError
 
 MARK = "SIMULATED, not measured"
 FORMATS = (".parquet", ".csv")
+_HEAD = f"# {MARK}: "
+"""How notes begin, before the name of their log."""
 
 Blocks = Iterable[Mapping[str, Array]]
 
@@ -98,7 +100,7 @@ def write_notes(path: Path, log: LogFormat, sensor: LogFormat | None, words: str
     text = yaml.safe_dump(notes, sort_keys=False, default_flow_style=None, width=100)
     comment = "".join(f"# {line}\n" for line in words.splitlines())
     with replacing(notes_path(path)) as temporary:
-        temporary.write_text(f"# {MARK}\n{comment}{text}", encoding="utf-8")
+        temporary.write_text(f"{_HEAD}{path.name}\n{comment}{text}", encoding="utf-8")
 
 
 def notes_path(path: Path) -> Path:
@@ -107,11 +109,20 @@ def notes_path(path: Path) -> Path:
     Raises
     ------
     ConfigError
-        If notes are there that `write_notes` has not written.
+        If notes are there that `write_notes` has not written, or those of another log.
     """
     notes = path.with_suffix(".yaml")
-    if notes.exists() and not notes.read_text("utf-8", "replace").startswith(f"# {MARK}"):
+    if not notes.exists():
+        return notes
+    first = notes.read_text("utf-8", "replace").partition("\n")[0]
+    if not first.startswith(_HEAD.rstrip(": ")):
         raise ConfigError(f"{notes}: is there already and not of a simulation; name another --out")
+    other = path.with_name(first.removeprefix(_HEAD))
+    if first.startswith(_HEAD) and other != path and other.is_file():
+        raise ConfigError(
+            f"{notes}: says how {other.name} is written, and that cannot be read without it; "
+            f"expected a log of another name than {path.stem!r}: name another --out"
+        )
     return notes
 
 
