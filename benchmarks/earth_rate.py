@@ -22,11 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from imubench_pipeline.earth_rate.bound import block_length, cramer_rao
 from imubench_pipeline.earth_rate.experiment import Experiment
 from imubench_pipeline.earth_rate.kalman import Filtered, RateFilter
 from imubench_pipeline.earth_rate.known_rate import track
 from imubench_pipeline.earth_rate.pairs import by_pairs, by_triples
-from imubench_pipeline.earth_rate.prediction import Outlook, block_length, cramer_rao
+from imubench_pipeline.earth_rate.prediction import Outlook
 from imubench_pipeline.earth_rate.simulation import (
     ASSUMED_LATITUDE,
     ASSUMED_TURNING,

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from imubench_pipeline.earth_rate.bound import bound, cramer_rao
 from imubench_pipeline.earth_rate.experiment import Experiment
 from imubench_pipeline.earth_rate.kalman import RateFilter
-from imubench_pipeline.earth_rate.prediction import bound, cramer_rao
 from imubench_pipeline.earth_rate.ranges import sigma_ranges
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.noise import NoiseModel

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from imubench_pipeline.earth_rate.bound import block_length
 from imubench_pipeline.earth_rate.experiment import Blocks, Experiment, Measured, block_means
 from imubench_pipeline.earth_rate.kalman import RateFilter
 from imubench_pipeline.earth_rate.known_rate import track
 from imubench_pipeline.earth_rate.pairs import Differences, by_pairs, by_triples
-from imubench_pipeline.earth_rate.prediction import block_length
 from imubench_pipeline.earth_rate.states import WIDE
 from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE
 from imubench_pipeline.noise import NoiseModel

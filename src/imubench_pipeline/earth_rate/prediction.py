@@ -1,13 +1,6 @@
-"""How well a gyro can find the Earth's rate, before anything is measured.
+"""How well a gyro can find the Earth's rate and north, before anything is measured: the best dwell.
 
-The bound is that of generalised least squares over the covariance of the block means (Cramér and
-Rao; for Gaussian noise it is reached): with h what the blocks see of the rate, 1 what they see of
-the fixed bias and C their covariance,
-
-    information of the rate = h^T C^-1 h - (h^T C^-1 1)^2 / (1^T C^-1 1 + 1 / bias variance).
-
-It uses nothing of the filter. White noise alone gives N / sqrt(T) / cos(latitude) for T seconds in
-dwells, where the bias is known; all else only adds to it.
+All of it is the Cramér-Rao bound of runs of equal dwells (`imubench_pipeline.earth_rate.bound`).
 """
 
 from __future__ import annotations
@@ -17,24 +10,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cholesky, solve_triangular
 
-from imubench_pipeline.earth_rate.covariance import of_means
-from imubench_pipeline.earth_rate.experiment import Blocks, Experiment
-from imubench_pipeline.earth_rate.whitening import whitened
+from imubench_pipeline.earth_rate.bound import (
+    MOST_BLOCKS,
+    block_length,
+    information_by_states,
+    sigma_of,
+)
+from imubench_pipeline.earth_rate.experiment import Experiment
 from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE
 from imubench_pipeline.noise import NoiseModel
 
 Array = NDArray[np.float64]
-
-_TOLERANCE = 1e-3
-"""Relative loss of the standard deviation by longer blocks that is nothing."""
-
-_TRIED = 4
-"""Dwells on which a block length is tried."""
-
-_MOST_BLOCKS = 2048
-"""Blocks whose covariance is still formed."""
 
 _SUMMED = 64
 """Dwells that are computed; the information of more grows by what the latter half of them add."""
@@ -50,124 +37,6 @@ _CURVE = 40
 
 _BETWEEN = 15
 """Numbers of dwells about the best of these."""
-
-
-def cramer_rao(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> Array:
-    """Return the least standard deviation of the rate that the data up to each block allow.
-
-    Parameters
-    ----------
-    blocks : Blocks
-    model : NoiseModel
-        With some noise in every sample: N, or a process that has one.
-    turn_on_bias : float
-        Standard deviation of the fixed bias, rad/s; by default it is not known.
-
-    Returns
-    -------
-    ndarray, shape (b,)
-        rad/s; infinite where the rate cannot be told from the bias.
-
-    Raises
-    ------
-    ValueError
-        If the turn-on bias is negative, or NaN.
-    """
-    return _sigma(information(blocks, model, turn_on_bias))
-
-
-def information(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> Array:
-    """Return the Fisher information of the rate in the data up to each block.
-
-    Parameters
-    ----------
-    blocks : Blocks
-    model : NoiseModel
-    turn_on_bias : float
-        rad/s; see `cramer_rao`.
-
-    Returns
-    -------
-    ndarray, shape (b,)
-        (rad/s)^-2.
-
-    Raises
-    ------
-    ValueError
-        If the turn-on bias is negative, or NaN.
-    """
-    # Leading blocks have the leading part of the root.
-    root = cholesky(of_means(model, blocks), lower=True, overwrite_a=True)
-    return _of_rate(solve_triangular(root, _seen(blocks), lower=True), turn_on_bias)
-
-
-def _by_states(blocks: Blocks, model: NoiseModel, turn_on_bias: float) -> Array:
-    """Return what `information` does, of many blocks faster."""
-    return _of_rate(whitened(model, blocks, _seen(blocks)), turn_on_bias)
-
-
-def _seen(blocks: Blocks) -> Array:
-    """Return what the means see of the rate, and of a fixed bias."""
-    return np.column_stack([blocks.seen, np.ones(len(blocks))])
-
-
-def _of_rate(white: Array, turn_on_bias: float) -> Array:
-    if not turn_on_bias >= 0:
-        raise ValueError(f"turn_on_bias is {turn_on_bias}, expected a number from 0, or infinity")
-    rate = np.cumsum(white[:, 0] ** 2)
-    if turn_on_bias == 0:
-        return rate
-    cross = np.cumsum(white[:, 0] * white[:, 1])
-    bias = np.cumsum(white[:, 1] ** 2) + 1.0 / turn_on_bias**2
-    left = rate - cross**2 / bias
-    return np.asarray(np.where(left > 1e-9 * rate, left, 0.0))
-
-
-def bound(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> float:
-    """Return what `cramer_rao` does at the end of a run, of many blocks faster, rad/s.
-
-    Parameters
-    ----------
-    blocks : Blocks
-    model : NoiseModel
-    turn_on_bias : float
-        rad/s; see `cramer_rao`.
-    """
-    return float(_sigma(_by_states(blocks, model, turn_on_bias))[-1])
-
-
-def block_length(experiment: Experiment, model: NoiseModel) -> int:
-    """Return the longest block whose means tell as much of the rate as the samples.
-
-    Blocks are shortened, by halves, until a fourth of their length would lower the bound by less
-    than 0.1 %; tried on the first four dwells, with 2,048 blocks at most.
-
-    Parameters
-    ----------
-    experiment : Experiment
-    model : NoiseModel
-
-    Returns
-    -------
-    int
-        Samples; at most those of the longest dwell.
-    """
-    tried = Experiment(experiment.dwells[:_TRIED], experiment.rate, experiment.latitude)
-    length = max(dwell.stop - dwell.start for dwell in experiment.dwells)
-    if len({dwell.sense for dwell in tried.dwells}) < 2:
-        return length  # nothing can be told of the rate, from samples either
-    sigmas: dict[int, float] = {}
-
-    def sigma(longest: int) -> float:
-        if longest not in sigmas:
-            sigmas[longest] = float(_sigma(_by_states(tried.blocks(longest), model, math.inf))[-1])
-        return sigmas[longest]
-
-    while length > 4 and len(tried.blocks(length // 4)) <= _MOST_BLOCKS:
-        if sigma(length // 4) > (1.0 - _TOLERANCE) * sigma(length):
-            break
-        length //= 2
-    return length
 
 
 @dataclass(frozen=True)
@@ -275,7 +144,7 @@ class Outlook:
         found = self._information(dwell, turns + 1)
         number = np.arange(1, turns + 1)
         time = (number + 1) * dwell + number * self.turning
-        return Prediction(number, time, _sigma(found[1:]))
+        return Prediction(number, time, sigma_of(found[1:]))
 
     def turns_needed(self, dwell: float, relative: float) -> int:
         """Return how many turns give the Earth's rate to a relative standard deviation.
@@ -312,7 +181,7 @@ class Outlook:
         found = self._information(dwell, _SUMMED)
         beyond = max(turns + 1 - _SUMMED, 0)
         last = found[min(turns, _SUMMED - 1)] + (_growth(found) * beyond if beyond else 0.0)
-        return float(_sigma(np.array([last]))[0])
+        return float(sigma_of(np.array([last]))[0])
 
     def time_needed(self, dwell: float, relative: float) -> float:
         """Return how long a run gives the Earth's rate to a relative standard deviation, s.
@@ -372,7 +241,7 @@ class Outlook:
             self._information((run_time - (n - 1) * self.turning) / n, n)[-1]
             for n in dwells.tolist()
         ]
-        return _sigma(np.array(last))
+        return sigma_of(np.array(last))
 
     def heading(self, dwell: float, turns: int) -> Array:
         """Return the least standard deviation of the heading by gyrocompassing after each turn.
@@ -408,10 +277,10 @@ class Outlook:
         )
         longest = block_length(design, self.model)
         each = -(-design.samples_in_dwells // len(design.dwells) // longest)
-        summed = max(_MOST_BLOCKS // each, _LEAST_SUMMED)
+        summed = max(MOST_BLOCKS // each, _LEAST_SUMMED)
         blocks = replace(design, dwells=design.dwells[:summed]).blocks(longest)
         last = np.flatnonzero(np.diff(blocks.dwell, append=-1))
-        found = _by_states(blocks, self.model, self.turn_on_bias)[last]
+        found = information_by_states(blocks, self.model, self.turn_on_bias)[last]
         more = np.arange(1, dwells - len(found) + 1)
         return np.concatenate([found, found[-1] + _growth(found) * more]) if len(more) else found
 
@@ -420,8 +289,3 @@ def _growth(found: Array) -> float:
     """Return what each of the latter half of the dwells adds on average."""
     half = len(found) // 2
     return float(found[-1] - found[-1 - half]) / half
-
-
-def _sigma(found: Array) -> Array:
-    with np.errstate(divide="ignore"):
-        return np.asarray(1.0 / np.sqrt(found))

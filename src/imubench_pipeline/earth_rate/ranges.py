@@ -13,9 +13,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.linalg import LinAlgError
 
+from imubench_pipeline.earth_rate.bound import bound
 from imubench_pipeline.earth_rate.experiment import Blocks
 from imubench_pipeline.earth_rate.pairs import by_pairs, by_triples
-from imubench_pipeline.earth_rate.prediction import bound
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.sigma_range import sigma_range
 
