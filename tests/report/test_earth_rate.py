@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.report import publish as publishing
 from imubench_pipeline.report.earth_rate import published_words
 from imubench_pipeline.report.publish import one_file, publish
@@ -13,7 +14,8 @@ from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.turned import answer, needs
 from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
 from imubench_pipeline.tables import build
-from tests.earth_rate.recordings import put, put_at_rest, run, turned_log
+from tests.earth_rate.recordings import EVERY_30, put, put_at_rest, run, turned_log
+from tests.earth_rate.runs import PAPER, turned
 from tests.report.pages import Read, lost_links, read_pages
 from tests.report.tables import DEGREE, Rows, joined, recording_rows, rejected_rows, site
 
@@ -162,6 +164,19 @@ def test_a_report_may_hold_nothing_but_such_runs(tmp_path: Path) -> None:
     found = read_pages(tmp_path / "report")
     assert {path: page.faults for path, page in found.items() if page.faults} == {}
     assert "1 recording of 1 sensor" in found["index.html"].text
+
+
+def test_turns_that_nothing_shows_are_a_remark(tmp_path: Path) -> None:
+    quiet = NoiseModel(N=PAPER.N / 2.0)
+    rest = put_at_rest(tmp_path / "night", quiet)
+    log = {"gyro_x": turned(EVERY_30, 600.0, peak=0.0, noise=quiet)}
+    rows = {"recordings": [{"sensor": "s", "recording": "run"} | ABOUT]}
+    rows |= run(put(tmp_path / "run", log), [rest])
+    publish(site(joined(recording_rows("s", "night"), rows), tmp_path), tmp_path / "report")
+    pages = read_pages(tmp_path / "report")
+    for path in ("earth_rate.html", "recordings/s/run.html"):
+        assert "19 of 19 turns rest on the schedule" in pages[path].text, path
+        assert "ambiguous" in pages[path].text
 
 
 def test_all_pages_stand_in_one_file(made: Site) -> None:

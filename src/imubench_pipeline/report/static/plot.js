@@ -68,7 +68,8 @@ function band(x, low, high, look, opacity = 0.18) {
   const edge = { type: "scatter", mode: "lines", x, hoverinfo: "skip", line: { width: 0, color: colourOf(look) } };
   const fillcolor = faint(colourOf(look), opacity);
   const there = x.map((_, i) => Number.isFinite(low[i]) && Number.isFinite(high[i]));
-  if (there.every(Boolean)) return [{ ...edge, y: low }, { ...edge, y: high, fill: "tonexty", fillcolor }];
+  const stretches = there.filter((one, i) => one && !there[i - 1]).length;
+  if (stretches < 2) return [{ ...edge, y: low }, { ...edge, y: high, fill: "tonexty", fillcolor }];
   // "tonexty" would join the two sides of a gap: each stretch is a shape by itself.
   const shapes = { x: [], y: [] };
   for (let first = 0; first < x.length; first += 1) {
