@@ -56,6 +56,23 @@ def test_samples_come_back_as_written(tmp_path: Path, rng: np.random.Generator) 
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["log.parquet"]
 
 
+def test_empty_lines_of_one_column_keep_their_time(
+    tmp_path: Path, rng: np.random.Generator
+) -> None:
+    wx = 1e-3 * rng.standard_normal(5000)
+    wx[2000:4000] = np.nan
+    cells = ["" if np.isnan(value) else f"{value:.17g}" for value in wx]
+    one, two = tmp_path / "one.csv", tmp_path / "two.csv"
+    one.write_text("wx\n" + "\n".join(cells) + "\n\n\n")
+    two.write_text("wx,n\n" + "".join(f"{cell},1\n" for cell in cells))
+    alone = {"gyro_x": XY["gyro_x"]}
+    results = [kept(source, tmp_path / source.stem, alone) for source in (one, two)]
+    for result, values in results:
+        assert result.summary["duration"] == 50.0
+        assert [(one.finding, one.value) for one in result.findings] == [("empty_cells", 2000.0)]
+        np.testing.assert_array_equal(values["gyro_x"], wx)
+
+
 def test_row_groups_and_encoding(tmp_path: Path) -> None:
     source = tmp_path / "a.csv"
     source.write_text("wx,wy\n" + "1.5,2\n2.5,1\n" * 600_000)

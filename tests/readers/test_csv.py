@@ -203,6 +203,47 @@ def test_what_is_wrong_is_named(tmp_path: Path, text: str | bytes, message: str)
         columns(path, log_format(comment="//"))
 
 
+ONE = {"gyro_x": {"column": "wx", "unit": "rad/s"}}
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("wx\n1\n2\n\n\n3\n", [1, 2, np.nan, np.nan, 3]),
+        ("wx\r\n1\r\n2\r\n\r\n3\r\n", [1, 2, np.nan, 3]),
+        ("wx\n1\n2\n \t \n3\n", [1, 2, np.nan, 3]),
+        ("wx\n1\n2\n\n# said\n\n3\n", [1, 2, np.nan, np.nan, 3]),
+        # What only sets records apart, or stands around them.
+        ("wx\n1\n2\n3\n\n\n \n\n", [1, 2, 3]),
+        ("\n\nwx\n\n\n1\n2\n3\n", [1, 2, 3]),
+        ("wx\n\n1\n\n2\n\n3\n\n", [1, 2, 3]),
+        ("wx\r\r\n1\r\r\n2\r\r\n3\r\r\n", [1, 2, 3]),
+    ],
+)
+def test_a_blank_line_between_lines_of_one_column_is_a_missing_sample(
+    tmp_path: Path, text: str, expected: list[float]
+) -> None:
+    found, _, file = columns(written(tmp_path, text), log_format(ONE))
+    np.testing.assert_array_equal(found["gyro_x"], expected)
+    assert file.findings == []
+
+
+def test_blank_lines_over_blocks_of_one_column_are_each_a_missing_sample(tmp_path: Path) -> None:
+    hole = 200_000  # lines, more than what is read at once
+    parts = ["1.5\n" * 50_000, "\n" * hole, "2.5\n" * 50_000, "\n" * hole]
+    found, _, _ = columns(written(tmp_path, "wx\n" + "".join(parts)), log_format(ONE))
+    values = found["gyro_x"]
+    assert len(values) == 100_000 + hole
+    assert np.isnan(values[50_000 : 50_000 + hole]).all()
+    assert np.isfinite(values).sum() == 100_000
+
+
+def test_a_line_behind_missing_samples_of_one_column_is_named_by_its_number(tmp_path: Path) -> None:
+    path = written(tmp_path, "wx\n1\n2\n\n\n3\nx\n4\n")
+    with pytest.raises(RecordingError, match=r"line 7, column 'wx': found 'x'"):
+        columns(path, log_format(ONE))
+
+
 @pytest.mark.parametrize("column", ["angle", 3])
 def test_a_position_that_is_missing_is_mended_where_it_is_stated(
     tmp_path: Path, column: str | int

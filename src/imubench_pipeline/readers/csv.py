@@ -160,8 +160,9 @@ class CsvFile(LogFile):
         stripped = b"\r\n" if blank else b"\r\n\t "
         one, count = layout.records(), 0
         for number, raw in enumerate(first_lines(self.path), start=1):
-            count += number > layout.lines_before and bool(one(raw).strip(stripped))
-            if count == row:
+            if number > layout.lines_before:
+                count += sum(bool(line.strip(stripped)) for line in one(raw).split(b"\n"))
+            if count >= row:
                 return number
         return row + layout.lines_before
 

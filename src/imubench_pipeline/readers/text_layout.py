@@ -14,7 +14,7 @@ from imubench_pipeline.readers.batch import RecordingError, stated_in
 from imubench_pipeline.readers.complete_lines import first_lines
 from imubench_pipeline.readers.text_cells import Decimal, are_figures, is_datum, is_number
 from imubench_pipeline.readers.text_header import are_units, completed, is_heading, likely_header
-from imubench_pipeline.readers.text_records import Records
+from imubench_pipeline.readers.text_records import Records, are_apart
 from imubench_pipeline.readers.text_refusals import (
     refuse_binary,
     refuse_decimals_apart,
@@ -60,6 +60,8 @@ class TextLayout:
         The lines before the first record, with the comments.
     passed_over : tuple of (int, str)
         Number and text of the lines before the first record that are neither names nor units.
+    blank_is_missing : bool
+        A blank line among the records is one whose only cell is empty.
     """
 
     file: str
@@ -74,6 +76,7 @@ class TextLayout:
     header: bytes
     preamble: tuple[bytes, ...]
     passed_over: tuple[tuple[int, str], ...]
+    blank_is_missing: bool
 
     def position(self, column: Column, key: str) -> int:
         """Return the position, counted from 0, of a column that the sensor file names.
@@ -107,12 +110,9 @@ class TextLayout:
 
     def records(self) -> Records:
         """Return what makes records of the lines from the first record on."""
-        return Records(
-            [sign.encode() for sign in self.comments],
-            self.header,
-            self.preamble,
-            self.split.runs,
-        )
+        runs, blank = self.split.runs, self.blank_is_missing
+        signs = [sign.encode() for sign in self.comments]
+        return Records(signs, self.header, self.preamble, runs, blank)
 
 
 @dataclass(frozen=True)
@@ -204,6 +204,8 @@ class _Search:
                 line.raw for line in [*comments, *lines[:first]] if line.number < record.number
             ),
             passed_over=tuple((line.number, line.text) for line in passed_over),
+            blank_is_missing=len(names) == 1
+            and not are_apart([line.number for line in lines[first:]]),
         )
 
     # --------------------------------------------------------------------- the first lines

@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from imubench_pipeline.readers.batch import RecordingError
+
 _IN_NUMBERS = frozenset(b"0123456789+-.,;:|\t \"'eEnNaAiIfFtT/\r")
 _NO_COMMENT = rb"(?!#(?i:n/a|na|value!|num!|div/0!)[;,|\t ])"
 """What a spreadsheet writes into a cell without a number, which may be the first of a line."""
+
+_IN_BLANK = b" \t\r\n"
+_BLANK_LINES = re.compile(rb"^[ \t\r]*+\n", re.MULTILINE)
+_MISSING = b"nan\n"
+_MOST_BLANK = 1 << 24  # beside each other, for memory
 
 _TAB_TO_SPACE = bytes.maketrans(b"\t", b" ")
 
@@ -28,6 +36,8 @@ class Records:
         The lines before the first record, which a logger that starts again repeats.
     runs : bool
         Columns are divided by runs of spaces or tabs, which become one space.
+    blank_is_missing : bool
+        A blank line between two records is one whose only cell is empty.
 
     Attributes
     ----------
@@ -43,6 +53,7 @@ class Records:
         header: bytes,
         preamble: Sequence[bytes],
         runs: bool,
+        blank_is_missing: bool = False,
     ) -> None:
         self._comments = tuple(comments)
         alternatives = b"|".join(re.escape(sign) for sign in self._comments)
@@ -57,6 +68,8 @@ class Records:
         self._preamble = frozenset(preamble)
         self._begins = tuple({*preamble[:1], header})
         self._runs = runs
+        self._blank_is_missing = blank_is_missing
+        self._blank = 0
         self.restarts = 0
         self.cut = 0
 
@@ -71,8 +84,26 @@ class Records:
                 break
         if self._runs:
             lines = _single_spaces(lines)
+        if self._blank_is_missing and lines:
+            lines = self._with_missing(lines)
         # pyarrow shows us a record of wrong width only if it is UTF-8.
         return lines if lines.isascii() else lines.decode("utf-8", "replace").encode()
+
+    def _with_missing(self, lines: bytes) -> bytes:
+        """Return the lines with a cell in blank ones; those at the end wait for what follows."""
+        ended = lines.rstrip(_IN_BLANK)
+        after = lines[len(ended) :].count(b"\n")
+        if not ended:
+            self._blank += after
+            return b""
+        if self._blank > _MOST_BLANK:
+            raise RecordingError(
+                f"{self._blank} blank lines follow each other among the records; expected a log "
+                "without: cut the file there"
+            )
+        before = _MISSING * self._blank
+        self._blank = after - 1
+        return before + _BLANK_LINES.sub(_MISSING, ended) + b"\n"
 
     def _without_headers(self, lines: bytes) -> bytes:
         kept = []
@@ -88,6 +119,17 @@ class Records:
             else:
                 kept.append(line + b"\n")
         return b"".join(kept)
+
+
+def are_apart(numbers: Sequence[int]) -> bool:
+    """Return whether blank lines are between all records, and only set these apart.
+
+    Parameters
+    ----------
+    numbers : sequence of int
+        The lines of the first records.
+    """
+    return all(later > sooner + 1 for sooner, later in pairwise(numbers))
 
 
 def _single_spaces(lines: bytes) -> bytes:
