@@ -342,6 +342,11 @@ def test_the_density_of_intervals_is_one_in_all() -> None:
     assert density.sum() * 0.01 == pytest.approx(1.0 - 0.07 + 0.07 / (1.0 - 0.35), rel=0.02)
 
 
+def test_hundreds_of_dwells_without_a_turn_are_none() -> None:
+    with np.errstate(divide="raise"):
+        assert interval_density(np.array([10.0, 9000.0]), 10.0, 2.0)[1] == -math.inf
+
+
 def test_the_alternation_is_that_of_the_level() -> None:
     log = turned(EVERY_30, 600.0, peak=0.0, noise=NoiseModel(N=1e-8))
     log += 1e-6 * np.arange(len(log)) / RATE

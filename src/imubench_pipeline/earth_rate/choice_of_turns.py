@@ -210,7 +210,9 @@ def interval_density(interval: Array, dwell: float, tolerance: float) -> Array:
         off = (interval - k * dwell) / scale
         student = 2.0 / (math.pi * math.sqrt(3.0) * (1.0 + off**2 / 3.0) ** 2)
         density += np.where(k > 0.0, weight * student / scale, 0.0)
-    return np.asarray(np.log(density))
+    # Of hundreds of dwells without a turn the density is 0, and the sequence is none.
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(density))
 
 
 def _at_edge(interval: float, dwell: float) -> float:
