@@ -5,8 +5,9 @@ from typing import Any
 
 import pytest
 import yaml
+from snakemake.cli import parse_config
 
-from imubench_pipeline.config import Run, read_run
+from imubench_pipeline.config import Run, given_beside, read_run
 from imubench_pipeline.sensor import (
     RecordingNotes,
     Sensor,
@@ -95,6 +96,28 @@ def test_snakemake_hands_text_over() -> None:
     assert run.simulated is None
     assert run.allan.per_decade == 5
     assert run.allan.longest == 0.25
+
+
+def test_what_a_run_was_given_beside_its_file_is_told_as_snakemake_takes_it(tmp_path: Path) -> None:
+    file = tmp_path / "config.yaml"
+    file.write_text("results: mine\nallan: {overlap: full}\n")
+    given = {
+        "results": "others, new", "logs": "/data/logs", "simulated": False, "held_back": ["a/b"],
+        "allan": {"overlap": "full", "per_decade": 5}, "report": {"title": "Mine"},
+        "error_budget": {"times": ["1 s", "3 min"]},
+    }  # fmt: skip
+    run = read_run(given)
+    told = given_beside(run, file)
+    assert "logs=/data/logs" in told and "simulated=false" in told
+    assert 'allan={"per_decade": 5}' in told
+    # What it takes is that run again, but for what matters to no recording.
+    again = read_yaml(file) | parse_config(told)
+    again["allan"] = {"overlap": "full"} | again["allan"]
+    assert read_run(again) == read_run(
+        {key: value for key, value in given.items() if key not in ("held_back", "report")}
+    )
+    assert given_beside(Run(results=Path("mine"), allan={"overlap": "full"}), file) == []
+    assert given_beside(Run(), tmp_path / "none.yaml") == []
 
 
 @pytest.mark.parametrize("longest", ["2/3", "0", "half", "1/0"])

@@ -150,6 +150,7 @@ def test_a_report_is_given_what_its_pages_show(project: dict[str, Any], tmp_path
     plan = Plan(project | {"requirements": str(tmp_path / "requirements")})
     settings = json.loads(plan.report_settings())
     assert settings["results"] == project["results"]
+    assert {f"logs={project['logs']}", "simulated=false"} <= set(settings["given"])
     assert set(settings["report"]) >= {"title", "units"}
     # Sensors with recordings; of one without a file nothing is known.
     assert list(settings["sensors"]) == ["s"]

@@ -11,6 +11,7 @@ import yaml
 from imubench_pipeline.plan import Plan
 from imubench_pipeline.readers import read
 from imubench_pipeline.sensor import LogFormat, Sensor, read_sensors
+from imubench_pipeline.sensor_model.profile_forms import DayCycleForm
 from imubench_pipeline.sensor_model.truth import figures_of
 from imubench_pipeline.simulated_logs import write_simulated
 from imubench_pipeline.simulated_recordings import (
@@ -237,6 +238,24 @@ def test_a_recording_that_is_simulated_twice_is_refused(tmp_path: Path) -> None:
     alone |= {"recording": "sim_x"}
     with pytest.raises(ConfigError, match=r"simulated.yaml: t/sim_x is simulated twice"):
         read_simulated(written(tmp_path, recordings=[alone, alone]), SENSORS)
+
+
+def test_a_board_is_run_as_its_page_of_the_manual_says(tmp_path: Path) -> None:
+    manual = (PROJECT / "docs/boards.md").read_text(encoding="utf-8")
+    listed = re.search(r"^boards: .*", manual, re.MULTILINE)
+    named = re.search(r"named (sim_\w+)$", listed[0]) if listed else None
+    assert listed and named and "--config simulated=my_simulated.yaml" in manual
+    (tmp_path / "boards").mkdir()
+    (tmp_path / "boards/oven.yaml").write_text(yaml.safe_dump(BOARD))
+    (tmp_path / "my_simulated.yaml").write_text(listed[0])
+    found = read_simulated(tmp_path / "my_simulated.yaml", SENSORS)
+    assert {one.recording for one in found.recordings} == {named[1]}
+
+
+def test_the_manual_has_the_defaults_of_a_day_cycle() -> None:
+    manual = (PROJECT / "docs/simulator.md").read_text(encoding="utf-8")
+    period, highest = (DayCycleForm.model_fields[name].default for name in ("period", "highest"))
+    assert f"period is {period} and highest, the time of the highest value, {highest}" in manual
 
 
 def test_a_board_that_is_not_there_is_named(tmp_path: Path) -> None:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, field_validator
 
@@ -12,12 +13,16 @@ from imubench_pipeline.calibration.declaration import AccelerationFromZero, Rate
 from imubench_pipeline.earth_rate.declaration import TimeFromZero
 from imubench_pipeline.requirements import Axis, Latitude, Time
 from imubench_pipeline.validation import (
+    ConfigError,
     FractionOfLog,
     Frequency,
     Strict,
     Text,
     parse,
+    read_yaml,
 )
+
+_OF_NO_RECORDING = {"held_back", "exports", "report"}
 
 
 class AllanSettings(Strict):
@@ -269,3 +274,41 @@ class Run(Strict):
 def read_run(config: Mapping[str, object], file: str = "config/config.yaml or --config") -> Run:
     """Validate the configuration of a run, as Snakemake hands it over (numbers may be text)."""
     return parse(Run, config, file)
+
+
+def given_beside(run: Run, file: Path) -> list[str]:
+    """Return what a run was given beside its file, as ``snakemake --config`` takes it.
+
+    What does not matter to the results of a recording is left out.
+
+    Parameters
+    ----------
+    run : Run
+    file : Path
+        The configuration that Snakemake reads by itself.
+    """
+    try:
+        written = parse(Run, read_yaml(file), str(file))
+    except ConfigError:
+        written = Run()
+    here, there = (one.model_dump(mode="json", exclude=_OF_NO_RECORDING) for one in (run, written))
+    return [f"{key}={_as_given(value)}" for key, value in _differing(here, there).items()]
+
+
+def _differing(here: Mapping[str, Any], there: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what is not there, or otherwise."""
+    found: dict[str, Any] = {}
+    for key, value in here.items():
+        other = there.get(key)
+        if isinstance(value, Mapping) and isinstance(other, Mapping):
+            if inner := _differing(value, other):
+                found[key] = inner
+        elif value != other:
+            found[key] = value
+    return found
+
+
+def _as_given(value: object) -> str:
+    if value is None:
+        return "false"  # files that are left out: no other entry outside of a group may be null
+    return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)

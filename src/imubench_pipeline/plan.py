@@ -14,7 +14,7 @@ from pathlib import Path
 
 from pydantic import BaseModel
 
-from imubench_pipeline.config import Run, read_run
+from imubench_pipeline.config import Run, given_beside, read_run
 from imubench_pipeline.drop_zone import Recording, fingerprint, fingerprints, found_logs
 from imubench_pipeline.provenance import source_digest
 from imubench_pipeline.requirements import Requirement, read_requirements
@@ -341,6 +341,7 @@ class Plan:
             {
                 "report": self.run.report.model_dump(mode="json"),
                 "results": str(self.run.results),
+                "given": given_beside(self.run, Path("config/config.yaml")),
                 "settings": {
                     section: getattr(self.run, section).model_dump(mode="json")
                     for section in (

@@ -263,6 +263,7 @@ def settings_of(
     boards: Mapping[str, Any] | None = None,
     units: str = "practical",
     title: str = "A title",
+    given: Sequence[str] = (),
 ) -> str:
     """What a plan says of the report."""
     sensors = dict.fromkeys(tables["recordings"]["sensor"].to_pylist())
@@ -270,6 +271,7 @@ def settings_of(
         {
             "report": {"title": title, "units": units},
             "results": "results",
+            "given": list(given),
             "settings": {
                 "allan": {"overlap": "octave"},
                 "error_budget": {"static_window": "60 s", "latitude": "45 deg"},

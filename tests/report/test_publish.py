@@ -220,6 +220,13 @@ def test_a_rejected_recording_says_why_wherever_it_is_listed(read: dict[str, Rea
         assert reason in read[path].text, path
 
 
+def test_figures_of_a_rejected_recording_are_not_offered(read: dict[str, Read]) -> None:
+    offered = "imubench figures results --sensor one --recording"
+    assert offered in read["recordings/one/day1.html"].text
+    assert offered not in read["recordings/one/torn.html"].text
+    assert "To make its results again: snakemake" in read["recordings/one/torn.html"].text
+
+
 def test_a_simulated_recording_is_called_so_on_every_page_that_names_it(
     read: dict[str, Read],
 ) -> None:

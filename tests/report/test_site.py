@@ -198,3 +198,13 @@ def test_a_summary_says_how_many_recordings_how_long_and_of_when() -> None:
         "All are simulated from published parameters, not measured."
     )
     assert summary([]) == "0 recordings of 0 sensors: 0 analysed, 0 rejected."
+
+
+def test_the_command_that_makes_results_again_has_what_the_run_was_given() -> None:
+    target = "results/recordings/imu/r/scores.parquet"
+    plain = of(recording_rows("imu", "r"))
+    assert plain.again(plain.views[0], "scores") == (f"snakemake -c2 --forcerun ingest -- {target}")
+    other = of(recording_rows("imu", "r"), given=["logs=my logs", "simulated=false"])
+    assert other.again(other.views[0], "scores") == (
+        f"snakemake -c2 --config 'logs=my logs' simulated=false --forcerun ingest -- {target}"
+    )

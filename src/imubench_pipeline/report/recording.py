@@ -82,13 +82,11 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         "budget_words": budget_words(site.settings["settings"]["error_budget"]),
         "provenance": list(provenance(view, channels, folder)),
         "sources": metadata_of(folder).get("sources", []),
-        "command": shlex.join(
-            [
-                *("snakemake", "-c2", "--forcerun", "ingest", "--"),
-                f"{site.results_name}/recordings/{view.sensor}/{view.name}/scores.parquet",
-            ]
-        ),
-        "figures_command": shlex.join(
+        "command": site.again(view, "scores"),
+        # Of a rejected one there is nothing to draw.
+        "figures_command": None
+        if view.rejected
+        else shlex.join(
             [
                 *("imubench", "figures", site.results_name),
                 *("--sensor", view.sensor, "--recording", view.name),

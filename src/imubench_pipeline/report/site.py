@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+import shlex
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -98,6 +99,18 @@ class Site:
     def results_name(self) -> str:
         """The folder of the results, as the commands of the pages name it."""
         return str(self.settings.get("results", "results"))
+
+    def again(self, view: RecordingView, table: str) -> str:
+        """Return the command that makes the results of a recording again, up to a table."""
+        given = self.settings.get("given", [])
+        return shlex.join(
+            [
+                *("snakemake", "-c2"),
+                *(["--config", *given] if given else []),
+                *("--forcerun", "ingest", "--"),
+                f"{self.results_name}/recordings/{view.sensor}/{view.name}/{table}.parquet",
+            ]
+        )
 
     @cached_property
     def views(self) -> list[RecordingView]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -91,12 +90,7 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         "stretches": list(_stretches(turning)),
         "provenance": list(provenance(view, [], folder)),
         "sources": metadata_of(folder).get("sources", []),
-        "command": shlex.join(
-            [
-                *("snakemake", "-c2", "--forcerun", "ingest", "--"),
-                f"{site.results_name}/recordings/{view.sensor}/{view.name}/earth_rate.parquet",
-            ]
-        ),
+        "command": site.again(view, "earth_rate"),
         "page": {
             "looks": {},
             "channels": [],
