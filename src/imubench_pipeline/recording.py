@@ -9,7 +9,7 @@ null. Where channels have clocks of their own, each clock has a file: ``log.gyro
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
@@ -21,6 +21,8 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from imubench_pipeline.readers.batch import POSITION, TABLE_RATE, TEMPERATURE
+
+Array = NDArray[np.float64]
 
 ROW_GROUP = 1 << 20
 """Rows of a row group."""
@@ -238,3 +240,26 @@ def channel_logs(folder: Path) -> dict[str, ChannelLog]:
             )
     order = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
     return {name: logs[name] for name in order if name in logs}
+
+
+def on_grid(blocks: Iterable[Array], grid: int) -> Array:
+    """Return a column on the whole grid of a log.
+
+    Parameters
+    ----------
+    blocks : iterable of ndarray
+        In order, in any unit.
+    grid : int
+        L, samples of the log.
+
+    Returns
+    -------
+    ndarray, shape (L,)
+        In the unit of the blocks, NaN where nothing is.
+    """
+    values = np.full(grid, np.nan)
+    reached = 0
+    for block in blocks:
+        values[reached : reached + len(block)] = block
+        reached += len(block)
+    return values

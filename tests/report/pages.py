@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
+from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
+
 VOID = {"meta", "link", "br", "img", "input", "hr", "wbr", "col"}
 BLOCKS = {"p", "ul", "ol", "dl", "div", "table", "section", "figure", "header", "footer", "main",
           "nav", "details", "h1", "h2", "h3", "h4", "aside", "form"}  # fmt: skip
@@ -171,3 +173,13 @@ def lost_links(pages: dict[str, Read], folder: Path, besides: set[str] = frozens
             elif found not in besides and not (folder / found).is_file():
                 lost.add(f"{path}: {link}")
     return lost
+
+
+def sound_pages(folder: Path, figures: set[str]) -> dict[str, Read]:
+    """The pages of a report, without fault, whose links lead to pages, tables and figures."""
+    found = read_pages(folder)
+    tables = set(TABLES) - set(OF_ONE_RECORDING)
+    besides = {f"../tables/{name}.{kind}" for name in tables for kind in ("csv", "parquet")}
+    assert {path: page.faults for path, page in found.items() if page.faults} == {}
+    assert lost_links(found, folder, besides | figures) == set()
+    return found

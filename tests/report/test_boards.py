@@ -1,19 +1,18 @@
 import json
-from collections.abc import Iterator
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from imubench_pipeline.report import publish as publishing
 from imubench_pipeline.report.boards import boards_page, published_lines
 from imubench_pipeline.report.publish import pages, publish
 from imubench_pipeline.report.site import Site
-from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
 from imubench_pipeline.tables import build
-from tests.report.pages import Read, lost_links, read_pages
+from tests.report.pages import Read, read_pages, sound_pages
 from tests.report.tables import DEGREE, HOUR, Rows, joined, recording_rows, rejected_rows, site
+
+pytestmark = pytest.mark.usefixtures("small_report")
 
 FIGURE = "data:image/svg+xml;base64,PHN2Zy8+"
 BOARD: dict[str, Any] = {
@@ -106,29 +105,13 @@ def some() -> list[Rows]:
     ]
 
 
-@pytest.fixture(autouse=True, scope="module")
-def _quick() -> Iterator[None]:
-    """What is large and the same in every report is left out."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(
-            publishing, "figure_text", lambda figure: "data:image/svg+xml;base64,PHN2Zy8+"
-        )
-        patch.setattr(publishing, "theory_figure", lambda system: None)
-        patch.setattr(publishing, "get_plotlyjs", lambda: "var Plotly = {};")
-        yield
-
-
 @pytest.fixture(scope="module")
 def read(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Read]:
     folder = tmp_path_factory.mktemp("report")
     publish(made(*some()), folder)
-    found = read_pages(folder)
-    tables = set(TABLES) - set(OF_ONE_RECORDING)
-    besides = {f"../tables/{name}.{kind}" for name in tables for kind in ("csv", "parquet")}
-    besides |= {f"figures/allan_gyro_{a}.{kind}" for a in "xy" for kind in ("svg", "pdf")}
-    assert {path: page.faults for path, page in found.items() if page.faults} == {}
-    assert lost_links(found, folder, besides) == set()
-    return found
+    return sound_pages(
+        folder, {f"figures/allan_gyro_{a}.{kind}" for a in "xy" for kind in ("svg", "pdf")}
+    )
 
 
 def row(page: Read, figure: str) -> list[str]:

@@ -1,22 +1,21 @@
 """The pages of gyros on a rate table, and at rest with a direction that is known."""
 
 import math
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.report import publish as publishing
 from imubench_pipeline.report.calibration import answer, earth_words, scatter_words
 from imubench_pipeline.report.publish import publish
-from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
 from tests.alignment.test_of_sensor import outlook, put_triad
 from tests.calibration.recordings import STEPS, UP, at_rest, on_table, run
 from tests.earth_rate.recordings import put, put_at_rest
-from tests.report.pages import Read, lost_links, read_pages
+from tests.report.pages import Read, sound_pages
 from tests.report.tables import Rows, joined, recording_rows, rejected_rows, site
+
+pytestmark = pytest.mark.usefixtures("small_report")
 
 ABOUT: dict[str, Any] = {"device": "7", "kind": "rate_table", "simulated": False, "status": "ok",
                          "rate": 32.0, "rate_from": "stated", "duration": 410.0,
@@ -44,29 +43,11 @@ def some(folder: Path) -> list[Rows]:
     ]
 
 
-@pytest.fixture(autouse=True, scope="module")
-def _quick() -> Iterator[None]:
-    """What is large and the same in every report is left out."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(
-            publishing, "figure_text", lambda figure: "data:image/svg+xml;base64,PHN2Zy8+"
-        )
-        patch.setattr(publishing, "theory_figure", lambda system: None)
-        patch.setattr(publishing, "get_plotlyjs", lambda: "var Plotly = {};")
-        yield
-
-
 @pytest.fixture(scope="module")
 def read(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Read]:
     folder = tmp_path_factory.mktemp("report")
     publish(site(joined(*some(tmp_path_factory.mktemp("kept")))), folder)
-    found = read_pages(folder)
-    tables = set(TABLES) - set(OF_ONE_RECORDING)
-    besides = {f"../tables/{name}.{kind}" for name in tables for kind in ("csv", "parquet")}
-    besides |= {f"figures/allan_gyro_x.{kind}" for kind in ("svg", "pdf")}
-    assert {path: page.faults for path, page in found.items() if page.faults} == {}
-    assert lost_links(found, folder, besides) == set()
-    return found
+    return sound_pages(folder, {f"figures/allan_gyro_x.{kind}" for kind in ("svg", "pdf")})
 
 
 def test_the_page_of_a_rate_table(read: dict[str, Read]) -> None:

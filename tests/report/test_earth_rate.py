@@ -1,23 +1,22 @@
 """The pages of gyros that were turned between north and south."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.report import publish as publishing
 from imubench_pipeline.report.earth_rate import published_words
 from imubench_pipeline.report.publish import one_file, publish
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.turned import answer, needs
-from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
 from imubench_pipeline.tables import build
 from tests.earth_rate.recordings import EVERY_30, put, put_at_rest, run, turned_log
 from tests.earth_rate.runs import PAPER, turned
-from tests.report.pages import Read, lost_links, read_pages
+from tests.report.pages import Read, read_pages, sound_pages
 from tests.report.tables import DEGREE, Rows, joined, recording_rows, rejected_rows, site
+
+pytestmark = pytest.mark.usefixtures("small_report")
 
 HOUR = DEGREE / 3600
 ABOUT: dict[str, Any] = {"device": "7", "kind": "two_position", "simulated": False, "status": "ok",
@@ -61,18 +60,6 @@ def some(folder: Path) -> list[Rows]:
     ]
 
 
-@pytest.fixture(autouse=True, scope="module")
-def _quick() -> Iterator[None]:
-    """What is large and the same in every report is left out."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(
-            publishing, "figure_text", lambda figure: "data:image/svg+xml;base64,PHN2Zy8+"
-        )
-        patch.setattr(publishing, "theory_figure", lambda system: None)
-        patch.setattr(publishing, "get_plotlyjs", lambda: "var Plotly = {};")
-        yield
-
-
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Site:
     return site(joined(*some(tmp_path_factory.mktemp("kept"))))
@@ -82,13 +69,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Site:
 def read(made: Site, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Read]:
     folder = tmp_path_factory.mktemp("report")
     publish(made, folder)
-    found = read_pages(folder)
-    tables = set(TABLES) - set(OF_ONE_RECORDING)
-    besides = {f"../tables/{name}.{kind}" for name in tables for kind in ("csv", "parquet")}
-    besides |= {f"figures/allan_gyro_x.{kind}" for kind in ("svg", "pdf")}
-    assert {path: page.faults for path, page in found.items() if page.faults} == {}
-    assert lost_links(found, folder, besides) == set()
-    return found
+    return sound_pages(folder, {f"figures/allan_gyro_x.{kind}" for kind in ("svg", "pdf")})
 
 
 def test_the_page_of_a_run_says_what_was_found(read: dict[str, Read]) -> None:

@@ -17,8 +17,8 @@ from imubench_pipeline.calibration.rate_table import Calibration, Term, calibrat
 from imubench_pipeline.calibration.residuals import residuals
 from imubench_pipeline.calibration.schedule import Schedule
 from imubench_pipeline.calibration.still import bias_at_rest
-from imubench_pipeline.earth_rate.noise_source import NoiseSource
-from imubench_pipeline.recording import ChannelLog
+from imubench_pipeline.earth_rate.noise_source import NO_MODEL, NoiseSource
+from imubench_pipeline.recording import ChannelLog, on_grid
 from imubench_pipeline.results import Key
 from imubench_pipeline.units import quantity_to_si
 
@@ -38,10 +38,6 @@ UNITS = {
 """SI unit of each quantity of the table ``calibration``."""
 
 _OF_RUN = {"rate_table": ("bias", "scale_factor"), "at_rest": ("bias", "present_bias")}
-_NO_MODEL = (
-    "the noise of this sensor is not known: no static recording of it could be used, and its "
-    "datasheet prints no noise; add a static log of this sensor"
-)
 
 
 @dataclass
@@ -122,8 +118,8 @@ def at_rest(given: Given, declared: AtRest) -> Found:
     if (reason := given.whole()) is not None:
         return Found(list(_without(names, "not_shown", reason)))
     if given.source is None:
-        return Found(list(_without(names, "no_model", _NO_MODEL)))
-    samples = _on_grid(given.log.blocks(), given.log.grid)
+        return Found(list(_without(names, "no_model", NO_MODEL)))
+    samples = on_grid(given.log.blocks(), given.log.grid)
     try:
         found = bias_at_rest(samples, given.log.rate, given.source.model, pointing)
     except ValueError as error:
@@ -178,10 +174,10 @@ def on_rate_table(given: Given, declared: OnRateTable) -> Found:
     except ValueError as error:
         return Found(list(_without(names, "too_short", str(error))))
     if given.source is None:
-        return Found(list(_without(names, "no_model", _NO_MODEL)))
+        return Found(list(_without(names, "no_model", NO_MODEL)))
     model = given.source.model
     setting = declared.si("setting_sigma", "angular_rate")
-    samples = _on_grid(given.log.blocks(), given.log.grid)
+    samples = on_grid(given.log.blocks(), given.log.grid)
     try:
         found, measured = calibrate(samples, schedule, model, pointing, setting_sigma=setting)
     except NotObservableError as error:
@@ -235,7 +231,7 @@ def _schedule(given: Given, declared: OnRateTable) -> Schedule:
             )
         try:
             return Schedule.from_column(
-                _on_grid(log.table_rates(), log.grid),
+                on_grid(log.table_rates(), log.grid),
                 log.rate,
                 tolerance=declared.si("tolerance", "angular_rate"),
                 shortest=declared.si("shortest", "time"),
@@ -352,13 +348,3 @@ def unusable(key: Mapping[str, Any], on_table: bool) -> Iterator[Row]:
 
 def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
-
-
-def _on_grid(blocks: Iterator[Array], grid: int) -> Array:
-    """Return a column on the whole grid, NaN where nothing is."""
-    values = np.full(grid, np.nan)
-    reached = 0
-    for block in blocks:
-        values[reached : reached + len(block)] = block
-        reached += len(block)
-    return values

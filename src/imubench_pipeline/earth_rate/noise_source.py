@@ -20,6 +20,12 @@ from imubench_pipeline.sensor_model.from_datasheet import from_datasheet
 from imubench_pipeline.simulate import channel_rng
 from imubench_pipeline.validation import ConfigError
 
+NO_MODEL = (
+    "the noise of this sensor is not known: no static recording of it could be used, and its "
+    "datasheet prints no noise; add a static log of this sensor"
+)
+"""Why nothing is found without a `NoiseSource`."""
+
 _SEED = 20260101
 """Of the drawn models: each recording and channel has a stream of its own."""
 

@@ -24,12 +24,12 @@ from imubench_pipeline.earth_rate.declaration import TwoPosition
 from imubench_pipeline.earth_rate.experiment import Dwell, Experiment
 from imubench_pipeline.earth_rate.found import FoundDwell, Turning
 from imubench_pipeline.earth_rate.needs import prediction_rows
-from imubench_pipeline.earth_rate.noise_source import NoiseSource
+from imubench_pipeline.earth_rate.noise_source import NO_MODEL, NoiseSource
 from imubench_pipeline.earth_rate.prediction import Outlook
 from imubench_pipeline.earth_rate.ranges import sigma_ranges
 from imubench_pipeline.earth_rate.turning import find_turning
 from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE
-from imubench_pipeline.recording import ChannelLog
+from imubench_pipeline.recording import ChannelLog, on_grid
 from imubench_pipeline.results import Key
 from imubench_pipeline.units import quantity_to_si
 
@@ -112,7 +112,7 @@ def earth_rate_of(
         return found
     if source is not None:
         _predict(key, log.rate, declared, source, settings, found)
-    samples = _whole(log.blocks(), log.grid)
+    samples = on_grid(log.blocks(), log.grid)
     try:
         turning = find_turning(
             samples,
@@ -121,7 +121,7 @@ def earth_rate_of(
             turning=declared.seconds("turning"),
             start=declared.seconds("start"),
             first_sense=declared.first_sense,
-            position=_whole(log.positions(), log.grid) if log.position else None,
+            position=on_grid(log.positions(), log.grid) if log.position else None,
             model=source.model if source else None,
             margin=quantity_to_si(settings.margin, "time"),
             trust_schedule=declared.trust_schedule,
@@ -135,11 +135,7 @@ def earth_rate_of(
         return found
     found.turning += _later(_turning_rows(key, turning, samples, log.rate), begins)
     if source is None:
-        reason = (
-            "the noise of this sensor is not known: no static recording of it could be used, and "
-            "its datasheet prints no noise; add a static log of this sensor"
-        )
-        found.earth_rate += _without(names, WHOLE, "no_model", reason)
+        found.earth_rate += _without(names, WHOLE, "no_model", NO_MODEL)
         return found
     used = _used(samples, turning, log.rate)
     dwells = [dwell for _, dwell in _dwells(turning, log.rate)]
@@ -196,16 +192,6 @@ def _parts(declared: TwoPosition, duration: float) -> Iterator[tuple[str, float]
     yield WHOLE, 0.0
     for text in declared.last:
         yield f"last {text}", max(duration - quantity_to_si(text, "time"), 0.0)
-
-
-def _whole(blocks: Iterator[Array], grid: int) -> Array:
-    """Return a column on the whole grid, NaN where nothing is."""
-    values = np.full(grid, np.nan)
-    reached = 0
-    for block in blocks:
-        values[reached : reached + len(block)] = block
-        reached += len(block)
-    return values
 
 
 def _later(rows: Iterator[Row], begins: float) -> Iterator[Row]:

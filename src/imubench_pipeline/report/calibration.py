@@ -14,7 +14,7 @@ from imubench_pipeline.report.practical import (
 )
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.view import RecordingView, Row
-from imubench_pipeline.report.words import sentence
+from imubench_pipeline.report.words import noise_words, sentence
 
 WORDS = {
     "bias": "bias at the start",
@@ -137,18 +137,6 @@ def not_observable(rows: Sequence[Row]) -> list[dict[str, Any]]:
         for row in rows
         if row["status"] == "not_observable"
     ]
-
-
-def noise_words(rows: Sequence[Row]) -> str:
-    """Return by which noise model figures are weighed, in a sentence.
-
-    Parameters
-    ----------
-    rows : sequence of mapping
-        Of the table ``calibration``, of one recording.
-    """
-    known = next((row for row in rows if row["model"]), None)
-    return f"Noise model: {known['model']}, from {known['model_from']}." if known else ""
 
 
 def scatter_words(rows: Sequence[Row]) -> str:

@@ -12,16 +12,15 @@ from imubench_pipeline.report.calibration import (
     answer,
     earth_words,
     lines,
-    noise_words,
     not_observable,
     scatter_words,
 )
 from imubench_pipeline.report.payload import Arrays
 from imubench_pipeline.report.practical import duration_text, number_text
-from imubench_pipeline.report.recording import metadata_of, provenance, recording_key
+from imubench_pipeline.report.recording import metadata_of, page_of, provenance
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.view import RecordingView, Row
-from imubench_pipeline.report.words import counted
+from imubench_pipeline.report.words import counted, noise_words
 
 
 def table_page(site: Site, view: RecordingView) -> Page:
@@ -33,9 +32,7 @@ def table_page(site: Site, view: RecordingView) -> Page:
     view : RecordingView
         One that was not rejected.
     """
-    folder = site.results / "recordings" / view.sensor / view.name
-    key = recording_key(site, view, folder)
-    return Page(view.page, "rate_table.html.jinja", key, lambda: _context(site, view, folder))
+    return page_of(site, view, "rate_table.html.jinja", _context)
 
 
 def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:

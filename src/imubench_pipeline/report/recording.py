@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -36,9 +36,28 @@ _RATE_FROM = {"stamps": "from the stamps", "stated": "as stated"}
 
 def recording_page(site: Site, view: RecordingView) -> Page:
     """Return the page of a recording."""
+    return page_of(site, view, "recording.html.jinja", _context)
+
+
+def page_of(
+    site: Site,
+    view: RecordingView,
+    template: str,
+    context: Callable[[Site, RecordingView, Path], dict[str, Any]],
+) -> Page:
+    """Return the page of a recording of any kind.
+
+    Parameters
+    ----------
+    site : Site
+    view : RecordingView
+    template : str
+    context : callable
+        Gives what the template needs, from these and the folder of the recording.
+    """
     folder = site.results / "recordings" / view.sensor / view.name
     key = recording_key(site, view, folder)
-    return Page(view.page, "recording.html.jinja", key, lambda: _context(site, view, folder))
+    return Page(view.page, template, key, lambda: context(site, view, folder))
 
 
 def recording_key(site: Site, view: RecordingView, folder: Path) -> str:

@@ -18,10 +18,10 @@ from imubench_pipeline.report.practical import (
     number_text,
     page_unit,
 )
-from imubench_pipeline.report.recording import metadata_of, provenance, recording_key
+from imubench_pipeline.report.recording import metadata_of, page_of, provenance
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.view import RecordingView, Row
-from imubench_pipeline.report.words import counted, sentence
+from imubench_pipeline.report.words import counted, noise_words, sentence
 from imubench_pipeline.tables import read
 
 METHOD_TERMS = {
@@ -53,9 +53,7 @@ def turned_page(site: Site, view: RecordingView) -> Page:
     view : RecordingView
         One that was not rejected.
     """
-    folder = site.results / "recordings" / view.sensor / view.name
-    key = recording_key(site, view, folder)
-    return Page(view.page, "turned.html.jinja", key, lambda: _context(site, view, folder))
+    return page_of(site, view, "turned.html.jinja", _context)
 
 
 def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
@@ -176,18 +174,6 @@ def line(row: Row) -> dict[str, Any]:
         "why": sentence(row["reason"] or ""),
         "use": row["method"] == "filter" and row["status"] == "ok",
     }
-
-
-def noise_words(rows: Sequence[Row]) -> str:
-    """Return by which noise model the estimates are weighed, in a sentence.
-
-    Parameters
-    ----------
-    rows : sequence of mapping
-        Of the table ``earth_rate``, of one recording.
-    """
-    known = next((row for row in rows if row["model"]), None)
-    return f"Noise model: {known['model']}, from {known['model_from']}." if known else ""
 
 
 def published_lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:

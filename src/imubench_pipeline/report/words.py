@@ -190,3 +190,15 @@ def started_text(started: str | None) -> str:
 
 
 _ISO = re.compile(r"^(\d{4}-\d\d-\d\d)T(\d\d:\d\d(?::\d\d)?)(?:\.0+(?!\d))?")
+
+
+def noise_words(rows: Sequence[Row]) -> str:
+    """Return by which noise model figures are weighed, in a sentence.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Of a table with ``model`` and ``model_from``, of one recording.
+    """
+    known = next((row for row in rows if row["model"]), None)
+    return f"Noise model: {known['model']}, from {known['model_from']}." if known else ""
