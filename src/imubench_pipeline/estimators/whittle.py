@@ -95,6 +95,27 @@ class Maximum:
         return np.asarray(np.sqrt(self.powers[len(self.terms.linear) :]))
 
 
+@dataclass(frozen=True)
+class Behind:
+    """What a low-pass leaves of the noise in each bin of a spectrum.
+
+    Attributes
+    ----------
+    white : ndarray, shape (b,)
+        Of white noise of N = 1, sampled, with what stands behind the filter in proportion to it.
+    flicker, slow : ndarray, shape (b,)
+        Gain of the power of flicker noise, whose folds show, and of slower noise.
+    """
+
+    white: Array
+    flicker: Array
+    slow: Array
+
+    def taken(self, chosen: NDArray[np.bool_]) -> Behind:
+        """Return that of chosen bins."""
+        return Behind(self.white[chosen], self.flicker[chosen], self.slow[chosen])
+
+
 @dataclass
 class Whittle:
     """The likelihood of one spectrum.
@@ -107,12 +128,15 @@ class Whittle:
         Correlation times between which a Gauss-Markov process is looked for, s.
     shapes : int
         Correlation times at which its shape is tabulated.
+    behind : Behind, optional
+        The sensor's low-pass, behind which the noise stands; quantization noise does not.
     """
 
     spectrum: Spectrum
     shortest: float
     longest: float
     shapes: int = SHAPES
+    behind: Behind | None = None
     scale: float = field(init=False)
     columns: dict[str, Array] = field(init=False)
     shape_of: Shapes = field(init=False)
@@ -125,6 +149,8 @@ class Whittle:
         self.columns = {}
         self.times = np.geomspace(self.shortest, self.longest, self.shapes)
         self.table = np.log(np.array([self.shape_of.gauss_markov(time) for time in self.times]))
+        if self.behind is not None:
+            self.table += np.log(self.behind.slow)
         self._nu = self.spectrum.ordinates
 
     def of(self, spectrum: Spectrum) -> Whittle:
@@ -143,7 +169,12 @@ class Whittle:
                 "F": self.shape_of.flicker,
                 "K": self.shape_of.random_walk,
             }
-            self.columns[letter] = make[letter]()
+            shape = make[letter]()
+            if self.behind is not None and letter == "N":
+                shape = self.behind.white
+            elif self.behind is not None and letter in "FK":
+                shape = shape * (self.behind.flicker if letter == "F" else self.behind.slow)
+            self.columns[letter] = shape
         return self.columns[letter]
 
     def gauss_markov(self, time: float) -> Array:
@@ -237,7 +268,14 @@ class Whittle:
         return np.asarray(sensitivity @ sensitivity.T)
 
 
-def whittle_of(spectrum: Spectrum, highest: float, shapes: int = SHAPES) -> Whittle:
+def whittle_of(
+    spectrum: Spectrum,
+    highest: float,
+    shapes: int = SHAPES,
+    *,
+    shortest: float | None = None,
+    behind: Behind | None = None,
+) -> Whittle:
     """Return the likelihood of a spectrum, with the correlation times that it can show.
 
     Parameters
@@ -248,7 +286,12 @@ def whittle_of(spectrum: Spectrum, highest: float, shapes: int = SHAPES) -> Whit
         Frequency up to which they reach, Hz.
     shapes : int
         Correlation times to tabulate.
+    shortest : float, optional
+        Shortest correlation time, s; by default twenty sampling intervals.
+    behind : Behind, optional
+        The sensor's low-pass, in these bins.
     """
     longest = _LONGEST_CORRELATION * float(spectrum.length.max())
-    shortest = max(_SHORTEST_CORRELATION / spectrum.rate, 1.0 / (np.pi * highest))
-    return Whittle(spectrum, min(shortest, longest / 4.0), longest, shapes)
+    least = _SHORTEST_CORRELATION / spectrum.rate if shortest is None else shortest
+    least = max(least, 1.0 / (np.pi * highest))
+    return Whittle(spectrum, min(least, longest / 4.0), longest, shapes, behind)
