@@ -133,6 +133,7 @@ class Whittle:
 
     def of(self, spectrum: Spectrum) -> Whittle:
         """Return the likelihood of other data in the same bins."""
+        _ = self.table  # made once for all
         other = copy.copy(self)
         other.spectrum, other._nu = spectrum, spectrum.ordinates
         other.scale = float(np.median(spectrum.density))
