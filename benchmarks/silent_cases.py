@@ -585,7 +585,9 @@ def clipped(rng: Rng) -> Log:
 # What the mean does
 
 
-def _with_mean(rng: Rng, noise: Noise, samples: int, rate: float, mean: Array) -> Log:
+def _with_mean(
+    rng: Rng, noise: Noise, samples: int, rate: float, mean: NDArray[np.floating]
+) -> Log:
     log = noise.log(samples, rate, rng)
     truth = {name: value for name, value in log.truth.items() if name != "R"}
     return replace(log, samples=log.samples + mean, truth=truth)
@@ -728,7 +730,7 @@ def outliers(rng: Rng) -> Log:
     return replace(log, samples=made, truth=log.truth | {"N": N})
 
 
-def _lines(rng: Rng, log: Log, noise: Noise, frequencies: Array) -> Log:
+def _lines(rng: Rng, log: Log, noise: Noise, frequencies: NDArray[np.floating]) -> Log:
     """Return a log with sinusoids, 10 to 10,000 times the noise at their frequencies."""
     samples = len(log.samples)
     time = np.arange(samples) / log.rate

@@ -63,6 +63,7 @@ from scipy.stats import beta
 from imubench_pipeline.estimation import Estimation
 from imubench_pipeline.plan import Plan
 from imubench_pipeline.results import Quality
+from imubench_pipeline.schemas import PARTS_OF, TABLES
 from imubench_pipeline.tables import read
 from silent_cases import CASES, CLEAN, NOTHING, Log, Truth
 
@@ -194,7 +195,7 @@ def tables_of(
         params=_Named(settings=plan.settings("allan")),
     )
     clock.done("allan")
-    names = [field.name for field in fields(Estimation) if field.name != "paths"]
+    names = [field.name for field in fields(Estimation) if field.name in TABLES | PARTS_OF]
     made = {name: kept / f"{name}.parquet" for name in names}
     _step(
         "estimate",

@@ -71,7 +71,7 @@ def of_density(
     rng : numpy.random.Generator
     """
     length = 1 << (4 * samples - 1).bit_length()
-    frequency = np.arange(1, length // 2 + 1) * (rate / length)
+    frequency = np.arange(1, length // 2 + 1, dtype=np.float64) * (rate / length)
     spectrum = np.zeros(length // 2 + 1, dtype=np.complex128)
     parts = rng.standard_normal((2, length // 2))
     spectrum[1:] = np.sqrt(0.5 * density(frequency) * rate * length) * (parts[0] + 1j * parts[1])
@@ -197,9 +197,7 @@ def moving_mean_cutoff(rate: float, taps: int) -> float:
     return float(f[np.argmax(gain < math.sqrt(0.5))] * rate)
 
 
-def decimated(
-    make: Callable[[int, float], Array], samples: int, rate: float, factor: int
-) -> Array:
+def decimated(make: Callable[[int, float], Array], samples: int, rate: float, factor: int) -> Array:
     """Return a process that is sampled faster, behind a steep low-pass of linear phase.
 
     It has lost half of its amplitude at 0.85 of Nyquist, and keeps 1e-4 of it beyond that.
@@ -224,13 +222,10 @@ def lagged(log: Array, rate: float, time: float) -> Array:
 
 def on_and_off(samples: int, rate: float, period: float, rng: np.random.Generator) -> Array:
     """Return a ventilation that is on (1) and off (0), a tenth of its period irregular."""
-    halves = (
-        0.5
-        * period
-        * (1.0 + 0.1 * rng.standard_normal(8 + math.ceil(2.2 * samples / (rate * period))))
-    )
+    number = 8 + math.ceil(2.2 * samples / (rate * period))
+    halves = 0.5 * period * (1.0 + 0.1 * rng.standard_normal(number))
     ends = np.cumsum(np.maximum(halves, 0.1 * period)) - rng.uniform(0.0, period)
-    return np.searchsorted(ends, np.arange(samples) / rate) % 2.0
+    return np.asarray(np.searchsorted(ends, np.arange(samples) / rate) % 2, dtype=np.float64)
 
 
 def resonance(
