@@ -330,8 +330,8 @@ def _matched(
     if given and not truth.nothing:
         nearest = min(given, key=lambda row: abs(np.log(row["value"] / truth.high)))
     for row in rows:
-        if row["component"] > 1 and row["value"] is None:
-            continue  # that the second of two is not told is no loss
+        if row["value"] is None and (row["component"] > 1 or (given and not truth.nothing)):
+            continue  # another component tells it
         alone = several or nearest is None or row is nearest
         yield row, truth if alone or row["value"] is None else NOTHING
 
