@@ -37,12 +37,17 @@ _SCAN, _COARSE_SCAN = 24, 8
 """Cut-offs tried before the best is polished, and to see whether a filter may be there."""
 
 _LOWEST = 1 / 500
-_HIGHEST: Mapping[tuple[Kind, int], float] = (
-    {("analogue", 1): 4.0}
-    | {("analogue", order): 1.0 for order in (2, 3, 4)}
-    | {("bilinear", order): 0.42 for order in (1, 2, 3, 4)}
-    | {("boxcar", 1): 0.222}
-)
+_HIGHEST: Mapping[tuple[Kind, int], float] = {
+    ("analogue", 1): 4.0,
+    ("analogue", 2): 1.0,
+    ("analogue", 3): 1.0,
+    ("analogue", 4): 1.0,
+    ("bilinear", 1): 0.42,
+    ("bilinear", 2): 0.42,
+    ("bilinear", 3): 0.42,
+    ("bilinear", 4): 0.42,
+    ("boxcar", 1): 0.222,
+}
 """Filters that are looked for, and their highest cut-off, parts of the rate; the lowest is 1/500.
 An analogue filter of higher order is there to keep noise from folding, and beyond the rate its
 folds are those of a lower one of first order; the shortest mean is one of two samples."""
@@ -56,7 +61,7 @@ _CORRELATIONS = (10.0, 1e5)
 _SLOWER = 4.0
 """Least correlation time of slow noise over that of the filter, 1 / (2 pi f_c)."""
 
-_FILTERS, _PROCESSES = 3.0, 10.0
+_FILTERS, PROCESSES = 3.0, 10.0
 """Correlation in sampling intervals, 1 / (2 pi f_c T), below which white noise beside it is taken
 for that behind a filter of first order, and above which it is beside a process."""
 
@@ -65,6 +70,9 @@ _SHOWS = 2.0
 
 _ENDS_RULE = 0.03
 """Part of the density that the ends of the transform may add; beyond, a bin says nothing."""
+
+_STEEP = 0.4
+"""Least over greatest gain in a bin below which its mean is ruled by one end of it."""
 
 _SOMETHING_ELSE = 3.0
 """Measured over expected density from which it is not those ends."""
@@ -180,6 +188,14 @@ class Cutoff:
     ruled: NDArray[np.bool_] | None = None
     readings: Sequence[Reading] = ()
 
+    @property
+    def words(self) -> str:
+        """The filter, in words; empty where none shows."""
+        cutoff = self.frequency.value or self.frequency.fitted
+        if self.kind is None or self.order is None or cutoff is None:
+            return ""
+        return f"{Filter(self.kind, self.order, cutoff).name} at {cutoff:.4g} Hz"
+
     def factors(self, number: int, rng: np.random.Generator) -> Array:
         """Return draws of N over its value for the filter that was chosen, shape (number,)."""
         if not self.readings:
@@ -262,8 +278,8 @@ def find_cutoff(
         if doubt is None:
             return Cutoff(absent, None, Parameter(N_alone), 0.0, gained)
         reason, before = doubt
-        ends = sorted((N_alone, before))
-        unknown = Parameter(None, "not_identified", reason, *ends, fitted=N_alone)
+        low, high = sorted((N_alone, before))
+        unknown = Parameter(None, "not_identified", reason, low, high, fitted=N_alone)
         told = replace(absent, status="not_identified", reason=reason)
         return Cutoff(told, None, unknown, 0.0, gained, or_process=reason, N_behind=before)
     best = tried[0]
@@ -341,14 +357,25 @@ def _moved(reading: Reading, one: _Tried, rate: float) -> dict[str, float]:
 def _ruled_by_ends(
     spectrum: Spectrum, fits: _Fits, best: _Tried, rounding: float
 ) -> NDArray[np.bool_]:
-    """Return the bins in which the ends of the transform rule, if nothing else is there."""
+    """Return the bins in which the ends of the transform rule, or the filter falls within the bin.
+
+    Those in which something else stands are none of them.
+    """
     N = fits.density(best)[0]
     one = best.low_pass
-    white = one.white(spectrum.frequency, spectrum.rate) + rounding / N**2
+    within = one.white(_inside(spectrum), spectrum.rate) + rounding / N**2
+    white = within.mean(axis=1)
     leak = one.leak(spectrum.frequency, spectrum.length, spectrum.rate)
     leak = np.where(spectrum.block == 1, leak, 0.0)
-    rules = leak > _ENDS_RULE * white
+    rules = (leak > _ENDS_RULE * white) | (within.min(axis=1) < _STEEP * within.max(axis=1))
     return np.asarray(rules & (spectrum.density < _SOMETHING_ELSE * N**2 * (white + leak)))
+
+
+def _inside(spectrum: Spectrum) -> Array:
+    """Return frequencies within each bin, shape (b, 6), Hz."""
+    within = (np.arange(_POINTS) + 0.5) / _POINTS
+    width = (spectrum.upper - spectrum.lower)[:, None]
+    return np.asarray(spectrum.lower[:, None] + width * within)
 
 
 def _process_or_filter(
@@ -362,7 +389,7 @@ def _process_or_filter(
     first = next(
         (one for one in tried if (one.kind, one.order) == ("analogue", 1) and not one.floor), None
     )
-    if first is None or first.correlation(fits.rate) < _PROCESSES:
+    if first is None or first.correlation(fits.rate) < PROCESSES:
         return None
     if stated is not None and 1.0 / _AS_STATED < first.cutoff / stated < _AS_STATED:
         return None
@@ -422,12 +449,10 @@ class _Fits:
         self.rate = spectrum.rate
         self.lowest = _LOWEST * spectrum.rate
         self.whittle: Whittle = whittle_of(
-            spectrum, 0.5 * spectrum.rate, COARSE, shortest=_PROCESSES / spectrum.rate
+            spectrum, 0.5 * spectrum.rate, COARSE, shortest=PROCESSES / spectrum.rate
         )
         whittle = self.whittle
-        within = (np.arange(_POINTS) + 0.5) / _POINTS
-        width = (spectrum.upper - spectrum.lower)[:, None]
-        self.frequency = spectrum.lower[:, None] + width * within
+        self.frequency = _inside(spectrum)
         shortest, longest = (end / spectrum.rate for end in _CORRELATIONS)
         count = 1 + round(_A_DECADE * math.log10(longest / shortest))
         times = np.geomspace(shortest, longest, count)
@@ -480,7 +505,7 @@ class _Fits:
         white, *slow = self.gains(one)
         N, after = self.density(one)
         behind = Behind(white + (after / N) ** 2, *slow)
-        shortest = max(_PROCESSES / self.rate, _SLOWER / (2.0 * math.pi * one.cutoff))
+        shortest = max(PROCESSES / self.rate, _SLOWER / (2.0 * math.pi * one.cutoff))
         spectrum = self.whittle.spectrum
         whittle = whittle_of(spectrum, 0.5 * self.rate, COARSE, shortest=shortest, behind=behind)
         own = 1 + one.floor
@@ -540,8 +565,12 @@ class _Fits:
                     options={"xatol": 1e-5},
                 )
                 one = replace(at(best.x, floor), cost=float(best.fun))
-                first = (kind, order) == ("analogue", 1)
-                if floor and first and one.correlation(self.rate) > _FILTERS:
+                if (
+                    floor
+                    and order == 1
+                    and kind != "boxcar"
+                    and one.correlation(self.rate) > _FILTERS
+                ):
                     continue  # white noise beside a process
                 before, after = self.density(one)
                 # Where what is behind the filter is the greater, it is a process of slow noise.

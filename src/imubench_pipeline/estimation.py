@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +14,8 @@ from imubench_pipeline.compensation import (
     compensated_curve,
     compensated_estimate,
     compensated_rows,
-    low_pass_of,
     low_pass_rows,
+    resolution_of,
     temperature_curve,
     temperature_of,
     temperature_rows,
@@ -89,27 +88,22 @@ def estimate_channel(
         def stream(use: str) -> np.random.Generator:
             return channel_rng(settings.seed, *asdict(key).values(), use)
 
-        fit = partial(
-            likelihood.fit_blocks,
+        found = likelihood.fit_blocks(
             log.blocks,
             log.grid,
             log.rate,
             holes=log.holes,
             segments=log.segments,
             band=band,
+            bandwidth=bandwidth,
+            resolution=resolution_of(log),
+            rng=stream("posterior"),
         )
-        found = fit(bandwidth=bandwidth, rng=stream("posterior"))
-        low_pass = low_pass_of(log, found)
-        shown = low_pass.order is not None and not low_pass.or_quantization
-        if bandwidth is None and shown:
-            # A bend of a per cent, which does not end the band, is many times the error of N.
-            bandwidth = low_pass.frequency.value or low_pass.frequency.lower
-            found = fit(bandwidth=bandwidth, rng=stream("posterior"))
         estimates |= {estimate.method: estimate for estimate in found.estimates}
         into.models += _model_rows(key, found)
         into.lines += _line_rows(key, found)
         into.spectrum += _spectrum_rows(key, found)
-        into.low_pass += low_pass_rows(key, low_pass)
+        into.low_pass += low_pass_rows(key, found)
         if log.temperature and "compensated" in settings.methods:
             if log.path not in into.paths:
                 rng = channel_rng(settings.seed, key.sensor, key.recording, log.path.name)

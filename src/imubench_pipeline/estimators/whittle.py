@@ -23,6 +23,7 @@ from imubench_pipeline.estimators.whittle_kernels import (
     shape_at,
     two_processes,
 )
+from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.spectral_shapes import Shapes
 from imubench_pipeline.spectrum import Spectrum
 
@@ -299,3 +300,23 @@ def whittle_of(
     least = _SHORTEST_CORRELATION / spectrum.rate if shortest is None else shortest
     least = max(least, 1.0 / (np.pi * highest))
     return Whittle(spectrum, min(least, longest / 4.0), longest, shapes, behind)
+
+
+def model_of(found: Maximum) -> NoiseModel:
+    """Return the noise model of a fit; flicker noise comes first, then processes by T_B."""
+    terms = found.terms
+    values = {letter: found.parameter(letter) for letter in terms.linear}
+    processes = [
+        GaussMarkov(float(B), float(time))
+        for B, time in zip(found.biases, found.times, strict=True)
+    ]
+    first = None if "F" in values or not processes else processes.pop(0)
+    return NoiseModel(
+        Q=values.get("Q", 0.0),
+        N=values.get("N", 0.0),
+        B=values.get("F", first.B if first else 0.0),
+        T_B=first.T_B if first else None,
+        K=values.get("K", 0.0),
+        R=found.ramp,
+        further=[process for process in processes if process.B > 0],
+    )
