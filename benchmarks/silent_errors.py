@@ -69,8 +69,8 @@ from silent_cases import CASES, CLEAN, NOTHING, Log, Truth
 
 SCRIPTS = Path(__file__).parents[1] / "workflow/scripts"
 
-ALL = frozenset({"N", "B", "T_B", "K", "Q", "R", "cutoff"})
-SLOW = frozenset({"B", "T_B", "K", "R"})
+ALL = frozenset({"N", "B", "B_curve", "T_B", "K", "Q", "R", "cutoff"})
+SLOW = frozenset({"B", "B_curve", "T_B", "K", "R"})
 
 BEARS_ON: Mapping[str, frozenset[str]] = {
     # What is missing, late or left out is accounted for: the figures are meant to hold.
@@ -87,6 +87,14 @@ BEARS_ON: Mapping[str, frozenset[str]] = {
     # White noise does not move the mean.
     "step": SLOW,
     "warm_up": SLOW,
+    "bias_step": SLOW,
+    "warm_up_drift": SLOW,
+    "periodic_drift": SLOW,
+    "telegraph_noise": SLOW,
+    "K_differs": frozenset({"K", "R"}),
+    # Nor does a changing variance make a process.
+    "noise_grows": frozenset({"N", "Q"}),
+    "noise_varies": frozenset({"N", "Q"}),
     # Of the unit, and not of the noise.
     "suspicious_unit": frozenset(),
     "large_offset": frozenset(),
@@ -101,7 +109,7 @@ CLASSES = ("silent", "loud", "refused", "right", "doubted", "none", "failed")
 _TELLING = 20.0
 """s between two words about how far a run is."""
 
-SHOWN = ("N", "B", "T_B", "K", "Q", "R")
+SHOWN = ("N", "B", "B_curve", "T_B", "K", "Q", "R")
 
 
 @dataclass(frozen=True)
@@ -475,7 +483,7 @@ def summary(judged: Sequence[Judged]) -> Iterator[str]:
     alone = sum(one.judgement == "silent" for one in values)
     yield f"values with a silent error, recommended method: {share(alone, len(values))}"
     clean = [one for one in own if one.case in CLEAN and one.component == 1]
-    for name in ("N", "B", "T_B", "K"):
+    for name in ("N", "B", "B_curve", "T_B", "K"):
         told = [one for one in clean if one.parameter == name and one.truth_high > 0.0]
         if told:
             right = sum(one.judgement == "right" for one in told)
