@@ -55,7 +55,7 @@ folds are those of a lower one of first order; the shortest mean is one of two s
 FAMILY: Sequence[tuple[Kind, int]] = tuple(_HIGHEST)
 """Kind and order of the filters that are tried."""
 
-_CORRELATIONS = (10.0, 1e5)
+_CORRELATIONS = (1e2, 1e5)
 """Shortest and longest correlation time of slow noise, sampling intervals."""
 
 _SLOWER = 4.0
@@ -93,6 +93,9 @@ _MOST_SLOW = 4
 _UNFOLDED = 0.3
 """Part of the rate up to which there is one such cut-off only: little is folded."""
 
+_REFINED_WITHIN = math.log(2.0)
+"""Distance in log f_c that a joint fit with the noise may move the cut-off."""
+
 _BETWEEN = 24
 """Cut-offs tried on each side, beyond that, for others that the log allows as well."""
 
@@ -119,7 +122,7 @@ sampling, whose folds are in N."""
 _ALONE = (("N", 0), ("NK", 0), ("NFK", 0), ("NK", 1), ("NFK", 1), ("NK", 2))
 """Letters and processes of the models of noise that are tried."""
 
-_WITH_Q = (Terms("NFK"), Terms("NK", 1))
+_WITH_Q = (Terms("N"), Terms("NK"), Terms("NF"), Terms("NFK"), Terms("NK", 1))
 _ABOVE_ENDS = 1.01
 _FEWEST_BINS = 24
 
@@ -407,6 +410,113 @@ def _process_or_filter(
     return reason, fits.density(first)[0]
 
 
+def refined(found: Cutoff, spectrum: Spectrum, clear: NDArray[np.bool_], terms: Terms) -> Cutoff:
+    """Return a low-pass whose cut-off is fitted together with all parameters of a model.
+
+    A process whose correlation is not much longer than that of the filter and the filter share
+    the bend: what one has the other has not.
+
+    Parameters
+    ----------
+    found : Cutoff
+        Its kind and order stay.
+    spectrum : Spectrum
+    clear : ndarray of bool, shape (b,)
+        Bins that no line touches, and in which the ends of the transform do not rule.
+    terms : Terms
+        The model.
+    """
+    start = found.frequency.value or found.frequency.fitted
+    if found.kind is None or found.order is None or start is None or found.behind is None:
+        return found
+    joint = _Joint(spectrum, clear, found, terms)
+    around = math.log(start)
+    best = minimize_scalar(
+        lambda x: joint.at(x)[0],
+        bounds=(around - _REFINED_WITHIN, around + _REFINED_WITHIN),
+        method="bounded",
+        options={"xatol": 1e-4},
+    )
+    cost, N = joint.at(float(best.x))
+    ends, relative = [], []
+    for sign in (-1.0, 1.0):
+        step, inside, outside = 2e-3, 0.0, 2e-3
+        while outside < _REFINED_WITHIN and joint.at(best.x + sign * outside)[0] < (
+            cost + _HALF_CHI_SQUARED
+        ):
+            step *= 2.0
+            inside, outside = outside, outside + step
+        for _ in range(4):
+            middle = 0.5 * (inside + outside)
+            if joint.at(best.x + sign * middle)[0] < cost + _HALF_CHI_SQUARED:
+                inside = middle
+            else:
+                outside = middle
+        ends.append(math.exp(best.x + sign * outside))
+        relative.append(math.log(joint.at(best.x + sign * outside)[1] / N))
+    lower, upper = ends
+    cutoff = math.exp(best.x)
+    told = upper <= _WIDEST * lower
+    reason = None if told else f"the log allows cut-offs from {lower:.4g} to {upper:.4g} Hz"
+    frequency = Parameter(
+        cutoff if told else None,
+        "ok" if told else "not_identified",
+        reason,
+        lower,
+        upper,
+        fitted=None if told else cutoff,
+    )
+    reading = Reading(1.0, relative[0], 0.0, relative[1])
+    one = _Tried(0.0, 0.0, found.kind, found.order, cutoff, False)
+    readings = [reading]
+    if (found.kind, found.order) == ("analogue", 1):
+        readings.append(replace(reading, weight=_TWIN, **_moved(reading, one, spectrum.rate)))
+    behind = joint.behind(spectrum, cutoff)
+    return replace(found, frequency=frequency, behind=behind, readings=readings)
+
+
+class _Joint:
+    """Fits of a model behind a filter, over its cut-off."""
+
+    def __init__(
+        self, spectrum: Spectrum, clear: NDArray[np.bool_], found: Cutoff, terms: Terms
+    ) -> None:
+        self._found, self._terms, self._clear = found, terms, clear
+        self._spectrum = spectrum
+        shortest = PROCESSES / spectrum.rate
+        self._plain = whittle_of(
+            spectrum.taken(clear), 0.5 * spectrum.rate, COARSE, shortest=shortest
+        )
+        self._known: dict[float, tuple[float, float]] = {}
+        N = found.N.in_model or 1.0
+        self._floor = (found.floor / N) ** 2
+
+    def behind(self, spectrum: Spectrum, cutoff: float) -> Behind:
+        """Return what the filter leaves, with what stands behind it."""
+        assert self._found.kind is not None and self._found.order is not None
+        one = _Tried(0.0, 0.0, self._found.kind, self._found.order, cutoff, False)
+        white, flicker, slow = _gains(spectrum, one)
+        return Behind(white + self._floor, flicker, slow)
+
+    def at(self, x: float) -> tuple[float, float]:
+        """Return -log L and N at a logarithm of the cut-off."""
+        if x not in self._known:
+            behind = self.behind(self._plain.spectrum, math.exp(x))
+            found = self._plain.standing(behind).maximum(self._terms)
+            self._known[x] = found.cost, max(found.parameter("N"), 1e-300)
+        return self._known[x]
+
+
+def _gains(spectrum: Spectrum, one: _Tried) -> tuple[Array, Array, Array]:
+    """Return what a filter leaves of white noise, of flicker noise and of slow noise."""
+    low_pass, frequency = one.low_pass, _inside(spectrum)
+    white = low_pass.white(frequency, spectrum.rate).mean(axis=1)
+    leak = low_pass.leak(spectrum.frequency, spectrum.length, spectrum.rate)
+    flicker = low_pass.flicker(frequency, spectrum.rate).mean(axis=1)
+    slow = low_pass.slow(frequency, spectrum.rate).mean(axis=1)
+    return white + np.where(spectrum.block == 1, leak, 0.0), flicker, slow
+
+
 @dataclass(frozen=True)
 class _Tried:
     """A filter, where its likelihood has a maximum.
@@ -452,7 +562,6 @@ class _Fits:
             spectrum, 0.5 * spectrum.rate, COARSE, shortest=PROCESSES / spectrum.rate
         )
         whittle = self.whittle
-        self.frequency = _inside(spectrum)
         shortest, longest = (end / spectrum.rate for end in _CORRELATIONS)
         count = 1 + round(_A_DECADE * math.log10(longest / shortest))
         times = np.geomspace(shortest, longest, count)
@@ -497,7 +606,7 @@ class _Fits:
             return found.cost + self.penalty * terms.parameters, found.cost, found.parameter("N")
 
         plain = min(score(Terms(*one)) for one in _ALONE)
-        rounded = min(score(Terms("Q" + terms.linear, terms.gauss_markov)) for terms in _WITH_Q)
+        rounded = min(score(Terms("Q" + one.linear, one.gauss_markov)) for one in _WITH_Q)
         return (plain if plain[0] < rounded[0] else rounded)[2], plain[0], plain[1], rounded[0]
 
     def behind(self, one: _Tried) -> float:
@@ -530,7 +639,9 @@ class _Fits:
     def may_bend(self, filters: Sequence[tuple[Kind, int]]) -> bool:
         """Return whether a filter at any of a few cut-offs is nearly as good as none."""
         _, _, alone, _ = self.unfiltered()
-        flat = np.column_stack([np.ones(len(self.frequency)), self.everything_slow[:, self.slow]])
+        flat = np.column_stack(
+            [np.ones(len(self.whittle.spectrum.frequency)), self.everything_slow[:, self.slow]]
+        )
         alone = min(alone, self._powers(flat)[1])
         least = min(
             self.cost(_Tried(0.0, 0.0, kind, order, float(cutoff), False))
@@ -623,12 +734,8 @@ class _Fits:
 
     def gains(self, one: _Tried) -> tuple[Array, Array, Array]:
         """Return what a filter leaves of white noise, with rounding, of flicker and slow noise."""
-        low_pass, spectrum = one.low_pass, self.whittle.spectrum
-        white = low_pass.white(self.frequency, self.rate).mean(axis=1) + self.rounded
-        leak = low_pass.leak(spectrum.frequency, spectrum.length, self.rate)
-        flicker = low_pass.flicker(self.frequency, self.rate).mean(axis=1)
-        slow = low_pass.slow(self.frequency, self.rate).mean(axis=1)
-        return white + np.where(spectrum.block == 1, leak, 0.0), flicker, slow
+        white, flicker, slow = _gains(self.whittle.spectrum, one)
+        return white + self.rounded, flicker, slow
 
     def _columns(self, one: _Tried, slow: Sequence[int] | None = None) -> Array:
         white, flicker, gain = self.gains(one)

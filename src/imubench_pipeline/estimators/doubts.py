@@ -58,6 +58,8 @@ def doubted(
     doubt = _of_white_noise(spectrum, frame, chosen, fitted)
     if doubt is not None:
         estimate, papers = (_with_unknown_white_noise(one, *doubt) for one in (estimate, papers))
+    if frame.cut:
+        estimate, papers = (_with_doubt_of_the_cut(one, frame) for one in (estimate, papers))
     against = papers_candidate.bic - chosen.bic
     if against > _WORSE:
         reason = (
@@ -125,6 +127,19 @@ def _of_white_noise(
         )
         return reason, *_range(N, level)
     return None
+
+
+def _with_doubt_of_the_cut(estimate: Estimate, frame: Frame) -> Estimate:
+    """Return an estimate from which frequencies were left out: what is there is not known."""
+    highest = frame.band.highest
+    reason = f"beyond {highest:.4g} Hz neither a process nor a low-pass explains the spectrum"
+    estimate = doubting(estimate, ("N",), f"{reason}: white noise below may be a process")
+    B = estimate.parameters["B"]
+    if B.status != "absent":
+        return estimate
+    reason = f"{reason}: a process that is faster would not be seen"
+    unknown = replace(B, status="not_identified", reason=reason, lower=None, upper=None)
+    return replace(estimate, parameters={**estimate.parameters, "B": unknown})
 
 
 def _range(first: float, second: float) -> tuple[float, float]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.cutoff import PROCESSES, Cutoff, find_cutoff
+from imubench_pipeline.cutoff import PROCESSES, Cutoff, find_cutoff, refined
 from imubench_pipeline.estimators.band import Band, find_band
 from imubench_pipeline.estimators.lines import Line, find, without_lines
 from imubench_pipeline.estimators.whittle import (
@@ -34,6 +34,9 @@ _TO_NYQUIST = "found: the spectrum follows its model up to Nyquist"
 
 _FASTEST = 3.0
 """Sampling intervals: shortest correlation of a process where longer ones explain nothing."""
+
+_APART = 60.0
+"""Correlation time of a process over that of a filter beyond which each has its own bend."""
 
 _QUANTIZATION_BAND = 1 / 10
 """Part of the rate that the band must reach for quantization noise to show."""
@@ -57,6 +60,8 @@ class Frame:
         The sensor's low-pass; None where a band is asked for, which is taken as it is.
     shortest : float or None
         Shortest correlation time of a process, s; None: as `whittle_of` has it.
+    cut : bool
+        Frequencies are left out that neither a process nor a filter explains.
     """
 
     lines: Sequence[Line]
@@ -65,6 +70,7 @@ class Frame:
     band: Band
     low_pass: Cutoff | None = None
     shortest: float | None = None
+    cut: bool = False
 
     def whittle(self, spectrum: Spectrum, shapes: int = SHAPES) -> Whittle:
         """Return the likelihood of the bins that are fitted."""
@@ -83,6 +89,27 @@ class Frame:
             shortest=self.shortest,
             behind=behind.taken(bins) if behind is not None else None,
         )
+
+    def shares_its_bend(self, times: NDArray[np.float64]) -> bool:
+        """Return whether a process is as fast as the low-pass, or nearly.
+
+        Parameters
+        ----------
+        times : ndarray, shape (g,)
+            T_B of each process, s.
+        """
+        if self.low_pass is None or self.low_pass.behind is None or not len(times):
+            return False
+        cutoff = self.low_pass.frequency.in_model or np.inf
+        return bool(times.min() < _APART / (2.0 * np.pi * cutoff))
+
+    def refined(self, spectrum: Spectrum, terms: Terms) -> Frame:
+        """Return the same behind a low-pass that is fitted together with a model."""
+        if self.low_pass is None:
+            return self
+        low_pass = refined(self.low_pass, spectrum, self.used, terms)
+        source = self.band.source.replace(self.low_pass.words, low_pass.words)
+        return replace(self, low_pass=low_pass, band=replace(self.band, source=source))
 
     def shows_quantization(self, rate: float) -> bool:
         """Return whether quantization noise would show: no filter in front, and high enough."""
@@ -103,7 +130,8 @@ class Frame:
         """Return the frequencies that no filter bends, behind none: where nothing explains all."""
         band = find_band(spectrum, self.clear)
         used = self.clear & (spectrum.upper <= band.highest * (1.0 + 1e-9))
-        return Frame(self.lines, self.clear, used, band, _none(self.low_pass))
+        cut = band.highest < 0.5 * spectrum.rate
+        return Frame(self.lines, self.clear, used, band, _none(self.low_pass), cut=cut)
 
 
 def _none(low_pass: Cutoff | None) -> Cutoff | None:

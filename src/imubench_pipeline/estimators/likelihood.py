@@ -35,6 +35,9 @@ _LEAST_SHARE = 0.05
 """Candidates of a smaller share do not enter the intervals."""
 
 _FEWEST_DRAWS = 4_000
+_FLEXIBLE = Terms("NFK", 1)
+"""Model with which the cut-off is fitted where none explains the spectrum."""
+
 _FORGOTTEN = 1e-3
 _MOST_ROUNDS = 12
 
@@ -289,7 +292,12 @@ def _explained(spectrum: Spectrum, frame: Frame) -> tuple[Frame, Whittle, list[C
         return tried, whittle, compare(whittle, quantization=quantization)
 
     first = fitted(frame)
-    if frame.low_pass is None or _explains(first):
+    if frame.low_pass is None:
+        return first
+    if frame.shares_its_bend(first[2][0].found.times) or not _explains(first):
+        terms = first[2][0].found.terms if _explains(first) else _FLEXIBLE
+        first = fitted(frame.refined(spectrum, replace(terms, ramp=False)))
+    if _explains(first):
         return first
     faster = fitted(frame.with_fast_processes(spectrum.rate))
     if _explains(faster):

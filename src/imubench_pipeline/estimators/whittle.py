@@ -165,6 +165,13 @@ class Whittle:
         other.scale = float(np.median(spectrum.density))
         return other
 
+    def standing(self, behind: Behind) -> Whittle:
+        """Return the likelihood of the same data behind a low-pass; this one stands behind none."""
+        other = copy.copy(self)
+        other.columns, other.behind = {}, behind
+        vars(other)["table"] = self.table + np.log(behind.slow)
+        return other
+
     def column(self, letter: str) -> Array:
         """Return the density of a unit linear term (Q, N, F or K) in each bin."""
         if letter not in self.columns:
