@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.estimators.estimate import Estimate, Parameter, Status
 from imubench_pipeline.estimators.frame import Frame
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.spectrum import Spectrum
@@ -22,6 +22,10 @@ _WORSE = 6.0
 _AS_FAST = 10.0
 """Sampling intervals: a process as fast may be the sensor's filter."""
 
+_AT_LEAST = 0.5
+"""Part of N that the least density beyond the band must leave for N to be told."""
+
+_GROUP = 4
 _PLATEAU = 1.5
 """Upper over lower end of a stretch beyond the band that shows white noise of its own."""
 
@@ -59,7 +63,9 @@ def doubted(
     if doubt is not None:
         estimate, papers = (_with_unknown_white_noise(one, *doubt) for one in (estimate, papers))
     if frame.cut:
-        estimate, papers = (_with_doubt_of_the_cut(one, frame) for one in (estimate, papers))
+        estimate, papers = (
+            _with_doubt_of_the_cut(one, spectrum, frame) for one in (estimate, papers)
+        )
     against = papers_candidate.bic - chosen.bic
     if against > _WORSE:
         reason = (
@@ -129,17 +135,37 @@ def _of_white_noise(
     return None
 
 
-def _with_doubt_of_the_cut(estimate: Estimate, frame: Frame) -> Estimate:
-    """Return an estimate from which frequencies were left out: what is there is not known."""
+def _with_doubt_of_the_cut(estimate: Estimate, spectrum: Spectrum, frame: Frame) -> Estimate:
+    """Return an estimate from which frequencies were left out: what is there is not known.
+
+    What is white noise in the band may be a process that falls beyond it, down to the least
+    density there: N lies between the two.
+    """
     highest = frame.band.highest
     reason = f"beyond {highest:.4g} Hz neither a process nor a low-pass explains the spectrum"
-    estimate = doubting(estimate, ("N",), f"{reason}: white noise below may be a process")
-    B = estimate.parameters["B"]
-    if B.status != "absent":
-        return estimate
-    reason = f"{reason}: a process that is faster would not be seen"
-    unknown = replace(B, status="not_identified", reason=reason, lower=None, upper=None)
-    return replace(estimate, parameters={**estimate.parameters, "B": unknown})
+    N, B = estimate.parameters["N"], estimate.parameters["B"]
+    least = _least_beyond(spectrum, frame)
+    if N.value is not None and N.lower is not None and least is not None:
+        told = f"{reason}, and the density falls to {(least / N.value) ** 2:.2g} of that below"
+        lower = min(N.lower, least)
+        status: Status = "ok" if least > _AT_LEAST * N.value else "doubtful"
+        N = replace(N, lower=lower, status=status, reason=told)
+    if B.status == "absent":
+        unseen = f"{reason}: a process that is faster would not be seen"
+        B = replace(B, status="not_identified", reason=unseen, lower=None, upper=None)
+    return replace(estimate, parameters={**estimate.parameters, "N": N, "B": B})
+
+
+def _least_beyond(spectrum: Spectrum, frame: Frame) -> float | None:
+    """Return the root of the least density beyond the band, over a few bins."""
+    part = spectrum.taken(frame.clear & (spectrum.lower >= frame.band.highest * (1.0 - 1e-9)))
+    if len(part.density) < _GROUP:
+        return None
+    ones = np.ones(_GROUP)
+    mean = np.convolve(part.density * part.ordinates, ones, "valid") / np.convolve(
+        part.ordinates, ones, "valid"
+    )
+    return math.sqrt(float(mean.min()))
 
 
 def _range(first: float, second: float) -> tuple[float, float]:
