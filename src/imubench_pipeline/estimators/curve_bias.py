@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.estimators.estimate import CURVE, Estimate, Parameter
 from imubench_pipeline.estimators.identifiability import NOT_IDENTIFIED
 from imubench_pipeline.estimators.intervals import as_good, mixture_quantile
 from imubench_pipeline.estimators.model_choice import Candidate
@@ -261,6 +261,25 @@ def _weak_bias(drawn: Sequence[Models], as_good: bool, longest: float) -> Parame
     return Parameter(None, "absent", reason, 0.0, upper)
 
 
+def of_model(model: NoiseModel, tau: Array) -> dict[str, Parameter]:
+    """Return the figures of the curve of a model as it is, without limits.
+
+    Parameters
+    ----------
+    model : NoiseModel
+    tau : ndarray, shape (m,)
+        As `averaging_times` gives them.
+    """
+    models = models_of(model)
+    if not models.terms.parameters:
+        nothing = Parameter(None, "not_shown", "there is no noise")
+        return dict.fromkeys(CURVE, nothing)
+    bias = Parameter(None, "absent", "no flicker noise and no Gauss-Markov process")
+    if models.has_bias:
+        bias = Parameter(float(bias_of_curve(models, float(tau[-1]))[0][0]))
+    return {"B_curve": bias} | lowest_parameters([models], [], tau)
+
+
 def lowest_parameters(
     best: Sequence[Models], drawn: Sequence[Models], tau: Array
 ) -> dict[str, Parameter]:
@@ -288,7 +307,7 @@ def lowest_parameters(
     if not points[0][2][0]:
         falls = points[0][1][0] > tau[0]
         reason = (
-            f"the curve of the noise {'still falls' if falls else 'rises'} "
+            f"no minimum is shown: the curve of the noise {'still falls' if falls else 'rises'} "
             f"{f'at {tau[-1]:.4g} s, a ninth of the log' if falls else 'from its beginning'}"
         )
         upper = limits[0][1] if falls else None
