@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.comparable import Comparable
+from imubench_pipeline.estimators.curve_bias import of_model
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.noise import FLOOR
 from imubench_pipeline.units import STANDARD_GRAVITY
@@ -44,10 +45,12 @@ def measured(entry: Comparable, estimate: Estimate, tau: NDArray[np.float64]) ->
         taken at the same end of their intervals, each correlation time at either end.
     """
     statistic = entry.statistic
-    if statistic == "plateau":
-        return _scaled(estimate.curve["B_curve"], FLOOR)
-    if statistic == "adev_minimum":
-        return estimate.curve["sigma_min"]
+    if statistic in ("plateau", "adev_minimum"):
+        # An estimate that was made by hand has its terms alone.
+        of_curve = estimate.curve or of_model(estimate.model, tau)
+        if statistic == "plateau":
+            return _scaled(of_curve["B_curve"], FLOOR)
+        return of_curve["sigma_min"]
     if statistic == "adev":
         return _ordinate(estimate, tau, entry.tau or math.nan)
     return estimate.parameters[statistic]
