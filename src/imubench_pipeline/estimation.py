@@ -28,7 +28,7 @@ from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.model_choice import disagreement
 from imubench_pipeline.recording import ChannelLog
-from imubench_pipeline.results import Key, parameter_rows
+from imubench_pipeline.results import Key, draw_rows, parameter_rows
 from imubench_pipeline.sensor import quantity_of
 from imubench_pipeline.simulate import channel_rng
 from imubench_pipeline.thermal.path import TemperaturePath, temperature_path
@@ -42,6 +42,7 @@ class Estimation:
     """Rows of the tables that the estimation of a recording leaves."""
 
     parameters: list[Row] = field(default_factory=list)
+    draws: list[Row] = field(default_factory=list)
     models: list[Row] = field(default_factory=list)
     lines: list[Row] = field(default_factory=list)
     spectrum: list[Row] = field(default_factory=list)
@@ -125,6 +126,7 @@ def estimate_channel(
     for method in settings.methods:
         if method in estimates:
             into.parameters += parameter_rows(key, estimates[method], recommended=method == best)
+            into.draws += draw_rows(key, estimates[method])
     unit = SI_UNITS[quantity_of(key.channel)]["B"]
     into.fixed_bias.append(asdict(key) | {"value": log.mean(), "unit": unit})
 

@@ -12,6 +12,7 @@ from imubench_pipeline.columns import figure as _figure
 from imubench_pipeline.columns import number as _number
 from imubench_pipeline.columns import text as _text
 from imubench_pipeline.earth_rate.columns import EARTH_RATE_TABLES
+from imubench_pipeline.estimators.columns import DRAWN_TABLES
 
 __all__ = [
     "BY_RECORDING",
@@ -19,6 +20,7 @@ __all__ = [
     "COMPARED",
     "OF_ONE_RECORDING",
     "OUTLOOK",
+    "SAMPLES",
     "TABLES",
     "TURNED",
     "Column",
@@ -365,13 +367,17 @@ TABLES: dict[str, tuple[Column, ...]] = {
         Column("assumed", pa.bool_(), "-", "not published by the source: chosen"),
         _text("source", "where the parameters are published"),
     ),
+    **DRAWN_TABLES,
     **EARTH_RATE_TABLES,
     **CALIBRATION_TABLES,
     **ALIGNMENT_TABLES,
 }
 """Every table a run leaves, by name; all numbers are SI (temperatures in degC)."""
 
-OF_ONE_RECORDING = ("envelope", "histogram")
+SAMPLES = ("envelope", "histogram")
+"""The tables of the samples themselves, for the pages of the recordings."""
+
+OF_ONE_RECORDING = (*SAMPLES, "draws")
 """The tables that are kept with each recording and not joined."""
 
 TURNED = tuple(EARTH_RATE_TABLES)

@@ -45,15 +45,20 @@ def interval(budgets: Sequence[Budget], level: float = 0.95) -> tuple[float, flo
 
 
 def draw_models(estimate: Estimate, draws: int, rng: np.random.Generator) -> list[NoiseModel]:
-    """Return noise models with parameters drawn from their 95 % limits.
+    """Return noise models that the log of an estimate allows.
 
-    An approximation, for estimates that have limits but no draws from a posterior: the
-    parameters are independent (B and T_B, or N and B of a short log, are not; with a negative
-    correlation of B and K, for one, the interval of a budget comes out too wide), and each is
-    log-normal about its value, with a spread of its own on either side, so that the limits are
-    the 2.5 % and 97.5 % points of the draws. A lower limit of 0 is reached linearly. What is
-    absent, with an upper limit, is half-normal from 0 with that as its 95 % point. A ramp, which
-    has a sign, is normal on either side. What has no limits stays as it is.
+    Where the estimate has draws of its posterior they are taken, all parameters of a model
+    together: evenly where fewer are asked for than there are, the same ones again where more are,
+    in random order, so that those of two channels meet by chance. Lines, which no noise parameter
+    depends on, are drawn beside them.
+
+    An estimate without draws (of the curve, or by least squares) has its parameters drawn from
+    their limits **independently**, which they are not: what is computed from several of them then
+    has an interval that is too wide, 1.0 to 3.5 times. Each is log-normal about its value, with a
+    spread of its own on either side, so that the limits are the 2.5 % and 97.5 % points of the
+    draws. A lower limit of 0 is reached linearly. What is absent, with an upper limit, is
+    half-normal from 0 with that as its 95 % point. A ramp, which has a sign, is normal on either
+    side. What has no limits stays as it is.
 
     Parameters
     ----------
@@ -66,13 +71,31 @@ def draw_models(estimate: Estimate, draws: int, rng: np.random.Generator) -> lis
     list of NoiseModel
         ``draws`` of them.
     """
-    return [_drawn(estimate, rng) for _ in range(draws)]
+    if estimate.draws is None:
+        return [_drawn(estimate, rng) for _ in range(draws)]
+    kept = len(estimate.draws)
+    rows = (np.arange(draws) % kept) if draws > kept else (np.arange(draws) * kept) // draws
+    return [estimate.draws.model(int(row), _lines(estimate, rng)) for row in rng.permutation(rows)]
+
+
+def drawn_jointly(estimate: Estimate) -> bool:
+    """Tell whether `draw_models` draws the parameters of an estimate together.
+
+    Parameters
+    ----------
+    estimate : Estimate
+    """
+    return estimate.draws is not None
+
+
+def _lines(estimate: Estimate, rng: np.random.Generator) -> list[Sinusoid]:
+    lines = [_values(group, rng) for group in estimate.lines]
+    return [Sinusoid(one["amplitude"], one["frequency"]) for one in lines]
 
 
 def _drawn(estimate: Estimate, rng: np.random.Generator) -> NoiseModel:
     first = _values(estimate.parameters, rng)
     further = [_values(group, rng) for group in estimate.further]
-    lines = [_values(group, rng) for group in estimate.lines]
     return NoiseModel(
         Q=first.get("Q", 0.0),
         N=first.get("N", 0.0),
@@ -81,7 +104,7 @@ def _drawn(estimate: Estimate, rng: np.random.Generator) -> NoiseModel:
         K=first.get("K", 0.0),
         R=first.get("R", 0.0),
         further=[GaussMarkov(one["B"], one["T_B"]) for one in further if one["B"] and one["T_B"]],
-        sinusoids=[Sinusoid(one["amplitude"], one["frequency"]) for one in lines],
+        sinusoids=_lines(estimate, rng),
     )
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
+from imubench_pipeline.estimators.draws import JointDraws
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
 
 Status = Literal["ok", "not_shown", "at_bound", "not_identified", "absent"]
@@ -89,12 +90,16 @@ class Estimate:
         Components beyond the first: B and T_B of a second Gauss-Markov process.
     lines : sequence of mapping
         Amplitude and frequency of each sinusoid.
+    draws : JointDraws or None
+        Noise models drawn jointly from the posterior, without the lines; None: the method has
+        none, and its parameters are known one by one only.
     """
 
     method: str
     parameters: Mapping[str, Parameter]
     further: Sequence[Mapping[str, Parameter]] = ()
     lines: Sequence[Mapping[str, Parameter]] = ()
+    draws: JointDraws | None = field(default=None, compare=False, repr=False)
 
     def components(self) -> Iterator[tuple[int, str, Parameter]]:
         """Yield component number, name and parameter, the first component first."""
