@@ -13,8 +13,14 @@ import pyarrow as pa
 
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.drift import drift_rows
-from imubench_pipeline.estimators.draws import SCALARS, JointDraws
-from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate, Parameter, Status
+from imubench_pipeline.estimators.estimate import (
+    FAMILY,
+    SI_UNITS,
+    Estimate,
+    JointDraws,
+    Parameter,
+    Status,
+)
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.noise import FLOOR
 from imubench_pipeline.pooled import pooled_rows
@@ -130,7 +136,7 @@ def draw_rows(key: Key, estimate: Estimate) -> Iterator[Row]:
         zip(estimate.draws.first.tolist(), estimate.draws.further.tolist(), strict=True)
     ):
         about = asdict(key) | {"method": estimate.method, "draw": number}
-        there = {name: value for name, value in zip(SCALARS, first, strict=True) if value}
+        there = {name: value for name, value in zip(FAMILY, first, strict=True) if value}
         yield about | {"component": 1} | there
         for component, (B, T_B) in enumerate(further, start=2):
             if B:
@@ -141,12 +147,12 @@ def draws(path: Path) -> dict[tuple[str, str], JointDraws]:
     """Read the table ``draws`` of a recording, by channel and method."""
     found = {}
     for (channel, method), table in _by(read("draws", [path]), "channel", "method").items():
-        columns = {name: table[name].to_numpy().astype(np.float64) for name in SCALARS}
+        columns = {name: table[name].to_numpy().astype(np.float64) for name in FAMILY}
         draw, component = table["draw"].to_numpy(), table["component"].to_numpy()
         count = int(draw.max()) + 1
-        first = np.zeros((count, len(SCALARS)))
+        first = np.zeros((count, len(FAMILY)))
         further = np.tile([0.0, np.nan], (count, int(component.max()) - 1, 1))
-        for place, name in enumerate(SCALARS):
+        for place, name in enumerate(FAMILY):
             own = component == 1
             values = columns[name][own]
             first[draw[own], place] = values if name == "T_B" else np.nan_to_num(values)
@@ -249,7 +255,9 @@ def joined_tables(
     joined["recordings"] = build("recordings", about)
     of_logs = (row for quality in qualities for row in quality.findings)
     unusual = unusual_rows(recommended.to_pylist(), catalogue)
-    joined["findings"] = build("findings", [*of_logs, *spectral_rows(joined), *unusual])
+    of_estimates = joined.pop("estimate_findings").to_pylist()
+    found = [*of_logs, *of_estimates, *spectral_rows(joined), *unusual]
+    joined["findings"] = build("findings", found)
     truth = list(truth_rows(truths))
     joined["simulated_truth"] = build("simulated_truth", truth)
     joined["published"] = build("published", published_rows(truths, truth, joined))

@@ -6,10 +6,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
-from imubench_pipeline.estimators.draws import JointDraws
+import numpy as np
+from numpy.typing import NDArray
+
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
 
-Status = Literal["ok", "not_shown", "at_bound", "not_identified", "absent"]
+Array = NDArray[np.float64]
+
+Status = Literal["ok", "doubtful", "not_shown", "at_bound", "not_identified", "absent"]
 
 PARAMETERS = ("N", "B", "T_B", "K")
 """The parameters of the papers' model."""
@@ -51,7 +55,8 @@ class Parameter:
     value : float or None
         SI; None where the status says why there is none.
     status : str
-        ``ok``; ``not_shown``: the curve does not show it; ``at_bound``: the fit ran into the
+        ``ok``; ``doubtful``: something about the log or the fit says that the value may be wrong;
+        ``not_shown``: the curve does not show it; ``at_bound``: the fit ran into the
         end of its search; ``not_identified``: the log cannot tell it; ``absent``: the model
         has no such term.
     reason : str or None
@@ -75,6 +80,48 @@ class Parameter:
     def in_model(self) -> float | None:
         """What the model takes."""
         return self.fitted if self.value is None else self.value
+
+
+@dataclass(frozen=True, eq=False)
+class JointDraws:
+    """Noise models drawn from the posterior of an estimate, over the models the log allows.
+
+    Attributes
+    ----------
+    first : ndarray, shape (d, 6)
+        Q, N, B, T_B, K and R, SI, of each draw; 0 for a term that it does not have. T_B is NaN
+        where B is flicker noise, or 0.
+    further : ndarray, shape (d, g, 2)
+        B and T_B of the further Gauss-Markov processes; B is 0, T_B NaN, where it has fewer.
+    """
+
+    first: Array
+    further: Array
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+    def model(self, number: int, sinusoids: Sequence[Sinusoid] = ()) -> NoiseModel:
+        """Return the noise model of a draw.
+
+        Parameters
+        ----------
+        number : int
+            Of the draw, from 0.
+        sinusoids : sequence of Sinusoid
+            Lines beside the noise.
+        """
+        Q, N, B, T_B, K, R = self.first[number].tolist()
+        return NoiseModel(
+            Q=Q,
+            N=N,
+            B=B,
+            T_B=T_B if T_B > 0.0 else None,
+            K=K,
+            R=R,
+            further=[GaussMarkov(b, t) for b, t in self.further[number].tolist() if b > 0.0],
+            sinusoids=sinusoids,
+        )
 
 
 @dataclass(frozen=True)

@@ -251,13 +251,16 @@ def fit_spectrum(
             replace(
                 estimate,
                 lines=sinusoids,
-                draws=joint_draws([(c.found.terms, draws[c.found.terms], c.share) for c in alike]),
+                draws=joint_draws(
+                    [(c.found.terms, draws[c.found.terms], c.share) for c in alike],
+                    whittle.longest,
+                ),
             ),
             replace(
                 gauss_markov,
                 parameters=papers_only(gauss_markov.parameters),
                 lines=sinusoids,
-                draws=joint_draws([(PAPERS, draws[PAPERS], 1.0)]),
+                draws=joint_draws([(PAPERS, draws[PAPERS], 1.0)], whittle.longest),
             ),
         ),
         candidates,

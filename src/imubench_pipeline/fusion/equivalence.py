@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from imubench_pipeline.error_budget.uncertainty import draw_models
-from imubench_pipeline.estimators.draws import JointDraws
-from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.estimators.estimate import Estimate, JointDraws, Parameter
 from imubench_pipeline.fusion.board import divided
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.simulate import channel_rng

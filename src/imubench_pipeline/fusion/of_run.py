@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from imubench_pipeline.config import FusionSettings
-from imubench_pipeline.estimators.draws import JointDraws
+from imubench_pipeline.estimators.estimate import JointDraws
 from imubench_pipeline.fusion.equivalence import (
     Candidate,
     TemperaturePart,
