@@ -290,6 +290,8 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _number("sigma", "as in unit", "standard deviation; null where reason says why"),
         _number("lower", "as in unit", "lower 95 % limit of a total"),
         _number("upper", "as in unit", "upper 95 % limit of a total"),
+        _text("drawn", "parameters behind the limits: jointly, or one by one", required=False),
+        _number("within", "-", "chance that the total is within limit"),
         _number("limit", "as in unit", "largest standard deviation that is allowed"),
         _text("unit", "SI unit"),
         _number("reached_after", "s", "time after which the limit is reached; null: never"),

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from scipy.special import ndtr
 
 from imubench_pipeline.error_budget.budget import Budget
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
@@ -42,6 +43,36 @@ def interval(budgets: Sequence[Budget], level: float = 0.95) -> tuple[float, flo
     tail = (1.0 - level) / 2.0
     lower, upper = np.quantile([one.total for one in budgets], [tail, 1.0 - tail])
     return float(lower), float(upper)
+
+
+def chance_within(limit: float, budgets: Sequence[Budget]) -> float:
+    """Return the chance that a total is within a limit, over budgets of drawn noise models.
+
+    The share of the draws, each smeared by the width of a normal kernel in log total (Silverman),
+    so that it does not go in steps and falls off beyond the outermost draws.
+
+    Parameters
+    ----------
+    limit : float
+        rad, m/s or m; above 0.
+    budgets : sequence of Budget
+        As `interval` takes them.
+
+    Returns
+    -------
+    float
+
+    References
+    ----------
+    B. W. Silverman, "Density estimation for statistics and data analysis", 1986, eq. 3.31.
+    """
+    totals = np.log(np.maximum([one.total for one in budgets], 1e-300))
+    quarter = np.subtract(*np.quantile(totals, [0.75, 0.25])) / 1.349
+    width = 0.9 * min(float(np.std(totals)), float(quarter)) * len(totals) ** -0.2
+    left = math.log(limit) - totals
+    if width < 1e-12:
+        return float(np.mean(left >= -1e-12))
+    return float(np.mean(ndtr(left / width)))
 
 
 def draw_models(estimate: Estimate, draws: int, rng: np.random.Generator) -> list[NoiseModel]:
