@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from imubench_pipeline.allan import of_blocks
 from imubench_pipeline.estimators import least_squares
 from imubench_pipeline.estimators.band import Band, find_band
-from imubench_pipeline.estimators.draws import joint_draws
+from imubench_pipeline.estimators.draws import drawn_share, joint_draws
 from imubench_pipeline.estimators.estimate import FAMILY, Estimate, Parameter
 from imubench_pipeline.estimators.intervals import describe, papers_only, with_upper_limits
 from imubench_pipeline.estimators.lines import Line, find, without_lines
@@ -252,7 +252,7 @@ def fit_spectrum(
                 estimate,
                 lines=sinusoids,
                 draws=joint_draws(
-                    [(c.found.terms, draws[c.found.terms], c.share) for c in alike],
+                    [(c.found.terms, draws[c.found.terms], drawn_share(c)) for c in alike],
                     whittle.longest,
                 ),
             ),
