@@ -95,7 +95,7 @@ def test_a_fall_is_read_at_equal_times() -> None:
             "upper": a / 3,
             "temperature": a,
             "edf_source": "fitted spectrum",
-        }  # fmt: skip
+        }
         for t, a in zip(tau, adev, strict=True)
     ]
     said = answer(channel(rows), "practical")[0]
