@@ -31,7 +31,8 @@ parameter of the recommended method is.
 
 A finding bears on what it speaks of. One of severity ``warning`` or ``fatal``, about the channel or
 the whole recording, bears on all parameters, except for those that say how something was dealt
-with so that the figures hold: `BEARS_ON` has them, and the notes that bear on anything.
+with so that the figures hold, and those that speak of white or of slow noise alone: `BEARS_ON` has
+them. Notes bear on nothing, but for that of a recording too short for slow noise.
 """
 
 from __future__ import annotations
@@ -99,8 +100,7 @@ BEARS_ON: Mapping[str, frozenset[str]] = {
     "suspicious_unit": frozenset(),
     "large_offset": frozenset(),
     "gravity_norm": frozenset(),
-    # Notes.
-    "quantised": frozenset({"N", "Q"}),
+    # A note; others only tell what is there, such as the step of a register.
     "short_recording": SLOW,
 }
 """The parameters on which a finding bears; of others: all if it is a warning, none if a note."""
