@@ -157,9 +157,12 @@ def any_white(rng: Rng) -> Noise:
 
 
 def any_length(rng: Rng) -> tuple[int, float]:
-    """Return 50,000 to 300,000 samples at 5 to 200 Hz."""
+    """Return 50,000 to 300,000 samples at 5 to 200 Hz, a quarter of an hour at least.
+
+    A shorter recording has a note that it shows white noise alone.
+    """
     rate = float(rng.choice([5.0, 10.0, 20.0, 50.0, 100.0, 200.0]))
-    return round(between(rng, 5e4, 3e5)), rate
+    return round(between(rng, max(5e4, 1000.0 * rate), 3e5)), rate
 
 
 def any_process(rng: Rng, samples: int, rate: float) -> Noise:
@@ -429,9 +432,9 @@ def angle_quantisation(rng: Rng) -> Log:
 
 
 def _for_filter(rng: Rng) -> tuple[int, float, Noise, float]:
-    """Return 60,000 to 150,000 samples at 50 to 200 Hz, N, B, T_B, K, and 0.05 to 0.8 Nyquist."""
-    rate = float(rng.choice([50.0, 100.0, 200.0]))
-    samples = round(between(rng, 6e4, 1.5e5))
+    """Return 20 to 50 min at 50 or 100 Hz, N, B, T_B, K, and 0.05 to 0.8 Nyquist."""
+    rate = float(rng.choice([50.0, 100.0]))
+    samples = round(between(rng, 1200.0, 3000.0) * rate)
     noise = any_white(rng)
     if rng.random() < 0.8:
         duration = samples / rate
@@ -505,7 +508,7 @@ def filtered_and_rounded(rng: Rng) -> Log:
 def filtered_fast_process(rng: Rng) -> Log:
     """A low-pass of second order at 0.1 to 0.5 Nyquist, and a process of T_B 20 to 80 T."""
     rate = float(rng.choice([20.0, 50.0, 100.0]))
-    samples = round(between(rng, 8e4, 2e5))
+    samples = round(between(rng, 1e5, 2e5))
     noise = any_white(rng).with_process(between(rng, 10.0, 100.0), between(rng, 20.0, 80.0) / rate)
     cutoff = between(rng, 0.1, 0.5) * 0.5 * rate
     log = sim.digital(noise.make(rng), samples, rate, cutoff, 2)

@@ -98,6 +98,9 @@ BEARS_ON: Mapping[str, frozenset[str]] = {
 """The parameters on which a finding bears; of others: all if it is a warning, none if a note."""
 
 CLASSES = ("silent", "loud", "refused", "right", "doubted", "none", "failed")
+_TELLING = 20.0
+"""s between two words about how far a run is."""
+
 SHOWN = ("N", "B", "T_B", "K", "Q", "R")
 
 
@@ -330,8 +333,8 @@ def _matched(
     if given and not truth.nothing:
         nearest = min(given, key=lambda row: abs(np.log(row["value"] / truth.high)))
     for row in rows:
-        if row["component"] > 1 and row["value"] is None:
-            continue  # that the second of two is not told is no loss
+        if row["value"] is None and (row["component"] > 1 or (given and not truth.nothing)):
+            continue  # another component tells it
         alone = several or nearest is None or row is nearest
         yield row, truth if alone or row["value"] is None else NOTHING
 
@@ -529,6 +532,23 @@ def details(case: str, number: int) -> Iterator[str]:
         )
 
 
+def progress(judged: Mapping[tuple[str, int], Sequence[Judged]], number: int) -> str:
+    """Say how many logs are judged, and how many of them are silently wrong."""
+    silent = sum(
+        any(one.recommended and one.judgement == "silent" for one in rows)
+        for rows in judged.values()
+    )
+    return f"{len(judged)} of {number} logs, {silent} silently wrong"
+
+
+def in_order(
+    judged: Mapping[tuple[str, int], Sequence[Judged]], names: Sequence[str]
+) -> list[Judged]:
+    """Return all judgements, case by case."""
+    return [one for name in names for (case, _), rows in judged.items() if case == name
+            for one in rows]  # fmt: skip
+
+
 def main() -> None:
     """Print the tables, and what must be looked at."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
@@ -551,7 +571,7 @@ def main() -> None:
     judged: dict[tuple[str, int], list[Judged]] = {}
     spent: dict[str, float] = defaultdict(float)
     errors: list[str] = []
-    begun = time.monotonic()
+    begun = told = time.monotonic()
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(given.processes, mp_context=context) as pool:
         for case, number, found, took, error in pool.map(of_log, tasks, chunksize=2):
@@ -559,20 +579,13 @@ def main() -> None:
             for step, seconds in took.items():
                 spent[step] += seconds
             errors += [f"{case} {number}: {error}"] if error else []
-            if len(judged) % 50 == 0 or len(judged) == len(tasks):
-                silent = sum(
-                    any(one.recommended and one.judgement == "silent" for one in rows)
-                    for rows in judged.values()
-                )
-                print(
-                    f"{len(judged)} of {len(tasks)} logs, {silent} silently wrong, "
-                    f"{time.monotonic() - begun:.0f} s",
-                    file=sys.stderr,
-                )
-    rows = [one for name in names for (case, _), found in judged.items() if case == name
-            for one in found]  # fmt: skip
-    if given.output:
-        write(rows, given.output)
+            now = time.monotonic()
+            if now - told > _TELLING or len(judged) == len(tasks):
+                told = now
+                print(f"{progress(judged, len(tasks))}, {now - begun:.0f} s", file=sys.stderr)
+                if given.output:  # what is known so far
+                    write(in_order(judged, names), given.output)
+    rows = in_order(judged, names)
     total = sum(spent.values())
     print("\n".join(case_table(rows)), end="\n\n")
     print("\n".join(method_table(rows)), end="\n\n")
