@@ -11,6 +11,7 @@ from imubench_pipeline.columns import count as _count
 from imubench_pipeline.columns import figure as _figure
 from imubench_pipeline.columns import number as _number
 from imubench_pipeline.columns import text as _text
+from imubench_pipeline.deterministic.columns import DETERMINISTIC_TABLES
 from imubench_pipeline.earth_rate.columns import EARTH_RATE_TABLES
 
 __all__ = [
@@ -366,6 +367,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         Column("assumed", pa.bool_(), "-", "not published by the source: chosen"),
         _text("source", "where the parameters are published"),
     ),
+    **DETERMINISTIC_TABLES,
     **EARTH_RATE_TABLES,
     **CALIBRATION_TABLES,
     **ALIGNMENT_TABLES,
@@ -403,6 +405,7 @@ BY_RECORDING = (
     "temperature",
     "allan_compensated",
     "low_pass",
+    "deterministic",
     "simulated_truth",
     "published",
     "error_budget",
