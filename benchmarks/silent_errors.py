@@ -69,8 +69,8 @@ from silent_cases import CASES, CLEAN, NOTHING, Log, Truth
 
 SCRIPTS = Path(__file__).parents[1] / "workflow/scripts"
 
-ALL = frozenset({"N", "B", "T_B", "K", "Q", "R", "cutoff"})
-SLOW = frozenset({"B", "T_B", "K", "R"})
+ALL = frozenset({"N", "B", "B_curve", "T_B", "K", "Q", "R", "cutoff"})
+SLOW = frozenset({"B", "B_curve", "T_B", "K", "R"})
 
 BEARS_ON: Mapping[str, frozenset[str]] = {
     # What is missing, late or left out is accounted for: the figures are meant to hold.
@@ -87,6 +87,14 @@ BEARS_ON: Mapping[str, frozenset[str]] = {
     # White noise does not move the mean.
     "step": SLOW,
     "warm_up": SLOW,
+    "bias_step": SLOW,
+    "warm_up_drift": SLOW,
+    "periodic_drift": SLOW,
+    "telegraph_noise": SLOW,
+    "K_differs": frozenset({"K", "R"}),
+    # Nor does a changing variance make a process.
+    "noise_grows": frozenset({"N", "Q"}),
+    "noise_varies": frozenset({"N", "Q"}),
     # Of the unit, and not of the noise.
     "suspicious_unit": frozenset(),
     "large_offset": frozenset(),
@@ -98,7 +106,10 @@ BEARS_ON: Mapping[str, frozenset[str]] = {
 """The parameters on which a finding bears; of others: all if it is a warning, none if a note."""
 
 CLASSES = ("silent", "loud", "refused", "right", "doubted", "none", "failed")
-SHOWN = ("N", "B", "T_B", "K", "Q", "R")
+_TELLING = 20.0
+"""s between two words about how far a run is."""
+
+SHOWN = ("N", "B", "B_curve", "T_B", "K", "Q", "R")
 
 
 @dataclass(frozen=True)
@@ -330,8 +341,8 @@ def _matched(
     if given and not truth.nothing:
         nearest = min(given, key=lambda row: abs(np.log(row["value"] / truth.high)))
     for row in rows:
-        if row["component"] > 1 and row["value"] is None:
-            continue  # that the second of two is not told is no loss
+        if row["value"] is None and (row["component"] > 1 or (given and not truth.nothing)):
+            continue  # another component tells it
         alone = several or nearest is None or row is nearest
         yield row, truth if alone or row["value"] is None else NOTHING
 
@@ -472,7 +483,7 @@ def summary(judged: Sequence[Judged]) -> Iterator[str]:
     alone = sum(one.judgement == "silent" for one in values)
     yield f"values with a silent error, recommended method: {share(alone, len(values))}"
     clean = [one for one in own if one.case in CLEAN and one.component == 1]
-    for name in ("N", "B", "T_B", "K"):
+    for name in ("N", "B", "B_curve", "T_B", "K"):
         told = [one for one in clean if one.parameter == name and one.truth_high > 0.0]
         if told:
             right = sum(one.judgement == "right" for one in told)
@@ -529,6 +540,23 @@ def details(case: str, number: int) -> Iterator[str]:
         )
 
 
+def progress(judged: Mapping[tuple[str, int], Sequence[Judged]], number: int) -> str:
+    """Say how many logs are judged, and how many of them are silently wrong."""
+    silent = sum(
+        any(one.recommended and one.judgement == "silent" for one in rows)
+        for rows in judged.values()
+    )
+    return f"{len(judged)} of {number} logs, {silent} silently wrong"
+
+
+def in_order(
+    judged: Mapping[tuple[str, int], Sequence[Judged]], names: Sequence[str]
+) -> list[Judged]:
+    """Return all judgements, case by case."""
+    return [one for name in names for (case, _), rows in judged.items() if case == name
+            for one in rows]  # fmt: skip
+
+
 def main() -> None:
     """Print the tables, and what must be looked at."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
@@ -551,7 +579,7 @@ def main() -> None:
     judged: dict[tuple[str, int], list[Judged]] = {}
     spent: dict[str, float] = defaultdict(float)
     errors: list[str] = []
-    begun = time.monotonic()
+    begun = told = time.monotonic()
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(given.processes, mp_context=context) as pool:
         for case, number, found, took, error in pool.map(of_log, tasks, chunksize=2):
@@ -559,20 +587,13 @@ def main() -> None:
             for step, seconds in took.items():
                 spent[step] += seconds
             errors += [f"{case} {number}: {error}"] if error else []
-            if len(judged) % 50 == 0 or len(judged) == len(tasks):
-                silent = sum(
-                    any(one.recommended and one.judgement == "silent" for one in rows)
-                    for rows in judged.values()
-                )
-                print(
-                    f"{len(judged)} of {len(tasks)} logs, {silent} silently wrong, "
-                    f"{time.monotonic() - begun:.0f} s",
-                    file=sys.stderr,
-                )
-    rows = [one for name in names for (case, _), found in judged.items() if case == name
-            for one in found]  # fmt: skip
-    if given.output:
-        write(rows, given.output)
+            now = time.monotonic()
+            if now - told > _TELLING or len(judged) == len(tasks):
+                told = now
+                print(f"{progress(judged, len(tasks))}, {now - begun:.0f} s", file=sys.stderr)
+                if given.output:  # what is known so far
+                    write(in_order(judged, names), given.output)
+    rows = in_order(judged, names)
     total = sum(spent.values())
     print("\n".join(case_table(rows)), end="\n\n")
     print("\n".join(method_table(rows)), end="\n\n")
