@@ -131,23 +131,26 @@ def _finding(channel: str, unit: str, course: Course) -> Finding:
     size = f"{course.size:.4g} {unit}"
     limits = f"95 %: {course.size_lower:.4g} to {course.size_upper:.4g} {unit}"
     if course.kind == "bias_step":
+        name = "bias_step"
         detail = (
             f"the bias of {channel} steps by {size} ({limits}) at {course.start:.6g} s "
             f"(± {course.place_error or 0.0:.2g} s); {_TAKEN_OUT}"
         )
     elif course.kind == "warm_up_drift":
+        name = "warm_up_drift"
         detail = (
             f"{channel} begins {size} ({limits}) away from where it settles, with a time constant "
             f"of {course.time:.4g} s ({course.time_lower:.4g} to {course.time_upper:.4g} s); "
             f"{_TAKEN_OUT}"
         )
     else:
+        name = "periodic_drift"
         detail = (
             f"the bias of {channel} swings with an amplitude of {size} ({limits}) and a period of "
             f"{course.time:.5g} s ({course.time_lower:.5g} to {course.time_upper:.5g} s); "
             f"{_TAKEN_OUT}"
         )
-    return Finding(course.kind, "warning", detail, course.size, channel, course.start, course.end)
+    return Finding(name, "warning", detail, course.size, channel, course.start, course.end)
 
 
 def _unsteady(channel: str, steady: Steadiness) -> Finding:
@@ -171,9 +174,8 @@ def _unsteady(channel: str, steady: Steadiness) -> Finding:
 
 
 def _differ(channel: str, halves: Halves) -> Finding:
-    what, name = (
-        ("K", "K_differs") if halves.of == "K" else ("the slow noise", "slow_noise_differs")
-    )
+    name = "K_differs" if halves.of == "K" else "slow_noise_differs"
+    what = "K" if halves.of == "K" else "the slow noise"
     detail = (
         f"{what} of {channel} up to {halves.middle:.5g} s is {halves.first:.3g} times, from there "
         f"on {halves.second:.3g} times that of the whole log, beyond chance: it is not one process"
