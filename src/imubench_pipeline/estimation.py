@@ -23,6 +23,7 @@ from imubench_pipeline.compensation import (
     temperature_rows,
 )
 from imubench_pipeline.config import EstimateSettings
+from imubench_pipeline.curve_limits import with_fitted_limits
 from imubench_pipeline.deterministic.courses import find_courses
 from imubench_pipeline.deterministic.verdict import deterministic_rows, verdict_of
 from imubench_pipeline.estimators import curve as reading
@@ -30,8 +31,9 @@ from imubench_pipeline.estimators import least_squares, likelihood
 from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.model_choice import disagreement
+from imubench_pipeline.presence import presence
 from imubench_pipeline.recording import ChannelLog
-from imubench_pipeline.results import Key, parameter_rows
+from imubench_pipeline.results import Key, allan_rows, draw_rows, parameter_rows
 from imubench_pipeline.sensor import quantity_of
 from imubench_pipeline.simulate import channel_rng
 from imubench_pipeline.thermal.path import TemperaturePath, temperature_path
@@ -44,7 +46,9 @@ Row = Mapping[str, Any]
 class Estimation:
     """Rows of the tables that the estimation of a recording leaves."""
 
+    allan: list[Row] = field(default_factory=list)
     parameters: list[Row] = field(default_factory=list)
+    draws: list[Row] = field(default_factory=list)
     models: list[Row] = field(default_factory=list)
     lines: list[Row] = field(default_factory=list)
     spectrum: list[Row] = field(default_factory=list)
@@ -74,7 +78,7 @@ def estimate_channel(
     key : Key
     log : ChannelLog
     curve : AllanCurve
-        Of the log.
+        Of the log, with limits by the identified power laws.
     settings : EstimateSettings
     bandwidth : float or None
         Cut-off of the sensor's own filter, where it is known, Hz.
@@ -102,6 +106,7 @@ def estimate_channel(
             blocks(), log.grid, log.rate, sizes, holes=log.holes, segments=log.segments
         )
     estimates: dict[str, Estimate] = {}
+    final = measured
     if "curve" in settings.methods:
         estimates["curve"] = reading.read(curve, longest=settings.longest)
     for method in ("paper", "weighted"):
@@ -128,6 +133,9 @@ def estimate_channel(
             bandwidth = low_pass.frequency.value or low_pass.frequency.lower
             found = fit(blocks, bandwidth=bandwidth, rng=stream("posterior"))
         estimates |= {estimate.method: estimate for estimate in found.estimates}
+        there = presence(log.blocks(), log.grid, log.segments) if log.holes else None
+        limited = partial(with_fitted_limits, segments=log.segments, presence=there)
+        final = limited(measured, found)
         into.models += _model_rows(key, found)
         into.lines += _line_rows(key, found)
         into.spectrum += _spectrum_rows(key, found)
@@ -146,9 +154,10 @@ def estimate_channel(
             into.temperature += temperature_rows(key, warm)
             if warm.compensated:
                 estimates["compensated"] = compensated_estimate(warm)
-                left = compensated_curve(log, warm, measured)
+                left = limited(compensated_curve(log, warm, measured), warm.without_temperature)
                 added = temperature_curve(log, warm, measured)
                 into.allan_compensated += compensated_rows(key, left, added)
+    into.allan += allan_rows(key, final)
     best = next(method for method in _BEST_FIRST if method in settings.methods)
     for method in settings.methods:
         if method in estimates:
@@ -156,6 +165,7 @@ def estimate_channel(
             if method != "compensated":
                 estimate = verdict.applied(estimate)
             into.parameters += parameter_rows(key, estimate, recommended=method == best)
+            into.draws += draw_rows(key, estimate)
     into.fixed_bias.append(asdict(key) | {"value": log.mean(), "unit": unit})
 
 
