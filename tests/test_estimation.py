@@ -234,6 +234,30 @@ def test_the_table_of_parameters_gives_the_estimates_back(
             assert estimate.model.name == name
 
 
+def test_the_table_of_draws_gives_the_noise_models_back(found: Estimation, tmp_path: Path) -> None:
+    write("parameters", found.parameters, tmp_path / "parameters.parquet")
+    write("draws", found.draws, tmp_path / "draws.parquet")
+    for channel, back in estimates(
+        tmp_path / "parameters.parquet", tmp_path / "draws.parquet"
+    ).items():
+        for estimate in back:
+            if estimate.method in ("curve", "paper", "weighted"):
+                assert estimate.draws is None
+                continue
+            assert estimate.draws is not None
+            assert len(estimate.draws) == 200
+            for name in ("N", "B", "K"):
+                parameter = estimate.parameters[name]
+                own = [getattr(estimate.draws.model(i), name) for i in range(200)]
+                if parameter.status != "ok":
+                    continue
+                # The interval is of the models that have the parameter, as most draws do.
+                low, high = np.quantile(own, [0.1, 0.9])
+                assert parameter.lower <= high, (channel, estimate.method, name)
+                assert low <= parameter.upper, (channel, estimate.method, name)
+                assert low <= parameter.value <= high, (channel, estimate.method, name)
+
+
 @pytest.mark.parametrize(
     ("methods", "best"),
     [

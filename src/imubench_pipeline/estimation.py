@@ -30,7 +30,7 @@ from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.model_choice import disagreement
 from imubench_pipeline.presence import presence
 from imubench_pipeline.recording import ChannelLog
-from imubench_pipeline.results import Key, allan_rows, parameter_rows
+from imubench_pipeline.results import Key, allan_rows, draw_rows, parameter_rows
 from imubench_pipeline.sensor import quantity_of
 from imubench_pipeline.simulate import channel_rng
 from imubench_pipeline.thermal.path import TemperaturePath, temperature_path
@@ -45,6 +45,7 @@ class Estimation:
 
     allan: list[Row] = field(default_factory=list)
     parameters: list[Row] = field(default_factory=list)
+    draws: list[Row] = field(default_factory=list)
     models: list[Row] = field(default_factory=list)
     lines: list[Row] = field(default_factory=list)
     spectrum: list[Row] = field(default_factory=list)
@@ -135,6 +136,7 @@ def estimate_channel(
     for method in settings.methods:
         if method in estimates:
             into.parameters += parameter_rows(key, estimates[method], recommended=method == best)
+            into.draws += draw_rows(key, estimates[method])
     unit = SI_UNITS[quantity_of(key.channel)]["B"]
     into.fixed_bias.append(asdict(key) | {"value": log.mean(), "unit": unit})
 

@@ -13,7 +13,14 @@ import pyarrow as pa
 
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.drift import drift_rows
-from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate, Parameter, Status
+from imubench_pipeline.estimators.estimate import (
+    FAMILY,
+    SI_UNITS,
+    Estimate,
+    JointDraws,
+    Parameter,
+    Status,
+)
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.noise import FLOOR
 from imubench_pipeline.pooled import pooled_rows
@@ -147,22 +154,68 @@ def parameter_rows(key: Key, estimate: Estimate, *, recommended: bool) -> Iterat
         }
 
 
-def estimates(path: Path) -> dict[str, list[Estimate]]:
-    """Read the estimates of a recording from its table ``parameters``, by channel."""
-    found: dict[str, list[Estimate]] = {}
-    for (channel, method), table in _by(read("parameters", [path]), "channel", "method").items():
-        found.setdefault(channel, []).append(estimate_of(method, table.to_pylist()))
+def draw_rows(key: Key, estimate: Estimate) -> Iterator[Row]:
+    """Yield the rows of the table ``draws``; none of an estimate that has no joint draws."""
+    if estimate.draws is None:
+        return
+    for number, (first, further) in enumerate(
+        zip(estimate.draws.first.tolist(), estimate.draws.further.tolist(), strict=True)
+    ):
+        about = asdict(key) | {"method": estimate.method, "draw": number}
+        there = {name: value for name, value in zip(FAMILY, first, strict=True) if value}
+        yield about | {"component": 1} | there
+        for component, (B, T_B) in enumerate(further, start=2):
+            if B:
+                yield about | {"component": component, "B": B, "T_B": T_B}
+
+
+def draws(path: Path) -> dict[tuple[str, str], JointDraws]:
+    """Read the table ``draws`` of a recording, by channel and method."""
+    found = {}
+    for (channel, method), table in _by(read("draws", [path]), "channel", "method").items():
+        columns = {name: table[name].to_numpy().astype(np.float64) for name in FAMILY}
+        draw, component = table["draw"].to_numpy(), table["component"].to_numpy()
+        count = int(draw.max()) + 1
+        first = np.zeros((count, len(FAMILY)))
+        further = np.tile([0.0, np.nan], (count, int(component.max()) - 1, 1))
+        for place, name in enumerate(FAMILY):
+            own = component == 1
+            values = columns[name][own]
+            first[draw[own], place] = values if name == "T_B" else np.nan_to_num(values)
+        for number in range(further.shape[1]):
+            own = component == number + 2
+            further[draw[own], number] = np.column_stack((columns["B"][own], columns["T_B"][own]))
+        found[str(channel), str(method)] = JointDraws(first, further)
     return found
 
 
-def recommended_estimates(path: Path) -> dict[str, Estimate]:
-    """Read the recommended estimate of each channel from the table ``parameters``."""
+def estimates(path: Path, joint: Path | None = None) -> dict[str, list[Estimate]]:
+    """Read the estimates of a recording from its table ``parameters``, by channel.
+
+    Parameters
+    ----------
+    path : Path
+    joint : Path, optional
+        Of its table ``draws``; without it no estimate has joint draws.
+    """
+    return _estimates(read("parameters", [path]), joint)
+
+
+def recommended_estimates(path: Path, joint: Path | None = None) -> dict[str, Estimate]:
+    """Read the recommended estimate of each channel (see `estimates`)."""
     table = read("parameters", [path])
-    by_channel = _by(table.filter(table["recommended"]), "channel", "method")
-    return {
-        channel: estimate_of(method, rows.to_pylist())
-        for (channel, method), rows in by_channel.items()
-    }
+    found = _estimates(table.filter(table["recommended"]), joint)
+    return {channel: by_method[0] for channel, by_method in found.items()}
+
+
+def _estimates(table: pa.Table, joint: Path | None) -> dict[str, list[Estimate]]:
+    drawn = draws(joint) if joint is not None else {}
+    found: dict[str, list[Estimate]] = {}
+    for (channel, method), rows in _by(table, "channel", "method").items():
+        estimate = estimate_of(method, rows.to_pylist())
+        estimate = replace(estimate, draws=drawn.get((channel, method)))
+        found.setdefault(channel, []).append(estimate)
+    return found
 
 
 def estimate_of(method: str, rows: Iterable[Row]) -> Estimate:

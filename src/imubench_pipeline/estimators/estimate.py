@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
+
+Array = NDArray[np.float64]
 
 Status = Literal["ok", "doubtful", "not_shown", "at_bound", "not_identified", "absent"]
 
@@ -77,6 +82,48 @@ class Parameter:
         return self.fitted if self.value is None else self.value
 
 
+@dataclass(frozen=True, eq=False)
+class JointDraws:
+    """Noise models drawn from the posterior of an estimate, over the models the log allows.
+
+    Attributes
+    ----------
+    first : ndarray, shape (d, 6)
+        Q, N, B, T_B, K and R, SI, of each draw; 0 for a term that it does not have. T_B is NaN
+        where B is flicker noise, or 0.
+    further : ndarray, shape (d, g, 2)
+        B and T_B of the further Gauss-Markov processes; B is 0, T_B NaN, where it has fewer.
+    """
+
+    first: Array
+    further: Array
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+    def model(self, number: int, sinusoids: Sequence[Sinusoid] = ()) -> NoiseModel:
+        """Return the noise model of a draw.
+
+        Parameters
+        ----------
+        number : int
+            Of the draw, from 0.
+        sinusoids : sequence of Sinusoid
+            Lines beside the noise.
+        """
+        Q, N, B, T_B, K, R = self.first[number].tolist()
+        return NoiseModel(
+            Q=Q,
+            N=N,
+            B=B,
+            T_B=T_B if T_B > 0.0 else None,
+            K=K,
+            R=R,
+            further=[GaussMarkov(b, t) for b, t in self.further[number].tolist() if b > 0.0],
+            sinusoids=sinusoids,
+        )
+
+
 @dataclass(frozen=True)
 class Estimate:
     """The parameters of one channel by one method.
@@ -90,12 +137,16 @@ class Estimate:
         Components beyond the first: B and T_B of a second Gauss-Markov process.
     lines : sequence of mapping
         Amplitude and frequency of each sinusoid.
+    draws : JointDraws or None
+        Noise models drawn jointly from the posterior, without the lines; None: the method has
+        none, and its parameters are known one by one only.
     """
 
     method: str
     parameters: Mapping[str, Parameter]
     further: Sequence[Mapping[str, Parameter]] = ()
     lines: Sequence[Mapping[str, Parameter]] = ()
+    draws: JointDraws | None = field(default=None, compare=False, repr=False)
 
     def components(self) -> Iterator[tuple[int, str, Parameter]]:
         """Yield component number, name and parameter, the first component first."""

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from imubench_pipeline.allan import of_blocks
 from imubench_pipeline.estimators import least_squares
 from imubench_pipeline.estimators.band import Band, find_band
+from imubench_pipeline.estimators.draws import drawn_share, joint_draws
 from imubench_pipeline.estimators.estimate import FAMILY, Estimate, Parameter
 from imubench_pipeline.estimators.intervals import describe, papers_only, with_upper_limits
 from imubench_pipeline.estimators.lines import Line, find, without_lines
@@ -247,8 +248,20 @@ def fit_spectrum(
     gauss_markov = describe("likelihood_gm", whittle, papers, [papers], draws, limit)
     return Likelihood(
         (
-            replace(estimate, lines=sinusoids),
-            replace(gauss_markov, parameters=papers_only(gauss_markov.parameters), lines=sinusoids),
+            replace(
+                estimate,
+                lines=sinusoids,
+                draws=joint_draws(
+                    [(c.found.terms, draws[c.found.terms], drawn_share(c)) for c in alike],
+                    whittle.longest,
+                ),
+            ),
+            replace(
+                gauss_markov,
+                parameters=papers_only(gauss_markov.parameters),
+                lines=sinusoids,
+                draws=joint_draws([(PAPERS, draws[PAPERS], 1.0)], whittle.longest),
+            ),
         ),
         candidates,
         lines,
