@@ -281,7 +281,11 @@ def joined_tables(
         "drift", drift_rows(recommended.to_pylist(), joined["fixed_bias"].to_pylist(), about)
     )
     joined["recordings"] = build("recordings", about)
-    of_logs = (row for quality in qualities for row in quality.findings)
+    of_logs = without_doubles(
+        (row for quality in qualities for row in quality.findings),
+        joined["deterministic"],
+        {(row["sensor"], row["recording"]): row["duration"] or 0.0 for row in about},
+    )
     unusual = unusual_rows(recommended.to_pylist(), catalogue)
     of_estimates = joined.pop("estimate_findings").to_pylist()
     found = [*of_logs, *of_estimates, *spectral_rows(joined), *unusual]
@@ -290,6 +294,43 @@ def joined_tables(
     joined["simulated_truth"] = build("simulated_truth", truth)
     joined["published"] = build("published", published_rows(truths, truth, joined))
     return joined
+
+
+_OF_LOGS = {"step": "bias_step", "warm_up": "warm_up_drift"}
+"""What is found of a log as it is read, and found again, with its size, beside its noise."""
+
+_NEAR = 1 / 100
+"""Part of a recording within which two steps are one."""
+
+
+def without_doubles(
+    findings: Iterable[Row],
+    deterministic: pa.Table,
+    durations: Mapping[tuple[str, str], float],
+) -> Iterator[Row]:
+    """Yield the findings of the ingest that the table ``deterministic`` does not tell better.
+
+    Parameters
+    ----------
+    findings : iterable of mapping
+        Rows of the table ``findings``.
+    deterministic : pyarrow.Table
+    durations : mapping
+        Of each sensor and recording, s.
+    """
+    known: dict[tuple[str, str, str], list[Row]] = {}
+    for row in deterministic.to_pylist():
+        known.setdefault((row["sensor"], row["recording"], row["channel"]), []).append(row)
+    for finding in findings:
+        kind = _OF_LOGS.get(finding["finding"])
+        if kind is None:
+            yield finding
+            continue
+        place = (finding["sensor"], finding["recording"], finding["channel"])
+        same = (row for row in known.get(place, ()) if row["kind"] == kind)
+        near = _NEAR * durations.get((finding["sensor"], finding["recording"]), 0.0)
+        if not any(abs(row["start"] - (finding["start"] or 0.0)) <= near for row in same):
+            yield finding
 
 
 def spectral_rows(tables: Mapping[str, pa.Table]) -> Iterator[Row]:

@@ -12,6 +12,7 @@ from imubench_pipeline.columns import curve_limits as _curve_limits
 from imubench_pipeline.columns import figure as _figure
 from imubench_pipeline.columns import number as _number
 from imubench_pipeline.columns import text as _text
+from imubench_pipeline.deterministic.columns import DETERMINISTIC_TABLES
 from imubench_pipeline.earth_rate.columns import EARTH_RATE_TABLES
 from imubench_pipeline.estimators.columns import DRAWN_TABLES
 from imubench_pipeline.fusion.columns import FUSION_TABLES
@@ -353,6 +354,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         Column("assumed", pa.bool_(), "-", "not published by the source: chosen"),
         _text("source", "where the parameters are published"),
     ),
+    **DETERMINISTIC_TABLES,
     **DRAWN_TABLES,
     **FUSION_TABLES,
     **EARTH_RATE_TABLES,
@@ -395,6 +397,7 @@ BY_RECORDING = (
     "temperature",
     "allan_compensated",
     "low_pass",
+    "deterministic",
     "simulated_truth",
     "published",
     "error_budget",
