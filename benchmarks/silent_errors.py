@@ -31,7 +31,8 @@ parameter of the recommended method is.
 
 A finding bears on what it speaks of. One of severity ``warning`` or ``fatal``, about the channel or
 the whole recording, bears on all parameters, except for those that say how something was dealt
-with so that the figures hold: `BEARS_ON` has them, and the notes that bear on anything.
+with so that the figures hold, and those that speak of white or of slow noise alone: `BEARS_ON` has
+them. Notes bear on nothing, but for that of a recording too short for slow noise.
 """
 
 from __future__ import annotations
@@ -99,8 +100,7 @@ BEARS_ON: Mapping[str, frozenset[str]] = {
     "suspicious_unit": frozenset(),
     "large_offset": frozenset(),
     "gravity_norm": frozenset(),
-    # Notes.
-    "quantised": frozenset({"N", "Q"}),
+    # A note; others only tell what is there, such as the step of a register.
     "short_recording": SLOW,
 }
 """The parameters on which a finding bears; of others: all if it is a warning, none if a note."""
@@ -283,7 +283,7 @@ def judge(case: str, number: int, log: Log, tables: Mapping[str, list[Any]]) -> 
     chosen = next((row for row in tables["models"] if row["chosen"]), None)
     groups: dict[tuple[str, str], list[Mapping[str, Any]]] = defaultdict(list)
     for row in tables["parameters"]:
-        groups[row["method"], row["parameter"]].append(row)
+        groups[row["method"], row["parameter"]].append(_upwards(row))
     for row in tables["low_pass"]:
         if row["parameter"] in ("N", "cutoff"):
             more = {"method": "low_pass", "recommended": False, "component": 1, "model": None}
@@ -316,6 +316,14 @@ def judge(case: str, number: int, log: Log, tables: Mapping[str, list[Any]]) -> 
                 verdict=verdict,
                 warned_by=", ".join(dict.fromkeys(warned)),
             )
+
+
+def _upwards(row: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return a row with a value above 0: a ramp may fall."""
+    if row["value"] is None or row["value"] >= 0.0:
+        return row
+    ends = [None if row[name] is None else -row[name] for name in ("upper", "lower")]
+    return {**row, "value": -row["value"], "lower": ends[0], "upper": ends[1]}
 
 
 def bears(finding: Mapping[str, Any], parameter: str) -> bool:
@@ -479,17 +487,24 @@ def summary(judged: Sequence[Judged]) -> Iterator[str]:
     logs = {(one.case, one.log) for one in own}
     silent = {(one.case, one.log) for one in own if one.judgement == "silent"}
     yield f"logs with a silent error, recommended method: {share(len(silent), len(logs))}"
+    methods = dict.fromkeys(one.method for one in judged)
+    for method in methods:
+        theirs = [one for one in judged if one.method == method]
+        there = {(one.case, one.log) for one in theirs}
+        wrong = {(one.case, one.log) for one in theirs if one.judgement == "silent"}
+        yield f"  {method}: {share(len(wrong), len(there))}"
     values = [one for one in own if one.value is not None]
     alone = sum(one.judgement == "silent" for one in values)
     yield f"values with a silent error, recommended method: {share(alone, len(values))}"
-    clean = [one for one in own if one.case in CLEAN and one.component == 1]
+    clean = [one for one in own if one.case in CLEAN]
     for name in ("N", "B", "B_curve", "T_B", "K"):
         told = [one for one in clean if one.parameter == name and one.truth_high > 0.0]
         if told:
-            right = sum(one.judgement == "right" for one in told)
-            warned = sum(bool(one.warned_by) for one in told)
-            text = f"clean cases, {name} right and ok: {share(right, len(told))}"
-            yield f"{text}; warned of: {warned}"
+            there = {(one.case, one.log) for one in told}
+            right = {(one.case, one.log) for one in told if one.judgement == "right"}
+            warned = {(one.case, one.log) for one in told if one.warned_by}
+            text = f"clean cases, {name} right and ok: {share(len(right), len(there))}"
+            yield f"{text}; warned of: {len(warned)}"
 
 
 def silent_list(judged: Iterable[Judged]) -> Iterator[str]:
@@ -578,6 +593,7 @@ def main() -> None:
     tasks = [(n, i) for i in range(given.first, given.first + given.logs) for n in names]
     judged: dict[tuple[str, int], list[Judged]] = {}
     spent: dict[str, float] = defaultdict(float)
+    took_longest = (0.0, "")
     errors: list[str] = []
     begun = told = time.monotonic()
     context = multiprocessing.get_context("spawn")
@@ -586,6 +602,7 @@ def main() -> None:
             judged[case, number] = found
             for step, seconds in took.items():
                 spent[step] += seconds
+            took_longest = max(took_longest, (sum(took.values()), f"{case} {number}"))
             errors += [f"{case} {number}: {error}"] if error else []
             now = time.monotonic()
             if now - told > _TELLING or len(judged) == len(tasks):
@@ -604,7 +621,10 @@ def main() -> None:
         f"{step} {100 * s / total:.0f} %"
         for step, s in sorted(spent.items(), key=lambda item: -item[1])
     )
-    print(f"{total / len(tasks):.2f} s of a process a log: {parts}")
+    longest, name = took_longest
+    print(
+        f"{total / len(tasks):.2f} s of a process a log: {parts}; longest {name}, {longest:.1f} s"
+    )
 
 
 def write(judged: Sequence[Judged], path: Path) -> None:

@@ -172,6 +172,15 @@ class Whittle:
         vars(other)["table"] = self.table + np.log(behind.slow)
         return other
 
+    def taken(self, spectrum: Spectrum, chosen: NDArray[np.bool_]) -> Whittle:
+        """Return the likelihood of other data in chosen bins."""
+        other = self.of(spectrum.taken(chosen))
+        if other.behind is not None:
+            other.behind = other.behind.taken(chosen)
+        other.columns = {letter: self.column(letter)[chosen] for letter in "NFK"}
+        other.table = np.ascontiguousarray(self.table[:, chosen])
+        return other
+
     def column(self, letter: str) -> Array:
         """Return the density of a unit linear term (Q, N, F or K) in each bin."""
         if letter not in self.columns:
