@@ -295,6 +295,17 @@ def test_findings_stand_on_the_page_of_their_recording(read: dict[str, Read]) ->
     assert "1 warning in 1 recording" in read["index.html"].text
 
 
+def test_what_is_taken_out_of_the_noise_stands_on_the_page_of_its_recording(
+    read: dict[str, Read],
+) -> None:
+    page = read["recordings/one/day1.html"]
+    (step,) = page.naming("400± 2", "tr")
+    assert "bias step" in step.text
+    assert "25 to 35" in step.text
+    (warm,) = page.naming("613500 to 700", "tr")
+    assert "warm up drift" in warm.text
+
+
 def test_samples_are_drawn_where_they_are_kept(read: dict[str, Read]) -> None:
     drawn = read["recordings/one/day1.html"].data["samples"]
     assert (set(drawn["envelope"]), set(drawn["histogram"])) == ({"gyro_x"}, {"gyro_x"})
