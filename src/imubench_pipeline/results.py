@@ -14,6 +14,7 @@ import pyarrow as pa
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.drift import drift_rows
 from imubench_pipeline.estimators.estimate import (
+    CURVE,
     FAMILY,
     SI_UNITS,
     Estimate,
@@ -22,7 +23,6 @@ from imubench_pipeline.estimators.estimate import (
     Status,
 )
 from imubench_pipeline.findings import Finding
-from imubench_pipeline.noise import FLOOR
 from imubench_pipeline.pooled import pooled_rows
 from imubench_pipeline.published import published_rows
 from imubench_pipeline.quality.spectral import band_finding, line_findings
@@ -222,10 +222,12 @@ def estimate_of(method: str, rows: Iterable[Row]) -> Estimate:
     """Return the estimate that rows of the table ``parameters`` stand for."""
     components: dict[int, dict[str, Parameter]] = {}
     lines: dict[int, dict[str, Parameter]] = {}
+    of_curve: dict[str, Parameter] = {}
     for row in rows:
         name = row["parameter"]
         group = lines if name in ("amplitude", "frequency") else components
-        group.setdefault(row["component"], {})[name] = Parameter(
+        place = of_curve if name in CURVE else group.setdefault(row["component"], {})
+        place[name] = Parameter(
             row["value"],
             cast(Status, row["status"]),
             row["reason"],
@@ -235,7 +237,7 @@ def estimate_of(method: str, rows: Iterable[Row]) -> Estimate:
             row["fitted"],
         )
     first = components.pop(1, {})
-    return Estimate(method, first, list(components.values()), list(lines.values()))
+    return Estimate(method, first, list(components.values()), list(lines.values()), of_curve)
 
 
 def _by(table: pa.Table, *names: str) -> dict[tuple[str, ...], pa.Table]:
@@ -282,7 +284,7 @@ def joined_tables(
     of_logs = without_doubles(
         (row for quality in qualities for row in quality.findings),
         joined["deterministic"],
-        {(row["sensor"], row["recording"]): row["duration"] or 0.0 for row in about},
+        {(row["sensor"], row["recording"]): row.get("duration") or 0.0 for row in about},
     )
     unusual = unusual_rows(recommended.to_pylist(), catalogue)
     of_estimates = joined.pop("estimate_findings").to_pylist()
@@ -347,11 +349,12 @@ def unusual_rows(parameters: Iterable[Row], catalogue: str) -> Iterator[Row]:
     """Yield the rows of the table ``findings`` about estimates far from what vendors print."""
     usual = usual_figures(sensors_of(catalogue))
     for row in parameters:
-        if row["parameter"] not in ("N", "B") or row["component"] != 1 or row["value"] is None:
-            continue
         # What vendors print of B is the minimum of the curve.
-        value = row["value"] * (FLOOR if row["parameter"] == "B" else 1.0)
-        for sentence in suspicious(quantity_of(row["channel"]), {row["parameter"]: value}, usual):
+        figure = {"N": "N", "sigma_min": "B"}.get(row["parameter"])
+        value = row["value"]
+        if figure is None or value is None:
+            continue
+        for sentence in suspicious(quantity_of(row["channel"]), {figure: value}, usual):
             finding = Finding("unusual_figure", "warning", sentence, value, row["channel"])
             yield finding.row(row["sensor"], row["recording"])
 

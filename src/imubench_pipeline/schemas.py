@@ -89,7 +89,11 @@ TABLES: dict[str, tuple[Column, ...]] = {
         Column("recommended", pa.bool_(), "-", "the method to use for this channel"),
         _text("model", "the terms of the model, such as N+GM+K"),
         _count("component", "number of a repeated term, from 1", required=True),
-        *_figure("Q, N, B, T_B, K, R; amplitude and frequency of a line"),
+        *_figure(
+            "Q, N, B, T_B, K, R; amplitude and frequency of a line; of the curve of the model: "
+            "B_curve (bias instability of the curve: highest Allan deviation of all F and GM "
+            "terms over 0.664), sigma_min and tau_min (lowest point, up to a ninth of the log)"
+        ),
         _number("duration_needed", "s", "length of a log that gives the value to 10 %"),
         _FITTED,
     ),
@@ -176,7 +180,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _SENSOR,
         _text("device", "of which the recordings are compared"),
         _CHANNEL,
-        _text("parameter", "N, B, K, T_B, Q, R, or bias: the fixed bias"),
+        _text("parameter", "N, B_curve, sigma_min, K, B, T_B, Q, R, or bias: the fixed bias"),
         _RECORDING,
         _count("position", "place in the order of the device's recordings, from 1", required=True),
         _text("started", "date and time of the first sample, where known", required=False),
@@ -196,7 +200,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _SENSOR,
         _text("device", "null: all recordings of the sensor", required=False),
         _CHANNEL,
-        _text("parameter", "Q, N, B, T_B, K, R, or bias: the fixed bias"),
+        _text("parameter", "N, B_curve, sigma_min, K, B, T_B, Q, R, or bias: the fixed bias"),
         _count("recordings", "recordings pooled", required=True),
         _count("left_out", "recordings that have no value to pool", required=True),
         _number("value", "as in unit", "pooled estimate"),
