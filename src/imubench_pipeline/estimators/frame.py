@@ -170,7 +170,7 @@ def frame_of(
     if band is not None:
         limit = find_band(spectrum, clear, asked=band)
         used = clear & (spectrum.upper <= limit.highest * (1.0 + 1e-9))
-        return Frame(lines, clear, used, limit)
+        return Frame(lines, clear, used, limit, shortest=PROCESSES / spectrum.rate)
     low_pass = find_cutoff(spectrum, clear, resolution=resolution, stated=bandwidth)
     if low_pass.or_quantization:
         low_pass = replace(low_pass, behind=None, readings=())
