@@ -7,6 +7,7 @@ of what the rule depends on, so that an edit runs again what it touches and noth
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from itertools import chain
@@ -16,6 +17,7 @@ from pydantic import BaseModel
 
 from imubench_pipeline.config import Run, given_beside, read_run
 from imubench_pipeline.drop_zone import Recording, fingerprint, fingerprints, found_logs
+from imubench_pipeline.faults import TOLD, Faults
 from imubench_pipeline.provenance import source_digest
 from imubench_pipeline.requirements import Requirement, read_requirements
 from imubench_pipeline.sensor import (
@@ -58,6 +60,7 @@ class Plan:
 
     def __init__(self, config: Mapping[str, object]) -> None:
         self.run: Run = read_run(config)
+        self.faults = Faults(self.run.results)
         self.sensors: dict[str, Sensor] = read_sensors(self.run.sensors)
         self.requirements: dict[str, Requirement] = read_requirements(self.run.requirements)
         simulated = read_simulated(self.run.simulated, self.sensors)
@@ -109,6 +112,27 @@ class Plan:
             )
             for sensor, name in self._simulated
         ]
+
+    def attempt(self, step: str, sensor: str, name: str | None = None) -> int:
+        """Return how often a step had failed and was tried again, with this run: what failed is.
+
+        Of a recording that is held back nothing is.
+        """
+        held_back = name is not None and self.recordings[sensor, name].held_back
+        return self.faults.attempt((step, sensor, name), again=not held_back)
+
+    def left_out(self) -> str:
+        """Return which steps failed in this run, so that a recording or sensor is left out."""
+        from imubench_pipeline.run_summary import one_line
+
+        told = [
+            f"  {one_line(f'{found.name}: {found.reason}')}\n    log: {log}"
+            for found, log in self.faults.now()
+        ]
+        if not told or TOLD in os.environ:
+            return ""
+        title = "what failed is left out, and tried again by the next run; the report is there"
+        return "\n".join([title, *told])
 
     def ingest_settings(self, sensor: str, name: str) -> str:
         """Return what the ingest of a recording depends on, its error where it cannot be read.
