@@ -34,7 +34,7 @@ def count(name: str, meaning: str, required: bool = False) -> Column:
 
 
 def figure(
-    parameters: str, statuses: str = "ok, not_shown, at_bound, not_identified or absent"
+    parameters: str, statuses: str = "ok, doubtful, not_shown, at_bound, not_identified or absent"
 ) -> tuple[Column, ...]:
     """Return what every table says of an estimated figure."""
     return (

@@ -49,6 +49,8 @@ class Estimation:
     temperature: list[Row] = field(default_factory=list)
     allan_compensated: list[Row] = field(default_factory=list)
     low_pass: list[Row] = field(default_factory=list)
+    estimate_findings: list[Row] = field(default_factory=list)
+    """Rows of the table ``findings``."""
     paths: dict[Path, TemperaturePath] = field(default_factory=dict)
     """Of the temperature, by the file of the log: its channels have one."""
 

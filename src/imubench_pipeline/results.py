@@ -213,7 +213,9 @@ def joined_tables(
     joined["recordings"] = build("recordings", about)
     of_logs = (row for quality in qualities for row in quality.findings)
     unusual = unusual_rows(recommended.to_pylist(), catalogue)
-    joined["findings"] = build("findings", [*of_logs, *spectral_rows(joined), *unusual])
+    of_estimates = joined.pop("estimate_findings").to_pylist()
+    found = [*of_logs, *of_estimates, *spectral_rows(joined), *unusual]
+    joined["findings"] = build("findings", found)
     truth = list(truth_rows(truths))
     joined["simulated_truth"] = build("simulated_truth", truth)
     joined["published"] = build("published", published_rows(truths, truth, joined))

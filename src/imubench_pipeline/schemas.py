@@ -19,6 +19,7 @@ __all__ = [
     "COMPARED",
     "OF_ONE_RECORDING",
     "OUTLOOK",
+    "PARTS_OF",
     "TABLES",
     "TURNED",
     "Column",
@@ -377,6 +378,9 @@ TABLES: dict[str, tuple[Column, ...]] = {
     **ALIGNMENT_TABLES,
 }
 """Every table a run leaves, by name; all numbers are SI (temperatures in degC)."""
+
+PARTS_OF = {"estimate_findings": "findings"}
+"""Files of a recording that hold rows of another table, and that table."""
 
 OF_ONE_RECORDING = ("envelope", "histogram")
 """The tables that are kept with each recording and not joined."""

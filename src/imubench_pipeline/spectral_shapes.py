@@ -8,6 +8,7 @@ a sum over the folds for flicker noise.
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -133,15 +134,20 @@ def _bracket(m: Array, h: float, p: float, q: float) -> Array:
 
 
 def _flicker_edges(order: Array) -> Array:
-    """Return the mean square of the ordinate k of flicker noise over its density, for k << L.
+    """Return the mean square of the ordinate k of flicker noise over its density, for k << L."""
+    return np.array([_flicker_edge(k) for k in order.tolist()])
+
+
+@cache
+def _flicker_edge(order: float) -> float:
+    """Return that of one ordinate.
 
     Flicker noise is a sum of Gauss-Markov processes of all correlation times, and for each the
     mean square of an ordinate is known in closed form.
     """
     times = np.geomspace(1e-4, 1e5, 400)  # T_B over the length of the log
-    x = np.pi * order[:, None] * times  # omega T_B
-    n_over = 1.0 / times
-    sign = np.where(order % 2 == 1, 1.0, -1.0)[:, None]
+    x = np.pi * order * times  # omega T_B
+    sign = 1.0 if order % 2 == 1 else -1.0
     full = 2.0 * times / (1.0 + x**2)  # the spectrum of unit variance, over the length
-    ends = 4.0 * times**2 * (1.0 + sign * np.exp(-n_over)) / (1.0 + x**2) ** 2
-    return np.asarray((full - ends).sum(axis=1) / full.sum(axis=1))
+    ends = 4.0 * times**2 * (1.0 + sign * np.exp(-1.0 / times)) / (1.0 + x**2) ** 2
+    return float((full - ends).sum() / full.sum())

@@ -15,13 +15,18 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 
-from imubench_pipeline.schemas import TABLES
+from imubench_pipeline.schemas import PARTS_OF, TABLES, Column
 
 _SMALL = 1_000_000  # bytes
 
 
 class TableError(ValueError):
     """Rows that do not fit the schema of their table."""
+
+
+def columns_of(table: str) -> tuple[Column, ...]:
+    """Return the columns of a table, or of the table that a file of a recording has rows of."""
+    return TABLES[PARTS_OF.get(table, table)]
 
 
 def schema(table: str) -> pa.Schema:
@@ -34,7 +39,7 @@ def schema(table: str) -> pa.Schema:
                 nullable=not column.required,
                 metadata={"unit": column.unit, "meaning": column.meaning},
             )
-            for column in TABLES[table]
+            for column in columns_of(table)
         ]
     )
 
@@ -45,7 +50,7 @@ def build(table: str, rows: Iterable[Mapping[str, Any]]) -> pa.Table:
     Parameters
     ----------
     table : str
-        A key of `imubench_pipeline.schemas.TABLES`.
+        A key of `imubench_pipeline.schemas.TABLES`, or of ``PARTS_OF`` there.
     rows : iterable of mapping
         One mapping a row; a column that a row leaves out is null. NaN becomes null.
 
@@ -55,7 +60,7 @@ def build(table: str, rows: Iterable[Mapping[str, Any]]) -> pa.Table:
         If a row has a column that the table does not, or lacks a required value.
     """
     listed = list(rows)
-    columns = TABLES[table]
+    columns = columns_of(table)
     unknown = {name for row in listed for name in row} - {column.name for column in columns}
     if unknown:
         raise TableError(f"table {table}: unknown columns {sorted(unknown)}")

@@ -111,8 +111,7 @@ def test_a_band_to_a_tenth_of_the_rate_tells_n_half_as_well_and_the_rest_as_well
         (NoiseModel(N=1e-3, B=1e-3), 0.01),
         (NoiseModel(N=1e-3, B=5e-3, T_B=4.0), 0.01),
         (NoiseModel(N=1e-4, B=3e-4, T_B=5.0, further=[GaussMarkov(6e-4, 200.0)]), 0.02),
-        # Correlation times far apart are interpolated in a coarse table: to a few per cent.
-        (NoiseModel(N=1e-4, B=3e-4, T_B=1.0, K=1e-5, further=[GaussMarkov(9e-4, 150.0)]), 0.06),
+        (NoiseModel(N=1e-4, B=3e-4, T_B=1.0, K=1e-5, further=[GaussMarkov(9e-4, 150.0)]), 0.03),
         # The ends of the log bend flicker noise where K shows.
         (NoiseModel(Q=2e-6, N=1e-4, B=2e-4, K=3e-6), 0.04),
     ],
@@ -321,6 +320,50 @@ def test_durations_of_a_strong_drift_are_not_those_at_which_it_looks_like_a_rand
     assert needed is not None
     assert integrated(model, 100.0, 31_200.0, 10.0)["B"] == pytest.approx(WANTED, rel=0.02)
     assert needed == pytest.approx(31_200, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        MTI_7,
+        C102,
+        NoiseModel(N=1e-3, K=1e-8),
+        NoiseModel(Q=1e-6, N=1e-4, B=1e-4, K=1e-6, R=1e-9),
+        NoiseModel(N=1e-4, B=3e-6, T_B=20.0, K=1e-7),
+        NoiseModel(N=1e-4, B=3e-4, T_B=5.0, K=1e-6, further=[GaussMarkov(6e-4, 200.0)]),
+        NoiseModel(N=1e-4, B=1e-4, K=1e-6, further=[GaussMarkov(1e-3, 1.0)]),
+    ],
+    ids=lambda model: model.name,
+)
+def test_durations_are_those_of_a_scan_of_many_lengths(model: NoiseModel) -> None:
+    values = values_of(model)
+    letters = {"Q": "Q", "N": "N", "F": "B", "K": "K"}
+    linear = "".join(
+        letter
+        for letter, name in letters.items()
+        if name in values and not (letter == "F" and model.T_B)
+    )
+    processes = [(values[n], values["T_" + n]) for n in ("B", "B 2") if "T_" + n in values]
+    found = maximum_of(
+        Terms(linear, len(processes), model.R != 0),
+        [*(values[letters[letter]] ** 2 for letter in linear), *(B**2 for B, _ in processes)],
+        *(time for _, time in processes),
+        ramp=model.R,
+    )
+    needed = durations_needed(found, 10.0, 3600.0, 5.0)
+    lengths = 3600.0 * np.geomspace(1e-2, 1e4, 85)
+    bounds = [bounds_of(model, 10.0, float(length), 5.0) for length in lengths]
+    for name, duration in zip(parameter_names(found.terms), needed, strict=True):
+        errors = np.array([bound[name] for bound in bounds])
+        enough = np.flatnonzero(errors <= WANTED)
+        if not len(enough):
+            assert duration is None or duration > lengths[-2], name
+        elif enough[0] > 0:
+            place = enough[0] - 1, enough[0]
+            crossing = np.interp(
+                -np.log(WANTED), -np.log(errors[[*place]]), np.log(lengths[[*place]])
+            )
+            assert duration == pytest.approx(np.exp(crossing), rel=0.02), name
 
 
 def test_no_duration_is_given_for_what_no_log_would_tell() -> None:

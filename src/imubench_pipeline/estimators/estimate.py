@@ -8,7 +8,7 @@ from typing import Literal
 
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
 
-Status = Literal["ok", "not_shown", "at_bound", "not_identified", "absent"]
+Status = Literal["ok", "doubtful", "not_shown", "at_bound", "not_identified", "absent"]
 
 PARAMETERS = ("N", "B", "T_B", "K")
 """The parameters of the papers' model."""
@@ -50,7 +50,8 @@ class Parameter:
     value : float or None
         SI; None where the status says why there is none.
     status : str
-        ``ok``; ``not_shown``: the curve does not show it; ``at_bound``: the fit ran into the
+        ``ok``; ``doubtful``: something about the log or the fit says that the value may be wrong;
+        ``not_shown``: the curve does not show it; ``at_bound``: the fit ran into the
         end of its search; ``not_identified``: the log cannot tell it; ``absent``: the model
         has no such term.
     reason : str or None

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 
 from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
 from imubench_pipeline.noise import NoiseModel
@@ -51,7 +51,7 @@ def _bounds(sensitivity: Array) -> Array:
         # Not from the information itself: squared, what can hardly be told apart is lost.
         root = np.linalg.qr((sensitivity[there] / size[there, None]).T, mode="r")
         if np.abs(np.diag(root)).min() > 0.0:
-            inverse = solve_triangular(root, np.eye(len(root)))
+            inverse = np.linalg.inv(root)
             result[there] = np.linalg.norm(inverse, axis=1) / size[there]
     return result
 
@@ -149,29 +149,86 @@ def durations_needed(
         1 + round(math.log10(_LONGEST / _SHORTEST) * _A_DECADE),
     )
     lengths = lengths[lengths * 2.0 * min(highest, 0.5 * rate) > 4.0 * found.terms.parameters]
-    errors = np.array([_errors(ideal_spectrum(rate, length, highest), found) for length in lengths])
-    return [_crossing(np.log(lengths), column) for column in errors.T]
+    known: dict[int, Array] = {}
+
+    def excess(place: int) -> Array:
+        if place not in known:
+            errors = _errors(ideal_spectrum(rate, float(lengths[place]), highest), found)
+            known[place] = np.log(errors / WANTED)
+        return known[place]
+
+    return [
+        _crossing(np.log(lengths), excess, known, number)
+        for number in range(len(parameter_names(found.terms)))
+    ]
 
 
-def _crossing(log_lengths: Array, errors: Array) -> float | None:
-    enough = np.flatnonzero(errors <= WANTED)
-    if len(enough) == 0:
+def _crossing(
+    log_lengths: Array, excess: Callable[[int], Array], known: dict[int, Array], number: int
+) -> float | None:
+    """Return the length at which the error of a parameter, which falls with it, is `WANTED`.
+
+    ``excess`` gives log(error / `WANTED`) of all parameters at a place in the lengths; the search
+    begins between the places that are known already, and looks at few more.
+    """
+    low, high = -1, len(log_lengths)
+    for place, values in known.items():
+        if values[number] > 0.0:
+            low = max(low, place)
+        else:
+            high = min(high, place)
+    steps = 0
+    while high - low > 1:
+        place = (low + high) // 2
+        if steps % 3 < 2 and known:
+            place = _guess(log_lengths, known, number, low, high)
+        if excess(place)[number] > 0.0:
+            low = place
+        else:
+            high = place
+        steps += 1
+    if high == len(log_lengths):
         return None
-    i = int(enough[0])
-    if i == 0 or not np.isfinite(errors[i - 1]):
-        return float(np.exp(log_lengths[i]))
-    falling = np.log(errors[i - 1 : i + 1])
-    part = (falling[0] - math.log(WANTED)) / (falling[0] - falling[1])
-    return float(np.exp(log_lengths[i - 1] + part * (log_lengths[i] - log_lengths[i - 1])))
+    if low < 0 or not np.isfinite(known[low][number]):
+        return float(np.exp(log_lengths[high]))
+    falling = known[low][number], known[high][number]
+    part = falling[0] / (falling[0] - falling[1])
+    return float(np.exp(log_lengths[low] + part * (log_lengths[high] - log_lengths[low])))
+
+
+def _guess(log_lengths: Array, known: dict[int, Array], number: int, low: int, high: int) -> int:
+    """Return a place between two where the error may be `WANTED`.
+
+    From what is known at both, or as an error falls with the square root of the length.
+    """
+    left = known[low][number] if low >= 0 else np.inf
+    right = known[high][number] if high < len(log_lengths) else -np.inf
+    if np.isfinite(left) and np.isfinite(right):
+        part = left / (left - right)
+        where = log_lengths[low] + part * (log_lengths[high] - log_lengths[low])
+    elif np.isfinite(left):
+        where = log_lengths[low] + 2.0 * left
+    elif np.isfinite(right):
+        where = log_lengths[high] + 2.0 * right
+    else:
+        return (low + high) // 2
+    place = int(np.searchsorted(log_lengths, where))
+    # The place before the crossing, then the one after it.
+    return min(max(place - (low < place - 1), low + 1), high - 1)
 
 
 def _errors(spectrum: Spectrum, found: Maximum) -> Array:
     """Return the relative bounds of a model in a spectrum's bins."""
     times = found.times if len(found.times) else np.array([1.0])
-    # A narrow table around the correlation times is enough for their derivatives.
-    shapes = 3 if len(times) == 1 else 96
-    whittle = Whittle(spectrum, float(times[0]) / 1.2, float(times[-1]) * 1.2, shapes)
-    return relative_errors(whittle, found)
+    return relative_errors(_Exact(spectrum, float(times[0]) / 2.0, float(times[-1]) * 2.0), found)
+
+
+class _Exact(Whittle):
+    """A likelihood that is asked for few shapes of Gauss-Markov processes: no table of them."""
+
+    def gauss_markov(self, time: float) -> Array:
+        """Return the density of a Gauss-Markov process of B = 1 in each bin."""
+        return self.shape_of.gauss_markov(time)
 
 
 def _as_maximum(model: NoiseModel) -> Maximum:

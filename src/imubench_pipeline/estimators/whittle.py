@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,18 +118,22 @@ class Whittle:
     columns: dict[str, Array] = field(init=False)
     shape_of: Shapes = field(init=False)
     times: Array = field(init=False)
-    table: Array = field(init=False)
 
     def __post_init__(self) -> None:
         self.shape_of = Shapes(self.spectrum)
         self.scale = float(np.median(self.spectrum.density))
         self.columns = {}
         self.times = np.geomspace(self.shortest, self.longest, self.shapes)
-        self.table = np.log(np.array([self.shape_of.gauss_markov(time) for time in self.times]))
         self._nu = self.spectrum.ordinates
+
+    @cached_property
+    def table(self) -> Array:
+        """Logarithms of the shapes of Gauss-Markov processes at `times`, shape (t, b)."""
+        return np.log(np.array([self.shape_of.gauss_markov(time) for time in self.times]))
 
     def of(self, spectrum: Spectrum) -> Whittle:
         """Return the likelihood of other data in the same bins."""
+        _ = self.table  # made once for all
         other = copy.copy(self)
         other.spectrum, other._nu = spectrum, spectrum.ordinates
         other.scale = float(np.median(spectrum.density))
@@ -208,8 +213,8 @@ class Whittle:
         Shape (m, b), or (m, 2 b) with a ramp, which shares no information with the others; the
         parameters stand in the order of `Maximum.powers`, then `times`.
         """
-        total = self.density(found)
         matrix = self.matrix(found.terms, found.times)
+        total = matrix @ found.powers
         rows = [
             2.0 * power * column / total
             for power, column in zip(found.powers, matrix.T, strict=True)

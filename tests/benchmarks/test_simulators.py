@@ -1,0 +1,101 @@
+"""Simulated noise against closed forms; the Allan variance here is that of the definition."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import signal
+
+import simulators as sim
+
+RATE = 10.0
+LENGTH = 400_000
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(20260101)
+
+
+def allan_deviation(log: np.ndarray, cluster: int) -> float:
+    means = log[: len(log) // cluster * cluster].reshape(-1, cluster).mean(axis=1)
+    return math.sqrt(0.5 * np.mean(np.diff(means) ** 2))
+
+
+def density(log: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two-sided, by Welch."""
+    frequency, one_sided = signal.welch(log, RATE, nperseg=4096)
+    return frequency[1:-1], 0.5 * one_sided[1:-1]
+
+
+def test_white_noise_and_walk_have_their_allan_deviation(rng):
+    white = sim.white(LENGTH, RATE, 2e-3, rng)
+    assert allan_deviation(white, 10) == pytest.approx(2e-3, rel=0.02)
+    walk = sim.random_walk(LENGTH, RATE, 3e-4, rng)
+    assert allan_deviation(walk, 300) == pytest.approx(3e-4 * math.sqrt(30.0 / 3.0), rel=0.1)
+
+
+def test_gauss_markov_process_is_stationary_and_peaks_at_its_bias_instability(rng):
+    B, T_B = 5e-3, 4.0
+    log = sim.gauss_markov(LENGTH, RATE, B, T_B, rng)
+    assert log.var() == pytest.approx(B**2 * math.log(2) / (math.pi * 0.4365**2), rel=0.05)
+    lagged = np.mean(log[40:] * log[:-40]) / log.var()
+    assert lagged == pytest.approx(math.exp(-1.0), rel=0.08)
+    assert allan_deviation(log, round(1.89 * T_B * RATE)) == pytest.approx(0.664 * B, rel=0.03)
+    starts = [sim.gauss_markov(1, RATE, B, T_B, rng)[0] for _ in range(4000)]
+    assert np.var(starts) == pytest.approx(B**2 * sim.VARIANCE, rel=0.1)
+
+
+def test_flicker_noise_of_both_kinds_has_the_plateau_and_its_own_density_at_nyquist(rng):
+    B = 1e-3
+    plain = sim.flicker(LENGTH, RATE, B, rng)
+    fractional = sim.fractional_flicker(LENGTH, B, rng)
+    for log in (plain, fractional):
+        assert allan_deviation(log, 500) == pytest.approx(0.664 * B, rel=0.1)
+    frequency, measured = density(plain)
+    assert np.mean(measured * 2.0 * np.pi * frequency)[()] == pytest.approx(B**2, rel=0.03)
+    frequency, measured = density(fractional)
+    sampled = B**2 / (RATE * 2.0 * np.sin(np.pi * frequency / RATE))
+    assert np.mean(measured / sampled) == pytest.approx(1.0, rel=0.03)
+
+
+def test_telegraph_noise_is_correlated_as_a_gauss_markov_process(rng):
+    log = sim.telegraph(LENGTH, RATE, 1.0, 8.0, rng)
+    assert set(np.unique(log)) == {-1.0, 1.0}
+    assert np.mean(log[40:] * log[:-40]) == pytest.approx(math.exp(-1.0), abs=0.04)  # T_B = 4 s
+
+
+def test_second_order_process_has_its_covariance_and_instability(rng):
+    log = sim.second_order(4 * LENGTH, RATE, 1.0, 3.0, rng)
+    assert log.std() == pytest.approx(1.0, rel=0.03)
+    assert np.mean(log[30:] * log[:-30]) == pytest.approx(2.0 / math.e, rel=0.05)
+    clusters = np.unique(np.geomspace(20, 200, 30).astype(int))
+    highest = max(allan_deviation(log, int(cluster)) for cluster in clusters)
+    assert sim.second_order_instability() * sim.FLOOR == pytest.approx(highest, rel=0.03)
+
+
+@pytest.mark.parametrize("order", [1, 2, 4])
+@pytest.mark.parametrize("kind", [sim.analogue, sim.digital])
+def test_low_pass_has_lost_half_of_the_power_at_its_cutoff(rng, kind, order):
+    log = kind(lambda samples, rate: sim.white(samples, rate, 1.0, rng), 200_000, RATE, 0.5, order)
+    assert len(log) == 200_000
+    frequency, measured = density(log)
+    assert np.mean(measured[frequency < 0.05]) == pytest.approx(1.0, rel=0.1)
+    at = np.abs(frequency - 0.5) < 0.02
+    assert np.mean(measured[at]) == pytest.approx(0.5, rel=0.1)
+    assert np.mean(measured[np.abs(frequency - 1.0) < 0.05]) == pytest.approx(
+        1.0 / (1.0 + 2.0 ** (2 * order)), rel=0.15
+    )
+
+
+def test_moving_mean_has_its_cutoff():
+    gain = abs(signal.freqz(np.ones(7) / 7, worN=[sim.moving_mean_cutoff(50.0, 7)], fs=50.0)[1])
+    assert gain[0] == pytest.approx(math.sqrt(0.5), rel=1e-3)
+
+
+def test_decimated_noise_keeps_its_density(rng):
+    log = sim.decimated(lambda n, rate: sim.white(n, rate, 1.0, rng) + 5.0, 100_000, RATE, 8)
+    frequency, measured = density(log)
+    assert len(log) == 100_000
+    assert log.mean() == pytest.approx(5.0, abs=0.05)
+    assert np.mean(measured[frequency < 3.0]) == pytest.approx(1.0, rel=0.06)
