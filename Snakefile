@@ -494,7 +494,7 @@ onstart:
 
 onsuccess:
     print(plan.summary())
-    if left_out := plan.left_out():
+    if left_out := plan.faults.left_out():
         raise WorkflowError(left_out)
 
 

@@ -29,7 +29,7 @@ def standing(sensor: str, **values: object) -> dict[str, Any]:
 
 
 def said(folder: Path, **rows: list[dict[str, Any]]) -> list[str]:
-    for name in ("recordings", "findings", "ranking"):
+    for name in ("recordings", "findings", "ranking", "failures"):
         write(name, rows.get(name, []), folder / f"tables/{name}.parquet")
     return summary(folder).splitlines()
 

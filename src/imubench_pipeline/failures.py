@@ -24,7 +24,7 @@ _METADATA = b"imubench.failure"
 _BESIDE = ("earth_rotation", "calibration")
 """Steps that need more than a static log: the rest of what it tells stands without them."""
 
-_NAMED = ("recordings", "findings", "failures")
+_NAMED = ("recordings", "findings", "estimate_findings", "failures")
 """Tables that say why a recording is left out of the others."""
 
 

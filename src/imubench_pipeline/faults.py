@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from imubench_pipeline.columns import text
 from imubench_pipeline.findings import Finding
 
 Cause = Literal["error", "killed", "time"]
@@ -17,6 +19,15 @@ Of = tuple[str, str, str | None]
 
 TOLD = "IMUBENCH_FAILURES_TOLD"
 """The environment variable of a run whose caller looks itself for what is left out."""
+
+FAILURES = (
+    text("sensor", "name of the sensor file"),
+    text("recording", "that is left out; null: a step of the whole sensor", required=False),
+    text("step", "of the workflow, which failed"),
+    text("cause", "error, killed, or time: it ran past its time"),
+    text("reason", "in one line; the folder faults has the rest"),
+)
+"""Columns of the table ``failures``."""
 
 _FOLDER = "faults"
 
@@ -115,6 +126,19 @@ class Faults:
             if record["failed"] and record["attempt"] >= self.attempt(of):
                 names = ("sensor", "recording", "step", "cause", "reason")
                 yield Failure(**{name: record[name] for name in names}), log_of(self._path(of))
+
+    def left_out(self) -> str:
+        """Return what a run says that left something out; nothing where its caller looks itself."""
+        from imubench_pipeline.run_summary import one_line
+
+        told = [
+            f"  {one_line(f'{found.name}: {found.reason}')}\n    log: {log}"
+            for found, log in self.now()
+        ]
+        if not told or TOLD in os.environ:
+            return ""
+        title = "what failed is left out, and tried again by the next run; the report is there"
+        return "\n".join([title, *told])
 
     def _path(self, of: Of) -> Path:
         step, sensor, recording = of

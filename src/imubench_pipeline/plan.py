@@ -7,7 +7,6 @@ of what the rule depends on, so that an edit runs again what it touches and noth
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from itertools import chain
@@ -17,7 +16,7 @@ from pydantic import BaseModel
 
 from imubench_pipeline.config import Run, given_beside, read_run
 from imubench_pipeline.drop_zone import Recording, fingerprint, fingerprints, found_logs
-from imubench_pipeline.faults import TOLD, Faults
+from imubench_pipeline.faults import Faults
 from imubench_pipeline.provenance import source_digest
 from imubench_pipeline.requirements import Requirement, read_requirements
 from imubench_pipeline.sensor import (
@@ -120,19 +119,6 @@ class Plan:
         """
         held_back = name is not None and self.recordings[sensor, name].held_back
         return self.faults.attempt((step, sensor, name), again=not held_back)
-
-    def left_out(self) -> str:
-        """Return which steps failed in this run, so that a recording or sensor is left out."""
-        from imubench_pipeline.run_summary import one_line
-
-        told = [
-            f"  {one_line(f'{found.name}: {found.reason}')}\n    log: {log}"
-            for found, log in self.faults.now()
-        ]
-        if not told or TOLD in os.environ:
-            return ""
-        title = "what failed is left out, and tried again by the next run; the report is there"
-        return "\n".join([title, *told])
 
     def ingest_settings(self, sensor: str, name: str) -> str:
         """Return what the ingest of a recording depends on, its error where it cannot be read.

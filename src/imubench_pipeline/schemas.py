@@ -12,6 +12,7 @@ from imubench_pipeline.columns import figure as _figure
 from imubench_pipeline.columns import number as _number
 from imubench_pipeline.columns import text as _text
 from imubench_pipeline.earth_rate.columns import EARTH_RATE_TABLES
+from imubench_pipeline.faults import FAILURES
 
 __all__ = [
     "BY_RECORDING",
@@ -63,13 +64,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _number("start", "s", "begin of the part concerned, from the first sample"),
         _number("end", "s", "its end"),
     ),
-    "failures": (
-        _SENSOR,
-        _text("recording", "that is left out; null: a step of the whole sensor", required=False),
-        _text("step", "of the workflow, which failed"),
-        _text("cause", "error, killed, or time: it ran past its time"),
-        _text("reason", "in one line; the folder faults has the rest"),
-    ),
+    "failures": FAILURES,
     "allan": (
         *_KEYS,
         _number("tau", "s", "cluster length, cluster_size / rate", required=True),

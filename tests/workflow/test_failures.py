@@ -60,8 +60,8 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Project:
 
 
 @pytest.fixture(scope="module")
-def faulty(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """The environment of a run with a package that has faults."""
+def faulty(project: Project, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """The environment of a run with a package that has faults, and is compiled."""
     place = tmp_path_factory.mktemp("code")
     package = Path(imubench_pipeline.__file__).parent
     copy = place / package.name
@@ -73,7 +73,13 @@ def faulty(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     put_fault(copy / "ingest.py", names, IN_INGEST)
     rows = 'rows: dict[str, list[Row]] = {"alignment": [], "earth_rate_prediction": []}'
     put_fault(copy / "alignment/of_sensor.py", rows, IN_OUTLOOK)
-    return os.environ | {"PYTHONPATH": str(place)}
+    project.environment = os.environ | {"PYTHONPATH": str(place)}
+    settings = project.settings.copy()
+    project.settings.pop()
+    done = project.run("results/recordings/one/good/scores.parquet")
+    assert done.returncode == 0, done.stdout + done.stderr
+    project.settings[:] = settings
+    return project.environment
 
 
 REASONS = {
@@ -156,6 +162,7 @@ def test_a_nightly_run_tries_again_and_says_in_its_exit_status_what_failed(
 
 def test_a_run_of_mended_code_makes_it_good(project: Project) -> None:
     project.environment = None
+    project.settings.pop()
     done = project.run()
     assert done.returncode == 0, done.stdout + done.stderr
     assert {row["status"] for row in project.table("recordings")} == {"ok"}
