@@ -50,6 +50,7 @@ RANKED = {
     *OUTLOOK,
 }
 ESTIMATED = (
+    "allan",
     "parameters",
     "models",
     "lines",
@@ -62,7 +63,6 @@ ESTIMATED = (
 )
 ANALYSED = [table for table in JOINED if table not in RANKED]
 PARTS = (
-    "allan",
     *ESTIMATED,
     "reconstruction",
     "scores",
@@ -182,11 +182,13 @@ rule ingest:
         steps.run("ingest", input, output, params, wildcards)
 
 
+# The limits of this curve go by an identified power law; those of the table `allan`, which the next
+# step writes, by the spectrum that it fits.
 rule allan:
     input:
         quality=FOLDER + "/quality.json",
     output:
-        FOLDER + "/allan.parquet",
+        FOLDER + "/curve.parquet",
     group:
         "recording"
     resources:
@@ -202,7 +204,7 @@ rule allan:
 rule estimate:
     input:
         quality=FOLDER + "/quality.json",
-        allan=FOLDER + "/allan.parquet",
+        curve=FOLDER + "/curve.parquet",
     output:
         **{table: f"{FOLDER}/{table}.parquet" for table in ESTIMATED},
     group:

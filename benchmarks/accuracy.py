@@ -3,7 +3,8 @@
 python benchmarks/accuracy.py [--logs 1000] [--others 200] [--processes 2]
 
 The likelihood estimates every log; the fits to the Allan variance, and the formulas of other
-programs, the first ``others`` of them.
+programs, the first ``others`` of them. All settings are the default ones: of each log the
+likelihood takes the band that it finds, which is said, and is held against the bound over it.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ from functools import partial
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
+from bands import bounds_over, highest, what_is_cut
 from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators import least_squares
@@ -49,16 +52,17 @@ CASES = (
     Case("weak B, 100 Hz", NoiseModel(N=1e-3, B=1e-4, T_B=100.0, K=1e-5), 100.0),
 )
 _LIMITED = 1 / 20
+_BY_LIKELIHOOD = ("likelihood", "likelihood_gm")
 
 Found = dict[str, dict[str, Parameter]]
 
 
-def of_log(case: Case, others: int, number: int) -> tuple[Found, str]:
-    """Return the estimates of one simulated log by method, and the model that was chosen."""
+def of_log(case: Case, others: int, number: int) -> tuple[Found, str, float]:
+    """Return the estimates of one simulated log by method, the chosen model, and the band, Hz."""
     rng = np.random.default_rng([number, CASES.index(case)])
     log = simulate(case.model, case.rate, round(case.hours * 3600 * case.rate), rng)
     spectrum, lines = spectra([log], len(log), case.rate)
-    result = fit_spectrum(spectrum, lines, band=0.5 * case.rate, rng=rng)
+    result = fit_spectrum(spectrum, lines, rng=rng)
     found: Found = {estimate.method: dict(estimate.parameters) for estimate in result.estimates}
     if number < others:
         limit = _LIMITED * case.rate
@@ -78,47 +82,64 @@ def of_log(case: Case, others: int, number: int) -> tuple[Found, str]:
         for peer in PEERS:
             printed = peer.estimate(log, case.rate)
             found[peer.name] = {name: Parameter(printed[name]) for name in PARAMETERS}
-    return found, result.candidates[0].found.terms.name
+    return found, result.candidates[0].found.terms.name, highest(result, case.rate)
 
 
-def table(case: Case, found: list[tuple[Found, str]]) -> Iterator[str]:
+def table(case: Case, found: list[tuple[Found, str, float]]) -> Iterator[str]:
     """Yield the lines of a table."""
     duration = case.hours * 3600.0
-    bounds = bounds_of(case.model, case.rate, duration, 0.5 * case.rate)
+    bands = [band for *_, band in found]
+    whole = bounds_of(case.model, case.rate, duration, 0.5 * case.rate)
     limited = bounds_of(case.model, case.rate, duration, _LIMITED * case.rate)
+    over_bands = bounds_over(case.model, case.rate, duration, bands)
     yield f"{case.name}, {len(found)} simulated logs of {case.hours:g} h"
-    yield "Cramér-Rao bound: " + ", ".join(f"{n} {100 * bounds[n]:.3g} %" for n in PARAMETERS)
+    yield "Cramér-Rao bound up to Nyquist: " + ", ".join(
+        f"{n} {100 * whole[n]:.3g} %" for n in PARAMETERS
+    )
     yield f"  up to rate/20: N {100 * limited['N']:.3g} %"
-    chosen = Counter(model for _, model in found).most_common(6)
+    yield what_is_cut(bands, case.rate)
+    chosen = Counter(model for _, model, _ in found).most_common(6)
     yield "chosen: " + ", ".join(f"{model} {number}" for model, number in chosen)
     yield (
         f"{'method':24}{'':5}{'logs':>6}{'value':>7}{'not id.':>8}{'absent':>7}{'RMSE/bound':>12}"
         f"{'bias/bound':>12}{'covered %':>11}{'width/bound':>13}"
     )
-    methods = dict.fromkeys(method for estimates, _ in found for method in estimates)
+    methods = dict.fromkeys(method for estimates, *_ in found for method in estimates)
     for method in methods:
         for name in PARAMETERS:
-            rows = [estimates[method][name] for estimates, _ in found if method in estimates]
-            bound = limited if method.endswith("rate/20") else bounds
-            yield f"{method:24}{name:5}" + row(rows, getattr(case.model, name), bound[name])
+            own = [i for i, (estimates, *_) in enumerate(found) if method in estimates]
+            rows = [found[i][0][method][name] for i in own]
+            if method in _BY_LIKELIHOOD:
+                bounds = over_bands[name][own]
+            else:
+                bound = limited if method.endswith("rate/20") else whole
+                bounds = np.full(len(own), bound[name])
+            yield f"{method:24}{name:5}" + row(rows, getattr(case.model, name), bounds)
 
 
-def row(parameters: list[Parameter], truth: float, bound: float) -> str:
+def row(parameters: list[Parameter], truth: float, bounds: NDArray[np.float64]) -> str:
     """Return the figures of one parameter of one method."""
     status = Counter(parameter.status for parameter in parameters)
-    values = [p for p in parameters if p.value is not None and p.status != "at_bound"]
+    given = [i for i, p in enumerate(parameters) if p.value is not None and p.status != "at_bound"]
     counts = (
-        f"{len(parameters):6d}{len(values):7d}{status['not_identified']:8d}{status['absent']:7d}"
+        f"{len(parameters):6d}{len(given):7d}{status['not_identified']:8d}{status['absent']:7d}"
     )
-    if not values:
+    if not given:
         return counts
+    values = [parameters[i] for i in given]
     errors = np.array([p.value for p in values], dtype=np.float64) / truth - 1.0
-    text = f"{np.sqrt(np.mean(errors**2)) / bound:12.3f}{errors.mean() / bound:12.2f}"
-    limits = [(p.lower, p.upper) for p in values if p.lower is not None and p.upper is not None]
-    if limits:
-        lower, upper = np.array(limits).T
+    errors /= bounds[given]
+    text = f"{np.sqrt(np.mean(errors**2)):12.3f}{errors.mean():12.2f}"
+    limited = [
+        i for i in given if parameters[i].lower is not None and parameters[i].upper is not None
+    ]
+    if limited:
+        limits = np.array(
+            [(parameters[i].lower, parameters[i].upper) for i in limited], dtype=np.float64
+        )
+        lower, upper = limits.T
         covered = np.mean((lower <= truth) & (truth <= upper))
-        width = np.median(upper - lower) / truth / (3.92 * bound)
+        width = np.median((upper - lower) / truth / (3.92 * bounds[limited]))
         text += f"{100 * covered:11.1f}{width:13.3f}"
     return counts + text
 

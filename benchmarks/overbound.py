@@ -7,7 +7,8 @@ model lies above the true Allan variance at every tau, above the true spectral d
 1 / horizon to half the rate, and above the true growth of the integrals up to the horizon; the
 share in which a filter that loads it is not overconfident; and the median ratio to the true Allan
 variance at its minimum, and at its worst. ``family`` is that ratio of the model found from the
-truth itself: what the family costs, however long the log.
+truth itself: what the family costs, however long the log. The likelihood takes the band that it
+finds, which is said.
 
 The filter estimates the angle and the noise from a measurement of the angle every second for ten
 minutes, then goes without for the horizon; its true covariance, that of a filter with a wrong
@@ -28,6 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from bands import highest, what_is_cut
 from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.export.growth import growth
@@ -71,12 +73,16 @@ def log_of(case: Case, rng: np.random.Generator) -> Array:
     return rest + model.B * fractional_noise(samples, rng)
 
 
-def of_log(case: Case, horizon: float, number: int) -> tuple[dict[Key, Scores], list[bool]]:
-    """Return the scores of one log, and whether the limits alone hold: pointwise, together."""
+Found = tuple[dict[Key, Scores], list[bool], float]
+
+
+def of_log(case: Case, horizon: float, number: int) -> Found:
+    """Return the scores of a log, whether the limits alone hold (pointwise, together), its band."""
     rng = np.random.default_rng([number, CASES.index(case)])
     log = log_of(case, rng)
     curve = allan_variance(log, case.rate, overlap="octave")
-    fitted = fit(log, case.rate, band=0.5 * case.rate, rng=rng).estimates[0].model
+    result = fit(log, case.rate, rng=rng)
+    fitted = result.estimates[0].model
     found: dict[Key, Scores] = {}
     for part in PARTS:
         longest = part * case.hours * 3600.0 if part else horizon
@@ -89,7 +95,8 @@ def of_log(case: Case, horizon: float, number: int) -> tuple[dict[Key, Scores], 
     within = curve.tau <= longest
     pointwise = curve.limits(0.95)[1] ** 2
     together = simultaneous_upper(curve, longest)
-    return found, [bool(np.all((upper > truth)[within])) for upper in (pointwise, together)]
+    limits = [bool(np.all((upper > truth)[within])) for upper in (pointwise, together)]
+    return found, limits, highest(result, case.rate)
 
 
 def scores(case: Case, model: NoiseModel, longest: float, horizon: float) -> Scores:
@@ -171,13 +178,12 @@ def of_truth(case: Case, family: Family, longest: float, horizon: float) -> Nois
     ).model
 
 
-def table(
-    case: Case, horizon: float, found: list[tuple[dict[Key, Scores], list[bool]]]
-) -> Iterator[str]:
+def table(case: Case, horizon: float, found: list[Found]) -> Iterator[str]:
     """Yield the lines of a case."""
     yield f"{case.name}, {len(found)} simulated logs of {case.hours:g} h, {case.rate:g} Hz"
+    yield f"  {what_is_cut([band for *_, band in found], case.rate)}"
     for i, name in enumerate(("95 % limits at each tau", "limits for all tau together")):
-        share = 100 * np.mean([alone[i] for _, alone in found])
+        share = 100 * np.mean([alone[i] for _, alone, _ in found])
         yield f"  {name}: above the true curve everywhere in {share:.0f} % of the logs"
     yield (
         f"  {'family':8}{'tau to':>8}{'AV':>7}{'PSD':>7}{'growth':>8}{'filter':>8}"
@@ -185,7 +191,7 @@ def table(
     )
     for key in found[0][0]:
         family, longest = key
-        columns = list(zip(*(scores[key] for scores, _ in found), strict=True))
+        columns = list(zip(*(scores[key] for scores, *_ in found), strict=True))
         shares = [100.0 * np.mean(column) for column in columns[:4]]
         own = scores(case, of_truth(case, family, longest, horizon), longest, horizon)
         yield (

@@ -8,10 +8,11 @@ Truths
 N is that before any low-pass, without rounding noise or with it, without outliers or with them;
 where it changes, what it is at any time. Where noise is sampled without an anti-aliasing filter
 (`decimated_without_filter`), N is that of the log, with what folds. B is that of the process; of
-several, from the lowest B to the bias instability of the curve, which is the highest Allan
-deviation of all of them together over 0.664. Flicker noise up to Nyquist and Kasdin's differ there:
-N is known as well as that. Telegraph noise is a Gauss-Markov process of the same covariance. Steps,
-drift and cycles are no random walk: K is 0 unless there is one.
+several, from the lowest B to the bias instability of the curve (B_curve), which is the highest
+Allan deviation of all of them together over 0.664, up to a ninth of the log or beyond. Flicker
+noise up to Nyquist and Kasdin's differ there: N is known as well as that. Telegraph noise is a
+Gauss-Markov process of the same covariance. Steps, drift and cycles are no random walk: K is 0
+unless there is one.
 """
 
 from __future__ import annotations
@@ -71,7 +72,7 @@ class Log:
     rate : float
         Hz.
     truth : dict of str to Truth
-        Of N, B, T_B, K, Q, R, and ``cutoff``; what is not there is not judged.
+        Of N, B, B_curve, T_B, K, Q, R, and ``cutoff``; what is not there is not judged.
     quantity : str
         ``gyro`` or ``accel``.
     stamps : ndarray, shape (L,), optional
@@ -117,7 +118,7 @@ class Noise:
     def truth(self, **others: Truth) -> dict[str, Truth]:
         """Return what its parameters are, and others."""
         own = {"N": exactly(self.N), "B": exactly(self.B), "K": exactly(self.K)}
-        own["T_B"] = exactly(self.T_B)
+        own |= {"B_curve": own["B"], "T_B": exactly(self.T_B)}
         return own | {"Q": NOTHING, "R": NOTHING, "cutoff": NOTHING} | others
 
     def offset(self, rng: Rng) -> float:
@@ -255,7 +256,7 @@ def _flicker(rng: Rng, *, fractional: bool, walk: bool) -> Log:
         log += sim.random_walk(samples, rate, K, rng)
     differs = (0.5 - 1.0 / np.pi) * B**2 / rate  # of the two at Nyquist
     known = Truth(math.sqrt(max(noise.N**2 - differs, 0.0)), math.sqrt(noise.N**2 + differs))
-    truth = noise.truth(N=known, B=exactly(B), K=exactly(K))
+    truth = noise.truth(N=known, B=exactly(B), B_curve=exactly(B), K=exactly(K))
     truth.pop("T_B")  # there is none; of a process that stands for it, anything
     return Log(log, rate, truth, noise.quantity)
 
@@ -295,10 +296,9 @@ def _two_processes(rng: Rng, *, walk: bool) -> Log:
     if walk:
         K = second.with_walk(between(rng, 5.0, 10.0), duration).K
         log += sim.random_walk(samples, rate, K, rng)
-    highest = math.hypot(noise.B, second.B)
-    truth = noise.truth(
-        B=Truth(min(noise.B, second.B), highest), T_B=Truth(fast, slow), K=exactly(K)
-    )
+    highest = sim.instability_of_curve([(noise.sigma, fast), (second.sigma, slow)], duration / 9.0)
+    B = Truth(min(noise.B, second.B), max(noise.B, second.B, highest))
+    truth = noise.truth(B=B, B_curve=exactly(highest), T_B=Truth(fast, slow), K=exactly(K))
     return Log(log, rate, truth, noise.quantity)
 
 
@@ -337,7 +337,7 @@ def second_order_process(rng: Rng) -> Log:
     sigma = noise.N * math.sqrt(between(rng, 20.0, 300.0) / (4.0 * time))
     log = noise.make(rng)(samples, rate) + sim.second_order(samples, rate, sigma, time, rng)
     B = sigma * sim.second_order_instability()
-    truth = noise.truth(B=Truth(B, B, loose=True))
+    truth = noise.truth(B=Truth(B, B, loose=True), B_curve=exactly(B))
     truth.pop("T_B")
     return Log(log, rate, truth, noise.quantity)
 
@@ -395,7 +395,10 @@ def slow_process(rng: Rng) -> Log:
     """A process of T_B from a fortieth to an eighth of the log, 30 to 3,000 times as dense."""
     samples, rate = any_length(rng)
     T_B = samples / rate / between(rng, 8.0, 40.0)
-    return any_white(rng).with_process(between(rng, 30.0, 3000.0), T_B).log(samples, rate, rng)
+    noise = any_white(rng).with_process(between(rng, 30.0, 3000.0), T_B)
+    shown = sim.instability_of_curve([(noise.sigma, T_B)], samples / rate / 9.0)
+    log = noise.log(samples, rate, rng)
+    return replace(log, truth=log.truth | {"B_curve": Truth(min(shown, noise.B), noise.B)})
 
 
 def walk_hides_white(rng: Rng) -> Log:
@@ -412,6 +415,37 @@ def walk_over_all(rng: Rng) -> Log:
     noise = any_white(rng)
     K = 2.0 * rate * noise.N * math.sqrt(between(rng, 5.0, 50.0))
     return replace(noise, K=K).log(samples, rate, rng)
+
+
+def flicker_and_process(rng: Rng) -> Log:
+    """White and flicker noise, and a process of 5 to 50 times their density at 1 / (2 pi T_B)."""
+    log = _flicker(rng, fractional=False, walk=False)
+    samples, duration = len(log.samples), len(log.samples) / log.rate
+    T_B = between(rng, duration / 500.0, duration / 100.0)
+    N, F = log.truth["N"], log.truth["B"].high
+    level = N.high**2 + F**2 * T_B
+    sigma = math.sqrt(between(rng, 5.0, 50.0) * level / (2.0 * T_B))
+    made = log.samples + sim.gauss_markov(
+        samples, log.rate, sigma / math.sqrt(sim.VARIANCE), T_B, rng
+    )
+    B = sigma / math.sqrt(sim.VARIANCE)
+    curve = exactly(math.hypot(F, B))
+    T = exactly(T_B)
+    truth = log.truth | {"B": Truth(min(F, B), curve.high), "B_curve": curve, "T_B": T}
+    return replace(log, samples=made, truth=truth)
+
+
+def few_samples(rng: Rng) -> Log:
+    """20 to 60 min at 1 to 5 Hz: white noise, with a process or a walk in half of the logs each."""
+    rate = float(rng.choice([1.0, 2.0, 5.0]))
+    duration = 60.0 * rng.uniform(20.0, 60.0)
+    noise = any_white(rng)
+    if rng.random() < 0.5:
+        T_B = between(rng, duration / 200.0, duration / 50.0)
+        noise = noise.with_process(between(rng, 10.0, 100.0), T_B)
+    if rng.random() < 0.5:
+        noise = noise.with_walk(between(rng, 2.0, 10.0), duration)
+    return noise.log(round(duration * rate), rate, rng)
 
 
 def angle_quantisation(rng: Rng) -> Log:
@@ -513,6 +547,56 @@ def filtered_fast_process(rng: Rng) -> Log:
     cutoff = between(rng, 0.1, 0.5) * 0.5 * rate
     log = sim.digital(noise.make(rng), samples, rate, cutoff, 2)
     return Log(log, rate, noise.truth(cutoff=exactly(cutoff)), noise.quantity)
+
+
+def filtered_walk(rng: Rng) -> Log:
+    """An analogue low-pass of any order, and a walk that hides N up to 0.02 to 0.3 of its end."""
+    rate = float(rng.choice([20.0, 50.0, 100.0]))
+    samples = round(between(rng, 1e5, 2e5))
+    noise = any_white(rng)
+    cutoff = between(rng, 0.1, 0.8) * 0.5 * rate
+    noise = replace(noise, K=2.0 * math.pi * between(rng, 0.02, 0.3) * cutoff * noise.N)
+    log = sim.analogue(noise.make(rng), samples, rate, cutoff, int(rng.integers(1, 5)))
+    return Log(log, rate, noise.truth(cutoff=exactly(cutoff)), noise.quantity)
+
+
+def filtered_flicker(rng: Rng) -> Log:
+    """A digital low-pass of any order, white and flicker noise."""
+    rate = float(rng.choice([50.0, 100.0]))
+    samples = round(between(rng, 1200.0, 3000.0) * rate)
+    noise = any_white(rng)
+    B = noise.N * math.sqrt(2.0 * math.pi * between(rng, 100.0, 1000.0) * rate / samples)
+    cutoff = between(rng, 0.05, 0.8) * 0.5 * rate
+
+    def make(length: int, inner: float) -> Array:
+        return noise.make(rng)(length, inner) + sim.flicker(length, inner, B, rng)
+
+    log = sim.digital(make, samples, rate, cutoff, int(rng.integers(1, 5)))
+    truth = noise.truth(B=exactly(B), B_curve=exactly(B), cutoff=exactly(cutoff))
+    truth.pop("T_B")
+    return Log(log, rate, truth, noise.quantity)
+
+
+def sinc_cubed(rng: Rng) -> Log:
+    """Running means over 2 to 8 samples, three times: the filter of a sigma-delta converter."""
+    samples, rate, noise, _ = _for_filter(rng)
+    taps = int(rng.integers(2, 9))
+    weights = np.array([1.0])
+    for _ in range(3):
+        weights = np.convolve(weights, np.full(taps, 1.0 / taps))
+    log = sim.weighted(noise.make(rng), samples, rate, weights)
+    truth = noise.truth()
+    truth.pop("cutoff")
+    return Log(log, rate, truth, noise.quantity)
+
+
+def resonant_low_pass(rng: Rng) -> Log:
+    """An analogue low-pass of second order that rises by 1.2 to 2 at its cut-off."""
+    samples, rate, noise, cutoff = _for_filter(rng)
+    log = sim.resonant(noise.make(rng), samples, rate, cutoff, rng.uniform(1.2, 2.0))
+    truth = noise.truth()
+    truth.pop("cutoff")
+    return Log(log, rate, truth, noise.quantity)
 
 
 def decimated_with_filter(rng: Rng) -> Log:
@@ -669,6 +753,27 @@ def ventilation(rng: Rng) -> Log:
     return _with_mean(rng, noise, samples, rate, rng.uniform(1.0, 5.0) * noise.sigma * cycle)
 
 
+def pulses(rng: Rng) -> Log:
+    """N, B, T_B, and a bias that is 3 to 10 sigma off for 1 to 20 % of the log, 1 to 4 times."""
+    samples, rate = any_length(rng)
+    noise = any_process(rng, samples, rate)
+    mean = np.zeros(samples)
+    for _ in range(rng.integers(1, 5)):
+        start, size = rng.uniform(0.0, 0.8) * samples, between(rng, 0.01, 0.2) * samples
+        off = float(rng.choice([-1.0, 1.0])) * rng.uniform(3.0, 10.0) * noise.sigma
+        mean[round(start) : round(start + size)] += off
+    return _with_mean(rng, noise, samples, rate, mean)
+
+
+def slow_line(rng: Rng) -> Log:
+    """N, B, T_B, and a sinusoid of 0.5 to 5 sigma, 3 to 50 cycles, as of a heating that is kept."""
+    samples, rate = any_length(rng)
+    noise = any_process(rng, samples, rate)
+    angle = 2.0 * np.pi * (between(rng, 3.0, 50.0) * np.arange(samples) / samples + rng.random())
+    mean = between(rng, 0.5, 5.0) * noise.sigma * np.sin(angle)
+    return _with_mean(rng, noise, samples, rate, mean)
+
+
 def ramp(rng: Rng) -> Log:
     """N, B, T_B and a ramp of 3 to 30 sigma of the process; in half of the logs a walk too."""
     samples, rate = any_length(rng)
@@ -731,6 +836,16 @@ def outliers(rng: Rng) -> Log:
     made[off] += size
     N = Truth(noise.N, math.sqrt(noise.N**2 + float((size**2).sum()) / (samples * rate)))
     return replace(log, samples=made, truth=log.truth | {"N": N})
+
+
+def zeros(rng: Rng) -> Log:
+    """N, B, T_B, K of an accelerometer at 1 g, and 1e-5 to 1e-3 of the samples are 0."""
+    samples, rate = any_length(rng)
+    noise = replace(of_four(rng, samples, rate), quantity="accel")
+    log = noise.log(samples, rate, rng)
+    made = log.samples - log.samples.mean() + 9.8
+    made[rng.random(samples) < between(rng, 1e-5, 1e-3)] = 0.0
+    return replace(log, samples=made)
 
 
 def _lines(rng: Rng, log: Log, noise: Noise, frequencies: NDArray[np.floating]) -> Log:
@@ -862,6 +977,8 @@ HARD: Mapping[str, Case] = {
         slow_process,
         walk_hides_white,
         walk_over_all,
+        flicker_and_process,
+        few_samples,
         angle_quantisation,
         analogue_1,
         analogue_2,
@@ -872,6 +989,10 @@ HARD: Mapping[str, Case] = {
         moving_mean,
         filtered_and_rounded,
         filtered_fast_process,
+        filtered_walk,
+        filtered_flicker,
+        sinc_cubed,
+        resonant_low_pass,
         decimated_with_filter,
         decimated_without_filter,
         means_of_samples,
@@ -886,11 +1007,14 @@ HARD: Mapping[str, Case] = {
         warm_up,
         day_cycle,
         ventilation,
+        pulses,
+        slow_line,
         ramp,
         growing_noise,
         bursts,
         heavy_tails,
         outliers,
+        zeros,
         lines,
         comb,
         vibration,

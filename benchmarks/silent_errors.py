@@ -31,7 +31,8 @@ parameter of the recommended method is.
 
 A finding bears on what it speaks of. One of severity ``warning`` or ``fatal``, about the channel or
 the whole recording, bears on all parameters, except for those that say how something was dealt
-with so that the figures hold: `BEARS_ON` has them, and the notes that bear on anything.
+with so that the figures hold, and those that speak of white or of slow noise alone: `BEARS_ON` has
+them. Notes bear on nothing, but for that of a recording too short for slow noise.
 """
 
 from __future__ import annotations
@@ -69,8 +70,8 @@ from silent_cases import CASES, CLEAN, NOTHING, Log, Truth
 
 SCRIPTS = Path(__file__).parents[1] / "workflow/scripts"
 
-ALL = frozenset({"N", "B", "T_B", "K", "Q", "R", "cutoff"})
-SLOW = frozenset({"B", "T_B", "K", "R"})
+ALL = frozenset({"N", "B", "B_curve", "T_B", "K", "Q", "R", "cutoff"})
+SLOW = frozenset({"B", "B_curve", "T_B", "K", "R"})
 
 BEARS_ON: Mapping[str, frozenset[str]] = {
     # What is missing, late or left out is accounted for: the figures are meant to hold.
@@ -87,18 +88,28 @@ BEARS_ON: Mapping[str, frozenset[str]] = {
     # White noise does not move the mean.
     "step": SLOW,
     "warm_up": SLOW,
+    "bias_step": SLOW,
+    "warm_up_drift": SLOW,
+    "periodic_drift": SLOW,
+    "telegraph_noise": SLOW,
+    "K_differs": frozenset({"K", "R"}),
+    # Nor does a changing variance make a process.
+    "noise_grows": frozenset({"N", "Q"}),
+    "noise_varies": frozenset({"N", "Q"}),
     # Of the unit, and not of the noise.
     "suspicious_unit": frozenset(),
     "large_offset": frozenset(),
     "gravity_norm": frozenset(),
-    # Notes.
-    "quantised": frozenset({"N", "Q"}),
+    # A note; others only tell what is there, such as the step of a register.
     "short_recording": SLOW,
 }
 """The parameters on which a finding bears; of others: all if it is a warning, none if a note."""
 
 CLASSES = ("silent", "loud", "refused", "right", "doubted", "none", "failed")
-SHOWN = ("N", "B", "T_B", "K", "Q", "R")
+_TELLING = 20.0
+"""s between two words about how far a run is."""
+
+SHOWN = ("N", "B", "B_curve", "T_B", "K", "Q", "R")
 
 
 @dataclass(frozen=True)
@@ -468,17 +479,24 @@ def summary(judged: Sequence[Judged]) -> Iterator[str]:
     logs = {(one.case, one.log) for one in own}
     silent = {(one.case, one.log) for one in own if one.judgement == "silent"}
     yield f"logs with a silent error, recommended method: {share(len(silent), len(logs))}"
+    methods = dict.fromkeys(one.method for one in judged)
+    for method in methods:
+        theirs = [one for one in judged if one.method == method]
+        there = {(one.case, one.log) for one in theirs}
+        wrong = {(one.case, one.log) for one in theirs if one.judgement == "silent"}
+        yield f"  {method}: {share(len(wrong), len(there))}"
     values = [one for one in own if one.value is not None]
     alone = sum(one.judgement == "silent" for one in values)
     yield f"values with a silent error, recommended method: {share(alone, len(values))}"
-    clean = [one for one in own if one.case in CLEAN and one.component == 1]
-    for name in ("N", "B", "T_B", "K"):
+    clean = [one for one in own if one.case in CLEAN]
+    for name in ("N", "B", "B_curve", "T_B", "K"):
         told = [one for one in clean if one.parameter == name and one.truth_high > 0.0]
         if told:
-            right = sum(one.judgement == "right" for one in told)
-            warned = sum(bool(one.warned_by) for one in told)
-            text = f"clean cases, {name} right and ok: {share(right, len(told))}"
-            yield f"{text}; warned of: {warned}"
+            there = {(one.case, one.log) for one in told}
+            right = {(one.case, one.log) for one in told if one.judgement == "right"}
+            warned = {(one.case, one.log) for one in told if one.warned_by}
+            text = f"clean cases, {name} right and ok: {share(len(right), len(there))}"
+            yield f"{text}; warned of: {len(warned)}"
 
 
 def silent_list(judged: Iterable[Judged]) -> Iterator[str]:
@@ -529,6 +547,23 @@ def details(case: str, number: int) -> Iterator[str]:
         )
 
 
+def progress(judged: Mapping[tuple[str, int], Sequence[Judged]], number: int) -> str:
+    """Say how many logs are judged, and how many of them are silently wrong."""
+    silent = sum(
+        any(one.recommended and one.judgement == "silent" for one in rows)
+        for rows in judged.values()
+    )
+    return f"{len(judged)} of {number} logs, {silent} silently wrong"
+
+
+def in_order(
+    judged: Mapping[tuple[str, int], Sequence[Judged]], names: Sequence[str]
+) -> list[Judged]:
+    """Return all judgements, case by case."""
+    return [one for name in names for (case, _), rows in judged.items() if case == name
+            for one in rows]  # fmt: skip
+
+
 def main() -> None:
     """Print the tables, and what must be looked at."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
@@ -550,29 +585,24 @@ def main() -> None:
     tasks = [(n, i) for i in range(given.first, given.first + given.logs) for n in names]
     judged: dict[tuple[str, int], list[Judged]] = {}
     spent: dict[str, float] = defaultdict(float)
+    took_longest = (0.0, "")
     errors: list[str] = []
-    begun = time.monotonic()
+    begun = told = time.monotonic()
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(given.processes, mp_context=context) as pool:
         for case, number, found, took, error in pool.map(of_log, tasks, chunksize=2):
             judged[case, number] = found
             for step, seconds in took.items():
                 spent[step] += seconds
+            took_longest = max(took_longest, (sum(took.values()), f"{case} {number}"))
             errors += [f"{case} {number}: {error}"] if error else []
-            if len(judged) % 50 == 0 or len(judged) == len(tasks):
-                silent = sum(
-                    any(one.recommended and one.judgement == "silent" for one in rows)
-                    for rows in judged.values()
-                )
-                print(
-                    f"{len(judged)} of {len(tasks)} logs, {silent} silently wrong, "
-                    f"{time.monotonic() - begun:.0f} s",
-                    file=sys.stderr,
-                )
-    rows = [one for name in names for (case, _), found in judged.items() if case == name
-            for one in found]  # fmt: skip
-    if given.output:
-        write(rows, given.output)
+            now = time.monotonic()
+            if now - told > _TELLING or len(judged) == len(tasks):
+                told = now
+                print(f"{progress(judged, len(tasks))}, {now - begun:.0f} s", file=sys.stderr)
+                if given.output:  # what is known so far
+                    write(in_order(judged, names), given.output)
+    rows = in_order(judged, names)
     total = sum(spent.values())
     print("\n".join(case_table(rows)), end="\n\n")
     print("\n".join(method_table(rows)), end="\n\n")
@@ -583,7 +613,10 @@ def main() -> None:
         f"{step} {100 * s / total:.0f} %"
         for step, s in sorted(spent.items(), key=lambda item: -item[1])
     )
-    print(f"{total / len(tasks):.2f} s of a process a log: {parts}")
+    longest, name = took_longest
+    print(
+        f"{total / len(tasks):.2f} s of a process a log: {parts}; longest {name}, {longest:.1f} s"
+    )
 
 
 def write(judged: Sequence[Judged], path: Path) -> None:

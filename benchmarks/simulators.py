@@ -9,7 +9,7 @@ process 2 S_v T_B / (1 + (2 pi f T_B)^2) with the variance S_v = B^2 ln 2 / (pi 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -134,6 +134,31 @@ def second_order_instability() -> float:
     return math.sqrt(-float(highest.fun)) / FLOOR
 
 
+def process_variance(tau: float, sigma: float, T_B: float) -> float:
+    """Return the Allan variance of a Gauss-Markov process of a standard deviation."""
+    x = tau / T_B
+    bracket = 1.0 - (3.0 - 4.0 * math.exp(-x) + math.exp(-2.0 * x)) / (2.0 * x)
+    return 2.0 * sigma**2 / x * bracket
+
+
+def instability_of_curve(processes: Sequence[tuple[float, float]], longest: float) -> float:
+    """Return the highest Allan deviation of Gauss-Markov processes up to some tau, over 0.664.
+
+    Parameters
+    ----------
+    processes : sequence of (float, float)
+        Standard deviation and T_B in s of each.
+    longest : float
+        s.
+    """
+    shortest = 0.5 * min(T_B for _, T_B in processes)
+    highest = max(
+        sum(process_variance(float(tau), sigma, T_B) for sigma, T_B in processes)
+        for tau in np.geomspace(min(shortest, longest), longest, 400)
+    )
+    return math.sqrt(highest) / FLOOR
+
+
 def telegraph(
     samples: int, rate: float, amplitude: float, dwell: float, rng: np.random.Generator
 ) -> Array:
@@ -170,6 +195,22 @@ def analogue(
     return np.asarray(signal.sosfilt(sections, made, zi=start)[0][::_OVERSAMPLED][settled:])
 
 
+def resonant(
+    make: Callable[[int, float], Array], samples: int, rate: float, cutoff: float, quality: float
+) -> Array:
+    """Return a process behind an analogue low-pass of second order and of a quality.
+
+    Its gain at the cut-off is the quality, and 1 far below.
+    """
+    inner = _OVERSAMPLED * rate
+    settled = math.ceil(_SETTLED * rate / cutoff)
+    made = make(_OVERSAMPLED * (samples + settled), inner)
+    w = 2.0 * math.pi * cutoff
+    sections = signal.tf2sos(*signal.bilinear([w**2], [1.0, w / quality, w**2], inner))
+    start = signal.sosfilt_zi(sections) * made[0]
+    return np.asarray(signal.sosfilt(sections, made, zi=start)[0][::_OVERSAMPLED][settled:])
+
+
 def digital(
     make: Callable[[int, float], Array], samples: int, rate: float, cutoff: float, order: int
 ) -> Array:
@@ -184,10 +225,15 @@ def digital(
 
 def moving_mean(make: Callable[[int, float], Array], samples: int, rate: float, taps: int) -> Array:
     """Return the running means of a process over some samples."""
-    made = make(samples + taps - 1, rate)
-    return np.asarray(
-        signal.fftconvolve(made - made[0], np.full(taps, 1.0 / taps), "valid") + made[0]
-    )
+    return weighted(make, samples, rate, np.full(taps, 1.0 / taps))
+
+
+def weighted(
+    make: Callable[[int, float], Array], samples: int, rate: float, weights: Array
+) -> Array:
+    """Return a process behind a filter of finite length, whose weights add up to 1."""
+    made = make(samples + len(weights) - 1, rate)
+    return np.asarray(signal.fftconvolve(made - made[0], weights, "valid") + made[0])
 
 
 def moving_mean_cutoff(rate: float, taps: int) -> float:

@@ -153,7 +153,8 @@ def test_the_tables_give_estimate_and_curve_back(
     curve = compensated_curves(tmp_path / "left.parquet", {"gyro_x": measured})["gyro_x"]
     adev = [row["adev"] for row in found.allan_compensated]
     np.testing.assert_allclose(curve.deviation, adev, rtol=1e-12)
-    np.testing.assert_array_equal(curve.edf, measured.edf)
+    assert curve.edf_source == ("fitted spectrum",) * len(measured.tau)
+    assert curve.limits()[1] == pytest.approx([row["upper"] for row in found.allan_compensated])
 
 
 def test_a_log_whose_temperature_does_nothing_is_left_as_it_is(tmp_path: Path) -> None:

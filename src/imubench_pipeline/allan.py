@@ -33,6 +33,10 @@ from imubench_pipeline.threads import read_ahead
 _MANY_CLUSTERS = 100
 _FEW_STEPS = 2  # strides in a cluster: for shorter ones the noise type needs every sample
 
+POWER_LAW = "power law"
+FITTED = "fitted spectrum"
+"""What degrees of freedom come from."""
+
 Edges = Callable[[int], tuple[NDArray[np.float64], NDArray[Any] | None, int]]
 """Cumulative sums and counts at the edges of adjacent clusters of about a size, and the size."""
 
@@ -59,6 +63,12 @@ class AllanCurve:
     averaged : ndarray, shape (m,)
         Samples that a cluster really averages: n, by default, or fewer (their harmonic mean)
         where samples are missing. The variance of white noise goes with 1 / averaged.
+    edf_upper : ndarray, shape (m,)
+        Those of the upper limit, which are more where few clusters remain. By default ``edf``.
+    edf_source : sequence of str
+        Where they come from at each tau: the identified power law, or the fitted spectrum.
+    share : ndarray, shape (m,)
+        Part of the differences that missing samples leave. By default 1.
     """
 
     tau: NDArray[np.float64]
@@ -68,6 +78,9 @@ class AllanCurve:
     samples: int = 0
     exponent: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     averaged: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    edf_upper: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    edf_source: Sequence[str] = ()
+    share: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
         # The class is frozen: defaults that follow from other fields go this way.
@@ -77,6 +90,12 @@ class AllanCurve:
             object.__setattr__(self, "exponent", np.zeros(len(self.tau), dtype=np.int64))
         if not len(self.averaged):
             object.__setattr__(self, "averaged", np.asarray(self.cluster_size, dtype=np.float64))
+        if not len(self.edf_upper):
+            object.__setattr__(self, "edf_upper", self.edf)
+        if not self.edf_source:
+            object.__setattr__(self, "edf_source", (POWER_LAW,) * len(self.tau))
+        if not len(self.share):
+            object.__setattr__(self, "share", np.ones(len(self.tau)))
 
     @property
     def deviation(self) -> NDArray[np.float64]:
@@ -89,7 +108,7 @@ class AllanCurve:
 
     def limits(self, confidence: float = 0.95) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the lower and upper confidence limits of the deviation, shapes (m,)."""
-        return deviation_limits(self.deviation, self.edf, confidence)
+        return deviation_limits(self.deviation, self.edf, confidence, self.edf_upper)
 
 
 def cluster_sizes(samples: int, *, per_decade: int = 10, longest: float = 0.5) -> NDArray[np.int64]:
@@ -318,6 +337,7 @@ def _curve(
         exponent=exponent,
         samples=samples,
         averaged=terms / thinned,
+        share=terms / possible,
     )
 
 

@@ -33,6 +33,17 @@ def count(name: str, meaning: str, required: bool = False) -> Column:
     return Column(name, pa.int64(), "-", meaning, required)
 
 
+def curve_limits(unit: str) -> tuple[Column, ...]:
+    """Return what every table of a measured Allan curve says of its limits."""
+    return (
+        number("lower", unit, "lower 95 % limit"),
+        number("upper", unit, "upper 95 % limit"),
+        number("edf", "-", "equivalent degrees of freedom of the Allan variance"),
+        number("edf_upper", "-", "those of the upper 95 % limit: more where few clusters remain"),
+        text("edf_source", "what they follow from: fitted spectrum, or power law at this tau"),
+    )
+
+
 def figure(
     parameters: str, statuses: str = "ok, doubtful, not_shown, at_bound, not_identified or absent"
 ) -> tuple[Column, ...]:

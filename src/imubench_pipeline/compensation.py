@@ -13,7 +13,7 @@ from imubench_pipeline.cutoff import Cutoff, find_cutoff
 from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate, Parameter
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.recording import ChannelLog
-from imubench_pipeline.results import Key
+from imubench_pipeline.results import Key, limit_rows
 from imubench_pipeline.sensor import quantity_of
 from imubench_pipeline.thermal.effect import shifted
 from imubench_pipeline.thermal.fit import fit_temperature
@@ -107,10 +107,8 @@ def compensated_rows(key: Key, left: AllanCurve, added: AllanCurve) -> Iterator[
     left, added : AllanCurve
         Of the log without what temperature adds to it, and of that.
     """
-    lower, upper = left.limits(0.95)
-    names = ("tau", "adev", "lower", "upper", "temperature")
-    for values in zip(left.tau, left.deviation, lower, upper, added.deviation, strict=True):
-        yield asdict(key) | dict(zip(names, map(float, values), strict=True))
+    for about, deviation in zip(limit_rows(left), added.deviation, strict=True):
+        yield asdict(key) | about | {"temperature": float(deviation)}
 
 
 def temperature_rows(key: Key, found: ThermalFit) -> Iterator[Row]:

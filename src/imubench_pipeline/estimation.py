@@ -22,13 +22,15 @@ from imubench_pipeline.compensation import (
     temperature_rows,
 )
 from imubench_pipeline.config import EstimateSettings
+from imubench_pipeline.curve_limits import with_fitted_limits
 from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators import least_squares, likelihood
 from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.model_choice import disagreement
+from imubench_pipeline.presence import presence
 from imubench_pipeline.recording import ChannelLog
-from imubench_pipeline.results import Key, parameter_rows
+from imubench_pipeline.results import Key, allan_rows, parameter_rows
 from imubench_pipeline.sensor import quantity_of
 from imubench_pipeline.simulate import channel_rng
 from imubench_pipeline.thermal.path import TemperaturePath, temperature_path
@@ -41,6 +43,7 @@ Row = Mapping[str, Any]
 class Estimation:
     """Rows of the tables that the estimation of a recording leaves."""
 
+    allan: list[Row] = field(default_factory=list)
     parameters: list[Row] = field(default_factory=list)
     models: list[Row] = field(default_factory=list)
     lines: list[Row] = field(default_factory=list)
@@ -70,7 +73,7 @@ def estimate_channel(
     key : Key
     log : ChannelLog
     curve : AllanCurve
-        Of the log.
+        Of the log, with limits by the identified power laws.
     settings : EstimateSettings
     bandwidth : float or None
         Cut-off of the sensor's own filter, where it is known, Hz.
@@ -78,6 +81,7 @@ def estimate_channel(
         Takes the rows.
     """
     estimates: dict[str, Estimate] = {}
+    final = curve
     if "curve" in settings.methods:
         estimates["curve"] = reading.read(curve, longest=settings.longest)
     for method in ("paper", "weighted"):
@@ -106,6 +110,9 @@ def estimate_channel(
             bandwidth = low_pass.frequency.value or low_pass.frequency.lower
             found = fit(bandwidth=bandwidth, rng=stream("posterior"))
         estimates |= {estimate.method: estimate for estimate in found.estimates}
+        there = presence(log.blocks(), log.grid, log.segments) if log.holes else None
+        limited = partial(with_fitted_limits, segments=log.segments, presence=there)
+        final = limited(curve, found)
         into.models += _model_rows(key, found)
         into.lines += _line_rows(key, found)
         into.spectrum += _spectrum_rows(key, found)
@@ -120,9 +127,10 @@ def estimate_channel(
             into.temperature += temperature_rows(key, warm)
             if warm.compensated:
                 estimates["compensated"] = compensated_estimate(warm)
-                left = compensated_curve(log, warm, curve)
+                left = limited(compensated_curve(log, warm, curve), warm.without_temperature)
                 added = temperature_curve(log, warm, curve)
                 into.allan_compensated += compensated_rows(key, left, added)
+    into.allan += allan_rows(key, final)
     best = next(method for method in _BEST_FIRST if method in settings.methods)
     for method in settings.methods:
         if method in estimates:

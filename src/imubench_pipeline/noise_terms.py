@@ -1,8 +1,8 @@
 """The noise terms of an inertial sensor, each with all that follows from it (IEEE Std 952, 647).
 
 A term knows its two-sided power spectral density, its Allan variance in continuous time and as
-sampled, the spectrum of its samples, and its discrete state space. Models, fits, simulation and
-scores take everything from here.
+sampled, the spectrum of its samples, the covariance of their sums, and its discrete state space.
+Models, fits, simulation, limits and scores take everything from here.
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from imubench_pipeline.sampled_flicker import sampled_flicker_shape, sampled_flicker_sums
 from imubench_pipeline.state_space import StateSpace
 
 PEAK = 0.4365
@@ -31,8 +31,9 @@ _SERIES_BELOW = 0.5
 _SERIES = [(-1) ** (k + 1) * (2.0**k - 4.0) / (2.0 * math.factorial(k)) for k in range(3, 24)]
 """The bracket of 000 eq. 26 cancels for tau << T_B; its power series over tau/T_B does not."""
 
-_FLICKER_TABLE = 1 << 12
-"""Cluster sizes up to which the Allan variance of sampled flicker is summed up exactly."""
+_WALK_BELOW = 1e-3
+"""Cluster length over T_B below which a Gauss-Markov process is a random walk to a thousandth, and
+the second differences of its sum's covariance begin to cancel."""
 
 Array = NDArray[np.float64]
 
@@ -57,6 +58,14 @@ class Term(ABC):
     @abstractmethod
     def sampled_spectrum(self, omega: Array, interval: float) -> Array:
         """Spectrum of the samples, SI^2; its mean over -pi..pi is their variance."""
+
+    @abstractmethod
+    def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
+        """Generalised covariance of the cumulative sum of the samples at whole lags, SI^2.
+
+        It is that of the second differences at n samples a cluster: what these take out, a
+        constant and a square of the lag, may differ from n to n.
+        """
 
     @abstractmethod
     def state_space(self, interval: float) -> StateSpace:
@@ -100,6 +109,10 @@ class Quantization(Term):
         """(Q^2 / T^2) (2 - 2 cos(omega))."""
         return self.Q**2 / interval**2 * 4.0 * np.sin(omega / 2.0) ** 2
 
+    def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
+        """Q^2 / T^2 at lag 0: the sum is what was rounded last."""
+        return self.Q**2 / interval**2 * (lags == 0.0)
+
     def state_space(self, interval: float) -> StateSpace:
         """Give the states: the present rounding and the one before."""
         return StateSpace(
@@ -135,6 +148,10 @@ class WhiteNoise(Term):
         """N^2 / T."""
         return np.full_like(omega, self.N**2 / interval)
 
+    def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
+        """-N^2 / (2 T) |k|: the sum is a random walk."""
+        return -0.5 * self.N**2 / interval * np.abs(lags)
+
     def state_space(self, interval: float) -> StateSpace:
         """No state: R_d = N^2 / T."""
         return StateSpace.without_states(self.N**2 / interval)
@@ -160,11 +177,15 @@ class Flicker(Term):
 
     def sampled_allan_variance(self, n: Array, interval: float) -> Array:
         """2 B^2 / (pi n^2) times the integral of sin^4(n x) / sin^3(x) from 0 to pi/2."""
-        return 2.0 / np.pi * self.B**2 * _sampled_flicker_shape(n)
+        return 2.0 / np.pi * self.B**2 * sampled_flicker_shape(n)
 
     def sampled_spectrum(self, omega: Array, interval: float) -> Array:
         """B^2 / sqrt(2 - 2 cos(omega))."""
         return self.B**2 / np.abs(2.0 * np.sin(omega / 2.0))
+
+    def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
+        """B^2 / (2 pi) k^2 ln(k), as sampled."""
+        return 0.5 / np.pi * self.B**2 * sampled_flicker_sums(np.abs(lags))
 
     def state_space(self, interval: float) -> StateSpace:
         """Raise: there is none.
@@ -209,6 +230,18 @@ class GaussMarkov(Term):
         gap = math.expm1(-interval / self.T_B) ** 2 + p * 4.0 * np.sin(omega / 2.0) ** 2
         return -variance * math.expm1(-2.0 * interval / self.T_B) / gap
 
+    def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
+        """-v (p e^(-|k| T/T_B) / (1 - p)^2 + |k| (1 + p) / (2 (1 - p))), p = e^(-T/T_B).
+
+        v = S_B T_B / 2. For clusters that are short for T_B the process is a random walk.
+        """
+        if n * interval < _WALK_BELOW * self.T_B:
+            return RandomWalk(math.sqrt(self.density)).sum_covariance(lags, n, interval)
+        k, p, rest = np.abs(lags), math.exp(-interval / self.T_B), -math.expm1(-interval / self.T_B)
+        variance = self.density * self.T_B / 2.0
+        decayed = p / rest**2 * np.exp(-k * (interval / self.T_B))
+        return -variance * (decayed + k * ((1.0 + p) / (2.0 * rest)))
+
     def state_space(self, interval: float) -> StateSpace:
         """Phi = e^(-T/T_B), Q_d = S_B T_B / 2 (1 - e^(-2T/T_B)); it starts stationary."""
         stationary = self.density * self.T_B / 2.0
@@ -242,6 +275,11 @@ class RandomWalk(Term):
         """K^2 T / (2 - 2 cos(omega))."""
         return self.K**2 * interval / (4.0 * np.sin(omega / 2.0) ** 2)
 
+    def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
+        """K^2 T (|k|^3 - |k|) / 12."""
+        k = np.abs(lags)
+        return self.K**2 * interval / 12.0 * (k**3 - k)
+
     def state_space(self, interval: float) -> StateSpace:
         """Phi = 1, Q_d = K^2 T; it starts at 0."""
         return StateSpace.scalar(1.0, self.K**2 * interval, 0.0)
@@ -269,6 +307,10 @@ class Ramp(Term):
     def sampled_spectrum(self, omega: Array, interval: float) -> Array:
         """0: a ramp is deterministic."""
         return np.zeros_like(omega)
+
+    def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
+        """0: a ramp is deterministic."""
+        return np.zeros_like(lags)
 
     def state_space(self, interval: float) -> StateSpace:
         """Give the states: the drift, and its rate R."""
@@ -307,6 +349,10 @@ class Sinusoid(Term):
     def sampled_spectrum(self, omega: Array, interval: float) -> Array:
         """0: a line has no density."""
         return np.zeros_like(omega)
+
+    def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
+        """0: a line is deterministic."""
+        return np.zeros_like(lags)
 
     def state_space(self, interval: float) -> StateSpace:
         """Rotate by 2 pi f_0 T a sample; the phase at the start is not known."""
@@ -370,29 +416,3 @@ def sampled_gauss_markov_shape(n: ArrayLike, interval: float, T_B: float) -> Arr
     added = h / (3.0 * n) - h**3 / 6.0 * (n / 3.0 + 1.0 / (15.0 * n))
     continuous = 2.0 / T_B * gauss_markov_shape(n * interval, T_B) + added
     return T_B / 2.0 * np.where(x < 3e-3, continuous, closed)
-
-
-def _sampled_flicker_shape(n: ArrayLike) -> Array:
-    """Return n^-2 times the integral of sin^4(n x) / sin^3(x) from 0 to pi/2; ln 2 for large n."""
-    sizes = np.asarray(n, dtype=np.float64)
-    table = _flicker_integrals()
-    # 1/sin^3(x) = 1/x^3 + 1/(2x) + ...: the second term adds (3/16) ln n and a constant.
-    beyond = table[-1] - math.log(2.0) * _FLICKER_TABLE**2 - 3.0 / 16.0 * math.log(_FLICKER_TABLE)
-    index = np.clip(np.rint(sizes), 1, _FLICKER_TABLE).astype(np.int64)
-    large = math.log(2.0) + (3.0 / 16.0 * np.log(sizes) + beyond) / sizes**2
-    return np.where(sizes <= _FLICKER_TABLE, table[index - 1] / index**2, large)
-
-
-@lru_cache(maxsize=1)
-def _flicker_integrals() -> Array:
-    """Return the integral of sin^4(n x) / sin^3(x) from 0 to pi/2 for n = 1 to `_FLICKER_TABLE`.
-
-    sin^4(n x) = (3 - 4 cos(2 n x) + cos(4 n x)) / 8, and the second difference over m of the
-    integral of (1 - cos(2 m x)) / sin^3(x) is a constant (which drops out) less
-    8 (1 + 1/3 + ... + 1/(2m - 1)).
-    """
-    m = np.arange(1, 2 * _FLICKER_TABLE)
-    steps = np.cumsum(np.concatenate(([0.0], -8.0 * np.cumsum(1.0 / (2.0 * m - 1.0)))))
-    integral = np.concatenate(([0.0, 0.0], np.cumsum(steps)[1:]))  # of m = 0, 1, 2 ...
-    sizes = np.arange(1, _FLICKER_TABLE + 1)
-    return np.asarray((4.0 * integral[sizes] - integral[2 * sizes]) / 8.0)

@@ -48,7 +48,6 @@ import numpy as np
 from scipy.optimize import linprog, minimize_scalar
 
 from imubench_pipeline.allan import AllanCurve
-from imubench_pipeline.confidence import deviation_limits
 from imubench_pipeline.export.growth import growth, growth_of
 from imubench_pipeline.noise import (
     GaussMarkov,
@@ -168,7 +167,7 @@ def simultaneous_upper(curve: AllanCurve, longest: float, confidence: float = 0.
     n = curve.cluster_size[curve.tau <= longest * (1.0 + 1e-9)]
     octaves = 1.0 + math.log2(n[-1] / n[0])
     level = 1.0 - (1.0 - confidence) / octaves
-    return deviation_limits(curve.deviation, curve.edf, 2.0 * level - 1.0)[1] ** 2
+    return curve.limits(2.0 * level - 1.0)[1] ** 2
 
 
 def overbound(

@@ -63,34 +63,58 @@ class Quality:
 
 def allan_rows(key: Key, curve: AllanCurve) -> Iterator[Row]:
     """Yield the rows of the table ``allan``."""
+    for i, about in enumerate(limit_rows(curve)):
+        yield (
+            asdict(key)
+            | about
+            | {
+                "cluster_size": int(curve.cluster_size[i]),
+                "averaged": float(curve.averaged[i]),
+                "exponent": int(curve.exponent[i]),
+                "share": float(curve.share[i]),
+            }
+        )
+
+
+def limit_rows(curve: AllanCurve) -> Iterator[dict[str, Any]]:
+    """Yield what every table of a measured curve says at each tau."""
     lower, upper = curve.limits(0.95)
     for i, tau in enumerate(curve.tau):
-        yield asdict(key) | {
+        yield {
             "tau": float(tau),
-            "cluster_size": int(curve.cluster_size[i]),
             "adev": float(curve.deviation[i]),
             "lower": float(lower[i]),
             "upper": float(upper[i]),
             "edf": float(curve.edf[i]),
-            "averaged": float(curve.averaged[i]),
-            "exponent": int(curve.exponent[i]),
+            "edf_upper": float(curve.edf_upper[i]),
+            "edf_source": curve.edf_source[i],
         }
 
 
 def curves(path: Path, quality: Quality) -> dict[str, AllanCurve]:
-    """Read the curves of a recording from its table ``allan``, by channel."""
+    """Read the curves of a recording from its table ``allan`` or the first of it, by channel."""
     by_channel = _by(read("allan", [path]), "channel")
     return {
         channel: AllanCurve(
             tau=table["tau"].to_numpy(),
             cluster_size=table["cluster_size"].to_numpy(),
             variance=table["adev"].to_numpy() ** 2,
-            edf=table["edf"].to_numpy(),
-            exponent=table["exponent"].to_numpy(),
             samples=int(quality.channels[channel]["grid"]),
+            exponent=table["exponent"].to_numpy(),
             averaged=table["averaged"].to_numpy(),
+            share=table["share"].to_numpy(),
+            **degrees_of(table),
         )
         for (channel,), table in by_channel.items()
+    }
+
+
+def degrees_of(table: pa.Table) -> dict[str, Any]:
+    """Return the degrees of freedom of a curve from the columns of its table."""
+    return {
+        "edf": table["edf"].to_numpy(),
+        "edf_upper": table["edf_upper"].to_numpy(),
+        "edf_source": tuple(table["edf_source"].to_pylist()),
     }
 
 
@@ -105,7 +129,9 @@ def compensated_curves(path: Path, measured: Mapping[str, AllanCurve]) -> dict[s
     """
     by_channel = _by(read("allan_compensated", [path]), "channel")
     return {
-        channel: replace(measured[channel], variance=table["adev"].to_numpy() ** 2)
+        channel: replace(
+            measured[channel], variance=table["adev"].to_numpy() ** 2, **degrees_of(table)
+        )
         for (channel,), table in by_channel.items()
     }
 

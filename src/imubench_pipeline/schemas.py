@@ -8,6 +8,7 @@ from imubench_pipeline.alignment.columns import ALIGNMENT_TABLES
 from imubench_pipeline.calibration.columns import CALIBRATION_TABLES
 from imubench_pipeline.columns import Column
 from imubench_pipeline.columns import count as _count
+from imubench_pipeline.columns import curve_limits as _curve_limits
 from imubench_pipeline.columns import figure as _figure
 from imubench_pipeline.columns import number as _number
 from imubench_pipeline.columns import text as _text
@@ -34,6 +35,7 @@ _METHOD = _text("method", "estimation method")
 _SI = "rad/s or m/s^2"
 _DENSITY = "(rad/s)^2/Hz or (m/s^2)^2/Hz"
 _KEYS = (_SENSOR, _RECORDING, _CHANNEL)
+_LIMITS = _curve_limits(_SI)
 
 TABLES: dict[str, tuple[Column, ...]] = {
     "recordings": (
@@ -70,15 +72,14 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _number("tau", "s", "cluster length, cluster_size / rate", required=True),
         _count("cluster_size", "samples in a cluster", required=True),
         _number("adev", _SI, "Allan deviation", required=True),
-        _number("lower", _SI, "lower 95 % limit"),
-        _number("upper", _SI, "upper 95 % limit"),
-        _number("edf", "-", "equivalent degrees of freedom of the Allan variance"),
+        *_LIMITS,
         _number(
             "averaged",
             "-",
             "samples that a cluster really averages: fewer than its size where samples are missing",
         ),
         _count("exponent", "noise type: 0 white, -1 flicker, -2 random walk, 1 and 2 phase noise"),
+        _number("share", "-", "part of the differences that missing samples leave"),
     ),
     "parameters": (
         *_KEYS,
@@ -160,8 +161,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         *_KEYS,
         _number("tau", "s", "cluster length", required=True),
         _number("adev", _SI, "Allan deviation of the log less what temperature adds", True),
-        _number("lower", _SI, "lower 95 % limit"),
-        _number("upper", _SI, "upper 95 % limit"),
+        *_LIMITS,
         _number("temperature", _SI, "Allan deviation of what temperature adds", True),
     ),
     "low_pass": (

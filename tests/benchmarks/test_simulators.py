@@ -99,3 +99,18 @@ def test_decimated_noise_keeps_its_density(rng):
     assert len(log) == 100_000
     assert log.mean() == pytest.approx(5.0, abs=0.05)
     assert np.mean(measured[frequency < 3.0]) == pytest.approx(1.0, rel=0.06)
+
+
+def test_bias_instability_of_a_curve_is_b_of_one_process_and_the_root_of_the_sum_of_two_alike():
+    sigma = math.sqrt(sim.VARIANCE) * 3e-4
+    assert sim.instability_of_curve([(sigma, 5.0)], 100.0) == pytest.approx(3e-4, rel=1e-3)
+    two = sim.instability_of_curve([(sigma, 5.0), (sigma, 5.0)], 100.0)
+    assert two == pytest.approx(math.sqrt(2.0) * 3e-4, rel=1e-3)
+    assert sim.instability_of_curve([(sigma, 5.0)], 2.0) < 2.5e-4
+
+
+def test_resonant_low_pass_has_its_quality_at_the_cutoff(rng):
+    log = sim.resonant(lambda n, rate: sim.white(n, rate, 1.0, rng), 200_000, RATE, 1.0, 1.6)
+    frequency, measured = density(log)
+    assert np.mean(measured[frequency < 0.1]) == pytest.approx(1.0, rel=0.1)
+    assert np.mean(measured[np.abs(frequency - 1.0) < 0.02]) == pytest.approx(1.6**2, rel=0.1)

@@ -118,7 +118,8 @@ def _channel_rows(
     return {
         "allan": [
             names | {"tau": t, "cluster_size": round(t * RATE), "adev": a, "lower": a / 1.2,
-                     "upper": a * 1.2, "edf": 9.0, "exponent": 0}
+                     "upper": a * 1.2, "edf": 9.0, "edf_upper": 9.0,
+                     "edf_source": "fitted spectrum", "exponent": 0, "share": 1.0}
             for t, a in zip(TAU, adev, strict=True)
         ],
         "parameters": [
@@ -188,6 +189,7 @@ def thermal_rows(key: Key, temperature: str) -> Rows:
             "adev": a / 2,
             "lower": a / 2.4,
             "upper": a / 1.6,
+            "edf_source": "fitted spectrum",
             "temperature": a * math.sqrt(0.75),
         }
         for t, a in zip(TAU, adev, strict=True)

@@ -76,7 +76,8 @@ def rows_of(
         ],
         "allan": [
             key | {"tau": t, "cluster_size": round(t * RATE), "adev": a, "lower": a / 1.2,
-                   "upper": a * 1.2, "edf": 9.0, "exponent": 0}
+                   "upper": a * 1.2, "edf": 9.0, "edf_upper": 9.0,
+                     "edf_source": "fitted spectrum", "exponent": 0, "share": 1.0}
             for t, a in zip(TAU, adev, strict=True)
         ],
         "parameters": list(

@@ -87,7 +87,15 @@ def test_a_fall_is_read_at_equal_times() -> None:
     adev = np.interp(np.log(tau), np.log([row["tau"] for row in rows["allan"]]),
                      [row["adev"] for row in rows["allan"]])  # fmt: skip
     rows["allan_compensated"] = [
-        NAMES | {"tau": t, "adev": a / 4, "lower": a / 5, "upper": a / 3, "temperature": a}
+        NAMES
+        | {
+            "tau": t,
+            "adev": a / 4,
+            "lower": a / 5,
+            "upper": a / 3,
+            "temperature": a,
+            "edf_source": "fitted spectrum",
+        }
         for t, a in zip(tau, adev, strict=True)
     ]
     said = answer(channel(rows), "practical")[0]

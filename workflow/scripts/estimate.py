@@ -11,12 +11,12 @@ from imubench_pipeline.tables import write
 
 
 def estimation(
-    quality: Path, allan: Path, sensor: str, recording: str, settings: str
+    quality: Path, curve: Path, sensor: str, recording: str, settings: str
 ) -> Estimation:
     """Return the rows that the channels leave; none of a rejected recording."""
     given = json.loads(settings)
     found = Estimation()
-    measured = curves(allan, Quality.read(quality))
+    measured = curves(curve, Quality.read(quality))
     for channel, log in static_logs(quality.parent).items():
         key = Key(sensor, recording, channel)
         how = EstimateSettings.model_validate(given["estimate"])
@@ -28,7 +28,7 @@ if __name__ == "__main__":
     names = snakemake.wildcards
     rows = estimation(
         Path(snakemake.input.quality),
-        Path(snakemake.input.allan),
+        Path(snakemake.input.curve),
         names.sensor,
         names.recording,
         snakemake.params.settings,

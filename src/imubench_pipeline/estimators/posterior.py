@@ -1,34 +1,69 @@
-"""Posterior intervals of the parameters of a model: adaptive Metropolis on the Whittle likelihood.
+"""Draws from the posterior of a model, for the intervals of its parameters.
 
 Flat in the amplitudes Q, N, B and K, in R, and in log T_B up to a fifth of the log. (Flat in log N
 has no lower end: where another term explains the spectrum without N, all of it would go there.)
+
+Importance sampling: for each of a grid of correlation times the posterior of the amplitudes is
+nearly normal, and its mode is a few steps away. Where the draws are not worth enough, as along thin
+curved ridges between terms that stand for each other, an adaptive Metropolis chain takes over.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from imubench_pipeline.estimators.importance import Mixture, adapted
+from imubench_pipeline.estimators.metropolis import chain
+from imubench_pipeline.estimators.posterior_kernels import log_posteriors, mode_at
 from imubench_pipeline.estimators.whittle import Maximum, Whittle
-from imubench_pipeline.estimators.whittle_kernels import Bins, ShapeTable, cost_of, shape_at
+from imubench_pipeline.estimators.whittle_kernels import Bins, ShapeTable, shape_at
 
 Array = NDArray[np.float64]
 
 DRAWS = 20_000
 """Draws that are kept, unless fewer are asked for."""
 
-_BURN_IN = 4_000
-_ADAPT_EVERY = 250
-_WIDEST = 1.0
-"""Largest relative standard deviation that the first proposals assume."""
+_WORTH = 10
+"""Draws for which one independent point is wanted: a chain is worth about as much."""
+
+_LEAST_WORTH = 2
+"""Part of that below which the chain takes over."""
+
+_ROUNDS = 6
+_GRID = (0, 20, 9)
+"""Correlation times of the first mixture along each axis, by the number of processes."""
+
+_WIDE = 0.7
+"""Standard deviation of its components in log T_B, distances in the grid."""
+
+_WIDEST = 2.0
+"""Largest one about the best fit."""
+
+_FOUND = 0.3
+"""Least weight of the component at the best fit."""
+
+_LEAST, _FLOOR = 1e-6, 5e-3
+_WEAK = 0.15
+"""Relative standard deviation of a squared amplitude from which it may as well be near 0."""
+
+_NEARLY_GONE, _GONE_SPREAD = 0.7, 0.8
+"""Amplitude over its unit, asinh, and standard deviation of its logarithm, in components of such a
+term."""
+
+_GONE_WEIGHT = 0.03
+_ALIKE = 1e-4
+"""Terms that are more alike are told apart no better."""
+
+_LEAST_START = 0.3
 
 
 @dataclass(frozen=True)
 class Posterior:
-    """Draws from the posterior of a model.
+    """Draws from the posterior of a model, equally weighted and in random order.
 
     Attributes
     ----------
@@ -38,14 +73,14 @@ class Posterior:
         T_B of each process, rising, s.
     ramps : ndarray, shape (draws,)
         R; zeros where the model has none.
-    accepted : float
-        Share of the proposals that were taken.
+    effective : float
+        Number of independent draws that they are worth; NaN of a chain.
     """
 
     parameters: Array
     times: Array
     ramps: Array
-    accepted: float
+    effective: float
 
 
 def sample(
@@ -65,155 +100,191 @@ def sample(
     Returns
     -------
     Posterior
-
-    References
-    ----------
-    H. Haario, E. Saksman and J. Tamminen, "An adaptive Metropolis algorithm", Bernoulli 7, 2001.
     """
-    start = _start(whittle, found)
-    terms = found.terms
-    linear = len(terms.linear)
-    p, g = linear + terms.gauss_markov, terms.gauss_markov
-    fixed = np.column_stack([whittle.column(letter) for letter in terms.linear])
-    ramp_unit = float(np.sqrt(1.0 / max(_ramp_information(whittle, start), 1e-300)))
-    at = [*np.log(np.sqrt(start.powers)), *np.log(start.times)]
-    if terms.ramp:
-        at.append(start.ramp / ramp_unit)
-    information = whittle.information(start)
-    if terms.ramp:
-        information[-1, -1] *= ramp_unit**2
-    spread = _first_spread(information)
-    kept, accepted = _metropolis(
-        np.array(at),
-        spread,
-        rng.standard_normal((_BURN_IN + draws, len(at))),
-        np.log(rng.random(_BURN_IN + draws)),
-        fixed / whittle.scale,
-        whittle.bins(ramp_unit),
-        g,
-        terms.ramp,
-        whittle.shape_table(whittle.scale),
+    target = _Target(whittle, found)
+    wanted = draws / _WORTH
+    size = 1 << max(9, math.ceil(math.log2(wanted)))
+    points = adapted(
+        target.log_density, target.first(), rng, size=size, wanted=wanted, most=_ROUNDS * size
     )
-    times = np.exp(kept[:, p : p + g])
-    order = np.argsort(times, axis=1)
-    biases = np.take_along_axis(np.exp(kept[:, linear:p]), order, axis=1)
-    return Posterior(
-        np.concatenate([np.exp(kept[:, :linear]), biases], axis=1),
-        np.take_along_axis(times, order, axis=1),
-        kept[:, -1] * ramp_unit if terms.ramp else np.zeros(len(kept)),
-        accepted,
-    )
+    effective = points.effective
+    if effective * _LEAST_WORTH >= wanted:
+        which = points.drawn(draws, rng)
+        kept = target.amplitudes(points.points[which])
+    else:
+        effective = math.nan
+        start, covariance = target.start()
+        kept, _ = chain(start, covariance, rng, draws, *target.arguments)
+    return target.posterior(kept, effective, rng)
 
 
-def _start(whittle: Whittle, found: Maximum) -> Maximum:
-    """Return the best fit with terms that are 0 at the size that the log could just show."""
-    total = whittle.density(found)
-    matrix = whittle.matrix(found.terms, found.times)
-    powers = found.powers.copy()
-    for j, column in enumerate(matrix.T):
-        smallest = 1.0 / np.sqrt(np.sum(whittle.spectrum.ordinates / 2.0 * (column / total) ** 2))
-        powers[j] = max(powers[j], 0.3 * smallest)
-    return Maximum(found.terms, powers, found.times, found.ramp, found.cost)
+class _Target:
+    """The posterior of a model, in coordinates in which it is nearly normal.
 
+    They are log T_B, and z with amplitude = unit sinh z > 0: linear where an amplitude may be 0,
+    its logarithm where it is known.
 
-def _ramp_information(whittle: Whittle, found: Maximum) -> float:
-    spectrum = whittle.spectrum
-    return float(np.sum(spectrum.ordinates * spectrum.ramp / whittle.density(found)))
+    Parameters
+    ----------
+    whittle : Whittle
+    found : Maximum
+    """
 
+    def __init__(self, whittle: Whittle, found: Maximum) -> None:
+        terms = found.terms
+        self.found = found
+        self.linear, self.processes = len(terms.linear), terms.gauss_markov
+        self.terms = self.linear + self.processes
+        fixed = np.column_stack([whittle.column(letter) for letter in terms.linear])
+        self.fixed = np.ascontiguousarray(fixed / whittle.scale)
+        density = whittle.density(found)
+        spectrum = whittle.spectrum
+        known = float(np.sum(spectrum.ordinates * spectrum.ramp / density))
+        self.ramp_unit = 1.0 / math.sqrt(max(known, 1e-300))
+        self.bins: Bins = whittle.bins(self.ramp_unit)
+        self.table: ShapeTable = whittle.shape_table(whittle.scale)
+        self.arguments = self.fixed, self.bins, self.processes, terms.ramp, self.table
+        # How well the square of each amplitude is known: alone, and beside the other terms.
+        parts = whittle.matrix(terms, found.times) / density[:, None]
+        parts *= np.sqrt(spectrum.ordinates / 2.0)[:, None]
+        size = np.linalg.norm(parts, axis=0)
+        parts /= size
+        inverse = np.linalg.inv(parts.T @ parts + _ALIKE * np.eye(self.terms))
+        error = np.sqrt(np.diag(inverse)) / size
+        self.log_unit = 0.5 * np.log(0.25 * error)
+        self.weak = np.flatnonzero(error > _WEAK * found.powers).tolist()
+        self.log_found = 0.5 * np.log(np.maximum(found.powers, _LEAST_START / size))
 
-def _first_spread(information: Array) -> Array:
-    """Return a root of the covariance of the first proposals."""
-    prior = np.eye(len(information)) / _WIDEST**2
-    covariance = np.linalg.inv(information + prior)
-    return np.asarray(np.linalg.cholesky(covariance) * 2.4 / np.sqrt(len(information)))
+    def log_density(self, points: Array) -> Array:
+        """Return the logarithm of the posterior at points, up to a constant."""
+        result = np.full(len(points), -np.inf)
+        inside = (points[:, : self.terms] > 0.0).all(axis=1)
+        if inside.any():
+            values, _, _ = log_posteriors(self.amplitudes(points[inside]), *self.arguments)
+            # d log sinh z = coth z dz
+            result[inside] = values - np.log(np.tanh(points[inside, : self.terms])).sum(axis=1)
+        return result
 
+    def amplitudes(self, points: Array) -> Array:
+        """Return (log amplitude ..., log T_B ...) of points."""
+        result = points.copy()
+        z = points[:, : self.terms]
+        # log sinh z, which does not overflow.
+        result[:, : self.terms] = self.log_unit + z + np.log(-0.5 * np.expm1(-2.0 * z))
+        return result
 
-@njit(cache=True)
-def _log_posterior(
-    x: Array,
-    fixed: Array,
-    bins: Bins,
-    processes: int,
-    with_ramp: bool,
-    table: ShapeTable,
-    model: Array,
-    data: Array,
-    shape: Array,
-) -> float:
-    nu, density, cross, ramp = bins
-    linear = fixed.shape[1]
-    p = linear + processes
-    last = table.first + table.step * (table.logarithms.shape[0] - 1)
-    prior = 0.0
-    for j in range(p):
-        prior += x[j]  # flat in the amplitude a is e^x in x = log a
-    for i in range(nu.size):
-        total = 0.0
-        for j in range(linear):
-            total += np.exp(2.0 * x[j]) * fixed[i, j]
-        model[i] = total
-    for g in range(processes):
-        where = x[p + g]
-        if where < table.first or where > last:
-            return -np.inf
-        shape_at(where, table, shape)
-        power = np.exp(2.0 * x[linear + g])
-        for i in range(nu.size):
-            model[i] += power * shape[i]
-    if not with_ramp:
-        return prior - cost_of(nu, density, model)
-    R = x[-1]
-    for i in range(nu.size):
-        data[i] = density[i] - 2.0 * R * cross[i] + R * R * ramp[i]
-    return prior - cost_of(nu, data, model)
+    def first(self) -> Mixture:
+        """Return a mixture that covers the posterior: a normal one for each T_B of a grid."""
+        first, step, logarithms = self.table
+        last = first + step * (len(logarithms) - 1)
+        number = _GRID[self.processes]
+        apart = (last - first) / max(number, 1)
+        grid = first + apart * (np.arange(number) + 0.5)
+        places = [np.log(self.found.times)]
+        if self.processes == 1:
+            places += [np.array([place]) for place in grid]
+        elif self.processes == 2:
+            places += [np.array([a, b]) for i, a in enumerate(grid) for b in grid[i + 1 :]]
+        widths = [_WIDEST] + [_WIDE * apart] * (len(places) - 1)
+        components = [self._component(*one) for one in zip(places, widths, strict=True)]
+        if self.terms > 1:
+            components += [self._without(term) for term in self.weak]
+        means, scales = (np.array(part) for part in zip(*components, strict=True))
+        values, _, _ = log_posteriors(means, *self.arguments)
+        mass = values + 0.5 * np.linalg.slogdet(scales)[1]
+        weights = np.exp(mass - mass.max())
+        weights /= weights.sum()
+        kept = weights > _LEAST
+        kept[0] = True
+        kept[len(places) :] = True
+        weights = np.maximum(weights, _FLOOR)
+        weights[len(places) :] = np.maximum(weights[len(places) :], _GONE_WEIGHT)
+        weights[0] = max(weights[0], _FOUND)
+        # From log amplitudes to z = asinh(amplitude / unit): dz = tanh z d log amplitude.
+        slope = np.ones_like(means)
+        z = np.arcsinh(np.exp(means[:, : self.terms] - self.log_unit))
+        means[:, : self.terms], slope[:, : self.terms] = z, np.tanh(z)
+        scales *= slope[:, :, None] * slope[:, None, :]
+        return Mixture(weights[kept] / weights[kept].sum(), means[kept], scales[kept])
 
+    def start(self) -> tuple[Array, Array]:
+        """Return the mode of the amplitudes at the best T_B, and the covariance there."""
+        return self._component(np.log(self.found.times), 1.0)
 
-@njit(cache=True)
-def _metropolis(
-    start: Array,
-    root: Array,
-    normals: Array,
-    log_uniforms: Array,
-    fixed: Array,
-    bins: Bins,
-    processes: int,
-    with_ramp: bool,
-    table: ShapeTable,
-) -> tuple[Array, float]:
-    n, d = normals.shape
-    b = fixed.shape[0]
-    model, data, shape = np.empty(b), np.empty(b), np.empty(b)
-    arguments = (fixed, bins, processes, with_ramp, table, model, data, shape)
-    x = start.copy()
-    here = _log_posterior(x, *arguments)
-    mean, covariance = x.copy(), root @ root.T * d / 5.76
-    kept = np.empty((n - _BURN_IN, d))
-    accepted, recent = 0, 0
-    scale = 1.0
-    for k in range(n):
-        proposal = x + scale * (root @ normals[k])
-        there = _log_posterior(proposal, *arguments)
-        if log_uniforms[k] < there - here:
-            x, here = proposal, there
-            recent += 1
-            if k >= _BURN_IN:
-                accepted += 1
-        if k >= _BURN_IN:
-            kept[k - _BURN_IN] = x
-            continue
-        # Learn the covariance, and the scale, while burning in only.
-        gain = 1.0 / (k / 2.0 + 50.0)
-        change = x - mean
-        mean = mean + gain * change
-        for a in range(d):
-            for c in range(d):
-                covariance[a, c] += gain * (change[a] * change[c] - covariance[a, c])
-        if k % _ADAPT_EVERY == _ADAPT_EVERY - 1:
-            rate = recent / _ADAPT_EVERY
-            scale *= min(2.0, max(0.5, np.exp(2.0 * (rate - 0.27))))
-            recent = 0
-            stable = covariance.copy()
-            for a in range(d):
-                stable[a, a] = stable[a, a] * (1.0 + 1e-6) + 1e-14
-            root = np.linalg.cholesky(stable) * 2.4 / np.sqrt(d)
-    return kept, accepted / (n - _BURN_IN)
+    def _component(self, places: Array, width: float) -> tuple[Array, Array]:
+        """Return mean and covariance of a normal one about correlation times."""
+        return self._normal(self.log_found, places, width, self.fixed)
+
+    def _without(self, term: int) -> tuple[Array, Array]:
+        """Return those of the posterior where one term is nearly gone."""
+        places, fixed = np.log(self.found.times), self.fixed
+        new = [term]
+        if term < self.linear:
+            fixed = np.ascontiguousarray(np.delete(fixed, term, axis=1))
+        else:
+            places = np.delete(places, term - self.linear)
+            new.append(self.terms + term - self.linear)
+        mean, covariance = self._normal(np.delete(self.log_found, term), places, _WIDEST, fixed)
+        old = np.delete(np.arange(self.terms + self.processes), new)
+        full_mean, full = np.empty(len(old) + len(new)), np.zeros((len(old) + len(new),) * 2)
+        full_mean[old], full[np.ix_(old, old)] = mean, covariance
+        full_mean[term] = self.log_unit[term] + math.log(math.sinh(_NEARLY_GONE))
+        full[term, term] = _GONE_SPREAD**2
+        if term >= self.linear:
+            # Its correlation time may be any.
+            first, step, logarithms = self.table
+            across = step * (len(logarithms) - 1)
+            full_mean[new[1]], full[new[1], new[1]] = first + 0.5 * across, (0.3 * across) ** 2
+        return full_mean, full
+
+    def _normal(
+        self, start: Array, places: Array, width: float, fixed: Array
+    ) -> tuple[Array, Array]:
+        """Return mean and covariance of a normal one, of some of the linear terms and processes."""
+        log_amplitudes, curvature, parts = mode_at(
+            start, places, fixed, self.bins, self.found.terms.ramp, self.table
+        )
+        p, g, linear = len(start), len(places), fixed.shape[1]
+        information = np.zeros((p + g, p + g))
+        information[:p, :p] = curvature
+        if g:
+            slopes = np.column_stack(
+                [
+                    0.5 * parts[:, linear + k] * self._slope(float(place))
+                    for k, place in enumerate(places)
+                ]
+            )
+            half = 0.5 * self.bins.nu[:, None]
+            information[p:, :p] = slopes.T @ (half * parts)
+            information[:p, p:] = information[p:, :p].T
+            information[p:, p:] = slopes.T @ (half * slopes) + np.eye(g) / width**2
+        return np.append(log_amplitudes, places), np.asarray(np.linalg.inv(information))
+
+    def _slope(self, place: float) -> Array:
+        """Return the change of the logarithm of a shape with log T_B."""
+        first, step, logarithms = self.table
+        last = first + step * (len(logarithms) - 1)
+        low, high = max(place - 0.5 * step, first), min(place + 0.5 * step, last)
+        ends = np.empty((2, len(self.bins.nu)))
+        shape_at(low, self.table, ends[0])
+        shape_at(high, self.table, ends[1])
+        return np.asarray(np.log(ends[1] / ends[0]) / (high - low))
+
+    def posterior(self, kept: Array, effective: float, rng: np.random.Generator) -> Posterior:
+        """Return equally weighted points as draws of the parameters."""
+        p = self.terms
+        ramps = np.zeros(len(kept))
+        if self.found.terms.ramp:
+            # Given the noise R is normal.
+            _, first, again = np.unique(kept[:, 0], return_index=True, return_inverse=True)
+            _, best, known = log_posteriors(kept[first], *self.arguments)
+            ramps = best[again] + rng.standard_normal(len(kept)) / np.sqrt(known[again])
+        times = np.exp(kept[:, p:])
+        order = np.argsort(times, axis=1)
+        biases = np.take_along_axis(np.exp(kept[:, self.linear : p]), order, axis=1)
+        return Posterior(
+            np.concatenate([np.exp(kept[:, : self.linear]), biases], axis=1),
+            np.take_along_axis(times, order, axis=1),
+            ramps * self.ramp_unit,
+            effective,
+        )

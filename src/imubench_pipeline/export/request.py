@@ -181,6 +181,7 @@ def curve_of(rows: list[dict[str, Any]]) -> AllanCurve:
         cluster_size=np.array([row["cluster_size"] for row in rows], dtype=np.int64),
         variance=np.array([row["adev"] for row in rows]) ** 2,
         edf=np.array([row["edf"] for row in rows]),
+        edf_upper=np.array([row["edf_upper"] for row in rows]),
     )
 
 

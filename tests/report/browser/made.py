@@ -181,7 +181,8 @@ def channel_rows(log: Log, channel: str) -> Rows:
     return {
         "allan": [
             key | {"tau": t, "cluster_size": round(t * RATE), "adev": a, "lower": a / s,
-                   "upper": a * s, "edf": 9.0, "exponent": 0}
+                   "upper": a * s, "edf": 9.0, "edf_upper": 9.0,
+                     "edf_source": "fitted spectrum", "exponent": 0, "share": 1.0}
             for t, a, s in zip(TAU.tolist(), adev.tolist(), spread.tolist(), strict=True)
         ],
         "parameters": [

@@ -1,0 +1,79 @@
+"""The limits of an Allan curve by the spectrum that was fitted to the same log.
+
+A power law identified at each tau does not know the noise a decade away: near the hump of a
+Gauss-Markov process its degrees of freedom are too many. The fitted model knows, where it explains
+the log.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from imubench_pipeline.allan import FITTED, POWER_LAW, AllanCurve
+from imubench_pipeline.estimators.likelihood import Likelihood, model_of
+from imubench_pipeline.noise import NoiseModel, Sinusoid
+from imubench_pipeline.presence import Presence
+from imubench_pipeline.spectral_degrees import Span, degrees_of_model
+
+_BEYOND_BAND = 1.0
+"""Tau times the end of the band below which the curve shows what was not fitted."""
+
+
+def with_fitted_limits(
+    curve: AllanCurve,
+    found: Likelihood,
+    segments: tuple[Span, ...] | None = None,
+    presence: Presence | None = None,
+) -> AllanCurve:
+    """Return a curve with the degrees of freedom that the fitted spectrum implies.
+
+    Where the model does not explain the log, and at tau so short that the curve shows frequencies
+    that were not fitted, the fewer of these and those of the identified power law are taken.
+
+    Parameters
+    ----------
+    curve : AllanCurve
+        With the degrees of freedom of the identified power law.
+    found : Likelihood
+        Of the same log.
+    segments : tuple of (int, int), optional
+        First and one-past-last sample of each.
+    presence : Presence, optional
+        Of the samples, where some are missing.
+
+    Returns
+    -------
+    AllanCurve
+        The same where nothing was fitted.
+    """
+    if not found.candidates or found.band is None:
+        return curve
+    chosen = found.candidates[0]
+    rate = float(curve.cluster_size[0] / curve.tau[0])
+    degrees = degrees_of_model(
+        with_lines(model_of(chosen.found), found),
+        rate,
+        curve.cluster_size,
+        curve.samples,
+        segments,
+        presence,
+        curve.share,
+    )
+    doubtful = np.full(len(curve.tau), chosen.goodness.verdict != "explained")
+    if found.band.highest < 0.5 * rate * (1.0 - 1e-9):
+        doubtful |= curve.tau * found.band.highest < _BEYOND_BAND
+    fitted = ~doubtful | (degrees.edf < curve.edf)
+    return replace(
+        curve,
+        edf=np.where(fitted, degrees.edf, curve.edf),
+        edf_upper=np.where(fitted, degrees.upper, curve.edf_upper),
+        edf_source=tuple(FITTED if one else POWER_LAW for one in fitted),
+    )
+
+
+def with_lines(model: NoiseModel, found: Likelihood) -> NoiseModel:
+    """Return a model with the narrow lines that were found beside it."""
+    lines = [Sinusoid(line.amplitude, line.frequency) for line in found.lines if line.narrow]
+    return replace(model, sinusoids=lines)

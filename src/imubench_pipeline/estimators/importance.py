@@ -1,0 +1,253 @@
+"""Adaptive importance sampling from a posterior, with mixtures of Student's t distributions.
+
+Each round draws from a mixture, weighs all draws so far by the posterior over the mean of all
+mixtures so far, and fits the next mixture to them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.special import ndtri
+from scipy.stats import qmc
+
+Array = NDArray[np.float64]
+
+_FREEDOM = 5
+_KEPT = 0.15
+"""Part of the first mixture in all that follow: what it covers no later one may leave out."""
+
+_LEAST_MASS = 0.01
+_LEARNT = 2048
+"""Points from which a mixture is learnt."""
+
+_CLIPPED = 8
+"""Points of highest weight that count alike when a mixture is learnt: a few that the first mixtures
+hardly reached must not be all that the next one knows (E. Koblents and J. Míguez, Statistics and
+Computing 25, 2015)."""
+
+_FITS = 3
+"""Steps of expectation and maximisation between two rounds."""
+
+
+@dataclass(frozen=True)
+class Mixture:
+    """A mixture of multivariate Student's t distributions.
+
+    Attributes
+    ----------
+    weights : ndarray, shape (c,)
+        They sum up to 1.
+    means : ndarray, shape (c, d)
+    scales : ndarray, shape (c, d, d)
+        Positive definite.
+    """
+
+    weights: Array
+    means: Array
+    scales: Array
+
+    def draw(self, number: int, rng: np.random.Generator) -> Array:
+        """Return a power of 2 of points, shape (number, d)."""
+        ends = np.floor(np.cumsum(self.weights) * number + rng.random()).astype(np.int64)
+        ends[-1] = number
+        which = np.repeat(np.arange(len(ends)), np.diff(np.minimum(ends, number), prepend=0))
+        which = rng.permutation(which)
+        uniform = qmc.Sobol(self.means.shape[1], seed=rng).random(number)
+        normal = ndtri(np.clip(uniform, 1e-12, 1.0 - 1e-12))
+        freedom = _freedom(self.means.shape[1])
+        normal /= np.sqrt(rng.chisquare(freedom, number) / freedom)[:, None]
+        roots = np.linalg.cholesky(self.scales)
+        return np.asarray(self.means[which] + np.einsum("nij,nj->ni", roots[which], normal))
+
+    def densities(self, points: Array) -> Array:
+        """Return weight times density of each component, up to a constant, shape (n, c)."""
+        inverses = np.linalg.inv(np.linalg.cholesky(self.scales))
+        freedom = _freedom(points.shape[1])
+        return np.asarray(_densities(points, self.weights, self.means, inverses, freedom))
+
+    def fitted(self, points: Array) -> Mixture:
+        """Return the mixture after a step towards points (expectation and maximisation)."""
+        inverses = np.linalg.inv(np.linalg.cholesky(self.scales))
+        freedom = _freedom(points.shape[1])
+        weights, means, scales = _fitted(
+            points, self.weights, self.means, inverses, freedom, _LEAST_MASS
+        )
+        return Mixture(weights / weights.sum(), means, scales) if len(weights) else self
+
+    def beside(self, other: Mixture, part: float) -> Mixture:
+        """Return a mixture of which a part is another."""
+        return Mixture(
+            np.concatenate([(1.0 - part) * self.weights, part * other.weights]),
+            np.concatenate([self.means, other.means]),
+            np.concatenate([self.scales, other.scales]),
+        )
+
+
+@dataclass(frozen=True)
+class Weighted:
+    """Points and their weights.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, d)
+    weights : ndarray, shape (n,)
+        They sum up to 1.
+    """
+
+    points: Array
+    weights: Array
+
+    @property
+    def effective(self) -> float:
+        """Number of independent points that tell as much."""
+        return float(1.0 / np.sum(self.weights**2))
+
+    def clipped(self, number: int) -> Weighted:
+        """Return the points with the highest weights lowered to one that so many have."""
+        most = np.partition(self.weights, -number)[-number]
+        if not most > 0.0:
+            return self
+        lowered = np.minimum(self.weights, most)
+        return Weighted(self.points, lowered / lowered.sum())
+
+    def drawn(self, number: int, rng: np.random.Generator) -> NDArray[np.int64]:
+        """Return which points to take for equal weights, in random order (systematically)."""
+        ends = np.cumsum(self.weights)
+        places = (np.arange(number) + rng.random()) / number * ends[-1]
+        which = np.minimum(np.searchsorted(ends, places), len(ends) - 1)
+        return rng.permutation(which)
+
+
+def adapted(
+    log_density: Callable[[Array], Array],
+    first: Mixture,
+    rng: np.random.Generator,
+    *,
+    size: int,
+    wanted: float,
+    most: int,
+) -> Weighted:
+    """Draw weighted points from a density until they are worth enough.
+
+    Parameters
+    ----------
+    log_density : callable
+        Logarithm of the density at points, shape (n, d), up to a constant; -inf where it is 0.
+    first : Mixture
+        That of the first round.
+    rng : numpy.random.Generator
+    size : int
+        Points of a round, a power of 2.
+    wanted : float
+        Effective number of points to reach.
+    most : int
+        Points to draw at most; where they are not worth ``wanted``, fewer are returned.
+
+    References
+    ----------
+    J.-M. Cornuet, J.-M. Marin, A. Mira and C. P. Robert, "Adaptive multiple importance sampling",
+    Scandinavian Journal of Statistics 39, 2012.
+    """
+    mixtures, mixture = [first], first
+    points = first.draw(size, rng)
+    values = log_density(points)
+    proposed = first.densities(points).sum(axis=1)
+    while True:
+        with np.errstate(divide="ignore"):
+            logarithm = values - np.log(proposed)
+        weights = np.exp(logarithm - logarithm.max())
+        found = Weighted(points, weights / weights.sum())
+        if found.effective >= wanted or len(points) + size > most:
+            return found
+        learnt = points[found.clipped(_CLIPPED).drawn(_LEARNT, rng)]
+        for _ in range(_FITS):
+            mixture = mixture.fitted(learnt)
+        new = mixture.beside(first, _KEPT)
+        added = new.draw(size, rng)
+        proposed = proposed + new.densities(points).sum(axis=1)
+        mixtures.append(new)
+        everywhere = [one.densities(added).sum(axis=1) for one in mixtures]
+        points = np.concatenate([points, added])
+        values = np.concatenate([values, log_density(added)])
+        proposed = np.concatenate([proposed, np.sum(everywhere, axis=0)])
+
+
+def _freedom(dimensions: int) -> int:
+    """Return degrees of freedom that are even with the dimensions, for a power without a root."""
+    return _FREEDOM + (_FREEDOM + dimensions) % 2
+
+
+@njit(cache=True)
+def _square(point: Array, mean: Array, inverse: Array) -> float:
+    total = 0.0
+    for a in range(point.size):
+        z = 0.0
+        for e in range(a + 1):
+            z += inverse[a, e] * (point[e] - mean[e])
+        total += z * z
+    return total
+
+
+@njit(cache=True)
+def _densities(points: Array, weights: Array, means: Array, inverses: Array, freedom: int) -> Array:
+    n, d = points.shape
+    result = np.empty((n, weights.size))
+    for k in range(weights.size):
+        factor = weights[k]
+        for a in range(d):
+            factor *= inverses[k, a, a]
+        for i in range(n):
+            base = 1.0 / (1.0 + _square(points[i], means[k], inverses[k]) / freedom)
+            value = factor
+            for _ in range((freedom + d) // 2):
+                value *= base
+            result[i, k] = value
+    return result
+
+
+@njit(cache=True)
+def _fitted(
+    points: Array, weights: Array, means: Array, inverses: Array, freedom: int, least: float
+) -> tuple[Array, Array, Array]:
+    n, d = points.shape
+    parts = _densities(points, weights, means, inverses, freedom)
+    for i in range(n):
+        total = parts[i].sum()
+        for k in range(weights.size):
+            parts[i, k] /= n * max(total, 1e-300)
+    new_weights, new_means = np.empty(weights.size), np.empty((weights.size, d))
+    new_scales = np.zeros((weights.size, d, d))
+    kept = 0
+    for k in range(weights.size):
+        mass, squares = 0.0, 0.0
+        for i in range(n):
+            mass += parts[i, k]
+            squares += parts[i, k] ** 2
+        if mass <= least or mass**2 <= (2 * d + 2) * squares:
+            continue
+        mean, scale = new_means[kept], new_scales[kept]
+        near = np.empty(n)
+        for i in range(n):
+            square = _square(points[i], means[k], inverses[k])
+            near[i] = parts[i, k] * (freedom + d) / (freedom + square)
+        for a in range(d):
+            mean[a] = np.sum(near * points[:, a]) / near.sum()
+        for i in range(n):
+            for a in range(d):
+                for e in range(a + 1):
+                    scale[a, e] += near[i] * (points[i, a] - mean[a]) * (points[i, e] - mean[e])
+        for a in range(d):
+            for e in range(a + 1):
+                scale[a, e] /= mass
+                scale[e, a] = scale[a, e]
+        for a in range(d):
+            # The covariance of few points is too narrow in some direction.
+            scale[a, a] = scale[a, a] * (1.0 + d * squares / mass**2) + 1e-14
+        new_weights[kept] = mass
+        kept += 1
+    return new_weights[:kept], new_means[:kept], new_scales[:kept]

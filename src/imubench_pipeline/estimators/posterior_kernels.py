@@ -1,0 +1,169 @@
+"""The compiled inner loops of the posterior: its logarithm, and its modes for given T_B.
+
+A point is (log amplitude of each term ..., log T_B of each process ...). The posterior is flat in
+the amplitudes and in R, over which it is integrated, and flat in log T_B within the table of
+shapes.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from imubench_pipeline.estimators.whittle_kernels import Bins, ShapeTable, cost_of, shape_at
+
+Array = NDArray[np.float64]
+
+_MOST_STEPS = 40
+_TOLERANCE = 1e-3
+_LONGEST_STEP = 1.5
+
+
+@njit(cache=True)
+def _model_at(
+    point: Array, fixed: Array, processes: int, table: ShapeTable, model: Array, shape: Array
+) -> bool:
+    """Set the density of a point; return whether its correlation times lie in the table."""
+    bins, linear = fixed.shape
+    last = table.first + table.step * (table.logarithms.shape[0] - 1)
+    for j in range(linear):
+        power = math.exp(2.0 * point[j])
+        for i in range(bins):
+            model[i] = power * fixed[i, j] + (model[i] if j else 0.0)
+    for g in range(processes):
+        where = point[linear + processes + g]
+        if where < table.first or where > last:
+            return False
+        shape_at(where, table, shape)
+        power = math.exp(2.0 * point[linear + g])
+        for i in range(bins):
+            model[i] += power * shape[i]
+    return True
+
+
+@njit(cache=True)
+def _ramp_at(bins: Bins, model: Array) -> tuple[float, float]:
+    """Return the best R given the noise, and its information."""
+    nu, _, cross, ramp = bins
+    above, below = 0.0, 0.0
+    for i in range(nu.size):
+        above += nu[i] * cross[i] / model[i]
+        below += nu[i] * ramp[i] / model[i]
+    return (above / below, below) if below > 0.0 else (0.0, 0.0)
+
+
+@njit(cache=True)
+def log_posterior(
+    point: Array,
+    fixed: Array,
+    bins: Bins,
+    processes: int,
+    with_ramp: bool,
+    table: ShapeTable,
+    model: Array,
+    shape: Array,
+) -> tuple[float, float, float]:
+    """Return the logarithm of the posterior at a point, the best R there and its information.
+
+    ``model`` and ``shape`` are working memory, shape (b,).
+    """
+    if not _model_at(point, fixed, processes, table, model, shape):
+        return -np.inf, 0.0, 0.0
+    value = -cost_of(bins.nu, bins.density, model)
+    for j in range(fixed.shape[1] + processes):
+        value += point[j]  # flat in the amplitude a is e^x in x = log a
+    if not with_ramp:
+        return value, 0.0, 0.0
+    best, known = _ramp_at(bins, model)
+    if known > 0.0:
+        value += 0.5 * (best * best * known - math.log(known))
+    return value, best, known
+
+
+@njit(cache=True)
+def log_posteriors(
+    points: Array, fixed: Array, bins: Bins, processes: int, with_ramp: bool, table: ShapeTable
+) -> tuple[Array, Array, Array]:
+    """Return those of points, each of shape (n,)."""
+    n = points.shape[0]
+    values, best, known = np.empty(n), np.empty(n), np.empty(n)
+    model, shape = np.empty(fixed.shape[0]), np.empty(fixed.shape[0])
+    for k in range(n):
+        values[k], best[k], known[k] = log_posterior(
+            points[k], fixed, bins, processes, with_ramp, table, model, shape
+        )
+    return values, best, known
+
+
+@njit(cache=True)
+def mode_at(
+    start: Array, times: Array, fixed: Array, bins: Bins, with_ramp: bool, table: ShapeTable
+) -> tuple[Array, Array, Array]:
+    """Return the mode of the log amplitudes for given log T_B, the curvature and D there.
+
+    ``start`` holds log amplitudes; D_j, shape (b, p), is the density of a term over that of the
+    model, times 2. The curvature of the posterior is sum nu D_j D_k / 2, and 2 from a flat
+    amplitude: it keeps a term that is absent from running off to 0.
+    """
+    nu, density, cross, ramp = bins
+    b, linear = fixed.shape
+    p = linear + times.size
+    columns = np.empty((b, p))
+    columns[:, :linear] = fixed
+    shape = np.empty(b)
+    for g in range(times.size):
+        shape_at(times[g], table, shape)
+        columns[:, linear + g] = shape
+    x = start.copy()
+    model, data, parts = np.empty(b), density.copy(), np.empty((b, p))
+    here = -np.inf
+    curvature = np.eye(p)
+    step = np.zeros(p)
+    for _ in range(_MOST_STEPS):
+        size = 1.0
+        moved = False
+        for _ in range(8):
+            tried = x + size * step
+            powers = np.exp(2.0 * tried)
+            for i in range(b):
+                total = 0.0
+                for j in range(p):
+                    total += powers[j] * columns[i, j]
+                model[i] = total
+            if with_ramp:
+                R, _ = _ramp_at(bins, model)
+                for i in range(b):
+                    data[i] = max(density[i] - 2.0 * R * cross[i] + R * R * ramp[i], 0.0)
+            there = tried.sum() - cost_of(nu, data, model)
+            if there >= here:
+                moved = True
+                break
+            size *= 0.5
+        if not moved:
+            break
+        gained = there - here
+        x, here = tried, there
+        gradient = np.ones(p)
+        curvature[:] = 0.0
+        for i in range(b):
+            excess = 0.5 * nu[i] * (1.0 - data[i] / model[i])
+            for j in range(p):
+                parts[i, j] = 2.0 * powers[j] * columns[i, j] / model[i]
+                gradient[j] -= excess * parts[i, j]
+                for k in range(j + 1):
+                    curvature[j, k] += 0.5 * nu[i] * parts[i, j] * parts[i, k]
+        for j in range(p):
+            for k in range(j):
+                curvature[k, j] = curvature[j, k]
+        for j in range(p):
+            curvature[j, j] += 2.0
+        if gained < _TOLERANCE:
+            break
+        step = np.linalg.solve(curvature, gradient)
+        longest = np.max(np.abs(step))
+        if longest > _LONGEST_STEP:
+            step *= _LONGEST_STEP / longest
+    return x, curvature, parts

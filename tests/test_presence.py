@@ -1,0 +1,45 @@
+import numpy as np
+import pytest
+
+from imubench_pipeline.presence import presence
+
+
+def expected(
+    log: np.ndarray, n: int, begin: np.ndarray, spans: list[tuple[int, int]]
+) -> list[bool]:
+    """From the definition: both clusters have nine tenths of their samples, in one segment."""
+    found = []
+    for i in begin:
+        parts = (log[i : i + n], log[i + n : i + 2 * n])
+        whole = any(start <= i and i + 2 * n <= stop for start, stop in spans)
+        found.append(whole and all(np.isfinite(p).sum() >= 0.9 * n - 1e-9 for p in parts))
+    return found
+
+
+@pytest.mark.parametrize("n", [1, 5, 20, 100, 700])
+@pytest.mark.parametrize("spans", [[(0, 3000)], [(0, 1111), (1111, 3000)]])
+def test_differences_are_there_by_definition(n: int, spans: list[tuple[int, int]]) -> None:
+    rng = np.random.default_rng(n)
+    log = rng.standard_normal(3000)
+    log[rng.random(3000) < 0.05] = np.nan
+    log[1800:1950] = np.nan
+    blocks = [log[:700], log[700:701], log[701:]]
+    found = presence(blocks, len(log), spans).differences(n)
+    assert found is not None
+    there, stride = found
+    begin = stride * np.arange(len(there))
+    assert begin[-1] + 2 * n <= 3000 < begin[-1] + 2 * n + stride
+    assert there.tolist() == expected(log, n, begin, spans)
+
+
+def test_a_long_log_is_counted_at_a_stride() -> None:
+    log = np.zeros(300_000)
+    log[100_000:160_000] = np.nan
+    found = presence([log[:77_777], log[77_777:]], len(log))
+    assert found.stride == 8
+    assert found.coarse[-1] == 240_000 and found.coarse[12_500] == 100_000
+    there, stride = found.differences(20_000) or (np.empty(0), 1)
+    # Missing wherever a tenth of a cluster lies in the hole.
+    gone = stride * np.flatnonzero(~there)
+    assert gone[0] == pytest.approx(100_000 - 38_000, abs=2 * stride)
+    assert gone[-1] == pytest.approx(160_000 - 2_000, abs=2 * stride)
