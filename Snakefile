@@ -494,8 +494,11 @@ onstart:
     follow()
 
 
+# Tables are read at the end of a run alone: a run should begin at once.
 onsuccess:
-    print(plan.summary())
+    from imubench_pipeline.run_summary import summary
+
+    print(summary(plan.run.results))
     if left_out := plan.faults.left_out():
         raise WorkflowError(left_out)
 
@@ -503,4 +506,6 @@ onsuccess:
 onerror:
     import sys
 
-    print(plan.failure(log), file=sys.stderr)
+    from imubench_pipeline.run_summary import failure
+
+    print(failure(log, plan.run.results), file=sys.stderr)

@@ -25,7 +25,8 @@ from imubench_pipeline.config import EstimateSettings
 from imubench_pipeline.curve_limits import with_fitted_limits
 from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators import least_squares, likelihood
-from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate
+from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate, not_shown
+from imubench_pipeline.estimators.least_squares import UnfitCurveError
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.model_choice import disagreement
 from imubench_pipeline.presence import presence
@@ -86,7 +87,11 @@ def estimate_channel(
         estimates["curve"] = reading.read(curve, longest=settings.longest)
     for method in ("paper", "weighted"):
         if method in settings.methods:
-            estimates[method] = least_squares.fit(curve, method=method, longest=settings.longest)
+            try:
+                fitted = least_squares.fit(curve, method=method, longest=settings.longest)
+            except UnfitCurveError as error:
+                fitted = Estimate(method, not_shown(str(error)))
+            estimates[method] = fitted
     if _BY_LIKELIHOOD & set(settings.methods):
         band = quantity_to_si(settings.band, "frequency") if settings.band else None
 

@@ -7,7 +7,7 @@ of what the rule depends on, so that an edit runs again what it touches and noth
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
@@ -403,19 +403,6 @@ class Plan:
         """Return the true parameters of the simulated recordings of a sensor."""
         entries = (entry for (of, _), entry in self._simulated.items() if of == sensor)
         return _text([entry.model_dump(mode="json") for entry in entries])
-
-    def summary(self) -> str:
-        """Return what a finished run says."""
-        # Tables are read at the end of a run alone: a run should begin at once.
-        from imubench_pipeline.run_summary import summary
-
-        return summary(self.run.results)
-
-    def failure(self, logs: Sequence[str]) -> str:
-        """Return what a run says in which a step failed, from the logs of Snakemake."""
-        from imubench_pipeline.run_summary import failure
-
-        return failure(logs, self.run.results)
 
     @staticmethod
     def code(step: str) -> str:

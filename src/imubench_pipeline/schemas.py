@@ -374,7 +374,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
 }
 """Every table a run leaves, by name; all numbers are SI (temperatures in degC)."""
 
-PARTS_OF = {"estimate_findings": "findings"}
+PARTS_OF = {"curve": "allan", "estimate_findings": "findings"}
 """Files of a recording that hold rows of another table, and that table."""
 
 OF_ONE_RECORDING = ("envelope", "histogram")

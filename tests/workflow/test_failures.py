@@ -97,8 +97,8 @@ def test_the_report_says_which_recordings_a_step_failed_for(
     project.environment = faulty
     done = project.run()
     said = done.stdout + done.stderr
-    assert done.returncode == 1
-    assert "2 recordings analysed, 0 rejected, 4 failed" in said
+    assert done.returncode == 1, said
+    assert "2 recordings analysed, 0 rejected, 4 failed" in said, said
     recordings = {(row["sensor"], row["recording"]): row for row in project.table("recordings")}
     failed = {name: row["reason"] for (_, name), row in recordings.items() if row["reason"]}
     assert failed.keys() == REASONS.keys()

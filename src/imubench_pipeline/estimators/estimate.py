@@ -124,3 +124,8 @@ class Estimate:
             further=[GaussMarkov(B, T_B) for B, T_B in pairs if B and T_B],
             sinusoids=[Sinusoid(A, f) for A, f in waves if A and f],
         )
+
+
+def not_shown(reason: str) -> dict[str, Parameter]:
+    """Return the parameters of the papers' model where the log shows none of them."""
+    return dict.fromkeys(PARAMETERS, Parameter(None, "not_shown", reason))
