@@ -13,6 +13,7 @@ from imubench_pipeline.schemas import (
     COMPARED,
     OF_ONE_RECORDING,
     OUTLOOK,
+    SAMPLES,
     TABLES,
     TURNED,
 )
@@ -59,6 +60,7 @@ ESTIMATED = (
     "temperature",
     "allan_compensated",
     "low_pass",
+    "deterministic",
     "estimate_findings",
 )
 ANALYSED = [table for table in JOINED if table not in RANKED]
@@ -80,6 +82,10 @@ for sensor, recording in plan.recordings:
 
 def of_sensor(file):
     return lambda w: [f"{folder}/{file}" for folder in FOLDERS[w.sensor]]
+
+
+def every(file):
+    return [f"{folder}/{file}" for folders in FOLDERS.values() for folder in folders]
 
 
 def as_files(*tables):
@@ -206,7 +212,7 @@ rule estimate:
         quality=FOLDER + "/quality.json",
         curve=FOLDER + "/curve.parquet",
     output:
-        **{table: f"{FOLDER}/{table}.parquet" for table in ESTIMATED},
+        **{table: f"{FOLDER}/{table}.parquet" for table in (*ESTIMATED, "draws")},
     group:
         "recording"
     resources:
@@ -264,6 +270,7 @@ rule datasheet:
 rule error_budget:
     input:
         parameters=FOLDER + "/parameters.parquet",
+        draws=FOLDER + "/draws.parquet",
     output:
         FOLDER + "/error_budget.parquet",
     group:
@@ -283,6 +290,7 @@ rule earth_rotation:
         quality=FOLDER + "/quality.json",
         static_quality=at_rest("quality.json"),
         static_parameters=at_rest("parameters.parquet"),
+        static_draws=at_rest("draws.parquet"),
     output:
         **{table: f"{FOLDER}/{table}.parquet" for table in TURNED},
     resources:
@@ -402,6 +410,7 @@ rule fusion:
                 "temperature",
             )
         },
+        draws=every("draws.parquet"),
     output:
         as_files("fusion"),
     group:
@@ -465,7 +474,7 @@ rule report:
         [
             f"{folder}/{table}.parquet"
             for folder in chain.from_iterable(FOLDERS.values())
-            for table in OF_ONE_RECORDING
+            for table in SAMPLES
         ],
         tables=[f"{RESULTS}/tables/{table}.parquet" for table in JOINED],
     output:

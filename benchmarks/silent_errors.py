@@ -283,7 +283,7 @@ def judge(case: str, number: int, log: Log, tables: Mapping[str, list[Any]]) -> 
     chosen = next((row for row in tables["models"] if row["chosen"]), None)
     groups: dict[tuple[str, str], list[Mapping[str, Any]]] = defaultdict(list)
     for row in tables["parameters"]:
-        groups[row["method"], row["parameter"]].append(row)
+        groups[row["method"], row["parameter"]].append(_upwards(row))
     for row in tables["low_pass"]:
         if row["parameter"] in ("N", "cutoff"):
             more = {"method": "low_pass", "recommended": False, "component": 1, "model": None}
@@ -316,6 +316,14 @@ def judge(case: str, number: int, log: Log, tables: Mapping[str, list[Any]]) -> 
                 verdict=verdict,
                 warned_by=", ".join(dict.fromkeys(warned)),
             )
+
+
+def _upwards(row: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return a row with a value above 0: a ramp may fall."""
+    if row["value"] is None or row["value"] >= 0.0:
+        return row
+    ends = [None if row[name] is None else -row[name] for name in ("upper", "lower")]
+    return {**row, "value": -row["value"], "lower": ends[0], "upper": ends[1]}
 
 
 def bears(finding: Mapping[str, Any], parameter: str) -> bool:

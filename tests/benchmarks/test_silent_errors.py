@@ -118,6 +118,16 @@ def test_planted_error_is_seen_and_is_loud_where_the_tables_warn_of_it(walk):
     assert own(log, wrong | {"models": doubted})["N"] == "loud"
 
 
+def test_ramp_that_falls_is_judged_as_one_that_rises(walk):
+    log, tables = walk
+    row = ROW | {"method": "likelihood", "recommended": True, "model": "N+R", "component": 1}
+    row |= {"parameter": "R", "value": -1.0, "lower": -1.1, "upper": -0.9}
+    for truth, expected in ((1.0, "right"), (1.49, "right"), (1.51, "silent"), (0.4, "silent")):
+        ramp = Log(log.samples, log.rate, {"R": exactly(truth)})
+        found = silent_errors.judge("", 0, ramp, {**tables, "parameters": [row]})
+        assert [one.judgement for one in found] == [expected]
+
+
 def test_second_process_of_one_is_a_value_of_nothing(walk):
     log, tables = walk
     B, T_B = exactly(1e-3), exactly(10.0)

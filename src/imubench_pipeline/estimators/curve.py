@@ -78,7 +78,7 @@ def read(curve: AllanCurve, *, longest: float = 1 / 9) -> Estimate:
     used = curve.cluster_size <= longest * curve.samples
     if not (curve.variance[used] > 0).all():
         reason = "the Allan variance is 0 at some tau: the samples repeat exactly"
-        return Estimate("curve", not_shown(reason))
+        return not_shown("curve", reason)
     # Where samples are missing, white noise is averaged over fewer than n: as at a shorter tau.
     thinned = np.sqrt(curve.cluster_size / curve.averaged)[used]
     points = _Curve(
@@ -88,12 +88,23 @@ def read(curve: AllanCurve, *, longest: float = 1 / 9) -> Estimate:
     )
     if used.sum() < 4:
         reason = f"the curve has {used.sum()} points up to {longest:.3g} of the log"
-        return Estimate("curve", not_shown(reason))
+        return not_shown("curve", reason)
     bias, correlation_time = _minimum(points)
     return Estimate(
         "curve",
         {"N": _white(points, thinned), "B": bias, "T_B": correlation_time, "K": _walk(points)},
+        curve={
+            "B_curve": bias,
+            "sigma_min": _times(bias, FLOOR),
+            "tau_min": _times(correlation_time, PEAK_TAU),
+        },
     )
+
+
+def _times(parameter: Parameter, factor: float) -> Parameter:
+    if parameter.value is None:
+        return parameter
+    return Parameter(parameter.value * factor)
 
 
 def _white(points: _Curve, thinned: Array) -> Parameter:
