@@ -295,7 +295,7 @@ def joined_tables(
     of_logs = without_doubles(
         (row for quality in qualities for row in quality.findings),
         joined["deterministic"],
-        {(row["sensor"], row["recording"]): row["duration"] or 0.0 for row in about},
+        {(row["sensor"], row["recording"]): row.get("duration") or 0.0 for row in about},
     )
     unusual = unusual_rows(recommended.to_pylist(), catalogue)
     of_estimates = joined.pop("estimate_findings").to_pylist()

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from imubench_pipeline.allan import of_blocks
 from imubench_pipeline.estimators import least_squares
 from imubench_pipeline.estimators.band import Band, find_band
+from imubench_pipeline.estimators.carried_lines import carried
 from imubench_pipeline.estimators.curve_bias import averaging_times, with_curve
 from imubench_pipeline.estimators.draws import drawn_share, joint_draws
 from imubench_pipeline.estimators.estimate import CURVE, FAMILY, Estimate, Parameter
@@ -233,7 +234,7 @@ def fit_spectrum(
     whittle = whittle_of(spectrum.taken(used), limit.highest)
     quantization = limit.highest >= _QUANTIZATION_BAND * spectrum.rate
     candidates = compare(whittle, quantization=quantization)
-    sinusoids = [_line_parameters(line) for line in lines if line.narrow]
+    sinusoids = carried(lines)
     chosen = candidates[0]
     draws: dict[Terms, Posterior] = {}
     # A ramp is no noise: it is believed or not, and does not widen intervals as a possibility.
@@ -352,14 +353,3 @@ def model_of(found: Maximum) -> NoiseModel:
         R=found.ramp,
         further=[process for process in processes if process.B > 0],
     )
-
-
-def _line_parameters(line: Line) -> dict[str, Parameter]:
-    return {
-        "amplitude": Parameter(
-            line.amplitude, lower=line.amplitude_lower, upper=line.amplitude_upper
-        ),
-        "frequency": Parameter(
-            line.frequency, lower=line.frequency_lower, upper=line.frequency_upper
-        ),
-    }
