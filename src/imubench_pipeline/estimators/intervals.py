@@ -223,6 +223,8 @@ def _interval(
 
 def mixture_quantile(parts: Sequence[tuple[Array, float]], level: float) -> float:
     """Return a quantile of draws that come from several models, each with its weight."""
+    if len(parts) == 1:
+        return float(np.quantile(parts[0][0], level))  # without the sorting
     values = np.concatenate([part for part, _ in parts])
     mass = np.concatenate([np.full(len(part), weight / len(part)) for part, weight in parts])
     order = np.argsort(values, kind="stable")
