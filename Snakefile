@@ -12,6 +12,7 @@ from imubench_pipeline.schemas import (
     COMPARED,
     OF_ONE_RECORDING,
     OUTLOOK,
+    SAMPLES,
     TABLES,
     TURNED,
 )
@@ -57,6 +58,7 @@ ESTIMATED = (
     "temperature",
     "allan_compensated",
     "low_pass",
+    "deterministic",
     "estimate_findings",
 )
 ANALYSED = [table for table in JOINED if table not in RANKED]
@@ -78,6 +80,10 @@ for sensor, recording in plan.recordings:
 
 def of_sensor(file):
     return lambda w: [f"{folder}/{file}" for folder in FOLDERS[w.sensor]]
+
+
+def every(file):
+    return [f"{folder}/{file}" for folders in FOLDERS.values() for folder in folders]
 
 
 def as_files(*tables):
@@ -202,7 +208,7 @@ rule estimate:
         quality=FOLDER + "/quality.json",
         curve=FOLDER + "/curve.parquet",
     output:
-        **{table: f"{FOLDER}/{table}.parquet" for table in ESTIMATED},
+        **{table: f"{FOLDER}/{table}.parquet" for table in (*ESTIMATED, "draws")},
     group:
         "recording"
     resources:
@@ -257,6 +263,7 @@ rule datasheet:
 rule error_budget:
     input:
         parameters=FOLDER + "/parameters.parquet",
+        draws=FOLDER + "/draws.parquet",
     output:
         FOLDER + "/error_budget.parquet",
     group:
@@ -275,6 +282,7 @@ rule earth_rotation:
         quality=FOLDER + "/quality.json",
         static_quality=at_rest("quality.json"),
         static_parameters=at_rest("parameters.parquet"),
+        static_draws=at_rest("draws.parquet"),
     output:
         **{table: f"{FOLDER}/{table}.parquet" for table in TURNED},
     resources:
@@ -390,6 +398,7 @@ rule fusion:
                 "temperature",
             )
         },
+        draws=every("draws.parquet"),
     output:
         as_files("fusion"),
     group:
@@ -453,7 +462,7 @@ rule report:
         [
             f"{folder}/{table}.parquet"
             for folder in chain.from_iterable(FOLDERS.values())
-            for table in OF_ONE_RECORDING
+            for table in SAMPLES
         ],
         tables=[f"{RESULTS}/tables/{table}.parquet" for table in JOINED],
     output:

@@ -28,6 +28,11 @@ def number(name: str, unit: str, meaning: str, required: bool = False) -> Column
     return Column(name, pa.float64(), unit, meaning, required)
 
 
+def drawn(name: str, unit: str, meaning: str) -> Column:
+    """Return a column of numbers of which there are many, in single precision."""
+    return Column(name, pa.float32(), unit, meaning, required=False)
+
+
 def count(name: str, meaning: str, required: bool = False) -> Column:
     """Return a column of counts."""
     return Column(name, pa.int64(), "-", meaning, required)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -64,7 +64,7 @@ def temperature_of(
 def compensated_estimate(found: ThermalFit) -> Estimate:
     """Return the estimate of method ``compensated``: the noise that temperature leaves."""
     without = found.without_temperature.estimates[0]
-    return Estimate("compensated", without.parameters, without.further, without.lines)
+    return replace(without, method="compensated")
 
 
 def compensated_curve(log: ChannelLog, found: ThermalFit, measured: AllanCurve) -> AllanCurve:

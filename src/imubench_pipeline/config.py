@@ -150,7 +150,7 @@ class ErrorBudgetSettings(Strict):
     )
     latitude: Latitude = Field("45 deg", description="where gyros look for north")
     axes: tuple[Axis, ...] = Field(("worst", "median"), min_length=1)
-    draws: int = Field(100, ge=20, description="noise models that give the interval of an error")
+    draws: int = Field(200, ge=20, description="noise models that give the interval of an error")
     seed: int = Field(20260101, ge=0)
 
 

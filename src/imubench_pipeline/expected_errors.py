@@ -12,7 +12,9 @@ from imubench_pipeline.error_budget import (
     Quantity,
     Start,
     budget,
+    chance_within,
     draw_models,
+    drawn_jointly,
     interval,
     time_until,
 )
@@ -150,7 +152,7 @@ def error_rows(
         The recommended one of each channel.
     questions : iterable of Question
     draws : int
-        Noise models drawn from the intervals of each estimate; they give the interval of a total.
+        Noise models drawn from what each log leaves open; they give the interval of a total.
     seed : int
         Of the run; each channel has a stream of its own.
     """
@@ -185,7 +187,9 @@ def error_rows(
         models = [estimates[c].model if c else _NOTHING for c in chosen.values()]
         many = [drawn[c] if c else [_NOTHING] * draws for c in chosen.values()]
         found = question.answer(*models)
-        lower, upper = interval([question.answer(*pair) for pair in zip(*many, strict=True)])
+        budgets = [question.answer(*pair) for pair in zip(*many, strict=True)]
+        lower, upper = interval(budgets)
+        apart = [c for c in chosen.values() if c and not drawn_jointly(estimates[c])]
         yield (
             asked
             | chosen
@@ -195,11 +199,14 @@ def error_rows(
                 # The draws of what is absent lie above it: the value itself is inside.
                 "lower": min(lower, found.total),
                 "upper": max(upper, found.total),
+                "drawn": "one by one" if apart else "jointly",
+                "within": question.limit and chance_within(question.limit, budgets),
                 "reached_after": question.reached(*models),
                 "reason": "; ".join(
                     [
                         *found.assumptions,
                         *_doubts(chosen, estimates),
+                        *_apart(apart, estimates),
                         *_unknown(question, estimates),
                     ]
                 )
@@ -241,6 +248,15 @@ def _axis(question: Question, quantity: str, estimates: Mapping[str, Estimate]) 
     ranked = sorted((c for c in estimates if quantity_of(c) == quantity), key=part)
     # Of two axes the median is the worse one.
     return ranked[-1] if question.axis == "worst" else ranked[len(ranked) // 2]
+
+
+def _apart(channels: Sequence[str], estimates: Mapping[str, Estimate]) -> Iterator[str]:
+    """Yield the channels of which only limits of single parameters are known."""
+    for channel in channels:
+        yield (
+            f"method {estimates[channel].method} tells the parameters of {channel} one by one: "
+            "the interval is too wide where they trade off"
+        )
 
 
 def _doubts(chosen: Mapping[str, str | None], estimates: Mapping[str, Estimate]) -> Iterator[str]:

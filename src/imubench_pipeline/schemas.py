@@ -12,7 +12,10 @@ from imubench_pipeline.columns import curve_limits as _curve_limits
 from imubench_pipeline.columns import figure as _figure
 from imubench_pipeline.columns import number as _number
 from imubench_pipeline.columns import text as _text
+from imubench_pipeline.deterministic.columns import DETERMINISTIC_TABLES
 from imubench_pipeline.earth_rate.columns import EARTH_RATE_TABLES
+from imubench_pipeline.estimators.columns import DRAWN_TABLES
+from imubench_pipeline.fusion.columns import FUSION_TABLES
 
 __all__ = [
     "BY_RECORDING",
@@ -21,6 +24,7 @@ __all__ = [
     "OF_ONE_RECORDING",
     "OUTLOOK",
     "PARTS_OF",
+    "SAMPLES",
     "TABLES",
     "TURNED",
     "Column",
@@ -85,7 +89,11 @@ TABLES: dict[str, tuple[Column, ...]] = {
         Column("recommended", pa.bool_(), "-", "the method to use for this channel"),
         _text("model", "the terms of the model, such as N+GM+K"),
         _count("component", "number of a repeated term, from 1", required=True),
-        *_figure("Q, N, B, T_B, K, R; amplitude and frequency of a line"),
+        *_figure(
+            "Q, N, B, T_B, K, R; amplitude and frequency of a line; of the curve of the model: "
+            "B_curve (bias instability of the curve: highest Allan deviation of all F and GM "
+            "terms over 0.664), sigma_min and tau_min (lowest point, up to a ninth of the log)"
+        ),
         _number("duration_needed", "s", "length of a log that gives the value to 10 %"),
         _FITTED,
     ),
@@ -172,7 +180,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _SENSOR,
         _text("device", "of which the recordings are compared"),
         _CHANNEL,
-        _text("parameter", "N, B, K, T_B, Q, R, or bias: the fixed bias"),
+        _text("parameter", "N, B_curve, sigma_min, K, B, T_B, Q, R, or bias: the fixed bias"),
         _RECORDING,
         _count("position", "place in the order of the device's recordings, from 1", required=True),
         _text("started", "date and time of the first sample, where known", required=False),
@@ -192,7 +200,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _SENSOR,
         _text("device", "null: all recordings of the sensor", required=False),
         _CHANNEL,
-        _text("parameter", "Q, N, B, T_B, K, R, or bias: the fixed bias"),
+        _text("parameter", "N, B_curve, sigma_min, K, B, T_B, Q, R, or bias: the fixed bias"),
         _count("recordings", "recordings pooled", required=True),
         _count("left_out", "recordings that have no value to pool", required=True),
         _number("value", "as in unit", "pooled estimate"),
@@ -287,6 +295,8 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _number("sigma", "as in unit", "standard deviation; null where reason says why"),
         _number("lower", "as in unit", "lower 95 % limit of a total"),
         _number("upper", "as in unit", "upper 95 % limit of a total"),
+        _text("drawn", "parameters behind the limits: jointly, or one by one", required=False),
+        _number("within", "-", "chance that the total is within limit"),
         _number("limit", "as in unit", "largest standard deviation that is allowed"),
         _text("unit", "SI unit"),
         _number("reached_after", "s", "time after which the limit is reached; null: never"),
@@ -317,28 +327,6 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _number("reached_after", "s", "time after which the limit is reached"),
         _text("reason", "what is not known", required=False),
     ),
-    "fusion": (
-        _text("quantity", "gyro or accel"),
-        _number("tau", "s", "averaging time at which they are compared", required=True),
-        _text("sensor", "of which several are averaged"),
-        _text("recording", "that answers for it: of its median channel", required=False),
-        _text("channel", "that answers", required=False),
-        Column("simulated", pa.bool_(), "-", "that recording is simulated", required=False),
-        _number("adev", _SI, "Allan deviation of one of them, by its noise model"),
-        _number("floor", _SI, "part of it that all have in common: any number keeps it"),
-        _number("common_share", "-", "the same as a part of the variance"),
-        _number("temperature_share", "-", "part of the variance that temperature adds: common"),
-        _text("other", "sensor of which one is to be equalled"),
-        _text("other_recording", "that answers for it", required=False),
-        _text("other_channel", "that answers", required=False),
-        Column("other_simulated", pa.bool_(), "-", "that one is simulated", required=False),
-        _number("other_adev", _SI, "its Allan deviation"),
-        _number("n", "-", "how many equal it, not rounded; below 1: one is better"),
-        _number("lower", "-", "lower 95 % limit of n; null: no number is enough"),
-        _number("upper", "-", "upper 95 % limit of n; null: no number may be enough"),
-        Column("reachable", pa.bool_(), "-", "some number is enough", required=False),
-        _text("reason", "why there is no n or no limit", required=False),
-    ),
     "published": (
         *_KEYS,
         _text("place", "table of the source"),
@@ -366,6 +354,9 @@ TABLES: dict[str, tuple[Column, ...]] = {
         Column("assumed", pa.bool_(), "-", "not published by the source: chosen"),
         _text("source", "where the parameters are published"),
     ),
+    **DETERMINISTIC_TABLES,
+    **DRAWN_TABLES,
+    **FUSION_TABLES,
     **EARTH_RATE_TABLES,
     **CALIBRATION_TABLES,
     **ALIGNMENT_TABLES,
@@ -375,7 +366,10 @@ TABLES: dict[str, tuple[Column, ...]] = {
 PARTS_OF = {"estimate_findings": "findings"}
 """Files of a recording that hold rows of another table, and that table."""
 
-OF_ONE_RECORDING = ("envelope", "histogram")
+SAMPLES = ("envelope", "histogram")
+"""The tables of the samples themselves, for the pages of the recordings."""
+
+OF_ONE_RECORDING = (*SAMPLES, "draws")
 """The tables that are kept with each recording and not joined."""
 
 TURNED = tuple(EARTH_RATE_TABLES)
@@ -403,6 +397,7 @@ BY_RECORDING = (
     "temperature",
     "allan_compensated",
     "low_pass",
+    "deterministic",
     "simulated_truth",
     "published",
     "error_budget",

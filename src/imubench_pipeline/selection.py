@@ -6,7 +6,6 @@ import math
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from statistics import NormalDist
 from typing import Any
 
 from imubench_pipeline.requirements import Requirement
@@ -18,9 +17,6 @@ _SURE = 0.975
 
 _VAGUE = 4.0
 """Upper over lower limit of an error beyond which the logs say too little."""
-
-_WIDTH = 3.92
-"""Standard deviations of a 95 % interval."""
 
 
 @dataclass(frozen=True)
@@ -59,14 +55,8 @@ class Standing:
 
     @property
     def chance(self) -> float:
-        """Chance that the error is within its limit: its logarithm is taken as normal."""
-        low, high = self.margins
-        if low >= 1.0 and math.isinf(high):
-            return 1.0
-        spread = math.log(high / low) / _WIDTH if low > 0 and high < math.inf else math.inf
-        if spread == 0.0:
-            return float(self.margin >= 1.0)
-        return NormalDist().cdf(math.log(self.margin) / spread)
+        """Chance that the error is within its limit, over the noise models that the log allows."""
+        return float(self.total["within"])
 
     @property
     def verdict(self) -> str:

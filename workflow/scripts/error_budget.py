@@ -12,7 +12,9 @@ from imubench_pipeline.tables import write
 from imubench_pipeline.units import quantity_to_si
 
 
-def rows(parameters: Path, sensor: str, recording: str, settings: str) -> Iterator[Row]:
+def rows(
+    parameters: Path, draws: Path, sensor: str, recording: str, settings: str
+) -> Iterator[Row]:
     """Yield the rows of the table ``error_budget``; none of a rejected recording."""
     given = json.loads(settings)
     how = ErrorBudgetSettings.model_validate(given["error_budget"])
@@ -24,7 +26,7 @@ def rows(parameters: Path, sensor: str, recording: str, settings: str) -> Iterat
     questions = list(standard(times, window, latitude, how.axes))
     for name, requirement in given["requirements"].items():
         questions += of_requirement(name, Requirement.model_validate(requirement))
-    estimates = recommended_estimates(parameters)
+    estimates = recommended_estimates(parameters, draws)
     if not estimates:
         return
     names = {"sensor": sensor, "recording": recording}
@@ -35,6 +37,7 @@ if __name__ == "__main__":
     names = snakemake.wildcards
     found = rows(
         Path(snakemake.input.parameters),
+        Path(snakemake.input.draws),
         names.sensor,
         names.recording,
         snakemake.params.settings,

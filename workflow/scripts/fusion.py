@@ -9,11 +9,12 @@ from imubench_pipeline.fusion.of_run import NEEDED, fusion_rows
 from imubench_pipeline.tables import build, read, write_arrow
 
 
-def main(inputs: Mapping[str, str], settings: str, outputs: list[Path]) -> None:
-    """Write the table ``fusion``, as Parquet and CSV."""
+def main(inputs: Mapping[str, str], joint: list[Path], settings: str, outputs: list[Path]) -> None:
+    """Write the table ``fusion``, as Parquet and CSV; ``joint``: tables ``draws`` of recordings."""
     how = FusionSettings.model_validate(json.loads(settings))
     tables = {name: read(name, [Path(inputs[name])]) for name in NEEDED}
-    table = build("fusion", fusion_rows(tables, how))
+    of_recording = {(path.parts[-3], path.parts[-2]): path for path in joint}
+    table = build("fusion", fusion_rows(tables, how, of_recording))
     for output in outputs:
         write_arrow(table, output)
 
@@ -21,6 +22,7 @@ def main(inputs: Mapping[str, str], settings: str, outputs: list[Path]) -> None:
 if __name__ == "__main__":
     main(
         snakemake.input,
+        [Path(path) for path in snakemake.input.draws],
         snakemake.params.settings,
         [Path(path) for path in snakemake.output],
     )

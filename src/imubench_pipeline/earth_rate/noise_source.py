@@ -43,7 +43,7 @@ class NoiseSource:
     words : str
         Where it is from.
     drawn : tuple of NoiseModel
-        Drawn from the limits of its parameters; none where it has no limits.
+        Drawn from what its log leaves open of it; none where nothing is known of that.
     """
 
     model: NoiseModel
@@ -82,13 +82,14 @@ def from_static(
     Parameters
     ----------
     folders : sequence of Path
-        Of those recordings, with their ``quality.json`` and ``parameters.parquet``.
+        Of those recordings, with their ``quality.json``, ``parameters.parquet`` and, where models
+        are drawn, ``draws.parquet``.
     own : mapping
         Row of the table ``recordings`` of the recording that was turned.
     channel : str
         The gyro that was turned; another gyro of the sensor answers where it has no estimate.
     draws : int
-        Models that are drawn from the limits of the estimate.
+        Models that are drawn from what the log leaves open of the estimate.
 
     Returns
     -------
@@ -111,7 +112,8 @@ def from_static(
 
     for row, folder in sorted(usable, key=far):
         parameters = folder / "parameters.parquet"
-        best = recommended_estimates(parameters)
+        joint = folder / "draws.parquet" if draws else None
+        best = recommended_estimates(parameters, joint)
         gyros = [name for name in best if name.startswith("gyro_") and best[name].model.N]
         if gyros:
             name = min(gyros, key=lambda name: (name != channel, name))
@@ -119,7 +121,7 @@ def from_static(
             papers = every.get("likelihood_gm", best[name]).model
             words = f"{_words(row, own, name, channel)}; method {best[name].method}"
             rng = channel_rng(_SEED, row["sensor"], row["recording"], name)
-            drawn = tuple(draw_models(best[name], draws, rng))
+            drawn = tuple(draw_models(best[name], draws, rng)) if draws else ()
             return NoiseSource(best[name].model, papers, words, drawn)
     return None
 

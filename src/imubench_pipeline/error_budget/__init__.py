@@ -10,7 +10,12 @@ from imubench_pipeline.error_budget.budget import (
 )
 from imubench_pipeline.error_budget.growth import Calibrated, Uncalibrated
 from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE, Gyrocompass
-from imubench_pipeline.error_budget.uncertainty import draw_models, interval
+from imubench_pipeline.error_budget.uncertainty import (
+    chance_within,
+    draw_models,
+    drawn_jointly,
+    interval,
+)
 from imubench_pipeline.error_budget.until import time_until
 
 __all__ = [
@@ -24,7 +29,9 @@ __all__ = [
     "Start",
     "Uncalibrated",
     "budget",
+    "chance_within",
     "draw_models",
+    "drawn_jointly",
     "interval",
     "time_until",
 ]

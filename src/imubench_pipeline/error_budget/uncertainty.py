@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from scipy.special import ndtr
 
 from imubench_pipeline.error_budget.budget import Budget
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
@@ -44,16 +45,51 @@ def interval(budgets: Sequence[Budget], level: float = 0.95) -> tuple[float, flo
     return float(lower), float(upper)
 
 
-def draw_models(estimate: Estimate, draws: int, rng: np.random.Generator) -> list[NoiseModel]:
-    """Return noise models with parameters drawn from their 95 % limits.
+def chance_within(limit: float, budgets: Sequence[Budget]) -> float:
+    """Return the chance that a total is within a limit, over budgets of drawn noise models.
 
-    An approximation, for estimates that have limits but no draws from a posterior: the
-    parameters are independent (B and T_B, or N and B of a short log, are not; with a negative
-    correlation of B and K, for one, the interval of a budget comes out too wide), and each is
-    log-normal about its value, with a spread of its own on either side, so that the limits are
-    the 2.5 % and 97.5 % points of the draws. A lower limit of 0 is reached linearly. What is
-    absent, with an upper limit, is half-normal from 0 with that as its 95 % point. A ramp, which
-    has a sign, is normal on either side. What has no limits stays as it is.
+    The share of the draws, each smeared by the width of a normal kernel in log total (Silverman),
+    so that it does not go in steps and falls off beyond the outermost draws.
+
+    Parameters
+    ----------
+    limit : float
+        rad, m/s or m; above 0.
+    budgets : sequence of Budget
+        As `interval` takes them.
+
+    Returns
+    -------
+    float
+
+    References
+    ----------
+    B. W. Silverman, "Density estimation for statistics and data analysis", 1986, eq. 3.31.
+    """
+    totals = np.log(np.maximum([one.total for one in budgets], 1e-300))
+    quarter = np.subtract(*np.quantile(totals, [0.75, 0.25])) / 1.349
+    width = 0.9 * min(float(np.std(totals)), float(quarter)) * len(totals) ** -0.2
+    left = math.log(limit) - totals
+    if width < 1e-12:
+        return float(np.mean(left >= -1e-12))
+    return float(np.mean(ndtr(left / width)))
+
+
+def draw_models(estimate: Estimate, draws: int, rng: np.random.Generator) -> list[NoiseModel]:
+    """Return noise models that the log of an estimate allows.
+
+    Where the estimate has draws of its posterior they are taken, all parameters of a model
+    together: evenly where fewer are asked for than there are, the same ones again where more are,
+    in random order, so that those of two channels meet by chance. Lines, which no noise parameter
+    depends on, are drawn beside them.
+
+    An estimate without draws (of the curve, or by least squares) has its parameters drawn from
+    their limits **independently**, which they are not: what is computed from several of them then
+    has an interval that is too wide, 1.0 to 3.5 times. Each is log-normal about its value, with a
+    spread of its own on either side, so that the limits are the 2.5 % and 97.5 % points of the
+    draws. A lower limit of 0 is reached linearly. What is absent, with an upper limit, is
+    half-normal from 0 with that as its 95 % point. A ramp, which has a sign, is normal on either
+    side. What has no limits stays as it is.
 
     Parameters
     ----------
@@ -66,13 +102,31 @@ def draw_models(estimate: Estimate, draws: int, rng: np.random.Generator) -> lis
     list of NoiseModel
         ``draws`` of them.
     """
-    return [_drawn(estimate, rng) for _ in range(draws)]
+    if estimate.draws is None:
+        return [_drawn(estimate, rng) for _ in range(draws)]
+    kept = len(estimate.draws)
+    rows = (np.arange(draws) % kept) if draws > kept else (np.arange(draws) * kept) // draws
+    return [estimate.draws.model(int(row), _lines(estimate, rng)) for row in rng.permutation(rows)]
+
+
+def drawn_jointly(estimate: Estimate) -> bool:
+    """Tell whether `draw_models` draws the parameters of an estimate together.
+
+    Parameters
+    ----------
+    estimate : Estimate
+    """
+    return estimate.draws is not None
+
+
+def _lines(estimate: Estimate, rng: np.random.Generator) -> list[Sinusoid]:
+    lines = [_values(group, rng) for group in estimate.lines]
+    return [Sinusoid(one["amplitude"], one["frequency"]) for one in lines]
 
 
 def _drawn(estimate: Estimate, rng: np.random.Generator) -> NoiseModel:
     first = _values(estimate.parameters, rng)
     further = [_values(group, rng) for group in estimate.further]
-    lines = [_values(group, rng) for group in estimate.lines]
     return NoiseModel(
         Q=first.get("Q", 0.0),
         N=first.get("N", 0.0),
@@ -81,7 +135,7 @@ def _drawn(estimate: Estimate, rng: np.random.Generator) -> NoiseModel:
         K=first.get("K", 0.0),
         R=first.get("R", 0.0),
         further=[GaussMarkov(one["B"], one["T_B"]) for one in further if one["B"] and one["T_B"]],
-        sinusoids=[Sinusoid(one["amplitude"], one["frequency"]) for one in lines],
+        sinusoids=_lines(estimate, rng),
     )
 
 

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
+
+Array = NDArray[np.float64]
 
 Status = Literal["ok", "doubtful", "not_shown", "at_bound", "not_identified", "absent"]
 
@@ -15,6 +20,15 @@ PARAMETERS = ("N", "B", "T_B", "K")
 
 FAMILY = ("Q", "N", "B", "T_B", "K", "R")
 """Those of the whole family of terms; lines have an amplitude and a frequency."""
+
+CURVE = ("B_curve", "sigma_min", "tau_min")
+"""Figures of the curve, which every model has: see `imubench_pipeline.estimators.curve_bias`."""
+
+SHOWN = ("Q", "N", "B_curve", "sigma_min", "tau_min", "B", "T_B", "K", "R")
+"""The order in which parameters are shown."""
+
+COMPARED = ("N", "B_curve", "sigma_min", "K")
+"""What is the same quantity of all models, and compared between sensors."""
 
 SI_UNITS: dict[str, dict[str, str]] = {
     "gyro": {
@@ -26,6 +40,9 @@ SI_UNITS: dict[str, dict[str, str]] = {
         "R": "rad/s^2",
         "amplitude": "rad/s",
         "frequency": "Hz",
+        "B_curve": "rad/s",
+        "sigma_min": "rad/s",
+        "tau_min": "s",
     },
     "accel": {
         "Q": "m/s",
@@ -36,6 +53,9 @@ SI_UNITS: dict[str, dict[str, str]] = {
         "R": "m/s^3",
         "amplitude": "m/s^2",
         "frequency": "Hz",
+        "B_curve": "m/s^2",
+        "sigma_min": "m/s^2",
+        "tau_min": "s",
     },
 }
 """SI unit of each parameter, by quantity."""
@@ -77,6 +97,48 @@ class Parameter:
         return self.fitted if self.value is None else self.value
 
 
+@dataclass(frozen=True, eq=False)
+class JointDraws:
+    """Noise models drawn from the posterior of an estimate, over the models the log allows.
+
+    Attributes
+    ----------
+    first : ndarray, shape (d, 6)
+        Q, N, B, T_B, K and R, SI, of each draw; 0 for a term that it does not have. T_B is NaN
+        where B is flicker noise, or 0.
+    further : ndarray, shape (d, g, 2)
+        B and T_B of the further Gauss-Markov processes; B is 0, T_B NaN, where it has fewer.
+    """
+
+    first: Array
+    further: Array
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+    def model(self, number: int, sinusoids: Sequence[Sinusoid] = ()) -> NoiseModel:
+        """Return the noise model of a draw.
+
+        Parameters
+        ----------
+        number : int
+            Of the draw, from 0.
+        sinusoids : sequence of Sinusoid
+            Lines beside the noise.
+        """
+        Q, N, B, T_B, K, R = self.first[number].tolist()
+        return NoiseModel(
+            Q=Q,
+            N=N,
+            B=B,
+            T_B=T_B if T_B > 0.0 else None,
+            K=K,
+            R=R,
+            further=[GaussMarkov(b, t) for b, t in self.further[number].tolist() if b > 0.0],
+            sinusoids=sinusoids,
+        )
+
+
 @dataclass(frozen=True)
 class Estimate:
     """The parameters of one channel by one method.
@@ -90,16 +152,25 @@ class Estimate:
         Components beyond the first: B and T_B of a second Gauss-Markov process.
     lines : sequence of mapping
         Amplitude and frequency of each sinusoid.
+    curve : mapping of str to Parameter
+        The figures of the curve, `CURVE`.
+    draws : JointDraws or None
+        Noise models drawn jointly from the posterior, without the lines; None: the method has
+        none, and its parameters are known one by one only.
     """
 
     method: str
     parameters: Mapping[str, Parameter]
     further: Sequence[Mapping[str, Parameter]] = ()
     lines: Sequence[Mapping[str, Parameter]] = ()
+    curve: Mapping[str, Parameter] = field(default_factory=dict)
+    draws: JointDraws | None = field(default=None, compare=False, repr=False)
 
     def components(self) -> Iterator[tuple[int, str, Parameter]]:
         """Yield component number, name and parameter, the first component first."""
         for name, parameter in self.parameters.items():
+            yield 1, name, parameter
+        for name, parameter in self.curve.items():
             yield 1, name, parameter
         for number, group in enumerate(self.further, start=2):
             for name, parameter in group.items():

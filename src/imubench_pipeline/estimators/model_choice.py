@@ -31,10 +31,10 @@ CANDIDATES = (
 latter to all of them where it is favoured."""
 
 
-_LIKE_A_WALK = 1 / 10
+LIKE_A_WALK = 1 / 10
 """Part of the longest correlation time beyond which a process looks like a random walk."""
 
-_UNIT_ROOT = 4.0
+UNIT_ROOT = 4.0
 """BIC by which such a process, or a ramp, must be the better where there is no walk: a walk often
 looks as if it came back to its mean, or had a trend (D. Dickey and W. Fuller, J. Am. Stat. Assoc.
 74, 1979; C. R. Nelson and H. Kang, Econometrica 49, 1981)."""
@@ -83,11 +83,11 @@ def compare(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
         like_a_walk = (
             "K" not in found.terms.linear
             and len(found.times) > 0
-            and found.times[-1] > _LIKE_A_WALK * whittle.longest
+            and found.times[-1] > LIKE_A_WALK * whittle.longest
         )
         # A ramp is tried beside a walk: it stands for the walk where none is left.
         like_a_walk |= found.terms.ramp and found.parameter("K") == 0.0
-        return 2.0 * found.cost + found.terms.parameters * penalty + _UNIT_ROOT * like_a_walk
+        return 2.0 * found.cost + found.terms.parameters * penalty + UNIT_ROOT * like_a_walk
 
     def add(terms: Terms) -> None:
         if terms not in tried and terms.parameters < bins // 4:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from imubench_pipeline.error_budget.uncertainty import draw_models
-from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.estimators.estimate import Estimate, JointDraws, Parameter
 from imubench_pipeline.fusion.board import divided
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.simulate import channel_rng
@@ -95,6 +95,9 @@ class Candidate:
         The recommended one; where temperature is taken out, that of what it leaves.
     temperature : TemperaturePart, optional
         What is taken out.
+    joint : callable, optional
+        Gives the joint draws of the estimate where the estimate has not got them with it: of a
+        run they are read of the channels that answer alone.
     """
 
     sensor: str
@@ -104,6 +107,14 @@ class Candidate:
     duration: float
     estimate: Estimate
     temperature: TemperaturePart | None = None
+    joint: Callable[[], JointDraws | None] | None = None
+
+    def drawn(self, draws: int, rng: np.random.Generator) -> list[NoiseModel]:
+        """Return noise models that the log allows (`draw_models`)."""
+        estimate = self.estimate
+        if estimate.draws is None and self.joint is not None:
+            estimate = replace(estimate, draws=self.joint())
+        return draw_models(estimate, draws, rng)
 
     @cached_property
     def model(self) -> NoiseModel:
@@ -155,7 +166,7 @@ class Answer:
     own, common : float
         Allan variance of one specimen without the common part, and this, SI.
     drawn_own, drawn_common : ndarray, shape (draws,)
-        The same of models drawn from the limits of the parameters.
+        The same of the models that the log allows.
     unknown : str or None
         The parameters that matter and are not known: there is no plain number.
     """
@@ -193,7 +204,7 @@ def answer(
     longest : float
         Longest tau that a log tells, as a part of it.
     draws : int
-        Models drawn from the limits of the parameters.
+        Models that are drawn of those that the log allows.
     seed : int
         Each channel has a stream of its own.
 
@@ -213,7 +224,7 @@ def answer(
     chosen = noisy[len(noisy) // 2]
     stream = channel_rng(seed, chosen.sensor, chosen.recording, chosen.channel, "fusion")
     own, common = _parts([chosen.model], correlation, tau)
-    drawn_own, drawn_common = _parts(draw_models(chosen.estimate, draws, stream), correlation, tau)
+    drawn_own, drawn_common = _parts(chosen.drawn(draws, stream), correlation, tau)
     if chosen.temperature is not None:
         common = common + chosen.of_temperature(tau)
         drawn_common = drawn_common + chosen.temperature.drawn(tau, draws, stream)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import cache, partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,12 +12,13 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from imubench_pipeline.config import FusionSettings
+from imubench_pipeline.estimators.estimate import JointDraws
 from imubench_pipeline.fusion.equivalence import (
     Candidate,
     TemperaturePart,
     equivalence_rows,
 )
-from imubench_pipeline.results import estimate_of
+from imubench_pipeline.results import draws, estimate_of
 from imubench_pipeline.units import quantity_to_si
 
 Row = Mapping[str, Any]
@@ -27,7 +30,9 @@ _OF_LIMIT = 1.96
 """Standard deviations from an estimate to a 95 % limit."""
 
 
-def candidates(tables: Mapping[str, pa.Table]) -> Iterator[Candidate]:
+def candidates(
+    tables: Mapping[str, pa.Table], joint: Mapping[tuple[str, str], Path] | None = None
+) -> Iterator[Candidate]:
     """Yield the channels of a run, each with the estimate of the method to use.
 
     Where temperature is taken out of a channel, its estimate is that of what temperature leaves.
@@ -36,6 +41,8 @@ def candidates(tables: Mapping[str, pa.Table]) -> Iterator[Candidate]:
     ----------
     tables : mapping of str to pyarrow.Table
         Those of `NEEDED`, of a run.
+    joint : mapping of (str, str) to Path, optional
+        The table ``draws`` of recordings, by sensor and recording.
 
     Yields
     ------
@@ -52,7 +59,13 @@ def candidates(tables: Mapping[str, pa.Table]) -> Iterator[Candidate]:
     for row in used:
         key = (row["sensor"], row["recording"], row["channel"], row["method"])
         groups.setdefault(key, []).append(row)
+    read = cache(draws)
+
+    def drawn(path: Path, channel: str, method: str) -> JointDraws | None:
+        return read(path).get((channel, method))
+
     for (sensor, recording, channel, method), rows in groups.items():
+        path = (joint or {}).get((sensor, recording))
         of = about[sensor, recording]
         yield Candidate(
             sensor,
@@ -62,6 +75,7 @@ def candidates(tables: Mapping[str, pa.Table]) -> Iterator[Candidate]:
             of["duration"] or 0.0,
             estimate_of(method, rows),
             warm.get((sensor, recording, channel)),
+            partial(drawn, path, channel, method) if path else None,
         )
 
 
@@ -87,7 +101,11 @@ def _channel(row: Row) -> tuple[str, str, str]:
     return row["sensor"], row["recording"], row["channel"]
 
 
-def fusion_rows(tables: Mapping[str, pa.Table], how: FusionSettings) -> Iterator[Row]:
+def fusion_rows(
+    tables: Mapping[str, pa.Table],
+    how: FusionSettings,
+    joint: Mapping[tuple[str, str], Path] | None = None,
+) -> Iterator[Row]:
     """Return the rows of the table ``fusion``.
 
     Parameters
@@ -95,13 +113,15 @@ def fusion_rows(tables: Mapping[str, pa.Table], how: FusionSettings) -> Iterator
     tables : mapping of str to pyarrow.Table
         Those of `NEEDED`, of a run.
     how : FusionSettings
+    joint : mapping of (str, str) to Path, optional
+        As `candidates` takes it.
 
     Returns
     -------
     iterator of mapping
     """
     return equivalence_rows(
-        candidates(tables),
+        candidates(tables, joint),
         [quantity_to_si(tau, "time") for tau in how.tau],
         how.common.model_dump(),
         longest=how.longest,

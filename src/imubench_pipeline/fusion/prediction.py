@@ -144,9 +144,9 @@ def prediction_limits(
 ) -> tuple[Array, Array]:
     """Return limits of the predicted Allan deviation that follow from those of the parameters.
 
-    The weights stay as they are, made from the estimates; what the sensors are is drawn from the
-    limits of the parameters by `draw_models`, which says what it assumes: the parameters are
-    independent, and so the limits are rather too wide where they are not (B and K).
+    The weights stay as they are, made from the estimates; what the sensors are is drawn by
+    `draw_models`: all parameters together where the estimates have joint draws, else one by one,
+    and then the limits are too wide where the parameters trade off.
     Sensors with one and the same estimate are specimens of one sensor and are drawn together:
     not to know a parameter is a common error.
 
@@ -160,7 +160,7 @@ def prediction_limits(
     tau : array_like, shape (m,)
         s.
     draws : int
-        Boards that are drawn from the limits of the parameters.
+        Boards that are drawn.
     rng : numpy.random.Generator
     level : float
         Share of the draws between the limits.
