@@ -88,6 +88,7 @@ BEARS_ON: Mapping[str, frozenset[str]] = {
     "periodic_drift": SLOW,
     "telegraph_noise": SLOW,
     "K_differs": frozenset({"K", "R"}),
+    "slow_noise_differs": SLOW,
     # Nor does a changing variance make a process.
     "noise_grows": frozenset({"N", "Q"}),
     "noise_varies": frozenset({"N", "Q"}),
