@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.allan import FITTED, POWER_LAW, AllanCurve
-from imubench_pipeline.estimators.likelihood import Likelihood, model_of
+from imubench_pipeline.estimators.likelihood import Likelihood
+from imubench_pipeline.estimators.whittle import model_of
 from imubench_pipeline.noise import NoiseModel, Sinusoid
 from imubench_pipeline.presence import Presence
 from imubench_pipeline.spectral_degrees import Degrees, Span, degrees_of_model
@@ -82,6 +83,10 @@ def with_fitted_limits(
     doubtful = np.full(len(curve.tau), chosen.goodness.verdict != "explained")
     if found.band.highest < 0.5 * rate * (1.0 - 1e-9):
         doubtful |= curve.tau * found.band.highest < _BEYOND_BAND
+    filtered = found.low_pass
+    if filtered is not None and filtered.behind is not None:
+        # The model has the noise before the sensor's low-pass.
+        doubtful |= curve.tau * (filtered.frequency.in_model or np.inf) < _BEYOND_BAND
     fitted = ~doubtful | (degrees.edf < curve.edf)
     return replace(
         curve,
