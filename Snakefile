@@ -58,6 +58,7 @@ ESTIMATED = (
     "temperature",
     "allan_compensated",
     "low_pass",
+    "deterministic",
     "estimate_findings",
 )
 ANALYSED = [table for table in JOINED if table not in RANKED]

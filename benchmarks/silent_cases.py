@@ -392,9 +392,9 @@ def _up_to_nyquist(rng: Rng, T_B: float, rate: float, low: float, high: float) -
 
 
 def slow_process(rng: Rng) -> Log:
-    """A process of T_B from a fortieth to an eighth of the log, 30 to 3,000 times as dense."""
+    """A process of T_B from a sixtieth to a fifteenth of the log, 30 to 3,000 times as dense."""
     samples, rate = any_length(rng)
-    T_B = samples / rate / between(rng, 8.0, 40.0)
+    T_B = samples / rate / between(rng, 15.0, 60.0)
     noise = any_white(rng).with_process(between(rng, 30.0, 3000.0), T_B)
     shown = sim.instability_of_curve([(noise.sigma, T_B)], samples / rate / 9.0)
     log = noise.log(samples, rate, rng)

@@ -40,7 +40,6 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 import os
-import runpy
 import sys
 import tempfile
 import time
@@ -50,9 +49,8 @@ import zlib
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -61,14 +59,11 @@ import pyarrow.csv
 import pyarrow.parquet
 from scipy.stats import beta
 
-from imubench_pipeline.estimation import Estimation
 from imubench_pipeline.plan import Plan
 from imubench_pipeline.results import Quality
-from imubench_pipeline.schemas import PARTS_OF, TABLES
 from imubench_pipeline.tables import read
 from silent_cases import CASES, CLEAN, NOTHING, Log, Truth
-
-SCRIPTS = Path(__file__).parents[1] / "workflow/scripts"
+from workflow_steps import OneRecording
 
 ALL = frozenset({"N", "B", "B_curve", "T_B", "K", "Q", "R", "cutoff"})
 SLOW = frozenset({"B", "B_curve", "T_B", "K", "R"})
@@ -142,27 +137,6 @@ def rng_of(case: str, number: int) -> np.random.Generator:
 # The steps, as a user has them
 
 
-class _Named(SimpleNamespace):
-    """Files under names, as a script of the workflow has them."""
-
-    def items(self) -> Iterable[tuple[str, Any]]:
-        return vars(self).items()
-
-    def __getitem__(self, place: int) -> Any:
-        return list(vars(self).values())[place]
-
-    def __iter__(self) -> Iterator[Any]:
-        return iter(vars(self).values())
-
-
-def _step(name: str, **given: object) -> None:
-    """Run a script of the workflow in this process."""
-    snakemake = SimpleNamespace(**given)
-    runpy.run_path(
-        str(SCRIPTS / f"{name}.py"), init_globals={"snakemake": snakemake}, run_name="__main__"
-    )
-
-
 def tables_of(
     log: Log, folder: Path, spent: dict[str, float] | None = None
 ) -> dict[str, list[Any]]:
@@ -182,52 +156,17 @@ def tables_of(
         ``parameters``, ``models``, ``findings`` and ``low_pass``; nothing of a rejected recording.
     """
     clock = _Clock({} if spent is None else spent)
-    plan = _written(log, folder)
-    kept = folder / "results/recordings/simulated/log"
-    kept.mkdir(parents=True)
-    of_log = _Named(sensor="simulated", recording="log")
-    quality, allan = kept / "quality.json", kept / "allan.parquet"
+    run = OneRecording(_written(log, folder))
     clock.done("write")
-    others = {name: kept / f"{name}.parquet" for name in ("envelope", "histogram")}
-    settings = plan.ingest_settings("simulated", "log")
-    source = str(plan.recordings["simulated", "log"].path)
-    _step(
-        "ingest",
-        wildcards=of_log,
-        output=_Named(quality=quality, **others),
-        params=_Named(source=source, settings=settings),
-    )
-    clock.done("ingest")
-    _step(
-        "allan",
-        wildcards=of_log,
-        input=_Named(quality=quality),
-        output=_Named(allan=allan),
-        params=_Named(settings=plan.settings("allan")),
-    )
-    clock.done("allan")
-    names = [field.name for field in fields(Estimation) if field.name in TABLES | PARTS_OF]
-    made = {name: kept / f"{name}.parquet" for name in names}
-    _step(
-        "estimate",
-        wildcards=of_log,
-        input=_Named(quality=quality, allan=allan),
-        output=_Named(**made),
-        params=_Named(settings=plan.estimate_settings("simulated", "log")),
-    )
-    clock.done("estimate")
-    parts = {name: [path] for name, path in made.items()}
+    for step in ("ingest", "allan", "estimate"):
+        run.run(step)
+        clock.done(step)
     joined = [folder / f"{name}.parquet" for name in ("parameters", "models", "findings")]
-    _step(
-        "sensor_tables",
-        input=_Named(**parts, allan=[allan], quality=[quality]),
-        output=joined,
-        params=_Named(truths=plan.truths("simulated"), catalogue=plan.catalogue()),
-    )
+    joined.append(folder / "low_pass.parquet")
+    run.run("sensor_tables", input=run.input("sensor_tables"), output=joined)
     clock.done("sensor_tables")
     found = {path.stem: read(path.stem, [path]).to_pylist() for path in joined}
-    found["low_pass"] = read("low_pass", [made["low_pass"]]).to_pylist()
-    if not Quality.read(quality).channels:
+    if not Quality.read(run.folder / "quality.json").channels:
         found["parameters"] = []
     return found
 

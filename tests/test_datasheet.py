@@ -1,5 +1,5 @@
 import math
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -7,8 +7,11 @@ import numpy as np
 import pytest
 import yaml
 
+from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.comparable import comparables
 from imubench_pipeline.datasheet import VERDICTS, Delta, bias_deltas, curve_rms, deltas
+from imubench_pipeline.estimators import curve as reading
+from imubench_pipeline.estimators.curve_bias import of_model
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.measured import fixed_bias
 from imubench_pipeline.noise import FLOOR, NoiseModel
@@ -27,7 +30,9 @@ def sheet(**figures: dict[str, Any]) -> Datasheet:
 
 def estimate(**values: float | None) -> Estimate:
     parameters = dict.fromkeys(("N", "B", "T_B", "K"), Parameter(None, "absent", "no such term"))
-    return Estimate("weighted", parameters | {k: Parameter(v) for k, v in values.items()})
+    found = Estimate("weighted", parameters | {k: Parameter(v) for k, v in values.items()})
+    curve = of_model(found.model, TAU) | {"B_curve": found.parameters["B"]}
+    return replace(found, curve=curve)
 
 
 def rows(datasheet: Datasheet, found: Estimate, channel: str = "gyro_x") -> dict:
@@ -76,9 +81,10 @@ def test_bias_instability_is_compared_with_the_minimum_of_the_curve() -> None:
         sheet(bias_instability=printed), estimate(N=1e-4, B=plateau / FLOOR, T_B=100.0, K=3e-6)
     )
     model = NoiseModel(N=1e-4, B=plateau / FLOOR, T_B=100.0, K=3e-6)
-    minimum = float(np.sqrt(model.allan_variance(TAU)).min())
-    assert found["adev_minimum", None].measured == pytest.approx(minimum)
-    assert found["adev_minimum", None].delta == pytest.approx(minimum / plateau - 1)
+    fine = np.geomspace(TAU[0], TAU[-1], 3001)
+    minimum = float(np.sqrt(model.allan_variance(fine)).min())
+    assert found["adev_minimum", None].measured == pytest.approx(minimum, rel=1e-3)
+    assert found["adev_minimum", None].delta == pytest.approx(minimum / plateau - 1, abs=1e-3)
     assert found["plateau", None].measured == pytest.approx(plateau)
     assert found["plateau", None].verdict == "as printed"
 
@@ -92,10 +98,20 @@ def test_a_curve_that_only_falls_has_no_minimum_to_compare() -> None:
 
 
 def test_what_is_read_from_the_curve_is_its_minimum() -> None:
-    read = Estimate("curve", {"N": Parameter(1e-4), "B": Parameter(1e-4), "T_B": Parameter(10.0)})
-    read = Estimate("curve", {**read.parameters, "K": Parameter(None, "not_shown", "no slope")})
+    model = NoiseModel(N=1e-4, B=1e-4, T_B=10.0, K=1e-5)
+    sizes = np.unique(np.geomspace(1, 40_000, 60).round().astype(np.int64))
+    read = reading.read(
+        AllanCurve(
+            sizes / 10.0,
+            sizes,
+            model.allan_variance(sizes / 10.0),
+            360_000 / sizes,
+            360_000,
+        )
+    )
     row = rows(sheet(bias_instability={"value": 10, "unit": "deg/h"}), read)["adev_minimum", None]
-    assert row.measured == pytest.approx(FLOOR * 1e-4)
+    minimum = float(np.sqrt(model.allan_variance(sizes / 10.0)).min())
+    assert row.measured == pytest.approx(minimum)
 
 
 def test_what_is_not_published_is_listed() -> None:
@@ -221,10 +237,9 @@ def test_a_verdict_takes_the_whole_interval(
     kind: str, lower: float, upper: float, verdict: str
 ) -> None:
     value = (lower + upper) / 2 * DEG
-    found = Estimate(
-        "likelihood",
-        estimate().parameters | {"N": Parameter(value, lower=lower * DEG, upper=upper * DEG)},
-    )
+    known = estimate()
+    white = Parameter(value, lower=lower * DEG, upper=upper * DEG)
+    found = replace(known, parameters=known.parameters | {"N": white})
     walk = {"value": 60, "unit": "deg/sqrt(h)", "kind": kind}
     row = rows(sheet(random_walk=walk), found)["N", None]
     assert row.verdict == verdict and row.verdict in VERDICTS
@@ -238,7 +253,8 @@ def test_limits_decide_where_there_is_no_value() -> None:
     printed = {"value": 60, "unit": "deg/sqrt(h)"}
     for upper, verdict in ((0.5, "better than typ"), (1.0, "not measured"), (2.0, "not measured")):
         absent = Parameter(None, "absent", "too small to see", 0.0, upper * DEG)
-        found = Estimate("likelihood", estimate().parameters | {"N": absent})
+        known = estimate()
+        found = replace(known, parameters=known.parameters | {"N": absent})
         row = rows(sheet(random_walk=printed), found)["N", None]
         assert row.verdict == verdict
         assert (row.reason or "").startswith("absent: too small to see")
@@ -254,10 +270,9 @@ def test_typical_and_maximum_are_two_rows_with_the_printed_interval() -> None:
         {"value": 90, "unit": "deg/sqrt(h)", "kind": "max"},
     ]
     sensor = Datasheet.model_validate({"gyro": {"random_walk": printed}})
-    found = Estimate(
-        "likelihood",
-        estimate().parameters | {"N": Parameter(1.2 * DEG, lower=1.15 * DEG, upper=1.25 * DEG)},
-    )
+    known = estimate()
+    white = Parameter(1.2 * DEG, lower=1.15 * DEG, upper=1.25 * DEG)
+    found = replace(known, parameters=known.parameters | {"N": white})
     typical, largest = (row for row in all_rows(sensor, found) if row.statistic == "N")
     assert (typical.verdict, largest.verdict) == ("worse than typ", "as printed")
     for row in (typical, largest):
@@ -351,20 +366,21 @@ def test_an_allan_deviation_is_compared_at_its_averaging_time() -> None:
     assert row.verdict == "not measured"
 
 
-def test_the_minimum_has_limits_where_its_parameters_have() -> None:
-    printed = {"value": 10, "unit": "deg/h"}
-    values = {"N": 1e-4, "B": 7e-5, "T_B": 100.0, "K": 3e-6}
-    sure = Estimate(
-        "likelihood",
-        {k: Parameter(v, lower=v / 1.1, upper=v * 1.1) for k, v in values.items()},
+def test_minimum_and_plateau_have_the_limits_of_the_curve() -> None:
+    known = estimate(N=1e-4, B=7e-5, T_B=100.0, K=3e-6)
+    curve = {
+        "B_curve": Parameter(7e-5, lower=6e-5, upper=8e-5),
+        "sigma_min": Parameter(5e-5, lower=4.5e-5, upper=5.6e-5),
+    }
+    found = rows(
+        sheet(bias_instability={"value": 10, "unit": "deg/h"}), replace(known, curve=curve)
     )
-    row = rows(sheet(bias_instability=printed), sure)["adev_minimum", None]
-    assert row.lower is not None and row.measured is not None and row.upper is not None
-    assert row.lower < row.measured < row.upper
-    # amplitudes 10 % larger make a curve 10 % larger; the correlation time only moves it
-    assert row.upper == pytest.approx(1.1 * row.measured, rel=0.03)
-    unsure = rows(sheet(bias_instability=printed), estimate(**values))["adev_minimum", None]
-    assert (unsure.measured, unsure.lower) == (row.measured, None)
+    row = found["adev_minimum", None]
+    assert (row.measured, row.lower, row.upper) == (5e-5, 4.5e-5, 5.6e-5)
+    row = found["plateau", None]
+    assert (row.measured, row.lower, row.upper) == pytest.approx(
+        (FLOOR * 7e-5, FLOOR * 6e-5, FLOOR * 8e-5)
+    )
 
 
 def bias_rows(sensor: Datasheet, channel: str, means: dict[str, float]) -> dict[str, Delta]:

@@ -10,6 +10,8 @@ from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.compensation import resolution_of
 from imubench_pipeline.config import EstimateSettings, Method
 from imubench_pipeline.estimation import Estimation, estimate_channel
+from imubench_pipeline.estimators.curve_bias import averaging_times, of_model
+from imubench_pipeline.estimators.estimate import CURVE
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recording import ChannelLog
 from imubench_pipeline.results import Key, estimates
@@ -29,8 +31,10 @@ WAVE = (5e-4, 1.7)
 BIAS = {"gyro_x": -0.03, "accel_z": 9.81}
 ALL: tuple[Method, ...] = ("likelihood", "likelihood_gm", "curve", "paper", "weighted")
 UNITS = {
-    "gyro_x": {"N": "rad/s/sqrt(Hz)", "B": "rad/s", "T_B": "s", "K": "rad/s/sqrt(s)"},
+    "gyro_x": {"N": "rad/s/sqrt(Hz)", "B": "rad/s", "T_B": "s", "K": "rad/s/sqrt(s)",
+               "B_curve": "rad/s", "sigma_min": "rad/s", "tau_min": "s"},
     "accel_z": {"N": "m/s^2/sqrt(Hz)", "B": "m/s^2", "T_B": "s", "K": "m/s^2/sqrt(s)",
+                "B_curve": "m/s^2", "sigma_min": "m/s^2", "tau_min": "s",
                 "amplitude": "m/s^2", "frequency": "Hz"},
 }  # fmt: skip
 
@@ -125,7 +129,7 @@ def test_every_method_has_its_parameters_with_their_units(found: Estimation, cha
     for method in ALL:
         names = [row["parameter"] for row in noise if row["method"] == method]
         four = ["N", "B", "T_B", "K"]
-        assert names == (["Q", *four, "R"] if method == "likelihood" else four)
+        assert names == [*(["Q", *four, "R"] if method == "likelihood" else four), *CURVE]
     for row in rows:
         if row["parameter"] in UNITS[channel]:
             assert row["unit"] == UNITS[channel][row["parameter"]]
@@ -144,11 +148,13 @@ def test_the_estimates_are_those_of_the_simulation(
         (row,) = of(found.parameters, channel, method=method, parameter="N")
         if channel == "gyro_x" or method.startswith("likelihood"):  # a line bends the curve
             assert row["value"] == pytest.approx(truth.N, rel=0.03), method
-    names = ("B", "T_B") if channel == "gyro_x" else ("K",)
+    names = ("B", "T_B", "B_curve") if channel == "gyro_x" else ("K", "sigma_min", "tau_min")
+    of_curve = of_model(truth, averaging_times(RATE, SAMPLES / RATE))
     for name in names:
         (row,) = of(found.parameters, channel, method="likelihood", parameter=name)
         assert row["status"] == "ok"
-        assert row["lower"] < getattr(truth, name) < row["upper"]
+        true = getattr(truth, name, None) or of_curve[name].value
+        assert row["lower"] < true < row["upper"]
 
 
 @pytest.mark.parametrize("channel", BIAS)
@@ -289,7 +295,7 @@ def test_the_papers_model_alone_says_what_it_says_beside_the_others(
 ) -> None:
     alone = estimated(logs["gyro_x"], methods=("likelihood_gm",))
     beside = of(found.parameters, "gyro_x", method="likelihood_gm")
-    assert [row["parameter"] for row in alone.parameters] == ["N", "B", "T_B", "K"]
+    assert [row["parameter"] for row in alone.parameters] == ["N", "B", "T_B", "K", *CURVE]
     assert [dict(row) | {"recommended": True} for row in beside] == alone.parameters
     assert alone.models == of(found.models, "gyro_x")
     assert alone.spectrum == of(found.spectrum, "gyro_x")

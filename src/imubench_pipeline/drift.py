@@ -122,7 +122,7 @@ def drift_rows(
         Rows of the table ``parameters``, of the recommended method. Used are component 1 and the
         parameters of `imubench_pipeline.pooled.POOLED`; only a value with status ``ok`` is an
         estimate. B and T_B are compared with those of the same terms: B of flicker noise and of a
-        Gauss-Markov process are different quantities.
+        Gauss-Markov process are different quantities; that of the curve is the same of all models.
     fixed_bias, recordings : iterable of mapping
         Rows of these tables.
 

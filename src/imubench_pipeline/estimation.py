@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from imubench_pipeline.allan import AllanCurve
+from imubench_pipeline.allan import AllanCurve, of_blocks
 from imubench_pipeline.compensation import (
     compensated_curve,
     compensated_estimate,
@@ -23,6 +24,8 @@ from imubench_pipeline.compensation import (
 )
 from imubench_pipeline.config import EstimateSettings
 from imubench_pipeline.curve_limits import with_fitted_limits
+from imubench_pipeline.deterministic.courses import find_courses
+from imubench_pipeline.deterministic.verdict import deterministic_rows, verdict_of
 from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators import least_squares, likelihood
 from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate
@@ -53,6 +56,7 @@ class Estimation:
     temperature: list[Row] = field(default_factory=list)
     allan_compensated: list[Row] = field(default_factory=list)
     low_pass: list[Row] = field(default_factory=list)
+    deterministic: list[Row] = field(default_factory=list)
     estimate_findings: list[Row] = field(default_factory=list)
     """Rows of the table ``findings``."""
     paths: dict[Path, TemperaturePath] = field(default_factory=dict)
@@ -81,39 +85,57 @@ def estimate_channel(
     into : Estimation
         Takes the rows.
     """
+    band = quantity_to_si(settings.band, "frequency") if settings.band else None
+    courses = find_courses(
+        log.blocks, log.grid, log.rate, segments=log.segments, highest=_unfiltered(band, bandwidth)
+    )
+    unit = SI_UNITS[quantity_of(key.channel)]["B"]
+    verdict = verdict_of(key.channel, unit, courses)
+    into.deterministic += deterministic_rows(asdict(key), unit, courses)
+    into.estimate_findings += [
+        finding.row(key.sensor, key.recording) for finding in verdict.findings
+    ]
+
+    def blocks() -> Iterator[NDArray[np.float64]]:
+        return courses.less(log.blocks())
+
+    measured = curve
+    if courses.found:
+        sizes = curve.cluster_size
+        curve = of_blocks(
+            blocks(), log.grid, log.rate, sizes, holes=log.holes, segments=log.segments
+        )
     estimates: dict[str, Estimate] = {}
-    final = curve
+    final = measured
     if "curve" in settings.methods:
         estimates["curve"] = reading.read(curve, longest=settings.longest)
     for method in ("paper", "weighted"):
         if method in settings.methods:
             estimates[method] = least_squares.fit(curve, method=method, longest=settings.longest)
     if _BY_LIKELIHOOD & set(settings.methods):
-        band = quantity_to_si(settings.band, "frequency") if settings.band else None
 
         def stream(use: str) -> np.random.Generator:
             return channel_rng(settings.seed, *asdict(key).values(), use)
 
         fit = partial(
             likelihood.fit_blocks,
-            log.blocks,
-            log.grid,
-            log.rate,
+            samples=log.grid,
+            rate=log.rate,
             holes=log.holes,
             segments=log.segments,
             band=band,
         )
-        found = fit(bandwidth=bandwidth, rng=stream("posterior"))
+        found = fit(blocks, bandwidth=bandwidth, rng=stream("posterior"))
         low_pass = low_pass_of(log, found)
         shown = low_pass.order is not None and not low_pass.or_quantization
         if bandwidth is None and shown:
             # A bend of a per cent, which does not end the band, is many times the error of N.
             bandwidth = low_pass.frequency.value or low_pass.frequency.lower
-            found = fit(bandwidth=bandwidth, rng=stream("posterior"))
+            found = fit(blocks, bandwidth=bandwidth, rng=stream("posterior"))
         estimates |= {estimate.method: estimate for estimate in found.estimates}
         there = presence(log.blocks(), log.grid, log.segments) if log.holes else None
         limited = partial(with_fitted_limits, segments=log.segments, presence=there)
-        final = limited(curve, found)
+        final = limited(measured, found)
         into.models += _model_rows(key, found)
         into.lines += _line_rows(key, found)
         into.spectrum += _spectrum_rows(key, found)
@@ -124,21 +146,33 @@ def estimate_channel(
                 path = temperature_path(log.temperatures(), log.segments, rng)
                 into.paths[log.path] = path
             path = into.paths[log.path]
-            warm = temperature_of(log, path, found, band, bandwidth, stream("temperature"))
+            # A warm-up is what temperature explains: it stays in the log that they are fitted to.
+            plain = found
+            if courses.found:
+                plain = fit(log.blocks, bandwidth=bandwidth, rng=stream("posterior"))
+            warm = temperature_of(log, path, plain, band, bandwidth, stream("temperature"))
             into.temperature += temperature_rows(key, warm)
             if warm.compensated:
                 estimates["compensated"] = compensated_estimate(warm)
-                left = limited(compensated_curve(log, warm, curve), warm.without_temperature)
-                added = temperature_curve(log, warm, curve)
+                left = limited(compensated_curve(log, warm, measured), warm.without_temperature)
+                added = temperature_curve(log, warm, measured)
                 into.allan_compensated += compensated_rows(key, left, added)
     into.allan += allan_rows(key, final)
     best = next(method for method in _BEST_FIRST if method in settings.methods)
     for method in settings.methods:
         if method in estimates:
-            into.parameters += parameter_rows(key, estimates[method], recommended=method == best)
-            into.draws += draw_rows(key, estimates[method])
-    unit = SI_UNITS[quantity_of(key.channel)]["B"]
+            estimate = estimates[method]
+            if method != "compensated":
+                estimate = verdict.applied(estimate)
+            into.parameters += parameter_rows(key, estimate, recommended=method == best)
+            into.draws += draw_rows(key, estimate)
     into.fixed_bias.append(asdict(key) | {"value": log.mean(), "unit": unit})
+
+
+def _unfiltered(band: float | None, bandwidth: float | None) -> float | None:
+    """Return the frequency up to which a log shows its noise as it is, Hz; None: not known."""
+    known = [frequency for frequency in (band, 0.5 * bandwidth if bandwidth else None) if frequency]
+    return min(known) if known else None
 
 
 _BY_LIKELIHOOD = {"likelihood", "likelihood_gm", "compensated"}

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.comparable import Comparable
+from imubench_pipeline.estimators.curve_bias import of_model
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.noise import FLOOR
 from imubench_pipeline.units import STANDARD_GRAVITY
@@ -34,19 +35,22 @@ def measured(entry: Comparable, estimate: Estimate, tau: NDArray[np.float64]) ->
     estimate : Estimate
         In SI.
     tau : ndarray, shape (m,)
-        Where the log shows the curve well enough for its minimum, s.
+        Where the log shows the curve well enough, s.
 
     Returns
     -------
     Parameter
-        SI. The limits of a point of the curve are at least as wide as 95 %: all amplitudes are
+        SI. The minimum and the plateau are those of `imubench_pipeline.estimators.curve_bias`.
+        The limits of another point of the curve are at least as wide as 95 %: all amplitudes are
         taken at the same end of their intervals, each correlation time at either end.
     """
     statistic = entry.statistic
-    if statistic == "plateau" or (statistic == "adev_minimum" and estimate.method == "curve"):
-        return _scaled(estimate.parameters["B"], FLOOR)  # what is read there is the minimum/0.664
-    if statistic == "adev_minimum":
-        return _minimum(estimate, tau)
+    if statistic in ("plateau", "adev_minimum"):
+        # An estimate that was made by hand has its terms alone.
+        of_curve = estimate.curve or of_model(estimate.model, tau)
+        if statistic == "plateau":
+            return _scaled(of_curve["B_curve"], FLOOR)
+        return of_curve["sigma_min"]
     if statistic == "adev":
         return _ordinate(estimate, tau, entry.tau or math.nan)
     return estimate.parameters[statistic]
@@ -60,15 +64,6 @@ def _scaled(parameter: Parameter, factor: float) -> Parameter:
     return replace(parameter, value=value, lower=lower, upper=upper)
 
 
-def _minimum(estimate: Estimate, tau: NDArray[np.float64]) -> Parameter:
-    """Return the minimum of the model's curve, if it lies inside the tau of the log."""
-    deviation = np.sqrt(estimate.model.allan_variance(tau))
-    lowest = int(np.argmin(deviation)) if len(tau) else 0
-    if not 0 < lowest < len(tau) - 1:
-        return Parameter(None, "not_shown", "the curve has no minimum inside the log's tau")
-    return _within(float(deviation[lowest]), estimate, tau)
-
-
 def _ordinate(estimate: Estimate, tau: NDArray[np.float64], at: float) -> Parameter:
     if not len(tau) or not tau[0] <= at <= tau[-1]:
         return Parameter(None, "not_shown", f"the log does not show the curve at {at:g} s")
@@ -77,12 +72,11 @@ def _ordinate(estimate: Estimate, tau: NDArray[np.float64], at: float) -> Parame
 
 
 def _within(value: float, estimate: Estimate, tau: NDArray[np.float64]) -> Parameter:
-    """Give the least of a model's curve the limits that those of its parameters allow."""
-    curves = [np.sqrt(end.model.allan_variance(tau)) for end in _ends(estimate)]
-    if not curves:
+    """Give a point of a model's curve the limits that those of its parameters allow."""
+    points = [float(np.sqrt(end.model.allan_variance(tau)[0])) for end in _ends(estimate)]
+    if not points:
         return Parameter(value)
-    least = [float(curve.min()) for curve in curves]
-    return Parameter(value, lower=min(value, *least), upper=max(value, *least))
+    return Parameter(value, lower=min(value, *points), upper=max(value, *points))
 
 
 def _ends(estimate: Estimate) -> Iterator[Estimate]:

@@ -44,7 +44,7 @@ Row = Mapping[str, Any]
 LEVEL = 0.01
 """Probability, where recordings agree, of saying that they differ."""
 
-POOLED = ("N", "B", "K", "T_B", "Q", "R")
+POOLED = ("N", "B_curve", "sigma_min", "K", "B", "T_B", "Q", "R")
 """The parameters that are pooled, in their order in the table."""
 
 _KEYS = ("sensor", "device", "channel", "parameter", "recordings", "left_out")

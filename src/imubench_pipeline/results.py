@@ -14,6 +14,7 @@ import pyarrow as pa
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.drift import drift_rows
 from imubench_pipeline.estimators.estimate import (
+    CURVE,
     FAMILY,
     SI_UNITS,
     Estimate,
@@ -22,7 +23,6 @@ from imubench_pipeline.estimators.estimate import (
     Status,
 )
 from imubench_pipeline.findings import Finding
-from imubench_pipeline.noise import FLOOR
 from imubench_pipeline.pooled import pooled_rows
 from imubench_pipeline.published import published_rows
 from imubench_pipeline.quality.spectral import band_finding, line_findings
@@ -222,10 +222,12 @@ def estimate_of(method: str, rows: Iterable[Row]) -> Estimate:
     """Return the estimate that rows of the table ``parameters`` stand for."""
     components: dict[int, dict[str, Parameter]] = {}
     lines: dict[int, dict[str, Parameter]] = {}
+    of_curve: dict[str, Parameter] = {}
     for row in rows:
         name = row["parameter"]
         group = lines if name in ("amplitude", "frequency") else components
-        group.setdefault(row["component"], {})[name] = Parameter(
+        place = of_curve if name in CURVE else group.setdefault(row["component"], {})
+        place[name] = Parameter(
             row["value"],
             cast(Status, row["status"]),
             row["reason"],
@@ -235,7 +237,7 @@ def estimate_of(method: str, rows: Iterable[Row]) -> Estimate:
             row["fitted"],
         )
     first = components.pop(1, {})
-    return Estimate(method, first, list(components.values()), list(lines.values()))
+    return Estimate(method, first, list(components.values()), list(lines.values()), of_curve)
 
 
 def _by(table: pa.Table, *names: str) -> dict[tuple[str, ...], pa.Table]:
@@ -279,7 +281,11 @@ def joined_tables(
         "drift", drift_rows(recommended.to_pylist(), joined["fixed_bias"].to_pylist(), about)
     )
     joined["recordings"] = build("recordings", about)
-    of_logs = (row for quality in qualities for row in quality.findings)
+    of_logs = without_doubles(
+        (row for quality in qualities for row in quality.findings),
+        joined["deterministic"],
+        {(row["sensor"], row["recording"]): row.get("duration") or 0.0 for row in about},
+    )
     unusual = unusual_rows(recommended.to_pylist(), catalogue)
     of_estimates = joined.pop("estimate_findings").to_pylist()
     found = [*of_logs, *of_estimates, *spectral_rows(joined), *unusual]
@@ -288,6 +294,43 @@ def joined_tables(
     joined["simulated_truth"] = build("simulated_truth", truth)
     joined["published"] = build("published", published_rows(truths, truth, joined))
     return joined
+
+
+_OF_LOGS = {"step": "bias_step", "warm_up": "warm_up_drift"}
+"""What is found of a log as it is read, and found again, with its size, beside its noise."""
+
+_NEAR = 1 / 100
+"""Part of a recording within which two steps are one."""
+
+
+def without_doubles(
+    findings: Iterable[Row],
+    deterministic: pa.Table,
+    durations: Mapping[tuple[str, str], float],
+) -> Iterator[Row]:
+    """Yield the findings of the ingest that the table ``deterministic`` does not tell better.
+
+    Parameters
+    ----------
+    findings : iterable of mapping
+        Rows of the table ``findings``.
+    deterministic : pyarrow.Table
+    durations : mapping
+        Of each sensor and recording, s.
+    """
+    known: dict[tuple[str, str, str], list[Row]] = {}
+    for row in deterministic.to_pylist():
+        known.setdefault((row["sensor"], row["recording"], row["channel"]), []).append(row)
+    for finding in findings:
+        kind = _OF_LOGS.get(finding["finding"])
+        if kind is None:
+            yield finding
+            continue
+        place = (finding["sensor"], finding["recording"], finding["channel"])
+        same = (row for row in known.get(place, ()) if row["kind"] == kind)
+        near = _NEAR * durations.get((finding["sensor"], finding["recording"]), 0.0)
+        if not any(abs(row["start"] - (finding["start"] or 0.0)) <= near for row in same):
+            yield finding
 
 
 def spectral_rows(tables: Mapping[str, pa.Table]) -> Iterator[Row]:
@@ -306,11 +349,12 @@ def unusual_rows(parameters: Iterable[Row], catalogue: str) -> Iterator[Row]:
     """Yield the rows of the table ``findings`` about estimates far from what vendors print."""
     usual = usual_figures(sensors_of(catalogue))
     for row in parameters:
-        if row["parameter"] not in ("N", "B") or row["component"] != 1 or row["value"] is None:
-            continue
         # What vendors print of B is the minimum of the curve.
-        value = row["value"] * (FLOOR if row["parameter"] == "B" else 1.0)
-        for sentence in suspicious(quantity_of(row["channel"]), {row["parameter"]: value}, usual):
+        figure = {"N": "N", "sigma_min": "B"}.get(row["parameter"])
+        value = row["value"]
+        if figure is None or value is None:
+            continue
+        for sentence in suspicious(quantity_of(row["channel"]), {figure: value}, usual):
             finding = Finding("unusual_figure", "warning", sentence, value, row["channel"])
             yield finding.row(row["sensor"], row["recording"])
 

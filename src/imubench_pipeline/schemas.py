@@ -12,6 +12,7 @@ from imubench_pipeline.columns import curve_limits as _curve_limits
 from imubench_pipeline.columns import figure as _figure
 from imubench_pipeline.columns import number as _number
 from imubench_pipeline.columns import text as _text
+from imubench_pipeline.deterministic.columns import DETERMINISTIC_TABLES
 from imubench_pipeline.earth_rate.columns import EARTH_RATE_TABLES
 from imubench_pipeline.estimators.columns import DRAWN_TABLES
 from imubench_pipeline.fusion.columns import FUSION_TABLES
@@ -88,7 +89,11 @@ TABLES: dict[str, tuple[Column, ...]] = {
         Column("recommended", pa.bool_(), "-", "the method to use for this channel"),
         _text("model", "the terms of the model, such as N+GM+K"),
         _count("component", "number of a repeated term, from 1", required=True),
-        *_figure("Q, N, B, T_B, K, R; amplitude and frequency of a line"),
+        *_figure(
+            "Q, N, B, T_B, K, R; amplitude and frequency of a line; of the curve of the model: "
+            "B_curve (bias instability of the curve: highest Allan deviation of all F and GM "
+            "terms over 0.664), sigma_min and tau_min (lowest point, up to a ninth of the log)"
+        ),
         _number("duration_needed", "s", "length of a log that gives the value to 10 %"),
         _FITTED,
     ),
@@ -175,7 +180,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _SENSOR,
         _text("device", "of which the recordings are compared"),
         _CHANNEL,
-        _text("parameter", "N, B, K, T_B, Q, R, or bias: the fixed bias"),
+        _text("parameter", "N, B_curve, sigma_min, K, B, T_B, Q, R, or bias: the fixed bias"),
         _RECORDING,
         _count("position", "place in the order of the device's recordings, from 1", required=True),
         _text("started", "date and time of the first sample, where known", required=False),
@@ -195,7 +200,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _SENSOR,
         _text("device", "null: all recordings of the sensor", required=False),
         _CHANNEL,
-        _text("parameter", "Q, N, B, T_B, K, R, or bias: the fixed bias"),
+        _text("parameter", "N, B_curve, sigma_min, K, B, T_B, Q, R, or bias: the fixed bias"),
         _count("recordings", "recordings pooled", required=True),
         _count("left_out", "recordings that have no value to pool", required=True),
         _number("value", "as in unit", "pooled estimate"),
@@ -349,6 +354,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         Column("assumed", pa.bool_(), "-", "not published by the source: chosen"),
         _text("source", "where the parameters are published"),
     ),
+    **DETERMINISTIC_TABLES,
     **DRAWN_TABLES,
     **FUSION_TABLES,
     **EARTH_RATE_TABLES,
@@ -391,6 +397,7 @@ BY_RECORDING = (
     "temperature",
     "allan_compensated",
     "low_pass",
+    "deterministic",
     "simulated_truth",
     "published",
     "error_budget",

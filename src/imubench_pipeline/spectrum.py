@@ -292,7 +292,7 @@ def _binned(ordinates: Sequence[Array], block: int) -> dict[str, NDArray[np.gene
     """Average ordinates in bins: the lowest stay single, then each is 5 % wide."""
     order = np.argsort(ordinates[0], kind="stable")
     frequency, density, ramp, cross, length = (column[order] for column in ordinates)
-    edges = _edges(frequency)
+    edges = bin_edges(frequency)
     counts = np.diff(np.append(edges, len(frequency)))
     last = edges + counts - 1
     return {
@@ -308,7 +308,7 @@ def _binned(ordinates: Sequence[Array], block: int) -> dict[str, NDArray[np.gene
     }
 
 
-def _edges(frequency: Array) -> NDArray[np.int64]:
+def bin_edges(frequency: Array) -> NDArray[np.int64]:
     """Return the first ordinate of each bin."""
     edges = list(range(min(SINGLE, len(frequency))))
     while edges[-1] + 1 < len(frequency):

@@ -20,7 +20,7 @@ from imubench_pipeline.report.practical import (
 
 ASCII = str.maketrans("−⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "--0123456789")
 SYMBOLS = {
-    *("Q", "N", "B", "T_B", "K", "R", "adev", "psd", "signal"),
+    *("Q", "N", "B", "T_B", "K", "R", "B_curve", "sigma_min", "tau_min", "adev", "psd", "signal"),
     *("sensitivity", "quadratic"),
 }
 

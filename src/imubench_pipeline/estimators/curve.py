@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.allan import AllanCurve
-from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.estimators.estimate import CURVE, PARAMETERS, Estimate, Parameter
 from imubench_pipeline.noise import FLOOR, PEAK_TAU
 
 Array = NDArray[np.float64]
@@ -87,12 +87,25 @@ def read(curve: AllanCurve, *, longest: float = 1 / 9) -> Estimate:
         nothing = Parameter(
             None, "not_shown", f"the curve has {used.sum()} points up to {longest:.3g} of the log"
         )
-        return Estimate("curve", dict.fromkeys(("N", "B", "T_B", "K"), nothing))
+        return Estimate(
+            "curve", dict.fromkeys(PARAMETERS, nothing), curve=dict.fromkeys(CURVE, nothing)
+        )
     bias, correlation_time = _minimum(points)
     return Estimate(
         "curve",
         {"N": _white(points, thinned), "B": bias, "T_B": correlation_time, "K": _walk(points)},
+        curve={
+            "B_curve": bias,
+            "sigma_min": _times(bias, FLOOR),
+            "tau_min": _times(correlation_time, PEAK_TAU),
+        },
     )
+
+
+def _times(parameter: Parameter, factor: float) -> Parameter:
+    if parameter.value is None:
+        return parameter
+    return Parameter(parameter.value * factor)
 
 
 def _white(points: _Curve, thinned: Array) -> Parameter:

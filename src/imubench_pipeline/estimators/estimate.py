@@ -21,6 +21,15 @@ PARAMETERS = ("N", "B", "T_B", "K")
 FAMILY = ("Q", "N", "B", "T_B", "K", "R")
 """Those of the whole family of terms; lines have an amplitude and a frequency."""
 
+CURVE = ("B_curve", "sigma_min", "tau_min")
+"""Figures of the curve, which every model has: see `imubench_pipeline.estimators.curve_bias`."""
+
+SHOWN = ("Q", "N", "B_curve", "sigma_min", "tau_min", "B", "T_B", "K", "R")
+"""The order in which parameters are shown."""
+
+COMPARED = ("N", "B_curve", "sigma_min", "K")
+"""What is the same quantity of all models, and compared between sensors."""
+
 SI_UNITS: dict[str, dict[str, str]] = {
     "gyro": {
         "Q": "rad",
@@ -31,6 +40,9 @@ SI_UNITS: dict[str, dict[str, str]] = {
         "R": "rad/s^2",
         "amplitude": "rad/s",
         "frequency": "Hz",
+        "B_curve": "rad/s",
+        "sigma_min": "rad/s",
+        "tau_min": "s",
     },
     "accel": {
         "Q": "m/s",
@@ -41,6 +53,9 @@ SI_UNITS: dict[str, dict[str, str]] = {
         "R": "m/s^3",
         "amplitude": "m/s^2",
         "frequency": "Hz",
+        "B_curve": "m/s^2",
+        "sigma_min": "m/s^2",
+        "tau_min": "s",
     },
 }
 """SI unit of each parameter, by quantity."""
@@ -137,6 +152,8 @@ class Estimate:
         Components beyond the first: B and T_B of a second Gauss-Markov process.
     lines : sequence of mapping
         Amplitude and frequency of each sinusoid.
+    curve : mapping of str to Parameter
+        The figures of the curve, `CURVE`.
     draws : JointDraws or None
         Noise models drawn jointly from the posterior, without the lines; None: the method has
         none, and its parameters are known one by one only.
@@ -146,11 +163,14 @@ class Estimate:
     parameters: Mapping[str, Parameter]
     further: Sequence[Mapping[str, Parameter]] = ()
     lines: Sequence[Mapping[str, Parameter]] = ()
+    curve: Mapping[str, Parameter] = field(default_factory=dict)
     draws: JointDraws | None = field(default=None, compare=False, repr=False)
 
     def components(self) -> Iterator[tuple[int, str, Parameter]]:
         """Yield component number, name and parameter, the first component first."""
         for name, parameter in self.parameters.items():
+            yield 1, name, parameter
+        for name, parameter in self.curve.items():
             yield 1, name, parameter
         for number, group in enumerate(self.further, start=2):
             for name, parameter in group.items():

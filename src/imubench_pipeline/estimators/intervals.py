@@ -21,12 +21,13 @@ from imubench_pipeline.estimators.identifiability import (
 )
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.posterior import Posterior
-from imubench_pipeline.estimators.whittle import Terms, Whittle
+from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
 
 Array = NDArray[np.float64]
 
 _AT_BOUND = 0.985
 _WIDTH_OF_INTERVAL = 3.92
+_ABOUT_AS_GOOD = 2.0
 _ABSENT = "the data do not ask for it"
 _ABSENT_BELOW = f"{_ABSENT}; with 95 % it is below the upper limit"
 
@@ -37,13 +38,16 @@ def with_upper_limits(
     wider: Sequence[Candidate],
     draws: dict[Terms, Posterior],
 ) -> Estimate:
-    """Return an estimate with upper limits of the K and B that its model does not have.
+    """Return an estimate that says of the K and B that its model does not have what is known.
+
+    Where a model that has one is about as good as the chosen one it is ``not_identified``, with
+    its interval; else ``absent``, with an upper limit.
 
     Parameters
     ----------
     estimate : Estimate
     alike : sequence of Candidate
-        The models that the log does not rule out.
+        The models that the log does not rule out, the chosen one first.
     wider : sequence of Candidate
         The model with a random walk, or with one bias instability, beside its terms.
     draws : dict of Terms to Posterior
@@ -54,12 +58,42 @@ def with_upper_limits(
         if parameters[name].status != "absent":
             continue
         having = [one for one in (*wider, *alike) if _has(name, one.found.terms)]
+        if not having:
+            continue
         limits = [
             float(np.quantile(_draws_of(name, one.found.terms, draws), 0.975)) for one in having
         ]
-        if limits:
+        good = [one for one in alike[1:] if as_good(one, alike[0]) and _in_model(name, one.found)]
+        if not good:
             parameters[name] = Parameter(None, "absent", _ABSENT_BELOW, 0.0, max(limits))
+            continue
+        names = " and ".join(one.found.terms.name for one in good)
+        verb = "is" if len(good) == 1 else "are"
+        reason = f"{names}, which {'has' if len(good) == 1 else 'have'} it, {verb} about as good"
+        reason += f" as {alike[0].found.terms.name}; only its interval is given"
+        parameters[name] = Parameter(None, "not_identified", reason, 0.0, max(limits))
+        timed = [one.found.terms for one in good if _has("T_B", one.found.terms)]
+        times = [_draws_of("T_B", terms, draws) for terms in timed]
+        if name == "B" and times:
+            ends = [np.quantile(one, (0.025, 0.975)) for one in times]
+            low, high = float(min(end[0] for end in ends)), float(max(end[1] for end in ends))
+            parameters["T_B"] = Parameter(None, "not_identified", reason, low, high)
     return replace(estimate, parameters=parameters)
+
+
+def as_good(other: Candidate, chosen: Candidate) -> bool:
+    """Tell whether a model is about as good as the chosen one: AIC favours it, or BIC hardly less.
+
+    A difference of 2 is not worth more than a bare mention (R. Kass and A. Raftery, J. Am. Stat.
+    Assoc. 90, 1995).
+    """
+    return other.aic <= chosen.aic or other.bic <= chosen.bic + _ABOUT_AS_GOOD
+
+
+def _in_model(name: str, found: Maximum) -> bool:
+    """Tell whether a fit has a parameter above 0."""
+    names = parameter_names(found.terms)
+    return name in names and bool(found.powers[names.index(name)] > 0.0)
 
 
 def papers_only(parameters: Mapping[str, Parameter]) -> dict[str, Parameter]:
@@ -182,13 +216,15 @@ def _interval(
     ]
     own = [(_draws_of(name, terms, draws), 1.0)]
     return (
-        min(_quantile(there, 0.025), _quantile(own, 0.025)),
-        max(_quantile(there, 0.975), _quantile(own, 0.975)),
+        min(mixture_quantile(there, 0.025), mixture_quantile(own, 0.025)),
+        max(mixture_quantile(there, 0.975), mixture_quantile(own, 0.975)),
     )
 
 
-def _quantile(parts: Sequence[tuple[Array, float]], level: float) -> float:
+def mixture_quantile(parts: Sequence[tuple[Array, float]], level: float) -> float:
     """Return a quantile of draws that come from several models, each with its weight."""
+    if len(parts) == 1:
+        return float(np.quantile(parts[0][0], level))  # without the sorting
     values = np.concatenate([part for part, _ in parts])
     mass = np.concatenate([np.full(len(part), weight / len(part)) for part, weight in parts])
     order = np.argsort(values, kind="stable")

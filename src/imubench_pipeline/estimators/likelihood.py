@@ -15,8 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 from imubench_pipeline.allan import of_blocks
 from imubench_pipeline.estimators import least_squares
 from imubench_pipeline.estimators.band import Band, find_band
+from imubench_pipeline.estimators.curve_bias import averaging_times, with_curve
 from imubench_pipeline.estimators.draws import drawn_share, joint_draws
-from imubench_pipeline.estimators.estimate import FAMILY, Estimate, Parameter
+from imubench_pipeline.estimators.estimate import CURVE, FAMILY, Estimate, Parameter
 from imubench_pipeline.estimators.intervals import describe, papers_only, with_upper_limits
 from imubench_pipeline.estimators.lines import Line, find, without_lines
 from imubench_pipeline.estimators.model_choice import PAPERS, Candidate, compare
@@ -215,8 +216,12 @@ def fit_spectrum(
         if not clear.all():
             reason += f", or lines that hide too much of it ({(~clear).sum()} bins)"
         nothing = {name: Parameter(None, "not_shown", reason) for name in FAMILY}
+        of_curve = {name: nothing["B"] for name in CURVE}
         return Likelihood(
-            (Estimate("likelihood", nothing), Estimate("likelihood_gm", papers_only(nothing))),
+            (
+                Estimate("likelihood", nothing, curve=of_curve),
+                Estimate("likelihood_gm", papers_only(nothing), curve=of_curve),
+            ),
             (),
             lines,
             None,
@@ -232,8 +237,8 @@ def fit_spectrum(
     chosen = candidates[0]
     draws: dict[Terms, Posterior] = {}
     # A ramp is no noise: it is believed or not, and does not widen intervals as a possibility.
-    alike = [
-        c for c in candidates if c is chosen or (c.share >= _LEAST_SHARE and not c.found.terms.ramp)
+    alike = [chosen] + [
+        c for c in candidates[1:] if c.share >= _LEAST_SHARE and not c.found.terms.ramp
     ]
     wider = [c for c in candidates if c.found.terms in _with_one_more(chosen.found.terms)]
     for candidate in candidates:
@@ -244,8 +249,11 @@ def fit_spectrum(
             draws[terms] = sample(whittle, candidate.found, rng, number)
     estimate = describe("likelihood", whittle, chosen, alike, draws, limit)
     estimate = with_upper_limits(estimate, alike, wider, draws)
+    tau = averaging_times(spectrum.rate, float(spectrum.length.max()))
+    estimate = with_curve(estimate, alike, wider, draws, tau)
     papers = next(c for c in candidates if c.found.terms == PAPERS)
     gauss_markov = describe("likelihood_gm", whittle, papers, [papers], draws, limit)
+    gauss_markov = with_curve(gauss_markov, [papers], (), draws, tau)
     return Likelihood(
         (
             replace(

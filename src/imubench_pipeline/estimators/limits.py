@@ -18,6 +18,12 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.confidence import equivalent_degrees
+from imubench_pipeline.estimators.curve_bias import (
+    averaging_times,
+    lowest_parameters,
+    lowest_point,
+    models_of,
+)
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.variance_covariance import variance_covariance
@@ -48,6 +54,9 @@ _NOTHING_KNOWN = 10.0
 
 _STEP = 1e-3
 """Of log T_B, for the derivative."""
+
+_STEP_OF_LOWEST = 0.05
+"""Of the logarithm of a parameter, for the derivatives of the lowest point of the curve."""
 
 
 @dataclass(frozen=True)
@@ -204,7 +213,11 @@ def with_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) 
     """
     model = estimate.model
     if not model.terms:
-        return estimate
+        nothing = Parameter(None, "not_shown", "no noise is found")
+        return replace(
+            estimate,
+            curve={"B_curve": estimate.parameters["B"], "sigma_min": nothing, "tau_min": nothing},
+        )
     errors = fit_errors(curve, used, model, estimate.method)
     unknown: dict[str, str] = {}
     if estimate.parameters["T_B"].status == "at_bound":
@@ -241,7 +254,41 @@ def with_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) 
             parameters[name] = replace(
                 parameters[name], lower=found.value * low, upper=found.value * high
             )
-    return Estimate(estimate.method, parameters)
+    return Estimate(
+        estimate.method,
+        parameters,
+        curve={"B_curve": parameters["B"]} | _lowest_point(model, errors, curve),
+    )
+
+
+def _lowest_point(model: NoiseModel, errors: Errors, curve: AllanCurve) -> dict[str, Parameter]:
+    """Return the lowest point of the fitted curve, with limits from the errors of the fit."""
+    tau = averaging_times(_rate(curve), curve.samples / _rate(curve))
+    best = models_of(model)
+    at = [getattr(model, name) for name in errors.names]
+    found = lowest_parameters([best], [], tau)
+    known = bool(np.isfinite(errors.covariance).all())
+    if not known or any(one.value is None for one in found.values()):
+        return found
+    ends = []
+    for sign in (-1.0, 1.0):
+        moved = [
+            models_of(replace(model, **{name: value * math.exp(sign * _STEP_OF_LOWEST)}))
+            for name, value in zip(errors.names, at, strict=True)
+        ]
+        ends.append([lowest_point(one, tau)[:2] for one in moved])
+    slopes = np.log(np.array(ends[1]) / np.array(ends[0]))[:, :, 0].T / (2.0 * _STEP_OF_LOWEST)
+    described = {}
+    for (name, one), slope in zip(found.items(), slopes, strict=True):
+        error = min(math.sqrt(max(float(slope @ errors.covariance @ slope), 0.0)), _NOTHING_KNOWN)
+        if error > _MOST_ERROR:
+            reason = f"its relative standard error is {_percent(error)}, above 50 %"
+            described[name] = Parameter(None, "not_identified", reason, fitted=one.value)
+            continue
+        factor = math.exp(_SIGMAS * error)
+        assert one.value is not None
+        described[name] = replace(one, lower=one.value / factor, upper=one.value * factor)
+    return described
 
 
 def _unknown_at_bound(error: float) -> dict[str, str]:

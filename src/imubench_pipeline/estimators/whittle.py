@@ -139,6 +139,13 @@ class Whittle:
         other.scale = float(np.median(spectrum.density))
         return other
 
+    def taken(self, spectrum: Spectrum, chosen: NDArray[np.bool_]) -> Whittle:
+        """Return the likelihood of other data in chosen bins."""
+        other = self.of(spectrum.taken(chosen))
+        other.columns = {letter: self.column(letter)[chosen] for letter in "NFK"}
+        other.table = np.ascontiguousarray(self.table[:, chosen])
+        return other
+
     def column(self, letter: str) -> Array:
         """Return the density of a unit linear term (Q, N, F or K) in each bin."""
         if letter not in self.columns:

@@ -20,6 +20,10 @@ _CLOSEST_PAIR = 2.5
 """Least ratio of two correlation times that are told apart."""
 
 _TOLERANCE = 1e-7
+_SCAN_TOLERANCE = 1e-2
+"""Of the cost, where correlation times are compared only."""
+
+_POLISH_TOLERANCE = 1e-6
 _MOST_STEPS = 60
 _GOLDEN = 0.6180339887498949
 
@@ -67,14 +71,60 @@ def cost_of(nu: Array, data: Array, density: Array) -> float:
 
 
 @njit(cache=True)
-def _non_negative(gram: Array, target: Array) -> Array:
-    """Minimise x' gram x / 2 - target' x over x >= 0 (Lawson and Hanson's active sets)."""
+def _solved(gram: Array, target: Array, free: NDArray[np.bool_]) -> Array:
+    """Return x with gram x = target over what is free, 0 elsewhere (Cholesky's root)."""
+    chosen = np.flatnonzero(free)
+    m = chosen.size
+    root = np.empty((m, m))
+    y = np.empty(m)
+    for a in range(m):
+        for b in range(a + 1):
+            total = gram[chosen[a], chosen[b]]
+            if a == b:
+                least = 1e-14 * total
+                total *= 1.0 + 1e-12
+            for c in range(b):
+                total -= root[a, c] * root[b, c]
+            if a == b:
+                # Terms that look alike must not divide by nothing.
+                root[a, a] = np.sqrt(max(total, least, 1e-300))
+            else:
+                root[a, b] = total / root[b, b]
+        total = target[chosen[a]]
+        for c in range(a):
+            total -= root[a, c] * y[c]
+        y[a] = total / root[a, a]
+    x = np.zeros(target.size)
+    for a in range(m - 1, -1, -1):
+        total = y[a]
+        for c in range(a + 1, m):
+            total -= root[c, a] * x[chosen[c]]
+        x[chosen[a]] = total / root[a, a]
+    return x
+
+
+@njit(cache=True)
+def _non_negative(gram: Array, target: Array, guess: Array) -> Array:
+    """Minimise x' gram x / 2 - target' x over x >= 0 (Lawson and Hanson's active sets).
+
+    ``guess`` is above 0 where x may be: mostly that is right.
+    """
     p = target.size
+    small = 1e-12 * np.max(np.abs(target))
+    free = guess > 0.0
+    if free.any():
+        x = _solved(gram, target, free)
+        gradient = target - gram @ x
+        right = True
+        for j in range(p):
+            right &= x[j] > 0.0 if free[j] else gradient[j] <= small
+        if right:
+            return x
     x = np.zeros(p)
-    free = np.zeros(p, dtype=np.bool_)
+    free[:] = False
     for _ in range(10 * p):
         gradient = target - gram @ x
-        best, steepest = -1, 1e-12 * np.max(np.abs(target))
+        best, steepest = -1, small
         for j in range(p):
             if not free[j] and gradient[j] > steepest:
                 best, steepest = j, gradient[j]
@@ -82,30 +132,21 @@ def _non_negative(gram: Array, target: Array) -> Array:
             return x
         free[best] = True
         while True:
-            chosen = np.flatnonzero(free)
-            m = chosen.size
-            small = np.empty((m, m))
-            right = np.empty(m)
-            for a in range(m):
-                right[a] = target[chosen[a]]
-                for b in range(m):
-                    small[a, b] = gram[chosen[a], chosen[b]]
-                small[a, a] *= 1.0 + 1e-12
-            solution = np.linalg.solve(small, right)
+            solution = _solved(gram, target, free)
             step, blocking = 1.0, -1
-            for a in range(m):
-                if solution[a] <= 0.0:
-                    old = x[chosen[a]]
-                    reach = old / (old - solution[a]) if old > 0.0 else 0.0
+            for j in range(p):
+                if free[j] and solution[j] <= 0.0:
+                    reach = x[j] / (x[j] - solution[j]) if x[j] > 0.0 else 0.0
                     if reach < step or blocking < 0:
-                        step, blocking = min(step, reach), a
-            for a in range(m):
-                x[chosen[a]] += step * (solution[a] - x[chosen[a]])
+                        step, blocking = min(step, reach), j
+            for j in range(p):
+                if free[j]:
+                    x[j] += step * (solution[j] - x[j])
             if blocking < 0:
                 break
-            x[chosen[blocking]] = 0.0
-            free[chosen[blocking]] = False
-            if m == 1:
+            x[blocking] = 0.0
+            free[blocking] = False
+            if not free.any():
                 break
     return x
 
@@ -113,6 +154,14 @@ def _non_negative(gram: Array, target: Array) -> Array:
 @njit(cache=True)
 def best_powers(columns: Array, bins: Bins, with_ramp: bool) -> tuple[Array, float, float]:
     """Return the squared parameters, R and the cost that fit best."""
+    return _best_powers(columns, bins, with_ramp, _TOLERANCE)
+
+
+@njit(cache=True)
+def _best_powers(
+    columns: Array, bins: Bins, with_ramp: bool, tolerance: float
+) -> tuple[Array, float, float]:
+    """Return those that fit best, to a tolerance of the cost."""
     nu, density, cross, ramp = bins
     b, p = columns.shape
     R = 0.0
@@ -121,7 +170,7 @@ def best_powers(columns: Array, bins: Bins, with_ramp: bool) -> tuple[Array, flo
     model = np.empty(b)
     for i in range(b):
         model[i] = density[i] + 1e-3
-    powers = np.zeros(p)
+    powers = np.ones(p)
     cost = np.inf
     for iteration in range(_MOST_STEPS):
         if with_ramp and iteration > 0:
@@ -145,7 +194,7 @@ def best_powers(columns: Array, bins: Bins, with_ramp: bool) -> tuple[Array, flo
         for j in range(p):
             for k in range(j):
                 gram[k, j] = gram[j, k]
-        wanted = _non_negative(gram, target)
+        wanted = _non_negative(gram, target, powers)
         if iteration == 0:
             powers = wanted
             model = columns @ powers
@@ -168,7 +217,7 @@ def best_powers(columns: Array, bins: Bins, with_ramp: bool) -> tuple[Array, flo
             break
         gain = cost - tried_cost
         powers, model, cost = tried, tried_model, tried_cost
-        if gain < _TOLERANCE:
+        if gain < tolerance:
             break
     return powers, R, cost
 
@@ -180,6 +229,7 @@ def _cost_at(
     bins: Bins,
     with_ramp: bool,
     table: ShapeTable,
+    tolerance: float,
 ) -> float:
     """Return the cost at logarithms of correlation times, profiled over everything else."""
     b, p = fixed.shape
@@ -189,7 +239,7 @@ def _cost_at(
     for g in range(places.size):
         shape_at(places[g], table, shape)
         columns[:, p + g] = shape / shape.mean()
-    return best_powers(columns, bins, with_ramp)[2]
+    return _best_powers(columns, bins, with_ramp, tolerance)[2]
 
 
 @njit(cache=True)
@@ -208,20 +258,20 @@ def _polished(
     a, d = low, high
     b, c = d - _GOLDEN * (d - a), a + _GOLDEN * (d - a)
     here[which] = b
-    cost_b = _cost_at(here, fixed, bins, with_ramp, table)
+    cost_b = _cost_at(here, fixed, bins, with_ramp, table, _POLISH_TOLERANCE)
     here[which] = c
-    cost_c = _cost_at(here, fixed, bins, with_ramp, table)
-    while d - a > 2e-4:
+    cost_c = _cost_at(here, fixed, bins, with_ramp, table, _POLISH_TOLERANCE)
+    while d - a > 5e-4:
         if cost_b <= cost_c:
             d, c, cost_c = c, b, cost_b
             b = d - _GOLDEN * (d - a)
             here[which] = b
-            cost_b = _cost_at(here, fixed, bins, with_ramp, table)
+            cost_b = _cost_at(here, fixed, bins, with_ramp, table, _POLISH_TOLERANCE)
         else:
             a, b, cost_b = b, c, cost_c
             c = a + _GOLDEN * (d - a)
             here[which] = c
-            cost_c = _cost_at(here, fixed, bins, with_ramp, table)
+            cost_c = _cost_at(here, fixed, bins, with_ramp, table, _POLISH_TOLERANCE)
     return (b, cost_b) if cost_b <= cost_c else (c, cost_c)
 
 
@@ -239,7 +289,7 @@ def one_process(
     place = np.empty(1)
     for i in range(0, logarithms.shape[0], _SCAN_STEP):
         place[0] = first + i * step
-        cost = _cost_at(place, fixed, bins, with_ramp, table)
+        cost = _cost_at(place, fixed, bins, with_ramp, table, _SCAN_TOLERANCE)
         if cost < lowest:
             best, lowest = place[0], cost
     reach = _SCAN_STEP * step
@@ -277,7 +327,7 @@ def two_processes(
             places[0], places[1] = first + i * step, first + j * step
             if places[1] - places[0] < apart:
                 continue
-            cost = _cost_at(places, fixed, bins, with_ramp, table)
+            cost = _cost_at(places, fixed, bins, with_ramp, table, _SCAN_TOLERANCE)
             if cost < lowest:
                 lowest = cost
                 best = places.copy()

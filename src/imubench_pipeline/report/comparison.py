@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from imubench_pipeline.estimators.estimate import FAMILY
+from imubench_pipeline.estimators.estimate import SHOWN
 from imubench_pipeline.report.parameters import cell, shown_symbols
 from imubench_pipeline.report.payload import Arrays, compared, datasheet_lines
 from imubench_pipeline.report.practical import System
@@ -88,7 +88,7 @@ class Comparison:
             yield {
                 "quantity": quantity,
                 "title": title,
-                "symbols": [s for s in FAMILY if s in self._symbols[quantity]],
+                "symbols": [s for s in SHOWN if s in self._symbols[quantity]],
                 "lines": lines,
                 "filters": {
                     "axis": sorted({line["axis"] for line in lines}),

@@ -18,6 +18,7 @@ from imubench_pipeline.report.practical import (
     duration_text,
     number_text,
     page_unit,
+    symbol_text,
 )
 from imubench_pipeline.report.words import started_text
 
@@ -57,7 +58,7 @@ def environment(system: System) -> jinja2.Environment:
         "to": _to,
     }
     made.filters |= {"duration": duration_text, "number": number_text, "json": _json}
-    made.filters["started"] = started_text
+    made.filters |= {"started": started_text, "symbol_text": symbol_text}
     made.filters["attribute"] = _compact
     return made
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from imubench_pipeline.estimators.estimate import FAMILY, PARAMETERS
+from imubench_pipeline.estimators.estimate import PARAMETERS, SHOWN
 from imubench_pipeline.report.practical import System, limit_digits, page_unit
 from imubench_pipeline.report.view import ChannelView, Row
 from imubench_pipeline.report.words import model_text, untold
@@ -19,7 +19,7 @@ def shown_symbols(channel: ChannelView) -> list[str]:
         for row in rows
         if row["status"] != "absent"
     }
-    return [symbol for symbol in FAMILY if symbol in PARAMETERS or symbol in there]
+    return [symbol for symbol in SHOWN if symbol in PARAMETERS or symbol in there]
 
 
 def methods_table(

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from imubench_pipeline.estimators.estimate import COMPARED
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.report.palette import Appearance, method_appearance
 from imubench_pipeline.report.view import METHOD_NAMES, ChannelView, Row
 
-FOREST = ("N", "B", "T_B", "K")
+FOREST = (*COMPARED, "B", "T_B")
 """The parameters that are drawn across sensors."""
 
 _SMOOTH = 80

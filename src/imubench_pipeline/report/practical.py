@@ -62,7 +62,10 @@ _CHOICES: dict[str, dict[str, dict[str, str]]] = {
             "Q": "°",
             "N": "°/√h",
             "B": "°/h",
+            "B_curve": "°/h",
+            "sigma_min": "°/h",
             "T_B": "s",
+            "tau_min": "s",
             "K": "°/h/√h",
             "R": "°/h/h",
             "adev": "°/h",
@@ -75,7 +78,10 @@ _CHOICES: dict[str, dict[str, dict[str, str]]] = {
             "Q": "°",
             "N": "°/s/√Hz",
             "B": "°/s",
+            "B_curve": "°/s",
+            "sigma_min": "°/s",
             "T_B": "s",
+            "tau_min": "s",
             "K": "°/s/√s",
             "R": "°/s/s",
             "adev": "°/s",
@@ -88,7 +94,10 @@ _CHOICES: dict[str, dict[str, dict[str, str]]] = {
             "Q": "rad",
             "N": "rad/s/√Hz",
             "B": "rad/s",
+            "B_curve": "rad/s",
+            "sigma_min": "rad/s",
             "T_B": "s",
+            "tau_min": "s",
             "K": "rad/s/√s",
             "R": "rad/s²",
             "adev": "rad/s",
@@ -103,7 +112,10 @@ _CHOICES: dict[str, dict[str, dict[str, str]]] = {
             "Q": "m/s",
             "N": "µg/√Hz",
             "B": "µg",
+            "B_curve": "µg",
+            "sigma_min": "µg",
             "T_B": "s",
+            "tau_min": "s",
             "K": "µg/√h",
             "R": "µg/h",
             "adev": "µg",
@@ -116,7 +128,10 @@ _CHOICES: dict[str, dict[str, dict[str, str]]] = {
             "Q": "m/s",
             "N": "m/s/√h",
             "B": "mg",
+            "B_curve": "mg",
+            "sigma_min": "mg",
             "T_B": "s",
+            "tau_min": "s",
             "K": "mg/√h",
             "R": "mg/h",
             "adev": "mg",
@@ -129,7 +144,10 @@ _CHOICES: dict[str, dict[str, dict[str, str]]] = {
             "Q": "m/s",
             "N": "m/s²/√Hz",
             "B": "m/s²",
+            "B_curve": "m/s²",
+            "sigma_min": "m/s²",
             "T_B": "s",
+            "tau_min": "s",
             "K": "m/s²/√s",
             "R": "m/s³",
             "adev": "m/s²",
@@ -145,6 +163,14 @@ _OF_DIMENSION: dict[System, dict[str, str]] = {
     "practical": {"angle": "°", "velocity": "m/s", "length": "m"},
     "si": {"angle": "rad", "velocity": "m/s", "length": "m"},
 }
+
+
+_SYMBOL_TEXTS = {"B_curve": "B (curve)", "sigma_min": "σ_min", "tau_min": "τ_min"}
+
+
+def symbol_text(symbol: str) -> str:
+    """Return how a page writes a parameter."""
+    return _SYMBOL_TEXTS.get(symbol, symbol)
 
 
 def page_unit(quantity: str, symbol: str, system: System) -> PageUnit:
@@ -192,6 +218,7 @@ def _unit(quantity: str, symbol: str, choice: str) -> PageUnit:
         "N": f"{quantity}_density",
         "K": f"{quantity}_random_walk",
         "T_B": "time",
+        "tau_min": "time",
         "sensitivity": f"{quantity}_temperature_coefficient",
         "quadratic": f"{quantity}_temperature_curvature",
     }.get(symbol, QUANTITIES[quantity])

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from imubench_pipeline.estimators.estimate import PARAMETERS
 from imubench_pipeline.recording import log_paths, read_metadata
 from imubench_pipeline.report import thermal
 from imubench_pipeline.report.calibration import at_rest
@@ -20,6 +19,7 @@ from imubench_pipeline.report.practical import (
     duration_text,
     number_text,
     page_unit,
+    symbol_text,
 )
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.view import ChannelView, RecordingView, Row
@@ -196,12 +196,12 @@ def _untold(symbols: Sequence[str], cells: Sequence[Mapping[str, Any]]) -> Itera
 def _answer(channel: ChannelView, system: System) -> str:
     """Return the values to use, with how well they are known, in a sentence."""
     parts = []
-    for symbol in PARAMETERS:
+    for symbol in ("N", "B_curve", "B", "T_B", "K"):
         unit = page_unit(channel.quantity, symbol, system)
         for row in channel.named(channel.recommended, symbol)[:1]:
             if row["value"] is not None:
                 known = precision(row, unit)
-                text = f"{symbol} {unit.text(row['value'], 3)} {unit.sign}"
+                text = f"{symbol_text(symbol)} {unit.text(row['value'], 3)} {unit.sign}"
                 parts.append(f"{text} ({known})" if known else text)
     if channel.fixed_bias is not None:
         unit = page_unit(channel.quantity, "signal", system)

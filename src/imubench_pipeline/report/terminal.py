@@ -8,9 +8,15 @@ from typing import Any
 from rich.console import RenderableType
 from rich.text import Text
 
-from imubench_pipeline.estimators.estimate import FAMILY, PARAMETERS
+from imubench_pipeline.estimators.estimate import PARAMETERS, SHOWN
 from imubench_pipeline.report.meaning import rankings
-from imubench_pipeline.report.practical import PageUnit, System, duration_text, page_unit
+from imubench_pipeline.report.practical import (
+    PageUnit,
+    System,
+    duration_text,
+    page_unit,
+    symbol_text,
+)
 from imubench_pipeline.report.terminal_table import fitting
 from imubench_pipeline.requirements import Requirement
 from imubench_pipeline.run_summary import one_line, rejections, serious
@@ -153,7 +159,7 @@ def _parameter_lines(
 ) -> tuple[list[str], list[list[str | Text]]]:
     """Return the heads and a line a channel, with a column a parameter that some channel has."""
     there = {row["parameter"] for row in rows if row["status"] != "absent"}
-    symbols = [symbol for symbol in FAMILY if symbol in PARAMETERS or symbol in there]
+    symbols = [symbol for symbol in SHOWN if symbol in PARAMETERS or symbol in there]
     units = {symbol: page_unit(quantity, symbol, system) for symbol in symbols}
     by_channel: dict[tuple[str, str, str], list[Row]] = {}
     for row in rows:
@@ -168,7 +174,10 @@ def _parameter_lines(
             for symbol, unit in units.items()
         )
         lines.append([one_line(f"{sensor} / {recording} {channel}{badge}"), *cells])
-    return ["recording", *(f"{symbol}\n{unit.sign}" for symbol, unit in units.items())], lines
+    return [
+        "recording",
+        *(f"{symbol_text(symbol)}\n{unit.sign}" for symbol, unit in units.items()),
+    ], lines
 
 
 def _cell(rows: Sequence[Row], unit: PageUnit, duration: float | None) -> str:

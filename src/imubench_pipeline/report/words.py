@@ -11,6 +11,7 @@ from imubench_pipeline.report.practical import (
     duration_text,
     interval_text,
     number_text,
+    symbol_text,
 )
 from imubench_pipeline.requirements import Requirement
 
@@ -33,7 +34,7 @@ def untold(row: Row, unit: PageUnit, duration: float | None) -> str:
     duration : float or None
         Length of the recording, s.
     """
-    symbol, status = row["parameter"], row["status"]
+    symbol, status = symbol_text(row["parameter"]), row["status"]
     if status == "ok":
         return ""
     if status == "absent":

@@ -148,8 +148,13 @@ kinds.overlay = (figure) => {
 };
 
 const FOREST_NAMES = {
-  N: "N, white noise", B: "B, bias instability", T_B: "T_B, correlation time", K: "K, random walk",
+  N: "N, white noise", B_curve: "Bias instability of the curve", sigma_min: "Lowest point of the curve",
+  B: "B of the first term", T_B: "T_B, correlation time", K: "K, random walk",
 };
+
+const SYMBOL_TEXTS = { B_curve: "B (curve)", sigma_min: "σ_min", tau_min: "τ_min" };
+const symbolText = (symbol) => SYMBOL_TEXTS[symbol] ?? symbol;
+const symbolMarkup = (symbol) => symbolText(symbol).replace(/_(\w+)/, "<sub>$1</sub>");
 
 // Dot and 95 % interval of a parameter; hollow where only the interval is known.
 kinds.forest = (figure) => {
@@ -191,7 +196,7 @@ kinds.forest = (figure) => {
           type: "data", symmetric: false, array: [(upper - middle) * unit.factor], arrayminus: [(middle - lower) * unit.factor],
           color: colour, thickness: 1.6, width: 4,
         } : undefined,
-        hovertemplate: `${name}<br>${symbol} ${words}${limits}<extra></extra>`,
+        hovertemplate: `${name}<br>${symbolText(symbol)} ${words}${limits}<extra></extra>`,
       });
     }
   }
@@ -203,7 +208,7 @@ kinds.forest = (figure) => {
     layout: {
       margin: { l: 10, r: 14, t: 30, b: 45 },
       title: { text: FOREST_NAMES[symbol], font: { size: 14 }, x: 0, xanchor: "left", xref: "container", pad: { l: 8 }, y: 0.98, yanchor: "top" },
-      xaxis: logAxis(`${symbol.replace("T_B", "T<sub>B</sub>")} (${unit.sign})`, logRange(extent, 0.08)),
+      xaxis: logAxis(`${symbolMarkup(symbol)} (${unit.sign})`, logRange(extent, 0.08)),
       yaxis: {
         ...linearAxis(""), tickvals: names.map((_, i) => i), ticktext: names.map((key) => wrapped(nameOf(key))),
         range: [-0.6, names.length - 0.4], fixedrange: true,

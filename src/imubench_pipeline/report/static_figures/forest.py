@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.path import Path
 
-from imubench_pipeline.estimators.estimate import PARAMETERS
+from imubench_pipeline.estimators.estimate import COMPARED
 from imubench_pipeline.report.palette import Appearance, sensor_appearances
 from imubench_pipeline.report.practical import System, page_unit
 from imubench_pipeline.report.static_figures.marks import Kind, Mark, marks
@@ -65,7 +65,7 @@ class _Block:
 def forest_figure(
     views: Sequence[ChannelView],
     sensors: Sequence[str],
-    symbol: str | Sequence[str] = PARAMETERS,
+    symbol: str | Sequence[str] = COMPARED,
     system: System = "practical",
 ) -> Figure:
     """Draw parameters of one channel across sensors, with their 95 % limits.
@@ -77,7 +77,7 @@ def forest_figure(
     sensors : sequence of str
         All sensors of the run: the place in it gives the look.
     symbol : str or sequence of str
-        Parameters, Q, N, B, T_B, K or R; each has a panel.
+        Parameters, as they stand in the table; each has a panel.
     system : str
         ``practical`` or ``si``.
     """

@@ -27,6 +27,8 @@ TERMS = {
 """The field's names of the terms, by quantity and symbol of the term."""
 
 SYMBOLS = {"T_B": "$T_B$", "R": "$|R|$"} | {symbol: f"${symbol}$" for symbol in "QNBK"}
+SYMBOLS |= {"B_curve": "$B$ of the curve", "sigma_min": r"$\sigma_\mathrm{min}$"}
+SYMBOLS |= {"tau_min": r"$\tau_\mathrm{min}$"}
 """The parameters as they are set; a logarithmic axis has no sign of R."""
 
 

@@ -1,0 +1,130 @@
+"""Whether the slow noise is the same on both halves of a log."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.deterministic.means import Means
+from imubench_pipeline.deterministic.ordinates import Ordinates
+from imubench_pipeline.estimators.whittle import Maximum
+from imubench_pipeline.spectral_shapes import Shapes
+
+Array = NDArray[np.float64]
+
+_FEWEST = 256
+"""Blocks in a part that is halved."""
+
+_POWERS = np.concatenate(([0.0], np.geomspace(1e-4, 1e4, 241)))
+"""Times the power that the whole log has."""
+
+_CHANCE = 10.8
+"""Twice the log likelihood ratio that is beyond chance: 0.1 % of chi-squared."""
+
+
+@dataclass(frozen=True)
+class Halves:
+    """The slow noise of the two halves of a log, the other terms held.
+
+    Attributes
+    ----------
+    of : {"K", "slow noise"}
+        The random walk, or all terms but the white noise together.
+    first, second : float
+        Deviation of each half over that of the whole log.
+    ratio : float
+        Twice the log likelihood ratio of two values against one.
+    begin, middle, end : float
+        Of the halves, s from the first sample.
+    """
+
+    of: Literal["K", "slow noise"]
+    first: float
+    second: float
+    ratio: float
+    begin: float
+    middle: float
+    end: float
+
+    @property
+    def differ(self) -> bool:
+        """Whether one value does not explain both."""
+        return self.ratio > _CHANCE
+
+
+def compare_halves(means: Means, noise: Maximum) -> Iterator[Halves]:
+    """Estimate the slow noise on each half of the longest part of a log, and compare.
+
+    Parameters
+    ----------
+    means : Means
+        Less what is deterministic.
+    noise : Maximum
+        Of the whole log.
+
+    Yields
+    ------
+    Halves
+        Of the random walk, where there is one, and of all slow noise; nothing of short logs.
+    """
+    part = max(means.parts, key=lambda one: len(one.mean))
+    half = len(part.mean) // 2
+    if half < _FEWEST // 2:
+        return
+    densities = []
+    for first in (0, half):
+        one = replace(part, mean=part.mean[first : first + half], power=part.power[:half])
+        ordinates = Ordinates(replace(means, parts=(one,)))
+        if not ordinates.usable:
+            return
+        densities.append(_densities(ordinates, noise))
+    begin = part.start / means.rate
+    length = half * means.interval
+    for name in ("K", "slow noise"):
+        scaled = "K" if name == "K" else "FKG"
+        likelihoods = [
+            _log_likelihoods(nu, data, columns, scaled) for nu, data, columns in densities
+        ]
+        earlier, later = likelihoods
+        if earlier is None or later is None:
+            continue
+        best = [int(np.argmax(earlier)), int(np.argmax(later))]
+        ratio = 2.0 * float(earlier[best[0]] + later[best[1]] - np.max(earlier + later))
+        yield Halves(
+            "K" if name == "K" else "slow noise",
+            math.sqrt(_POWERS[best[0]]),
+            math.sqrt(_POWERS[best[1]]),
+            ratio,
+            begin,
+            begin + length,
+            begin + 2.0 * length,
+        )
+
+
+def _densities(ordinates: Ordinates, noise: Maximum) -> tuple[Array, Array, dict[str, Array]]:
+    """Return ordinates and density of each bin, and the density of each term in it."""
+    spectrum = ordinates.spectrum(ordinates.coefficient, np.ones_like(ordinates.length))
+    shapes = Shapes(spectrum)
+    units = {"N": shapes.white, "F": shapes.flicker, "K": shapes.random_walk}
+    columns = {letter: noise.parameter(letter) ** 2 * units[letter]() for letter in "NFK"}
+    columns["G"] = np.zeros(len(spectrum.density))
+    for B, time in zip(noise.biases, noise.times, strict=True):
+        columns["G"] += B**2 * shapes.gauss_markov(float(time))
+    return spectrum.ordinates, spectrum.density, columns
+
+
+def _log_likelihoods(
+    nu: Array, data: Array, columns: dict[str, Array], scaled: str
+) -> Array | None:
+    """Return the log likelihood of a half for each power of some terms; None: they are 0."""
+    slow = sum((columns[name] for name in scaled), np.zeros(len(nu)))
+    if not slow.any():
+        return None
+    held = sum((columns[name] for name in columns if name not in scaled), np.zeros(len(nu)))
+    density = np.maximum(held + _POWERS[:, None] * slow, 1e-9 * float(data.max()))
+    return np.asarray(-0.5 * np.sum(nu * (np.log(density) + data / density), axis=1))

@@ -1,0 +1,179 @@
+"""Block means of a log, and the power of its fast noise in each block: one pass."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.phase import split
+
+Array = NDArray[np.float64]
+
+_MOST = 1 << 14
+"""Blocks of a log, about: a step is placed to so many parts of it, and better where it is large."""
+
+_LEAST = 10
+"""Samples in a block: its mean lies below the low-pass of most sensors."""
+
+_FEWEST = 512
+"""Blocks of a short log, whose blocks are smaller for it."""
+
+_SHORTEST_PART = 64
+"""Blocks: of a shorter part nothing is told."""
+
+_LONGEST_HOLE = 1 / 5
+"""Part of a segment: a longer hole divides it."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """Block means of a part of a log without long holes.
+
+    Attributes
+    ----------
+    start : int
+        First sample.
+    mean : ndarray, shape (n,)
+        rad/s or m/s²; interpolated, with white noise, where a block has few samples.
+    power : ndarray, shape (n,)
+        Half the mean squared difference of neighbouring samples in each block: the variance of
+        white noise, (rad/s)² or (m/s²)². NaN where a block has few samples.
+    present : float
+        Share of its samples that are there.
+    """
+
+    start: int
+    mean: Array
+    power: Array
+    present: float
+
+
+@dataclass(frozen=True)
+class Means:
+    """Block means of a log.
+
+    Attributes
+    ----------
+    block : int
+        Samples in a block.
+    rate : float
+        Of the samples, Hz.
+    parts : tuple of Part
+    """
+
+    block: int
+    rate: float
+    parts: tuple[Part, ...]
+
+    @property
+    def interval(self) -> float:
+        """Duration of a block, s."""
+        return self.block / self.rate
+
+
+def means_of(
+    blocks: Iterable[Array],
+    samples: int,
+    rate: float,
+    segments: Sequence[tuple[int, int]] | None = None,
+) -> Means:
+    """Return the block means of a log in one pass, in bounded memory.
+
+    Parameters
+    ----------
+    blocks : iterable of ndarray
+        The log in order, in SI; NaN where a sample is missing.
+    samples : int
+        L, the length of all blocks together.
+    rate : float
+        Hz.
+    segments : sequence of (int, int), optional
+        First and one-past-last sample of each; one by default.
+    """
+    spans = tuple(segments) if segments else ((0, samples),)
+    total = sum(stop - start for start, stop in spans)
+    size = max(-(-total // _MOST), min(_LEAST, max(total // _FEWEST, 1)))
+    gathered: list[list[Array]] = [[] for _ in spans]
+    rests: list[Array] = [np.empty(0) for _ in spans]
+    for number, values in split(blocks, spans):
+        values = np.asarray(values, dtype=np.float64)
+        rest = rests[number]
+        if len(rest):
+            values = np.concatenate((rest, values))
+        whole = len(values) // size * size
+        if whole:
+            gathered[number].append(_rows(values[:whole].reshape(-1, size)))
+        rests[number] = values[whole:].copy()
+    parts: list[Part] = []
+    for (start, _), rows in zip(spans, gathered, strict=True):
+        if rows:
+            parts += _parts(start, size, np.concatenate(rows, axis=1))
+    return Means(size, rate, tuple(parts))
+
+
+def _rows(values: Array) -> Array:
+    """Return mean, power of differences and share present of each row, shape (3, rows)."""
+    size = values.shape[1]
+    if np.isfinite(values.sum()):
+        level = values[0, 0]
+        mean = (values - level).mean(axis=1) + level
+        steps = np.diff(values, axis=1)
+        power = np.einsum("ij,ij->i", steps, steps) / (2.0 * max(size - 1, 1))
+        return np.array([mean, power, np.ones(len(values))])
+    there = np.isfinite(values)
+    count = there.sum(axis=1)
+    mean = np.where(there, values, 0.0).sum(axis=1) / np.maximum(count, 1)
+    both = there[:, 1:] & there[:, :-1]
+    steps = np.where(both, np.diff(np.where(there, values, 0.0), axis=1), 0.0)
+    pairs = both.sum(axis=1)
+    power = np.where(
+        pairs > 0, np.einsum("ij,ij->i", steps, steps) / (2.0 * np.maximum(pairs, 1)), np.nan
+    )
+    return np.array([mean, power, count / size])
+
+
+def _parts(start: int, size: int, rows: Array) -> list[Part]:
+    """Divide a segment at its longest holes, and bridge the others."""
+    mean, power, share = rows
+    there = np.flatnonzero(share >= 0.5)
+    if len(there) < _SHORTEST_PART:
+        return []
+    longest = max(2.0, _LONGEST_HOLE * len(mean))
+    cuts = np.flatnonzero(np.diff(there) > longest)
+    parts = []
+    for first, last in zip(
+        there[np.concatenate(([0], cuts + 1))],
+        there[np.append(cuts, len(there) - 1)],
+        strict=True,
+    ):
+        here = slice(int(first), int(last) + 1)
+        if here.stop - here.start < _SHORTEST_PART:
+            continue
+        parts.append(
+            Part(
+                start + here.start * size,
+                _bridged(mean[here], share[here] >= 0.5),
+                np.where(share[here] >= 0.5, power[here], np.nan),
+                float(share[here].mean()),
+            )
+        )
+    return parts
+
+
+def _bridged(mean: Array, there: NDArray[np.bool_]) -> Array:
+    """Fill blocks without samples: interpolated, with the white noise of the others."""
+    if there.all():
+        return mean
+    missing = np.flatnonzero(~there)
+    present = np.flatnonzero(there)
+    filled = mean.copy()
+    filled[missing] = np.interp(missing, present, mean[present])
+    neighbours = np.diff(mean[present])[np.diff(present) == 1]
+    if len(neighbours):
+        white = 1.4826 * float(np.median(np.abs(neighbours))) / np.sqrt(2.0)
+        rng = np.random.default_rng(len(missing))
+        filled[missing] += white * rng.standard_normal(len(missing))
+    return filled

@@ -1,0 +1,81 @@
+"""What is no noise: steps, exponentials, sinusoids, ramps, and their cosine transforms.
+
+All are given on the block means of one part of a log, in blocks from its beginning.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+Kind = Literal["step", "exponential", "sinusoid", "ramp", "pulse"]
+
+
+@dataclass(frozen=True)
+class Regressor:
+    """A deterministic course of unit size in one part of a log.
+
+    Attributes
+    ----------
+    kind : str
+        ``step``: 0 before its place, 1 from it on; ``exponential``: 1 at the beginning of the
+        part; ``sinusoid``: a cosine and a sine; ``ramp``: 1 a block; ``pulse``: 1 in one block.
+    part : int
+        Number of the part.
+    where : float
+        Place of a step or pulse, time constant of an exponential, both in blocks; frequency of a
+        sinusoid in cycles a block.
+    """
+
+    kind: Kind
+    part: int
+    where: float = 0.0
+
+    @property
+    def columns(self) -> int:
+        """Amplitudes that it has."""
+        return 2 if self.kind == "sinusoid" else 1
+
+    def means(self, n: int) -> Array:
+        """Return its means in n blocks, shape (columns, n)."""
+        i = np.arange(n, dtype=np.float64)
+        if self.kind == "step":
+            return np.clip(i + 1.0 - self.where, 0.0, 1.0)[None]
+        if self.kind == "pulse":
+            return (i == self.where).astype(np.float64)[None]
+        if self.kind == "ramp":
+            return (i + 0.5)[None]
+        if self.kind == "exponential":
+            time = self.where
+            return (time * -math.expm1(-1.0 / time) * np.exp(-i / time))[None]
+        phase = 2.0 * np.pi * self.where * (i + 0.5)
+        return np.asarray(np.sinc(self.where) * np.array([np.cos(phase), np.sin(phase)]))
+
+    def coefficients(self, n: int) -> Array:
+        """Return its orthonormal DCT-II coefficients 1 ... n - 1, shape (columns, n - 1)."""
+        return np.asarray(scipy.fft.dct(self.means(n), type=2, norm="ortho", axis=1)[:, 1:])
+
+    def at(self, blocks: Array) -> Array:
+        """Return its values at times in blocks from the beginning of the part.
+
+        Returns
+        -------
+        ndarray, shape (columns, s)
+        """
+        if self.kind == "step":
+            return (blocks >= self.where).astype(np.float64)[None]
+        if self.kind == "pulse":
+            return ((blocks >= self.where) & (blocks < self.where + 1.0)).astype(np.float64)[None]
+        if self.kind == "ramp":
+            return blocks[None]
+        if self.kind == "exponential":
+            return np.exp(-blocks / self.where)[None]
+        phase = 2.0 * np.pi * self.where * blocks
+        return np.array([np.cos(phase), np.sin(phase)])

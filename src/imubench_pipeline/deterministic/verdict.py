@@ -1,0 +1,183 @@
+"""What the deterministic courses of a channel mean: findings, and parameters to be doubted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from imubench_pipeline.deterministic.courses import Course, Courses
+from imubench_pipeline.deterministic.halves import Halves, compare_halves
+from imubench_pipeline.deterministic.search import MOST
+from imubench_pipeline.deterministic.steadiness import Steadiness, steadiness_of
+from imubench_pipeline.estimators.estimate import Estimate, Parameter, Status
+from imubench_pipeline.findings import Finding
+
+Row = Mapping[str, Any]
+
+_TAKEN_OUT = "it is taken out of the noise"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a log that changes in time means for its estimates.
+
+    Attributes
+    ----------
+    findings : tuple of Finding
+    caveats : mapping of str to (str, str)
+        Status and reason of the parameters that are not to be relied on.
+    """
+
+    findings: tuple[Finding, ...]
+    caveats: Mapping[str, tuple[Status, str]]
+
+    def applied(self, estimate: Estimate) -> Estimate:
+        """Return an estimate with the caveats on the parameters that have a value."""
+        if not self.caveats:
+            return estimate
+
+        def of(parameters: Mapping[str, Parameter]) -> dict[str, Parameter]:
+            return {name: self._on(name, one) for name, one in parameters.items()}
+
+        return replace(
+            estimate,
+            parameters=of(estimate.parameters),
+            further=[of(group) for group in estimate.further],
+        )
+
+    def _on(self, name: str, parameter: Parameter) -> Parameter:
+        if name not in self.caveats or parameter.status not in ("ok", "doubtful"):
+            return parameter
+        status, reason = self.caveats[name]
+        if status == "not_identified":
+            return replace(
+                parameter, value=None, status=status, reason=reason, fitted=parameter.value
+            )
+        return replace(parameter, status=status, reason=reason)
+
+
+def verdict_of(channel: str, unit: str, courses: Courses) -> Verdict:
+    """Return what was found of a channel, and what it casts doubt on.
+
+    Parameters
+    ----------
+    channel : str
+    unit : str
+        SI unit of its samples.
+    courses : Courses
+    """
+    findings = [_finding(channel, unit, course) for course in courses.found]
+    caveats: dict[str, tuple[Status, str]] = {}
+    if courses.means is None or courses.searched is None:
+        return Verdict((), {})
+    steady = steadiness_of(courses.means)
+    if steady is not None and (steady.grows or steady.varies):
+        finding = _unsteady(channel, steady)
+        findings.append(finding)
+        caveats["N"] = ("doubtful", finding.detail)
+    if courses.telegraph:
+        reason = (
+            f"the bias of {channel} steps {MOST} times or more, as telegraph noise does: the steps "
+            "are left in the noise, where they pass for B, T_B and K"
+        )
+        findings.append(Finding("telegraph_noise", "warning", reason, float(MOST), channel))
+        caveats |= {name: ("doubtful", reason) for name in ("B", "T_B", "K")}
+        return Verdict(tuple(findings), caveats)
+    noise = courses.searched.fit.noise
+    for halves in compare_halves(courses.without(), noise):
+        if halves.differ:
+            finding = _differ(channel, halves)
+            findings.append(finding)
+            doubted = ("K",) if halves.of == "K" else ("B", "T_B", "K")
+            caveats |= {name: ("doubtful", finding.detail) for name in doubted}
+            break
+    reason_against = courses.against_random_walk
+    if reason_against is not None:
+        caveats["K"] = ("not_identified", reason_against)
+    return Verdict(tuple(findings), caveats)
+
+
+def deterministic_rows(key: Mapping[str, str], unit: str, courses: Courses) -> Iterator[Row]:
+    """Yield the rows of the table ``deterministic``.
+
+    Parameters
+    ----------
+    key : mapping
+        Sensor, recording and channel.
+    unit : str
+        SI unit of the samples.
+    courses : Courses
+    """
+    for course in courses.found:
+        yield {
+            **key,
+            "kind": course.kind,
+            "start": course.start,
+            "end": course.end,
+            "size": course.size,
+            "size_lower": course.size_lower,
+            "size_upper": course.size_upper,
+            "unit": unit,
+            "time": course.time,
+            "time_lower": course.time_lower,
+            "time_upper": course.time_upper,
+            "place_error": course.place_error,
+            "gain": course.gain,
+        }
+
+
+def _finding(channel: str, unit: str, course: Course) -> Finding:
+    size = f"{course.size:.4g} {unit}"
+    limits = f"95 %: {course.size_lower:.4g} to {course.size_upper:.4g} {unit}"
+    if course.kind == "bias_step":
+        name = "bias_step"
+        detail = (
+            f"the bias of {channel} steps by {size} ({limits}) at {course.start:.6g} s "
+            f"(± {course.place_error or 0.0:.2g} s); {_TAKEN_OUT}"
+        )
+    elif course.kind == "warm_up_drift":
+        name = "warm_up_drift"
+        detail = (
+            f"{channel} begins {size} ({limits}) away from where it settles, with a time constant "
+            f"of {course.time:.4g} s ({course.time_lower:.4g} to {course.time_upper:.4g} s); "
+            f"{_TAKEN_OUT}"
+        )
+    else:
+        name = "periodic_drift"
+        detail = (
+            f"the bias of {channel} swings with an amplitude of {size} ({limits}) and a period of "
+            f"{course.time:.5g} s ({course.time_lower:.5g} to {course.time_upper:.5g} s); "
+            f"{_TAKEN_OUT}"
+        )
+    return Finding(name, "warning", detail, course.size, channel, course.start, course.end)
+
+
+def _unsteady(channel: str, steady: Steadiness) -> Finding:
+    if steady.grows:
+        word = "grows" if steady.trend > 0.0 else "falls"
+        detail = (
+            f"the fast noise of {channel} {word} by {100 * abs(steady.trend):.3g} % "
+            f"(± {196 * steady.trend_error:.2g} %) from beginning to end; N is its mean over the "
+            "log"
+        )
+        return Finding(
+            "noise_grows", "warning", detail, steady.trend, channel, steady.start, steady.end
+        )
+    detail = (
+        f"the fast noise of {channel} differs by {100 * steady.spread:.3g} % (one standard "
+        "deviation) between sixteenths of the log, beyond chance; N is its mean over the log"
+    )
+    return Finding(
+        "noise_varies", "warning", detail, steady.spread, channel, steady.start, steady.end
+    )
+
+
+def _differ(channel: str, halves: Halves) -> Finding:
+    name = "K_differs" if halves.of == "K" else "slow_noise_differs"
+    what = "K" if halves.of == "K" else "the slow noise"
+    detail = (
+        f"{what} of {channel} up to {halves.middle:.5g} s is {halves.first:.3g} times, from there "
+        f"on {halves.second:.3g} times that of the whole log, beyond chance: it is not one process"
+    )
+    return Finding(name, "warning", detail, halves.ratio, channel, halves.begin, halves.end)

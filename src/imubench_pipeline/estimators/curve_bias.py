@@ -1,0 +1,371 @@
+"""The bias instability of the curve: one quantity of every model, whatever its terms.
+
+B of flicker noise, of a Gauss-Markov process and of the first of two are different things, and
+which of them a log gets hangs on a choice that the log hardly makes. Their sum does not:
+
+- ``B_curve``: the largest Allan deviation of all flicker and Gauss-Markov terms together, over
+  0.664; of a single one it is its B;
+- ``sigma_min``, ``tau_min``: the lowest point of the Allan deviation of the whole noise, which is
+  what datasheets print, and its averaging time.
+
+Both are looked for up to a ninth of the log: beyond, no curve shows anything.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.estimators.estimate import CURVE, Estimate, Parameter
+from imubench_pipeline.estimators.identifiability import NOT_IDENTIFIED
+from imubench_pipeline.estimators.intervals import as_good, mixture_quantile
+from imubench_pipeline.estimators.model_choice import Candidate
+from imubench_pipeline.estimators.posterior import Posterior
+from imubench_pipeline.estimators.whittle import Terms
+from imubench_pipeline.noise import FLOOR, PEAK_TAU, GaussMarkov, NoiseModel
+from imubench_pipeline.noise_terms import gauss_markov_shape
+
+Array = NDArray[np.float64]
+
+LONGEST = 1 / 9
+"""Part of the log up to which a curve is taken to be shown."""
+
+_POINTS = 16
+"""Averaging times a decade at which the lowest point is looked for, before it is refined."""
+
+_BETWEEN = 49
+"""Averaging times between the peaks of several processes."""
+
+_DRAWS = 1000
+"""Draws of each model that are used."""
+
+_WIDTH_OF_INTERVAL = 3.92
+_PEAK_SHAPE = float(gauss_markov_shape(np.array([PEAK_TAU]), 1.0)[0])
+
+
+@dataclass(frozen=True)
+class Models:
+    """Parameters of many models that have the same terms.
+
+    Attributes
+    ----------
+    terms : Terms
+    parameters : ndarray, shape (d, p)
+        The linear parameters in their order, then B of each process; SI.
+    times : ndarray, shape (d, g)
+        T_B of each process, s.
+    weight : float
+        Of all of them together, among those of other terms.
+    """
+
+    terms: Terms
+    parameters: Array
+    times: Array
+    weight: float = 1.0
+
+    def parameter(self, letter: str) -> Array:
+        """Return Q, N, B of flicker noise (F) or K, shape (d,); zeros where there is none."""
+        if letter not in self.terms.linear:
+            return np.zeros(len(self.parameters))
+        return self.parameters[:, self.terms.linear.index(letter)]
+
+    @property
+    def biases(self) -> Array:
+        """B of each Gauss-Markov process, shape (d, g)."""
+        return self.parameters[:, len(self.terms.linear) :]
+
+    @property
+    def has_bias(self) -> bool:
+        """Whether there is flicker noise or a Gauss-Markov process."""
+        return "F" in self.terms.linear or self.terms.gauss_markov > 0
+
+
+def models_of(model: NoiseModel) -> Models:
+    """Return a noise model alone, without its ramp and lines, as `Models` of one."""
+    processes = list(model.further)
+    letters = {"Q": model.Q, "N": model.N, "F": 0.0, "K": model.K}
+    if model.T_B is None:
+        letters["F"] = model.B
+    elif model.B > 0.0:
+        processes.append(GaussMarkov(model.B, model.T_B))
+    there = "".join(letter for letter, value in letters.items() if value > 0.0)
+    values = [letters[letter] for letter in there] + [one.B for one in processes]
+    times = [one.T_B for one in processes]
+    return Models(
+        Terms(there, len(processes)),
+        np.array([values], dtype=np.float64),
+        np.array([times], dtype=np.float64).reshape(1, len(times)),
+    )
+
+
+def bias_of_curve(models: Models, longest: float) -> tuple[Array, Array]:
+    """Return the bias instability of the curve of models.
+
+    Parameters
+    ----------
+    models : Models
+    longest : float
+        Averaging time up to which it is looked for, s.
+
+    Returns
+    -------
+    bias : ndarray, shape (d,)
+        The largest Allan deviation of the flicker and Gauss-Markov terms over 0.664, rad/s or
+        m/s².
+    at : ndarray, shape (d,)
+        Where it is, s; flicker noise alone has it everywhere, and the longest is given.
+    """
+    flicker, count = models.parameter("F"), models.terms.gauss_markov
+    if count == 0:
+        return flicker, np.full(len(flicker), longest)
+    peaks = np.minimum(PEAK_TAU * models.times, longest)
+    if count == 1:
+        tau = peaks
+    else:
+        ends = np.log(peaks.min(axis=1)), np.log(peaks.max(axis=1))
+        tau = np.exp(np.linspace(*ends, _BETWEEN, axis=1))
+    squared = flicker[:, None] ** 2 + np.zeros_like(tau)
+    for B, T_B in zip(models.biases.T, models.times.T, strict=True):
+        shape = gauss_markov_shape(tau / T_B[:, None], 1.0)
+        squared += B[:, None] ** 2 * shape / _PEAK_SHAPE
+    highest = squared.argmax(axis=1)
+    rows = np.arange(len(tau))
+    return np.sqrt(squared[rows, highest]), tau[rows, highest]
+
+
+def allan_variance(models: Models, tau: Array) -> Array:
+    """Return the Allan variance of models at averaging times of shape (m,), shape (d, m)."""
+    variance = (
+        3.0 * models.parameter("Q")[:, None] ** 2 / tau**2
+        + models.parameter("N")[:, None] ** 2 / tau
+        + (FLOOR * models.parameter("F")[:, None]) ** 2
+        + models.parameter("K")[:, None] ** 2 * tau / 3.0
+    )
+    for B, T_B in zip(models.biases.T, models.times.T, strict=True):
+        shape = gauss_markov_shape(tau / T_B[:, None], 1.0)
+        variance = variance + (FLOOR * B[:, None]) ** 2 * shape / _PEAK_SHAPE
+    return np.asarray(variance)
+
+
+def lowest_point(models: Models, tau: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Return the lowest point of the Allan deviation of models.
+
+    Parameters
+    ----------
+    models : Models
+    tau : ndarray, shape (m,)
+        Rising evenly in the logarithm, s; between them a parabola is taken.
+
+    Returns
+    -------
+    deviation : ndarray, shape (d,)
+        rad/s or m/s².
+    at : ndarray, shape (d,)
+        Its averaging time, s.
+    inside : ndarray of bool, shape (d,)
+        It is a minimum, and not an end of ``tau``.
+    """
+    level = np.log(allan_variance(models, tau))
+    rows = np.arange(len(level))
+    lowest = level.argmin(axis=1)
+    inside = (lowest > 0) & (lowest < len(tau) - 1)
+    middle = np.clip(lowest, 1, max(len(tau) - 2, 1))
+    before, here, after = (level[rows, middle + i] for i in (-1, 0, 1))
+    bend = np.maximum(before - 2.0 * here + after, 1e-300)
+    shift = np.where(inside, np.clip(0.5 * (before - after) / bend, -0.5, 0.5), 0.0)
+    refined = here - 0.25 * (before - after) * shift
+    step = math.log(tau[-1] / tau[0]) / (len(tau) - 1)
+    deviation = np.exp(0.5 * np.where(inside, refined, level[rows, lowest]))
+    return deviation, tau[lowest] * np.exp(shift * step), inside
+
+
+def averaging_times(rate: float, duration: float) -> Array:
+    """Return where the lowest point of the curve of a log is looked for, s: up to `LONGEST`."""
+    first, last = 1.0 / rate, max(duration * LONGEST, 4.0 / rate)
+    return np.geomspace(first, last, 2 + math.ceil(math.log10(last / first) * _POINTS))
+
+
+def with_curve(
+    estimate: Estimate,
+    alike: Sequence[Candidate],
+    wider: Sequence[Candidate],
+    draws: Mapping[Terms, Posterior],
+    tau: Array,
+) -> Estimate:
+    """Return an estimate by likelihood with the figures of its curve.
+
+    Values are the geometric means over the models that the log does not rule out, by their weights
+    (BIC), and intervals those of their draws together. (By AIC, two processes of which the slower
+    stands for the random walk count as much as the walk: limits are twice as wide as they need
+    be.)
+
+    Parameters
+    ----------
+    estimate : Estimate
+    alike : sequence of Candidate
+        The models that the log does not rule out, the chosen one first.
+    wider : sequence of Candidate
+        Models with one bias instability beside the terms of the chosen one: what is absent is
+        below their limits.
+    draws : mapping of Terms to Posterior
+        Of all of them.
+    tau : ndarray, shape (m,)
+        As `averaging_times` gives them.
+    """
+    chosen = alike[0]
+    best = [_best(one) for one in alike]
+    drawn = [_drawn(one, draws) for one in alike]
+    if not best[0].has_bias:
+        having = [one for one in alike if as_good(one, chosen) and _best(one).has_bias]
+        every = [*(one for one in wider if _best(one).has_bias), *having]
+        bias = _weak_bias([_drawn(one, draws) for one in every], bool(having), float(tau[-1]))
+    else:
+        bias = _bias(best, drawn, float(tau[-1]))
+    return replace(estimate, curve={"B_curve": bias} | lowest_parameters(best, drawn, tau))
+
+
+def _bias(best: Sequence[Models], drawn: Sequence[Models], longest: float) -> Parameter:
+    having = [i for i, models in enumerate(best) if models.has_bias]
+    values = [float(bias_of_curve(best[i], longest)[0][0]) for i in having]
+    value = _mean(values, [best[i].weight for i in having])
+    parts = [(bias_of_curve(drawn[i], longest)[0], drawn[i].weight) for i in having]
+    lower, upper = _limits(parts, value)
+    first, at = bias_of_curve(best[having[0]], longest)
+    if first[0] == 0.0:
+        return Parameter(None, "absent", "the data do not ask for it", 0.0, upper)
+    reason = None
+    error = math.log(upper / lower) / _WIDTH_OF_INTERVAL if lower > 0.0 else math.inf
+    if best[having[0]].terms.gauss_markov and at[0] >= longest * (1.0 - 1e-9):
+        reason = f"its processes still rise at {longest:.4g} s, a ninth of the log"
+    elif error > NOT_IDENTIFIED:
+        reason = "a log of this length does not tell it to 50 % (standard error)"
+    if reason:
+        reason += "; only its interval is given"
+        return Parameter(None, "not_identified", reason, lower, upper, fitted=value)
+    return Parameter(value, "ok", None, lower, upper)
+
+
+def _weak_bias(drawn: Sequence[Models], as_good: bool, longest: float) -> Parameter:
+    """Return what is said where the chosen model has no bias instability."""
+    if not drawn:
+        return Parameter(None, "absent", "the data do not ask for it")
+    upper = max(float(np.quantile(bias_of_curve(one, longest)[0], 0.975)) for one in drawn)
+    if as_good:
+        reason = "models with a bias instability are about as good; only its interval is given"
+        return Parameter(None, "not_identified", reason, 0.0, upper)
+    reason = "the data do not ask for it; with 95 % it is below the upper limit"
+    return Parameter(None, "absent", reason, 0.0, upper)
+
+
+def of_model(model: NoiseModel, tau: Array) -> dict[str, Parameter]:
+    """Return the figures of the curve of a model as it is, without limits.
+
+    Parameters
+    ----------
+    model : NoiseModel
+    tau : ndarray, shape (m,)
+        As `averaging_times` gives them.
+    """
+    models = models_of(model)
+    if not models.terms.parameters:
+        nothing = Parameter(None, "not_shown", "there is no noise")
+        return dict.fromkeys(CURVE, nothing)
+    bias = Parameter(None, "absent", "no flicker noise and no Gauss-Markov process")
+    if models.has_bias:
+        bias = Parameter(float(bias_of_curve(models, float(tau[-1]))[0][0]))
+    return {"B_curve": bias} | lowest_parameters([models], [], tau)
+
+
+def lowest_parameters(
+    best: Sequence[Models], drawn: Sequence[Models], tau: Array
+) -> dict[str, Parameter]:
+    """Return ``sigma_min`` and ``tau_min``.
+
+    Parameters
+    ----------
+    best : sequence of Models
+        One model of each set of terms, as it is fitted; the chosen one first.
+    drawn : sequence of Models
+        Draws of them; none where the fit gives no limits.
+    tau : ndarray, shape (m,)
+        As `averaging_times` gives them.
+    """
+    points = [lowest_point(one, tau) for one in best]
+    weights = [one.weight for one in best]
+    values = [_mean([float(point[i][0]) for point in points], weights) for i in (0, 1)]
+    found = [lowest_point(one, tau) for one in drawn]
+    limits: list[tuple[float | None, float | None]] = [(None, None), (None, None)]
+    if drawn:
+        sizes = [one.weight for one in drawn]
+        lows = list(zip([point[0] for point in found], sizes, strict=True))
+        times = list(zip([point[1] for point in found], sizes, strict=True))
+        limits = [_limits(lows, values[0]), _limits(times, values[1])]
+    if not points[0][2][0]:
+        falls = points[0][1][0] > tau[0]
+        reason = (
+            f"no minimum is shown: the curve of the noise {'still falls' if falls else 'rises'} "
+            f"{f'at {tau[-1]:.4g} s, a ninth of the log' if falls else 'from its beginning'}"
+        )
+        upper = limits[0][1] if falls else None
+        return {
+            "sigma_min": Parameter(None, "not_shown", reason, 0.0 if upper else None, upper),
+            "tau_min": Parameter(None, "not_shown", reason, values[1] if falls else None),
+        }
+    return {
+        "sigma_min": Parameter(values[0], "ok", None, *limits[0]),
+        "tau_min": _time_of_lowest(values[1], limits[1], found, drawn),
+    }
+
+
+def _time_of_lowest(
+    value: float,
+    limits: tuple[float | None, float | None],
+    found: Sequence[tuple[Array, Array, NDArray[np.bool_]]],
+    drawn: Sequence[Models],
+) -> Parameter:
+    weight = sum(one.weight for one in drawn)
+    outside = sum(
+        one.weight * float(np.mean(~point[2])) for one, point in zip(drawn, found, strict=True)
+    )
+    if outside > 0.025 * weight:
+        reason = "models that the log does not rule out have no minimum within a ninth of it"
+        return Parameter(None, "not_identified", reason, limits[0], None, fitted=value)
+    return Parameter(value, "ok", None, *limits)
+
+
+def _limits(parts: Sequence[tuple[Array, float]], value: float) -> tuple[float, float]:
+    """Return the 95 % limits of draws of several models; those of the first lie inside."""
+    own = [(parts[0][0], 1.0)]
+    return (
+        min(mixture_quantile(parts, 0.025), mixture_quantile(own, 0.025), value),
+        max(mixture_quantile(parts, 0.975), mixture_quantile(own, 0.975), value),
+    )
+
+
+def _mean(values: Sequence[float], weights: Sequence[float]) -> float:
+    """Return the weighted geometric mean; the first value where that is 0."""
+    if values[0] == 0.0:
+        return 0.0
+    there = [(value, weight) for value, weight in zip(values, weights, strict=True) if value > 0.0]
+    total = sum(weight for _, weight in there)
+    return math.exp(sum(weight * math.log(value) for value, weight in there) / total)
+
+
+def _best(candidate: Candidate) -> Models:
+    found = candidate.found
+    return Models(found.terms, np.sqrt(found.powers)[None], found.times[None], candidate.weight)
+
+
+def _drawn(candidate: Candidate, draws: Mapping[Terms, Posterior]) -> Models:
+    posterior = draws[candidate.found.terms]
+    every = max(1, len(posterior.parameters) // _DRAWS)
+    return Models(
+        candidate.found.terms,
+        posterior.parameters[::every],
+        posterior.times[::every],
+        candidate.weight,
+    )

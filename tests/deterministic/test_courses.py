@@ -1,0 +1,107 @@
+"""Steps, warm-ups and periodic drift of known size are found, and nothing in a log without."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from imubench_pipeline.deterministic.courses import Courses, find_courses
+from tests.deterministic.logs import RATE, SIGMA, K, static_log, times
+
+Array = NDArray[np.float64]
+
+
+def courses_of(log: Array, segments: tuple[tuple[int, int], ...] | None = None) -> Courses:
+    return find_courses(lambda: [log[:70_000], log[70_000:]], len(log), RATE, segments=segments)
+
+
+@pytest.mark.parametrize("walk", [0.0, K, 3e-5])
+def test_a_log_of_noise_alone_has_none(walk: float) -> None:
+    log = static_log(3, walk=walk)
+    found = courses_of(log)
+    assert found.found == ()
+    assert not found.telegraph
+    assert np.concatenate(list(found.less([log]))) == pytest.approx(log, abs=0.0)
+
+
+def test_flicker_noise_has_none() -> None:
+    rng = np.random.default_rng(4)
+    frequency = np.fft.rfftfreq(400_000, 1.0 / RATE)
+    density = (5e-5) ** 2 / (2.0 * np.pi * np.maximum(frequency, frequency[1]))
+    normal = rng.standard_normal((2, len(frequency)))
+    scale = np.sqrt(0.5 * density * 400_000 * RATE)
+    log = np.fft.irfft(scale * (normal[0] + 1j * normal[1]))[:200_000]
+    assert courses_of(log + 1e-5 * rng.standard_normal(len(log))).found == ()
+
+
+def test_steps_are_found_with_their_sizes_and_places() -> None:
+    log = static_log(5)
+    truth = [(2500.0, 4.0 * SIGMA), (6000.0, -5.0 * SIGMA)]
+    stepped = log + sum(size * (times(log) >= place) for place, size in truth)
+    found = courses_of(stepped)
+    assert [course.kind for course in found.found] == ["bias_step"] * 2
+    for course, (place, size) in zip(
+        sorted(found.found, key=lambda one: one.start), truth, strict=True
+    ):
+        assert course.size_lower < size < course.size_upper
+        assert course.start == pytest.approx(place, abs=10.0)
+    left = np.concatenate(list(found.less([stepped]))) - log
+    assert np.std(left) < 0.3 * SIGMA
+
+
+def test_a_step_far_beyond_the_noise_is_placed_to_the_sample() -> None:
+    log = static_log(6)
+    found = courses_of(log + 0.1 * (times(log) >= 4000.35))
+    (step,) = found.found
+    assert step.size == pytest.approx(0.1, rel=0.01)
+    left = np.concatenate(list(found.less([log + 0.1 * (times(log) >= 4000.35)]))) - log
+    assert np.ptp(left) < 3.0 * SIGMA
+
+
+def test_a_warm_up_is_found_with_its_time_constant() -> None:
+    log = static_log(7)
+    (warm,) = courses_of(log + 20.0 * SIGMA * np.exp(-times(log) / 600.0)).found
+    assert warm.kind == "warm_up_drift"
+    assert warm.size_lower < 20.0 * SIGMA < warm.size_upper
+    assert warm.time_lower is not None
+    assert warm.time_upper is not None
+    assert warm.time_lower < 600.0 < warm.time_upper
+
+
+def test_periodic_drift_is_found_with_its_period() -> None:
+    log = static_log(8)
+    (drift,) = courses_of(log + 3.0 * SIGMA * np.sin(2.0 * np.pi * times(log) / 1200.0 + 1.0)).found
+    assert drift.kind == "periodic_drift"
+    assert drift.size_lower < 3.0 * SIGMA < drift.size_upper
+    assert drift.time == pytest.approx(1200.0, rel=0.01)
+
+
+def test_telegraph_noise_is_named_and_left() -> None:
+    log = static_log(9)
+    flips = np.cumsum(np.random.default_rng(1).random(len(log)) < 1.0 / 300.0 / RATE) % 2
+    found = courses_of(log + 8.0 * SIGMA * flips)
+    assert found.telegraph
+    assert found.found == ()
+
+
+def test_a_step_between_segments_is_none_and_one_inside_is_found() -> None:
+    log = static_log(10)
+    half = len(log) // 2
+    log[half:] += 1.0
+    log += 5.0 * SIGMA * (times(log) >= 3000.0)
+    (step,) = courses_of(log, ((0, half), (half, len(log)))).found
+    assert step.start == pytest.approx(3000.0, abs=10.0)
+    assert step.size_lower < 5.0 * SIGMA < step.size_upper
+
+
+def test_steps_are_found_among_missing_samples() -> None:
+    log = static_log(11)
+    log += 5.0 * SIGMA * (times(log) >= 3000.0)
+    rng = np.random.default_rng(2)
+    log[rng.random(len(log)) < 0.05] = np.nan
+    log[90_000:110_000] = np.nan
+    (step,) = courses_of(log).found
+    assert step.size_lower < 5.0 * SIGMA < step.size_upper
+
+
+def test_a_log_too_short_to_be_searched_has_none() -> None:
+    assert courses_of(np.random.default_rng(3).standard_normal(100)).found == ()

@@ -1,0 +1,62 @@
+"""Findings and doubts of logs that change."""
+
+import numpy as np
+import pytest
+
+from imubench_pipeline.deterministic.courses import find_courses
+from imubench_pipeline.deterministic.verdict import Verdict, deterministic_rows, verdict_of
+from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.schemas import TABLES
+from tests.deterministic.logs import RATE, SIGMA, K, N, static_log, times
+
+
+def verdict(log: np.ndarray) -> Verdict:
+    return verdict_of("gyro_x", "rad/s", find_courses(lambda: [log], len(log), RATE))
+
+
+def names(of: Verdict) -> list[str]:
+    return [finding.finding for finding in of.findings]
+
+
+def test_a_steady_log_has_no_finding_and_no_doubt() -> None:
+    of = verdict(static_log(1))
+    assert names(of) == []
+    assert of.caveats == {}
+
+
+def test_a_step_is_a_finding_and_a_row() -> None:
+    log = static_log(2)
+    log += 5.0 * SIGMA * (times(log) >= 3000.0)
+    courses = find_courses(lambda: [log], len(log), RATE)
+    (finding,) = verdict_of("gyro_x", "rad/s", courses).findings
+    assert finding.finding == "bias_step"
+    assert finding.value == pytest.approx(5.0 * SIGMA, rel=0.3)
+    key = {"sensor": "s", "recording": "r", "channel": "gyro_x"}
+    (row,) = deterministic_rows(key, "rad/s", courses)
+    assert set(row) == {column.name for column in TABLES["deterministic"]}
+
+
+def test_noise_that_grows_makes_n_doubtful() -> None:
+    log = static_log(3)
+    of = verdict(log + 0.15 * times(log) / times(log)[-1] * (log - log.mean()))
+    assert "noise_grows" in names(of)
+    estimate = of.applied(Estimate("likelihood", {"N": Parameter(N), "K": Parameter(K)}))
+    assert estimate.parameters["N"].status == "doubtful"
+    assert estimate.parameters["N"].value == N
+    assert estimate.parameters["K"].status == "ok"
+
+
+def test_heavy_tails_are_no_growth() -> None:
+    rng = np.random.default_rng(4)
+    log = static_log(4)
+    assert names(verdict(log + N * np.sqrt(RATE) * rng.standard_t(3, len(log)))) == []
+
+
+def test_a_walk_on_one_half_alone_is_a_finding() -> None:
+    log = static_log(5, walk=3e-6)
+    rng = np.random.default_rng(5)
+    late = np.arange(len(log)) > len(log) // 2
+    log += np.cumsum(late * rng.standard_normal(len(log))) * 4e-5 / np.sqrt(RATE)
+    of = verdict(log)
+    assert {"K_differs", "slow_noise_differs"} & set(names(of))
+    assert of.caveats["K"][0] == "doubtful"
