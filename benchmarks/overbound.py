@@ -35,8 +35,9 @@ from imubench_pipeline.error_budget import draw_models
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.export.growth import growth
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.overbound import Family, overbound, simultaneous_upper
+from imubench_pipeline.overbound import overbound, simultaneous_upper
 from imubench_pipeline.simulate import simulate
+from imubench_pipeline.smallest_model import Family
 from model_choice import fractional_noise
 
 Array = NDArray[np.float64]
@@ -97,6 +98,7 @@ def of_log(case: Case, horizon: float, number: int) -> Found:
                 horizon=horizon,
                 longest=longest,
                 drawn=drawn,
+                most_excess=math.inf,
             )
             found[family, longest] = scores(case, bound.model, longest, horizon)
     truth = case.model.allan_variance(curve.tau, case.rate)
@@ -182,7 +184,13 @@ def of_truth(case: Case, family: Family, longest: float, horizon: float) -> Nois
         tau, n, case.model.allan_variance(tau, case.rate), np.full(len(n), 1e8), samples
     )
     return overbound(
-        curve, case.model, case.rate, family=family, horizon=horizon, longest=longest
+        curve,
+        case.model,
+        case.rate,
+        family=family,
+        horizon=horizon,
+        longest=longest,
+        most_excess=math.inf,
     ).model
 
 

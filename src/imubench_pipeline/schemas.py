@@ -103,7 +103,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         Column("chosen", pa.bool_(), "-", "the model of method likelihood: the lowest BIC"),
         _count("free", "free parameters", required=True),
         _number("log_likelihood", "-", "up to a constant of the channel", required=True),
-        _number("bic", "-", "-2 log likelihood + free log(bins); + 4 where GM stands for K", True),
+        _number("bic", "-", "-2 log likelihood + free log(bins); + 4: GM for K, + 6: Q, R", True),
         _number("aic", "-", "-2 log likelihood + 2 free", required=True),
         _number("weight", "-", "of the model among the candidates, by BIC", required=True),
         _number("deviance", "-", "mean of a bin; about 1 where the model is right"),
@@ -172,6 +172,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
     ),
     "low_pass": (
         *_KEYS,
+        _text("kind", "analogue, bilinear or boxcar; null: none shows", required=False),
         _count("order", "of the filter: 1, or that of Butterworth; null: none shows"),
         *_figure("cutoff (-3 dB), N (before the filter), floor (white, behind the filter)"),
         _FITTED,

@@ -60,3 +60,14 @@ def test_a_walk_on_one_half_alone_is_a_finding() -> None:
     of = verdict(log)
     assert {"K_differs", "slow_noise_differs"} & set(names(of))
     assert of.caveats["K"][0] == "doubtful"
+
+
+def test_what_makes_b_doubtful_makes_the_curve_doubtful() -> None:
+    curve = {name: Parameter(1.0) for name in ("B_curve", "sigma_min", "tau_min")}
+    estimate = Estimate("likelihood", {"B": Parameter(1.0)}, curve=curve)
+    found = Verdict((), {"B": ("doubtful", "the halves differ")}).applied(estimate).curve
+    assert {one.status for one in found.values()} == {"doubtful"}
+    found = Verdict((), {"K": ("doubtful", "the halves differ")}).applied(estimate).curve
+    assert [one.status for one in found.values()] == ["ok", "doubtful", "doubtful"]
+    found = Verdict((), {"K": ("not_identified", "a drift is as good")}).applied(estimate).curve
+    assert {one.status for one in found.values()} == {"ok"}

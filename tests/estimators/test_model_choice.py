@@ -104,9 +104,13 @@ def short_log(rng: np.random.Generator) -> np.ndarray:
 
 
 def in_place_of_a_walk(candidate: Candidate, duration: float) -> float:
-    """What is added to the BIC of a process that lasts for a fiftieth of the log and more."""
-    slow = len(candidate.found.times) and candidate.found.times[-1] > duration / 50
-    return 4.0 if slow and "K" not in candidate.found.terms.linear else 0.0
+    """What is added to the BIC: of a process that lasts for a fiftieth of the log, of R and Q."""
+    found = candidate.found
+    added = 6.0 * (found.terms.ramp + ("Q" in found.terms.linear))
+    if found.terms.ramp and found.parameter("K") == 0.0:
+        return added + 4.0
+    slow = len(found.times) and found.times[-1] > duration / 50
+    return added + 4.0 if slow and "K" not in found.terms.linear else added
 
 
 def test_bic_and_aic_differ_as_by_hand(short_log: np.ndarray) -> None:
@@ -382,8 +386,8 @@ def test_a_disagreement_of_aic_and_bic_is_said_with_its_size() -> None:
     assert disagreement([simple]) is None
 
 
-def test_a_ramp_in_place_of_a_walk_must_be_the_better() -> None:
-    """Beside a walk that is left at 0 it pays as a slow process does."""
+def test_a_ramp_must_be_the_better_and_more_so_in_place_of_a_walk() -> None:
+    """It pays 6; beside a walk that is left at 0 what a slow process pays, too."""
     seen = set()
     for seed, K in enumerate((0.0, 0.0, 1e-3, 1e-3)):
         rng = np.random.default_rng(seed)
@@ -396,5 +400,5 @@ def test_a_ramp_in_place_of_a_walk_must_be_the_better() -> None:
                 alone = found.parameter("K") == 0.0
                 seen.add(alone)
                 plain = 2.0 * found.cost + found.terms.parameters * penalty
-                assert candidate.bic - plain == pytest.approx(4.0 if alone else 0.0, abs=1e-6)
+                assert candidate.bic - plain == pytest.approx(10.0 if alone else 6.0, abs=1e-6)
     assert seen == {True, False}

@@ -151,6 +151,14 @@ def _channel_rows(
                      "amplitude_upper": 2 * HOUR, "ratio": 30.0, "false_alarm": 1e-6}
             for f in found
         ],
+        "deterministic": [
+            names | {"kind": "bias_step", "start": 400.0, "end": 400.0, "size": 30 * HOUR,
+                     "size_lower": 25 * HOUR, "size_upper": 35 * HOUR, "unit": "rad/s",
+                     "place_error": 2.0, "gain": 90.0},
+            names | {"kind": "warm_up_drift", "start": 0.0, "end": 7200.0, "size": 40 * HOUR,
+                     "size_lower": 25 * HOUR, "size_upper": 55 * HOUR, "unit": "rad/s",
+                     "time": 613.0, "time_lower": 500.0, "time_upper": 700.0, "gain": 60.0},
+        ],
         "fixed_bias": [names | {"value": 5 * HOUR, "unit": "rad/s"}],
         "simulated_truth": [
             names | {"parameter": "N", "component": 1, "value": MODEL.N, "unit": "rad/s/sqrt(Hz)",

@@ -295,6 +295,16 @@ def test_findings_stand_on_the_page_of_their_recording(read: dict[str, Read]) ->
     assert "1 warning in 1 recording" in read["index.html"].text
 
 
+def test_what_is_taken_out_of_the_noise_stands_on_the_page_of_its_recording(
+    read: dict[str, Read],
+) -> None:
+    page = read["recordings/one/day1.html"]
+    steps = page.naming("400± 2", "tr")
+    assert all("bias step" in row.text for row in steps)
+    assert "25 to 35" in steps[0].text
+    assert all("warm up drift" in row.text for row in page.naming("613500 to 700", "tr"))
+
+
 def test_samples_are_drawn_where_they_are_kept(read: dict[str, Read]) -> None:
     drawn = read["recordings/one/day1.html"].data["samples"]
     assert (set(drawn["envelope"]), set(drawn["histogram"])) == ({"gyro_x"}, {"gyro_x"})

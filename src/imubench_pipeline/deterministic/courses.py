@@ -35,7 +35,7 @@ _MOST_STEPS = 8
 
 _LIMIT = 1.96
 _HALF_LOG_LIKELIHOOD = 1.92
-_FEWER = 0.5
+_FEWER = 0.25
 """Part of its power that a random walk keeps beside what may stand for it, to be told from it."""
 
 _MOST_LEVERAGE = 0.5

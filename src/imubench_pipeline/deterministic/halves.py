@@ -23,8 +23,12 @@ _FEWEST = 256
 _POWERS = np.concatenate(([0.0], np.geomspace(1e-4, 1e4, 241)))
 """Times the power that the whole log has."""
 
-_CHANCE = 10.8
-"""Twice the log likelihood ratio that is beyond chance: 0.1 % of chi-squared."""
+_ROUNDS = 4
+_LEAST_WHITE = 0.1
+
+_CHANCE = 13.0
+"""Twice the log likelihood ratio that is beyond chance: 0.03 % of chi-squared, for the other terms
+are held, although they are not known."""
 
 
 @dataclass(frozen=True)
@@ -123,8 +127,17 @@ def _log_likelihoods(
 ) -> Array | None:
     """Return the log likelihood of a half for each power of some terms; None: they are 0."""
     slow = sum((columns[name] for name in scaled), np.zeros(len(nu)))
-    if not slow.any():
+    if not slow.any() or not columns["N"].any():
         return None
-    held = sum((columns[name] for name in columns if name not in scaled), np.zeros(len(nu)))
-    density = np.maximum(held + _POWERS[:, None] * slow, 1e-9 * float(data.max()))
+    white = columns["N"]
+    others = [columns[name] for name in columns if name not in scaled and name != "N"]
+    rest = sum(others, np.zeros(len(nu))) + _POWERS[:, None] * slow
+    # White noise that grows must not pass for slow noise: it has its own power on each half.
+    power = np.ones((len(rest), 1))
+    for _ in range(_ROUNDS):
+        weight = nu / (rest + power * white) ** 2
+        above = np.sum(weight * white * (data - rest), axis=1)
+        power = (above / np.sum(weight * white**2, axis=1))[:, None]
+        power = np.clip(power, _LEAST_WHITE, 1.0 / _LEAST_WHITE)
+    density = rest + power * white
     return np.asarray(-0.5 * np.sum(nu * (np.log(density) + data / density), axis=1))

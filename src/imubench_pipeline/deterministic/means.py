@@ -24,6 +24,9 @@ _FEWEST = 512
 _SHORTEST_PART = 64
 """Blocks: of a shorter part nothing is told."""
 
+_MAD = 1.4826
+"""Standard deviation over the median absolute deviation, of normal noise."""
+
 _LONGEST_HOLE = 1 / 5
 """Part of a segment: a longer hole divides it."""
 
@@ -164,16 +167,25 @@ def _parts(start: int, size: int, rows: Array) -> list[Part]:
 
 
 def _bridged(mean: Array, there: NDArray[np.bool_]) -> Array:
-    """Fill blocks without samples: interpolated, with the white noise of the others."""
+    """Fill blocks without samples: interpolated, with the white noise of the others.
+
+    A long hole is bridged between the means of several blocks, for the white noise of one would
+    be a slow course over it.
+    """
     if there.all():
         return mean
-    missing = np.flatnonzero(~there)
-    present = np.flatnonzero(there)
     filled = mean.copy()
-    filled[missing] = np.interp(missing, present, mean[present])
-    neighbours = np.diff(mean[present])[np.diff(present) == 1]
-    if len(neighbours):
-        white = 1.4826 * float(np.median(np.abs(neighbours))) / np.sqrt(2.0)
-        rng = np.random.default_rng(len(missing))
-        filled[missing] += white * rng.standard_normal(len(missing))
+    neighbours = np.diff(mean)[there[1:] & there[:-1]]
+    white = _MAD * float(np.median(np.abs(neighbours))) / np.sqrt(2.0) if len(neighbours) else 0.0
+    rng = np.random.default_rng(int((~there).sum()))
+    missing = np.flatnonzero(~there)
+    for run in np.split(missing, np.flatnonzero(np.diff(missing) > 1) + 1):
+        first, last = int(run[0]), int(run[-1])
+        reach = max(1, len(run) // 4)
+        before = slice(max(0, first - reach), first)
+        after = slice(last + 1, last + 1 + reach)
+        left = mean[before][there[before]].mean()
+        right = mean[after][there[after]].mean()
+        share = (run - first + 1) / (len(run) + 1)
+        filled[run] = left + share * (right - left) + white * rng.standard_normal(len(run))
     return filled

@@ -29,6 +29,12 @@ _HELD_OUT = 16
 _NEARLY = 6.0
 """Below the threshold by so much, a candidate is still judged by the noise fitted anew."""
 
+_UNDECIDED = 4.0
+"""Below it by so much after that, it is not told from noise, nor noise from it."""
+
+_BESIDE = (3, 16)
+"""Ordinates on either side of a sinusoid that tell how far the noise is from its model there."""
+
 _SAFETY: dict[Kind, float] = {
     "step": 1.0,
     "exponential": 1.35,
@@ -121,14 +127,29 @@ def _next(ordinates: Ordinates, fit: Fit) -> tuple[Fit | None, Fit | None]:
         wanted = score.threshold * _SAFETY[score.regressor.kind]
         tried = ordinates.fit((*fit.regressors, score.regressor), fit.density)
         gain = 2.0 * (tried.log_likelihood - fit.log_likelihood)
+        if score.regressor.kind == "sinusoid":
+            gain /= _level_beside(ordinates, tried, score.regressor)
         if gain - wanted > most:
             best, most = tried, gain - wanted
-        elif gain > wanted - _NEARLY and score.regressor.kind != "pulse":
+        elif gain > wanted - _UNDECIDED and score.regressor.kind != "pulse":
             nearly = tried
     if best is None:
         return None, nearly
     moved = _polished(ordinates, best.regressors, len(best.regressors) - 1, best.density)
     return ordinates.fit(moved, best.density), None
+
+
+def _level_beside(ordinates: Ordinates, fit: Fit, sinusoid: Regressor) -> float:
+    """Return the mean power of the ordinates beside a sinusoid over that of the model, at least 1.
+
+    A process that swings is a broad hump of the spectrum, and no sinusoid.
+    """
+    here = ordinates.part(sinusoid.part)
+    ratio = fit.residual[here] ** 2 * ordinates.weights(fit.density)[here]
+    centre = 2.0 * sinusoid.where * ordinates.sizes[sinusoid.part]
+    away = np.abs(np.arange(1, len(ratio) + 1) - centre)
+    beside = ratio[(away >= _BESIDE[0]) & (away <= _BESIDE[1])]
+    return max(float(beside.mean()), 1.0) if len(beside) else 1.0
 
 
 def _candidates(ordinates: Ordinates, fit: Fit) -> list[Score]:

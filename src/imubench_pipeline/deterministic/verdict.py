@@ -38,23 +38,29 @@ class Verdict:
             return estimate
 
         def of(parameters: Mapping[str, Parameter]) -> dict[str, Parameter]:
-            return {name: self._on(name, one) for name, one in parameters.items()}
+            return {name: _with(one, self.caveats.get(name)) for name, one in parameters.items()}
+
+        slow = [self.caveats[name] for name in ("B", "K") if name in self.caveats]
+        # The lowest point of the curve is where its slow terms begin.
+        lowest = next((caveat for caveat in slow if caveat[0] == "doubtful"), None)
+        of_curve = {"B_curve": self.caveats.get("B"), "sigma_min": lowest, "tau_min": lowest}
 
         return replace(
             estimate,
             parameters=of(estimate.parameters),
             further=[of(group) for group in estimate.further],
+            curve={name: _with(one, of_curve.get(name)) for name, one in estimate.curve.items()},
         )
 
-    def _on(self, name: str, parameter: Parameter) -> Parameter:
-        if name not in self.caveats or parameter.status not in ("ok", "doubtful"):
-            return parameter
-        status, reason = self.caveats[name]
-        if status == "not_identified":
-            return replace(
-                parameter, value=None, status=status, reason=reason, fitted=parameter.value
-            )
-        return replace(parameter, status=status, reason=reason)
+
+def _with(parameter: Parameter, caveat: tuple[Status, str] | None) -> Parameter:
+    """Return a parameter with a caveat, if there is one and it has a value."""
+    if caveat is None or parameter.status not in ("ok", "doubtful"):
+        return parameter
+    status, reason = caveat
+    if status == "not_identified":
+        return replace(parameter, value=None, status=status, reason=reason, fitted=parameter.value)
+    return replace(parameter, status=status, reason=reason)
 
 
 def verdict_of(channel: str, unit: str, courses: Courses) -> Verdict:

@@ -45,6 +45,7 @@ def exports(
                 inflation=settings.inflation,
                 because=settings.because,
                 overbound=settings.overbound,
+                most_excess=settings.most_excess,
             )
             try:
                 content = made(tables, request, recordings)

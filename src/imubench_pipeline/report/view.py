@@ -60,6 +60,7 @@ class ChannelView:
     fixed_bias: float | None = None
     temperature: dict[str, Row] = field(default_factory=dict)
     low_pass: dict[str, Row] = field(default_factory=dict)
+    deterministic: list[Row] = field(default_factory=list)
     compensated: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     _models: dict[str, NoiseModel] = field(default_factory=dict)
 
@@ -234,7 +235,7 @@ def _channels(view: RecordingView) -> list[ChannelView]:
             column: _floats(part, column)
             for column in ("tau", "adev", "lower", "upper", "reconstructed")
         }
-    for table in ("models", "lines", "datasheet", "datasheet_curve"):
+    for table in ("models", "lines", "deterministic", "datasheet", "datasheet_curve"):
         for one in view.rows(table):
             getattr(channels[one["channel"]], table).append(one)
     for (name,), part in _by(view.parts["spectrum"], "channel").items():
