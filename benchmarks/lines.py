@@ -19,7 +19,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.estimators.likelihood import lines_and_band
+from imubench_pipeline.estimators.frame import frame_of
 from imubench_pipeline.estimators.lines import Line
 from imubench_pipeline.noise import NoiseModel, Sinusoid
 from imubench_pipeline.simulate import simulate
@@ -43,7 +43,7 @@ def without(name: str, number: int) -> bool:
 
 def found_in(log: NDArray[np.float64]) -> list[Line]:
     """Return the lines that the likelihood leaves out."""
-    return lines_and_band(*spectra([log], len(log), RATE))[0]
+    return list(frame_of(*spectra([log], len(log), RATE)).lines)
 
 
 def bin_width(frequency: float) -> float:

@@ -34,8 +34,9 @@ from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.export.growth import growth
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.overbound import Family, overbound, simultaneous_upper
+from imubench_pipeline.overbound import overbound, simultaneous_upper
 from imubench_pipeline.simulate import simulate
+from imubench_pipeline.smallest_model import Family
 from model_choice import fractional_noise
 
 Array = NDArray[np.float64]
@@ -88,7 +89,13 @@ def of_log(case: Case, horizon: float, number: int) -> Found:
         longest = part * case.hours * 3600.0 if part else horizon
         for family in FAMILIES:
             bound = overbound(
-                curve, fitted, case.rate, family=family, horizon=horizon, longest=longest
+                curve,
+                fitted,
+                case.rate,
+                family=family,
+                horizon=horizon,
+                longest=longest,
+                most_excess=math.inf,
             )
             found[family, longest] = scores(case, bound.model, longest, horizon)
     truth = case.model.allan_variance(curve.tau, case.rate)
@@ -174,7 +181,13 @@ def of_truth(case: Case, family: Family, longest: float, horizon: float) -> Nois
         tau, n, case.model.allan_variance(tau, case.rate), np.full(len(n), 1e8), samples
     )
     return overbound(
-        curve, case.model, case.rate, family=family, horizon=horizon, longest=longest
+        curve,
+        case.model,
+        case.rate,
+        family=family,
+        horizon=horizon,
+        longest=longest,
+        most_excess=math.inf,
     ).model
 
 

@@ -1026,4 +1026,15 @@ HARD: Mapping[str, Case] = {
 }
 """Logs that are not, or in which a parameter is hardly to be seen."""
 
+FILTERED = (
+    "analogue_1",
+    "analogue_2",
+    "analogue_steep",
+    "digital_1",
+    "digital_2",
+    "digital_steep",
+    "moving_mean",
+)
+"""Those behind a low-pass of the family that the package knows."""
+
 CASES: dict[str, Case] = {**CLEAN, **HARD}

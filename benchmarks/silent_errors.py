@@ -62,7 +62,7 @@ from scipy.stats import beta
 from imubench_pipeline.plan import Plan
 from imubench_pipeline.results import Quality
 from imubench_pipeline.tables import read
-from silent_cases import CASES, CLEAN, NOTHING, Log, Truth
+from silent_cases import CASES, CLEAN, FILTERED, NOTHING, Log, Truth
 from workflow_steps import OneRecording
 
 ALL = frozenset({"N", "B", "B_curve", "T_B", "K", "Q", "R", "cutoff"})
@@ -447,6 +447,27 @@ def summary(judged: Sequence[Judged]) -> Iterator[str]:
             yield f"{text}; warned of: {len(warned)}"
 
 
+def filter_summary(judged: Sequence[Judged]) -> Iterator[str]:
+    """Yield how well N before a low-pass, and its cut-off, are known in the cases with one."""
+    behind = [one for one in judged if one.case in FILTERED]
+    for method in ("likelihood", "low_pass"):
+        found = [one for one in behind if one.method == method and one.parameter == "N"]
+        values = [one.value / one.truth_high - 1.0 for one in found if one.value is not None]
+        limited = [one for one in found if one.lower is not None and one.upper is not None]
+        if values and limited:
+            near = sum(abs(value) <= 0.03 for value in values)
+            covered = sum(
+                (one.lower or 0.0) <= one.truth_high <= (one.upper or 0.0) for one in limited
+            )
+            given, held = share(len(values), len(found)), share(covered, len(limited))
+            yield f"behind a low-pass, N of {method}: given in {given}"
+            yield f"  within 3 % {share(near, len(values))}; covered {held}"
+    cutoffs = [one for one in behind if one.parameter == "cutoff"]
+    if cutoffs:
+        told = sum(one.judgement == "right" for one in cutoffs)
+        yield f"behind a low-pass, cut-off told: {share(told, len(cutoffs))}"
+
+
 def silent_list(judged: Iterable[Judged]) -> Iterator[str]:
     """Yield a line a silent error of the recommended method, enough to make it again."""
     for one in judged:
@@ -556,7 +577,7 @@ def main() -> None:
     print("\n".join(method_table(rows)), end="\n\n")
     print("\n".join(silent_list(rows)), end="\n\n")
     print("\n".join(errors), end="\n\n" if errors else "")
-    print("\n".join(summary(rows)))
+    print("\n".join([*summary(rows), *filter_summary(rows)]))
     parts = ", ".join(
         f"{step} {100 * s / total:.0f} %"
         for step, s in sorted(spent.items(), key=lambda item: -item[1])

@@ -4,21 +4,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.linalg import block_diag
+from scipy.optimize import brentq
 
 from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes
 from imubench_pipeline.export.growth import growth
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.noise_terms import Array
-from imubench_pipeline.overbound import (
-    FAMILIES,
-    Family,
-    Overbound,
-    limits_of,
-    overbound,
-    simultaneous_upper,
-    smallest,
-)
+from imubench_pipeline.overbound import Overbound, limits_of, overbound, simultaneous_upper
 from imubench_pipeline.simulate import simulate
+from imubench_pipeline.smallest_model import FAMILIES, Family, smallest
 
 GYRO = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7)
 RATE = 5.0
@@ -116,7 +110,7 @@ def test_a_longer_tau_asks_for_more() -> None:
 
 
 def test_where_a_walk_must_be_far_too_large_white_noise_does_not_make_room() -> None:
-    found = overbound(measured(GYRO), GYRO, RATE, longest=4000.0).model
+    found = overbound(measured(GYRO), GYRO, RATE, longest=4000.0, most_excess=math.inf).model
     assert found.K > 5.0 * GYRO.K
     assert found.N < 1.35 * GYRO.N
 
@@ -124,10 +118,63 @@ def test_where_a_walk_must_be_far_too_large_white_noise_does_not_make_room() -> 
 def test_the_band_can_be_narrower() -> None:
     quantized = NoiseModel(Q=1e-4, N=8.4e-5, K=1e-6)
     curve = measured(NoiseModel(N=8.4e-5, K=1e-6))
-    whole = overbound(curve, quantized, RATE)
+    whole = overbound(curve, quantized, RATE, most_excess=math.inf)
     part = overbound(curve, quantized, RATE, band=(None, 0.1))
     assert whole.model.N > 2.0 * part.model.N
     assert part.band == pytest.approx((1 / 600, 0.1))
+
+
+PROCESS = NoiseModel(N=1e-5, B=2e-4, T_B=20.0)
+
+
+def test_a_random_walk_beyond_two_correlation_times_is_warned_of() -> None:
+    curve = measured(PROCESS, 1e9)
+    assert overbound(curve, PROCESS, RATE, horizon=38.0).warning is None
+    found = overbound(curve, PROCESS, RATE, horizon=60.0)
+    # Its limits are the curve itself.
+    tau = np.append(found.tau, 60.0)
+    walk = found.model.K**2 * tau / 3.0 + found.model.N**2 / tau
+    ratio = np.sqrt(walk / PROCESS.allan_variance(tau, RATE))
+    assert found.excess[0] == pytest.approx(float(ratio.max()), rel=0.05)
+    # K^2 = S_B, what drives the process: K^2 tau / 3 over the closed form of a process at 3 T_B.
+    shape = 1.0 - (3.0 - 4.0 * math.exp(-3.0) + math.exp(-6.0)) / 6.0
+    assert found.excess[0] == pytest.approx(math.sqrt(3.0**2 / 3.0 / shape), rel=0.02)
+    assert found.warning is not None
+    assert "beyond 2 T_B = 40 s" in found.warning
+    assert "N+GM is 1 times" in found.warning
+    assert overbound(curve, PROCESS, RATE, horizon=60.0, family="N+GM").warning is None
+
+
+def test_a_random_walk_far_too_large_is_refused_with_what_to_take() -> None:
+    curve = measured(PROCESS, 1e9)
+    with pytest.raises(ValueError, match=r"N\+GM is 1 times.*at most 3 times is allowed") as error:
+        overbound(curve, PROCESS, RATE, horizon=400.0)
+    assert "beyond 2 T_B = 40 s" in str(error.value)
+    allowed = overbound(curve, PROCESS, RATE, horizon=400.0, most_excess=20.0)
+    assert allowed.excess[0] > 3.0
+    assert allowed.warning is not None
+
+
+def test_a_log_too_short_for_a_horizon_is_told_from_a_family_that_does_not_suit() -> None:
+    with pytest.raises(ValueError, match="no family comes closer than"):
+        overbound(measured(GYRO), GYRO, RATE, horizon=4000.0)
+
+
+def test_the_density_is_bounded_above_the_band_s_lowest_frequency_only() -> None:
+    walk = NoiseModel(N=1e-4, K=1e-5)
+    found = overbound(measured(walk, 1e9), walk, RATE, family="N+GM")
+    low = found.band[0]
+    frequency = np.geomspace(low, RATE / 2.0, 300)
+    assert np.all(found.model.psd(frequency) >= walk.psd(frequency))
+    # A process is flat below 1 / (2 pi T_B), a walk is not: there they cross.
+    crossing = brentq(
+        lambda f: float(found.model.psd(f) - walk.psd(f)), 1e-3 * low, low, xtol=1e-12
+    )
+    assert found.passed_below == pytest.approx(crossing, rel=0.03)
+    assert f"holds above {low:.3g} Hz only" in found.density_words
+    assert f"above it below {found.passed_below:.3g} Hz" in found.density_words
+    same = overbound(measured(walk, 1e9), walk, RATE)
+    assert same.passed_below is None
 
 
 def test_limits_for_all_tau_together_hold_in_so_many_logs() -> None:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 
-from imubench_pipeline.estimators.likelihood import lines_and_band
+from imubench_pipeline.estimators.frame import frame_of
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.ingest import ingest_as_planned
 from imubench_pipeline.plan import Plan
@@ -51,6 +51,6 @@ def spectral_findings(channel: str, log: ChannelLog, bandwidth: float | None) ->
         # Filling holes takes a model: that is the estimation's.
         return []
     spectrum, line_spectra = spectra(log.blocks(), log.grid, log.rate, log.segments)
-    lines, _, _, band = lines_and_band(spectrum, line_spectra, bandwidth=bandwidth)
-    rows = [asdict(line) | {"channel": channel} for line in lines]
-    return [*line_findings(rows), *band_finding(channel, band.highest, band.source)]
+    frame = frame_of(spectrum, line_spectra, bandwidth=bandwidth)
+    rows = [asdict(line) | {"channel": channel} for line in frame.lines]
+    return [*line_findings(rows), *band_finding(channel, frame.band.highest, frame.band.source)]

@@ -126,6 +126,14 @@ def _add_export(exporting: argparse.ArgumentParser) -> None:
         action="store_true",
         help="the smallest model above the upper 95 %% limit of the measured curve up to --horizon",
     )
+    exporting.add_argument(
+        "--excess",
+        type=float,
+        default=3.0,
+        metavar="FACTOR",
+        help="an overbound whose Allan deviation must be more times its limit is refused; "
+        "default: 3",
+    )
     exporting.add_argument("--method", help="of the estimates; default: the recommended one")
     exporting.add_argument("--latitude", type=float, metavar="DEG", help="for gravity")
     exporting.add_argument("--rate", type=float, metavar="HZ", help="default: the recording's")
@@ -158,6 +166,7 @@ def _export(given: argparse.Namespace) -> int:
         inflation=given.inflate,
         because=given.because,
         overbound=given.overbound,
+        most_excess=given.excess,
         method=given.method,
         latitude=given.latitude,
         rate=given.rate,

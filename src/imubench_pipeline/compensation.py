@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from imubench_pipeline.allan import AllanCurve, of_blocks
-from imubench_pipeline.cutoff import Cutoff, find_cutoff
 from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate, Parameter
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.recording import ChannelLog
@@ -56,6 +55,7 @@ def temperature_of(
         holes=log.holes,
         band=band,
         bandwidth=bandwidth,
+        resolution=resolution_of(log),
         plain=plain,
         rng=rng,
     )
@@ -127,25 +127,18 @@ def temperature_rows(key: Key, found: ThermalFit) -> Iterator[Row]:
         yield about | _figure(name, parameter, its_unit) | {"reason": reason}
 
 
-def low_pass_of(log: ChannelLog, found: Likelihood) -> Cutoff:
-    """Return the sensor's own low-pass, from the spectrum of a channel.
+def low_pass_rows(key: Key, found: Likelihood) -> Iterator[Row]:
+    """Yield the rows of the table ``low_pass``: none where a band was asked for.
 
-    Parameters
-    ----------
-    log : ChannelLog
-        Its samples show the step of the register.
-    found : Likelihood
-        Has the spectrum of the log.
+    N is that of the estimate, which is the density before the filter.
     """
-    return find_cutoff(found.spectrum, found.clear, resolution=resolution_of(log))
-
-
-def low_pass_rows(key: Key, low_pass: Cutoff) -> Iterator[Row]:
-    """Yield the rows of the table ``low_pass``."""
+    low_pass = found.low_pass
+    if low_pass is None:
+        return
     density = SI_UNITS[quantity_of(key.channel)]["N"]
-    about = asdict(key) | {"order": low_pass.order}
+    about = asdict(key) | {"kind": low_pass.kind, "order": low_pass.order}
     yield about | _figure("cutoff", low_pass.frequency, "Hz")
-    yield about | _figure("N", low_pass.N, density)
+    yield about | _figure("N", found.estimates[0].parameters["N"], density)
     if low_pass.order is not None:
         yield about | _figure("floor", Parameter(low_pass.floor), density)
 

@@ -169,6 +169,9 @@ class ExportSettings(Strict):
     overbound: bool = Field(
         False, description="the smallest model above the upper limit of the curve instead"
     )
+    most_excess: float = Field(
+        3.0, gt=1, description="an overbound so many times its limit (Allan deviation) is refused"
+    )
 
 
 class CommonSettings(Strict):

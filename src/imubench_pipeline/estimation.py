@@ -16,8 +16,8 @@ from imubench_pipeline.compensation import (
     compensated_curve,
     compensated_estimate,
     compensated_rows,
-    low_pass_of,
     low_pass_rows,
+    resolution_of,
     temperature_curve,
     temperature_of,
     temperature_rows,
@@ -124,14 +124,10 @@ def estimate_channel(
             holes=log.holes,
             segments=log.segments,
             band=band,
+            bandwidth=bandwidth,
+            resolution=resolution_of(log),
         )
-        found = fit(blocks, bandwidth=bandwidth, rng=stream("posterior"))
-        low_pass = low_pass_of(log, found)
-        shown = low_pass.order is not None and not low_pass.or_quantization
-        if bandwidth is None and shown:
-            # A bend of a per cent, which does not end the band, is many times the error of N.
-            bandwidth = low_pass.frequency.value or low_pass.frequency.lower
-            found = fit(blocks, bandwidth=bandwidth, rng=stream("posterior"))
+        found = fit(blocks, rng=stream("posterior"))
         estimates |= {estimate.method: estimate for estimate in found.estimates}
         there = presence(log.blocks(), log.grid, log.segments) if log.holes else None
         limited = partial(with_fitted_limits, segments=log.segments, presence=there)
@@ -139,7 +135,7 @@ def estimate_channel(
         into.models += _model_rows(key, found)
         into.lines += _line_rows(key, found)
         into.spectrum += _spectrum_rows(key, found)
-        into.low_pass += low_pass_rows(key, low_pass)
+        into.low_pass += low_pass_rows(key, found)
         if log.temperature and "compensated" in settings.methods:
             if log.path not in into.paths:
                 rng = channel_rng(settings.seed, key.sensor, key.recording, log.path.name)
@@ -149,7 +145,7 @@ def estimate_channel(
             # A warm-up is what temperature explains: it stays in the log that they are fitted to.
             plain = found
             if courses.found:
-                plain = fit(log.blocks, bandwidth=bandwidth, rng=stream("posterior"))
+                plain = fit(log.blocks, rng=stream("posterior"))
             warm = temperature_of(log, path, plain, band, bandwidth, stream("temperature"))
             into.temperature += temperature_rows(key, warm)
             if warm.compensated:

@@ -24,10 +24,12 @@ of three sensors (``benchmarks/overbound.py``) the models so found lay above the
 gyro their Allan variance was 1.18 (N+K) and 1.12 times the true one at its minimum, in the median.
 No random walk lies close above flicker noise: there it was 5.0 times, 4.5 of them the family's.
 
-All of this is linear in the densities N^2, S_B and K^2 at a given T_B: linear programs, inside a
-search over T_B. Smallest is the model with the least mean, over log tau, of the logarithm of its
-Allan variance over the limit. (Its mean ratio, one program, lets the largest ratios rule: where a
-random walk must be far above the curve at long tau, white noise would be raised to make room.)
+A random walk cannot follow a Gauss-Markov process: beyond 2 T_B it must lie ever further above it,
+and below the band its density still rises. So what a family costs is told with the model, and one
+whose Allan deviation must be more than three times its limit is refused, with what the other
+families would come to.
+
+The search for it is in `imubench_pipeline.smallest_model`.
 
 References
 ----------
@@ -40,28 +42,22 @@ NAVIGATION 68 (2), 2021.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
 
 import numpy as np
-from scipy.optimize import linprog, minimize_scalar
 
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.export.growth import growth, growth_of
-from imubench_pipeline.noise import (
-    GaussMarkov,
-    NoiseModel,
-    RandomWalk,
-    Term,
-    WhiteNoise,
-    bias_instability,
-)
+from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.noise_terms import Array
-
-Family = Literal["N+K", "N+GM", "N+GM+K"]
-
-FAMILIES: Sequence[Family] = get_args(Family)
+from imubench_pipeline.smallest_model import (
+    FAMILIES,
+    Family,
+    Limits,
+    count_of_points,
+    smallest,
+)
 
 _LOOKS_AT = 0.37
 """f tau at which the Allan variance looks: where sin^4(x) / x^2 is largest, over pi."""
@@ -70,39 +66,19 @@ _MEMORY = 0.1
 """Lowest frequency times the horizon, by default."""
 
 _POINTS_A_DECADE = 12
-_TIMES_A_DECADE = 6
-"""Correlation times tried before the best is sought between its neighbours."""
-
 _BEYOND = 30.0
 """Longest correlation time tried over the longest tau or the horizon."""
 
-_MOST_PROGRAMS = 12
-_SAME = 1e-6
-"""The programs have come to an end where the mean logarithm falls by less."""
+MOST_EXCESS = 3.0
+"""Largest Allan deviation of a model over the limit that it must lie above, by default."""
+
+_WALK_FOLLOWS = 2.0
+"""Horizon over T_B up to which a random walk follows a Gauss-Markov process."""
+
+_BELOW_BAND = 1e-4
+"""Lowest frequency over that of the band down to which the densities are compared."""
 
 _TOUCHES = 1.01
-_ABOVE = 1e-9
-"""The model is larger by this, so that no rounding puts it below a limit."""
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What a model must lie above.
-
-    Attributes
-    ----------
-    kind : str
-        In words.
-    x, value : ndarray, shape (m,)
-        Tau or time in s, or frequency in Hz, and the least value there.
-    of_term : callable
-        Term -> what is bounded, of this term, at ``x``.
-    """
-
-    kind: str
-    x: Array
-    value: Array
-    of_term: Callable[[Term], Array]
 
 
 @dataclass(frozen=True)
@@ -123,6 +99,14 @@ class Overbound:
         That ratio at the minimum of the measured curve.
     touches : mapping of str to float
         Where the model comes within 1 % of its limits: kind, and tau, frequency or time.
+    excess : (float, float)
+        Largest Allan deviation of the model over its limit, and the tau where that is, s: what
+        the family costs, however long the log.
+    passed_below : float or None
+        Frequency, Hz, below which the fitted density is above that of the model; None: as far as
+        a ten-thousandth of the lowest of the band it nowhere is.
+    warning : str or None
+        The family does not suit the horizon, in words; with what the others would come to.
     """
 
     model: NoiseModel
@@ -134,6 +118,9 @@ class Overbound:
     ratio: Array
     at_minimum: float
     touches: dict[str, float]
+    excess: tuple[float, float]
+    passed_below: float | None
+    warning: str | None = None
 
     @property
     def words(self) -> str:
@@ -145,6 +132,19 @@ class Overbound:
             f"fitted growth of the integrals up to {self.horizon:.4g} s; at the minimum of the "
             f"measured curve its Allan deviation is {math.sqrt(self.at_minimum):.2f} times the "
             "measured one"
+        )
+
+    @property
+    def density_words(self) -> str:
+        """Above which frequency the density is bounded, for the head of a file."""
+        low = self.band[0]
+        if self.passed_below is None:
+            below = "the fitted density is nowhere above it there, but it is less sure"
+        else:
+            below = f"the fitted density is above it below {self.passed_below:.3g} Hz"
+        return (
+            f"the bound on the spectral density holds above {low:.3g} Hz only; below, it is none "
+            f"({below}): it does not cover a filter that averages for longer than {1.0 / low:.4g} s"
         )
 
 
@@ -180,6 +180,7 @@ def overbound(
     longest: float | None = None,
     band: tuple[float | None, float | None] = (None, None),
     confidence: float = 0.95,
+    most_excess: float = MOST_EXCESS,
 ) -> Overbound:
     """Return the smallest model that lies above a measured curve and its fit.
 
@@ -203,6 +204,8 @@ def overbound(
         half the rate. A sensor that is filtered below half the rate may say so here.
     confidence : float
         Of the limits, for all tau together.
+    most_excess : float
+        Largest Allan deviation of the model over the limit that it must lie above.
 
     Returns
     -------
@@ -211,13 +214,23 @@ def overbound(
     Raises
     ------
     ValueError
-        If the family is not known, no model of it lies above, the horizon is shorter than two
-        samples, or the curve does not reach ``longest``.
+        If the family is not known, no model of it lies above, or only one that is more than
+        ``most_excess`` times too large, the horizon is shorter than two samples, or the curve does
+        not reach ``longest``.
     """
     reach = longest or horizon
     ends = (band[0] or _MEMORY / horizon, band[1] or 0.5 * rate)
     limits = limits_of(curve, fitted, rate, horizon, reach, ends, confidence)
-    model = smallest(limits, family, (2.0 / rate, _BEYOND * max(horizon, reach)))
+    times = (2.0 / rate, _BEYOND * max(horizon, reach))
+    model = smallest(limits, family, times)
+    excess = _excess(limits[0], model)
+    unsuited = _unsuited(fitted, family, max(horizon, reach))
+    warning = None
+    if excess[0] > most_excess or unsuited:
+        said = _offer(limits, family, times, excess, unsuited, most_excess)
+        if excess[0] > most_excess:
+            raise ValueError(f"{said}; at most {most_excess:g} times is allowed")
+        warning = said
     within = curve.tau <= reach * (1.0 + 1e-9)
     tau, measured = curve.tau[within], curve.variance[within]
     ratio = model.allan_variance(tau, rate) / measured
@@ -227,7 +240,76 @@ def overbound(
         if above.min() < _TOUCHES:
             touches[limit.kind] = float(limit.x[np.argmin(above)])
     lowest = float(ratio[np.argmin(measured)])
-    return Overbound(model, family, horizon, reach, ends, tau, ratio, lowest, touches)
+    return Overbound(
+        model,
+        family,
+        horizon,
+        reach,
+        ends,
+        tau,
+        ratio,
+        lowest,
+        touches,
+        excess,
+        _passed_below(model, fitted, rate, ends[0]),
+        warning,
+    )
+
+
+def _excess(limit: Limits, model: NoiseModel) -> tuple[float, float]:
+    """Return the largest deviation of a model over a limit, and where that is."""
+    above = np.sum([limit.of_term(term) for term in model.terms], axis=0) / limit.value
+    worst = int(np.argmax(above))
+    return math.sqrt(float(above[worst])), float(limit.x[worst])
+
+
+def _unsuited(fitted: NoiseModel, family: Family, horizon: float) -> str | None:
+    """Say so where a random walk is to follow a Gauss-Markov process beyond 2 T_B."""
+    times = [term.T_B for term in fitted.terms if isinstance(term, GaussMarkov)]
+    if "GM" in family or not times or horizon <= _WALK_FOLLOWS * min(times):
+        return None
+    return (
+        f"a random walk cannot follow a Gauss-Markov process of T_B = {min(times):.4g} s beyond "
+        f"2 T_B = {_WALK_FOLLOWS * min(times):.4g} s"
+    )
+
+
+def _offer(
+    limits: Sequence[Limits],
+    family: Family,
+    times: tuple[float, float],
+    excess: tuple[float, float],
+    unsuited: str | None,
+    most_excess: float,
+) -> str:
+    """Return how far a family is above its limits, why, and how far the others would be."""
+    said = (
+        f"the Allan deviation of the smallest {family} is {excess[0]:.3g} times its limit at "
+        f"{excess[1]:.4g} s"
+    )
+    others = {
+        other: _excess(limits[0], smallest(limits, other, times))[0]
+        for other in FAMILIES
+        if other != family
+    }
+    better = {
+        other: value for other, value in others.items() if value < min(excess[0], most_excess)
+    }
+    reason = f": {unsuited}" if unsuited else ""
+    offer = ", ".join(f"{other} is {value:.3g} times" for other, value in better.items())
+    if offer:
+        return f"{said}{reason}; the smallest {offer} at most"
+    least = min([excess[0], *others.values()])
+    return f"{said}{reason}; no family comes closer than {least:.3g} times"
+
+
+def _passed_below(
+    model: NoiseModel, fitted: NoiseModel, rate: float, lowest: float
+) -> float | None:
+    """Return the frequency below the band from which on the fitted density is the larger."""
+    frequency = np.geomspace(lowest, _BELOW_BAND * lowest, 400)
+    passed = np.flatnonzero(fitted.psd(frequency, rate) > model.psd(frequency))
+    return float(frequency[passed[0]]) if len(passed) else None
 
 
 def limits_of(
@@ -251,8 +333,8 @@ def limits_of(
     def widening(tau: Array) -> Array:
         return np.asarray(np.interp(np.log(tau), np.log(curve.tau), upper / curve.variance))
 
-    frequency = np.geomspace(*band, _count(*band, _POINTS_A_DECADE))
-    time = np.geomspace(1.0 / rate, horizon, _count(1.0 / rate, horizon, _POINTS_A_DECADE))
+    frequency = np.geomspace(*band, count_of_points(*band, _POINTS_A_DECADE))
+    time = np.geomspace(1.0 / rate, horizon, count_of_points(1.0 / rate, horizon, _POINTS_A_DECADE))
     density = fitted.psd(frequency, rate) * widening(_LOOKS_AT / frequency)
     grown, wider = growth(fitted, time, rate), widening(time)
     n = tau * rate
@@ -262,96 +344,3 @@ def limits_of(
         Limits("first integral", time, grown.first * wider, lambda t: growth_of(t, time).first),
         Limits("second integral", time, grown.second * wider, lambda t: growth_of(t, time).second),
     ]
-
-
-def smallest(limits: Sequence[Limits], family: Family, times: tuple[float, float]) -> NoiseModel:
-    """Return the smallest model of a family that lies above limits.
-
-    Parameters
-    ----------
-    limits : sequence of Limits
-        Those of the Allan variance first: there the model is kept close.
-    family : {"N+K", "N+GM", "N+GM+K"}
-    times : (float, float)
-        Shortest and longest T_B to try, s.
-
-    Raises
-    ------
-    ValueError
-        If the family is not known, or no model of it lies above.
-    """
-    if family not in FAMILIES:
-        raise ValueError(f"family {family!r} is not known, expected one of {', '.join(FAMILIES)}")
-    walks = family.endswith("K")
-    fixed: list[Term] = [WhiteNoise(1.0)] + [RandomWalk(1.0)] * walks
-    if "GM" not in family:
-        cost, powers = _program(limits, fixed)
-        T_B = None
-    else:
-        tried = np.log(np.geomspace(*times, _count(*times, _TIMES_A_DECADE)))
-
-        def solved(log_time: float) -> tuple[float, Array]:
-            time = math.exp(log_time)
-            return _program(limits, [*fixed, GaussMarkov(bias_instability(1.0, time), time)])
-
-        costs = [solved(float(x))[0] for x in tried]
-        best = int(np.argmin(costs))
-        around = tried[max(best - 1, 0)], tried[min(best + 1, len(tried) - 1)]
-        finer = minimize_scalar(lambda x: solved(x)[0], bounds=around, method="bounded")
-        place = float(finer.x) if finer.fun < costs[best] else float(tried[best])
-        cost, powers = solved(place)
-        T_B = math.exp(place)
-    if not math.isfinite(cost):
-        raise ValueError(f"no model {family} lies above the limits")
-    powers = powers * (1.0 + _ABOVE)
-    B = bias_instability(float(powers[-1]), T_B) if T_B else 0.0
-    return NoiseModel(
-        N=math.sqrt(powers[0]),
-        B=B,
-        T_B=T_B if B > 0.0 else None,
-        K=math.sqrt(powers[1]) if walks else 0.0,
-    )
-
-
-def _program(limits: Sequence[Limits], terms: Sequence[Term]) -> tuple[float, Array]:
-    """Return the mean log ratio of the Allan variance to its limit, and the powers of the terms.
-
-    The logarithm is concave: each program lies on its tangent at the last answer, so that the mean
-    falls from program to program.
-    """
-    parts = [
-        np.column_stack([limit.of_term(term) for term in terms]) / limit.value[:, None]
-        for limit in limits
-    ]
-    rows = np.concatenate(parts)
-    scale = rows.max(axis=0)
-    curve, rows = parts[0] / scale, rows / scale
-    weights = _log_weights(limits[0].x)
-    cost, powers, ratio = math.inf, np.zeros(len(terms)), np.ones(len(curve))
-    for _ in range(_MOST_PROGRAMS):
-        answer = linprog(
-            (weights / ratio) @ curve, A_ub=-rows, b_ub=-np.ones(len(rows)), method="highs"
-        )
-        if answer.status != 0 or answer.x is None:
-            break
-        # What the solver's tolerance leaves below a limit is made up for.
-        found = np.maximum(answer.x, 0.0)
-        found /= min(float(np.min(rows @ found)), 1.0)
-        ratio = curve @ found
-        lower = float(weights @ np.log(ratio))
-        if lower > cost - _SAME:
-            break
-        cost, powers = lower, found
-    return cost, np.asarray(powers / scale)
-
-
-def _log_weights(x: Array) -> Array:
-    """Return weights of a mean over log x."""
-    if len(x) == 1:
-        return np.ones(1)
-    edges = np.log(np.concatenate((x[:1], np.sqrt(x[1:] * x[:-1]), x[-1:])))
-    return np.asarray(np.diff(edges) / (edges[-1] - edges[0]))
-
-
-def _count(start: float, stop: float, a_decade: int) -> int:
-    return 2 + math.ceil(a_decade * math.log10(stop / start))

@@ -13,7 +13,7 @@ from imubench_pipeline.full_overlap import PRESENT
 
 Counts = NDArray[np.int64]
 
-_POINTS = 1 << 16
+_POINTS = 1 << 15
 _FEWEST_CLUSTERS = 16
 _STEPS = 32
 

@@ -172,6 +172,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
     ),
     "low_pass": (
         *_KEYS,
+        _text("kind", "analogue, bilinear or boxcar; null: none shows", required=False),
         _count("order", "of the filter: 1, or that of Butterworth; null: none shows"),
         *_figure("cutoff (-3 dB), N (before the filter), floor (white, behind the filter)"),
         _FITTED,

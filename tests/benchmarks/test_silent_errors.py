@@ -143,6 +143,27 @@ def test_second_process_of_one_is_a_value_of_nothing(walk):
     assert [j.judgement for j in silent_errors.judge("", 0, two, made)] == ["right", "right"]
 
 
+def test_what_is_known_behind_a_low_pass_is_said():
+    values = {"value": 1.02, "lower": 1.01, "upper": 1.03, "judgement": "right"}
+    about = {"case": "digital_1", "recommended": True, "component": 1}
+    truth = {"truth_low": 1.0, "truth_high": 1.0}
+    rows = [
+        silent_errors.Judged(
+            log=0, method="likelihood", parameter="N", **(about | truth | values)
+        ),
+        silent_errors.Judged(
+            log=1, method="likelihood", parameter="N", **(about | truth | values | {"lower": 0.99})
+        ),
+        silent_errors.Judged(log=1, method="low_pass", parameter="cutoff", judgement="refused",
+                             **(about | truth)),
+    ]  # fmt: skip
+    given, N, cutoff = silent_errors.filter_summary(rows)
+    assert "N of likelihood: given in 2 of 2" in given
+    assert "within 3 % 2 of 2" in N
+    assert "covered 1 of 2" in N
+    assert cutoff.startswith("behind a low-pass, cut-off told: 0 of 1")
+
+
 def test_log_that_the_steps_cannot_use_is_a_failure(monkeypatch):
     short = small(np.arange(20.0), N=exactly(1.0), K=NOTHING)
     monkeypatch.setitem(CASES, "short", lambda rng: short)

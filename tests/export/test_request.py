@@ -1,3 +1,4 @@
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -103,6 +104,33 @@ def test_an_overbound_is_larger_and_says_what_it_is(tables: dict[str, pa.Table])
     joined = text.replace("\n#  ", "")
     assert "the smallest N+K that lies above the measured Allan variance" in joined
     assert "at every tau up to 60 s (95 % for all together)" in joined
+
+
+def test_the_head_of_an_overbound_says_where_its_density_holds(tables: dict[str, pa.Table]) -> None:
+    text = made(tables, replace(REQUEST, overbound=True))
+    assert isinstance(text, str)
+    joined = text.replace("\n#  ", "")
+    assert "the bound on the spectral density holds above 0.00167 Hz only" in joined
+    assert "averages for longer than 600 s" in joined
+    matrices = json.loads(made(tables, replace(REQUEST, target="json", overbound=True)))
+    assert matrices["gyro"]["density_bounded"] == pytest.approx([0.1 / 60.0, RATE / 2.0])
+    assert (
+        json.loads(made(tables, replace(REQUEST, target="json")))["gyro"]["density_bounded"] is None
+    )
+
+
+def test_a_walk_that_cannot_follow_is_refused_or_warned_of(tables: dict[str, pa.Table]) -> None:
+    text = made(tables, replace(REQUEST, overbound=True, horizon=150.0))
+    assert isinstance(text, str)
+    joined = text.replace("\n#  ", "")
+    assert "WARNING: the Allan deviation of the smallest N+K is" in joined
+    assert "N+GM is held by gnss-ins-sim; N+GM+K is held by matlab, json, npz, python" in joined
+    with pytest.raises(ExportError, match=r"at most 1\.2 times is allowed; N\+GM is held by gnss"):
+        made(tables, replace(REQUEST, overbound=True, horizon=150.0, most_excess=1.2))
+    settings = ExportSettings(targets=("kalibr",), overbound=True, horizon="150 s", most_excess=1.2)
+    ((place, content),) = exports(tables, settings)
+    assert str(place) == "mti_7/not_made.txt"
+    assert "take a horizon shorter than 150 s" in str(content)
 
 
 def test_gravity_and_rate_and_inflation(tables: dict[str, pa.Table]) -> None:

@@ -13,34 +13,35 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from imubench_pipeline.allan import of_blocks
+from imubench_pipeline.cutoff import Cutoff
 from imubench_pipeline.estimators import least_squares
-from imubench_pipeline.estimators.band import Band, find_band
+from imubench_pipeline.estimators.band import Band
 from imubench_pipeline.estimators.curve_bias import averaging_times, with_curve
+from imubench_pipeline.estimators.doubts import doubted
 from imubench_pipeline.estimators.draws import drawn_share, joint_draws
 from imubench_pipeline.estimators.estimate import CURVE, FAMILY, Estimate, Parameter
+from imubench_pipeline.estimators.frame import FEWEST_BINS, Frame, frame_of
 from imubench_pipeline.estimators.intervals import describe, papers_only, with_upper_limits
-from imubench_pipeline.estimators.lines import Line, find, without_lines
+from imubench_pipeline.estimators.lines import Line
 from imubench_pipeline.estimators.model_choice import PAPERS, Candidate, compare
 from imubench_pipeline.estimators.posterior import DRAWS, Posterior, sample
-from imubench_pipeline.estimators.whittle import COARSE, Maximum, Terms, whittle_of
+from imubench_pipeline.estimators.whittle import Terms, Whittle, model_of
 from imubench_pipeline.missing import block_means, divided, filled, slow_part
-from imubench_pipeline.noise import GaussMarkov, NoiseModel
-from imubench_pipeline.spectrum import LineSpectrum, Spectrum, spectra
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.spectrum import Spectrum, spectra
 
 Array = NDArray[np.float64]
 Span = tuple[int, int]
-
-_FEWEST_BINS = 4 * (PAPERS.parameters + 1)
-"""The papers' model can be fitted to so many, and to spare."""
 
 _LEAST_SHARE = 0.05
 """Candidates of a smaller share do not enter the intervals."""
 
 _FEWEST_DRAWS = 4_000
+_FLEXIBLE = Terms("NFK", 1)
+"""Model with which the cut-off is fitted where none explains the spectrum."""
+
 _FORGOTTEN = 1e-3
 _MOST_ROUNDS = 12
-_QUANTIZATION_BAND = 1 / 10
-"""Part of the rate that the band must reach for quantization noise to show."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,8 @@ class Likelihood:
         The bins clear of lines, and those of them that are used: below the end of the band.
     fitted : ndarray, shape (b,)
         Density of the chosen model in each bin, its ramp included; NaN where there is none.
+    frame : Frame
+        What was fitted, and behind what.
     """
 
     estimates: tuple[Estimate, Estimate]
@@ -72,6 +75,12 @@ class Likelihood:
     clear: NDArray[np.bool_]
     used: NDArray[np.bool_]
     fitted: Array
+    frame: Frame
+
+    @property
+    def low_pass(self) -> Cutoff | None:
+        """The sensor's own low-pass; None where it was not looked for."""
+        return self.frame.low_pass
 
 
 def fit(
@@ -81,6 +90,7 @@ def fit(
     segments: Sequence[tuple[int, int]] | None = None,
     band: float | None = None,
     bandwidth: float | None = None,
+    resolution: float = 0.0,
     rng: np.random.Generator | None = None,
 ) -> Likelihood:
     """Estimate the noise parameters of a log by their likelihood.
@@ -96,7 +106,10 @@ def fit(
     band : float, optional
         Highest frequency to use, Hz; by default it is found from the spectrum.
     bandwidth : float, optional
-        Cut-off of the sensor's own filter, where it is known, Hz.
+        Cut-off of the sensor's own filter, where it is stated, Hz: it tells a filter from a
+        process where the spectrum does not.
+    resolution : float
+        Step of the register (LSB), SI, where the samples are rounded.
     rng : numpy.random.Generator, optional
         For the posterior draws, and for missing samples; by default always the same.
 
@@ -123,6 +136,7 @@ def fit(
         holes=not bool(np.isfinite(values).all()),
         band=band,
         bandwidth=bandwidth,
+        resolution=resolution,
         rng=rng or np.random.default_rng(0),
     )
 
@@ -136,6 +150,7 @@ def fit_blocks(
     segments: Sequence[tuple[int, int]] | None = None,
     band: float | None = None,
     bandwidth: float | None = None,
+    resolution: float = 0.0,
     rng: np.random.Generator,
 ) -> Likelihood:
     """Estimate the noise parameters of a log that comes in blocks, in bounded memory (see `fit`).
@@ -150,7 +165,7 @@ def fit_blocks(
         Gives the log in order, in SI, as often as it is called; NaN where a sample is missing.
     samples : int
         L, the length of all blocks together.
-    rate, segments, band, bandwidth, rng
+    rate, segments, band, bandwidth, resolution, rng
         As in `fit`.
     holes : bool
         Samples may be missing.
@@ -158,7 +173,8 @@ def fit_blocks(
     spans = tuple(segments) if segments else ((0, samples),)
     if not holes:
         spectrum, lines = spectra(blocks(), samples, rate, spans)
-        return fit_spectrum(spectrum, lines, band=band, bandwidth=bandwidth, rng=rng)
+        frame = frame_of(spectrum, lines, band=band, bandwidth=bandwidth, resolution=resolution)
+        return fit_spectrum(spectrum, frame, rng=rng)
     means = block_means(blocks(), spans)
     parts = divided(means, spans)
     if not parts:
@@ -171,13 +187,12 @@ def fit_blocks(
         complete = filled(blocks(), path, model, rate, rng)
         spectrum, lines = spectra(complete, samples, rate, parts)
         spectrum = replace(spectrum, ordinates=spectrum.ordinates * present)
+        frame = frame_of(spectrum, lines, band=band, bandwidth=bandwidth, resolution=resolution)
+        if frame.used.sum() < FEWEST_BINS:
+            break
         if number < rounds:
-            _, _, used, limit = lines_and_band(spectrum, lines, band, bandwidth)
-            if used.sum() < _FEWEST_BINS:
-                break
-            whittle = whittle_of(spectrum.taken(used), limit.highest)
-            model = model_of(compare(whittle, quantization=False)[0].found)
-    return fit_spectrum(spectrum, lines, band=band, bandwidth=bandwidth, rng=rng)
+            model = model_of(compare(frame.whittle(spectrum), quantization=False)[0].found)
+    return fit_spectrum(spectrum, frame, rng=rng)
 
 
 def _rounds(missing: float) -> int:
@@ -198,23 +213,23 @@ def _first_model(
         return NoiseModel(N=float(np.std(there)) / math.sqrt(rate))
 
 
-def fit_spectrum(
-    spectrum: Spectrum,
-    line_spectra: Sequence[LineSpectrum],
-    *,
-    band: float | None = None,
-    bandwidth: float | None = None,
-    rng: np.random.Generator,
-) -> Likelihood:
-    """Estimate the noise parameters from a spectrum (see `fit`)."""
-    lines, clear, used, limit = lines_and_band(spectrum, line_spectra, band, bandwidth)
-    if used.sum() < _FEWEST_BINS:
+def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) -> Likelihood:
+    """Estimate the noise parameters from a spectrum (see `fit`).
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+    frame : Frame
+        What of it is fitted.
+    rng : numpy.random.Generator
+    """
+    if frame.used.sum() < FEWEST_BINS:
         reason = (
-            f"{used.sum()} bins of the spectrum are left up to {limit.highest:.4g} Hz, "
-            f"{_FEWEST_BINS} are needed: too short a log"
+            f"{frame.used.sum()} bins of the spectrum are left up to {frame.band.highest:.4g} Hz, "
+            f"{FEWEST_BINS} are needed: too short a log"
         )
-        if not clear.all():
-            reason += f", or lines that hide too much of it ({(~clear).sum()} bins)"
+        if not frame.clear.all():
+            reason += f", or lines that hide too much of it ({(~frame.clear).sum()} bins)"
         nothing = {name: Parameter(None, "not_shown", reason) for name in FAMILY}
         of_curve = {name: nothing["B"] for name in CURVE}
         return Likelihood(
@@ -223,17 +238,16 @@ def fit_spectrum(
                 Estimate("likelihood_gm", papers_only(nothing), curve=of_curve),
             ),
             (),
-            lines,
+            frame.lines,
             None,
             spectrum,
-            clear,
-            used,
-            np.full(len(used), np.nan),
+            frame.clear,
+            frame.used,
+            np.full(len(frame.used), np.nan),
+            frame,
         )
-    whittle = whittle_of(spectrum.taken(used), limit.highest)
-    quantization = limit.highest >= _QUANTIZATION_BAND * spectrum.rate
-    candidates = compare(whittle, quantization=quantization)
-    sinusoids = [_line_parameters(line) for line in lines if line.narrow]
+    frame, whittle, candidates = _explained(spectrum, frame)
+    sinusoids = [_line_parameters(line) for line in frame.lines if line.narrow]
     chosen = candidates[0]
     draws: dict[Terms, Posterior] = {}
     # A ramp is no noise: it is believed or not, and does not widen intervals as a possibility.
@@ -246,14 +260,18 @@ def fit_spectrum(
         if candidate in alike or candidate in wider or terms == PAPERS:
             part = 1.0 if terms == PAPERS or candidate is chosen else candidate.share
             number = max(_FEWEST_DRAWS, round(part * DRAWS))
-            draws[terms] = sample(whittle, candidate.found, rng, number)
-    estimate = describe("likelihood", whittle, chosen, alike, draws, limit)
+            draws[terms] = _behind(frame, sample(whittle, candidate.found, rng, number), terms, rng)
+    estimate = describe("likelihood", whittle, chosen, alike, draws, frame.band)
     estimate = with_upper_limits(estimate, alike, wider, draws)
     tau = averaging_times(spectrum.rate, float(spectrum.length.max()))
     estimate = with_curve(estimate, alike, wider, draws, tau)
     papers = next(c for c in candidates if c.found.terms == PAPERS)
-    gauss_markov = describe("likelihood_gm", whittle, papers, [papers], draws, limit)
+    gauss_markov = describe("likelihood_gm", whittle, papers, [papers], draws, frame.band)
     gauss_markov = with_curve(gauss_markov, [papers], (), draws, tau)
+    fitted = frame.whole(spectrum).density(chosen.found) + chosen.found.ramp**2 * spectrum.ramp
+    estimate, gauss_markov = doubted(
+        estimate, gauss_markov, spectrum, frame, candidates, papers, fitted
+    )
     return Likelihood(
         (
             replace(
@@ -272,14 +290,58 @@ def fit_spectrum(
             ),
         ),
         candidates,
-        lines,
-        limit,
+        frame.lines,
+        frame.band,
         spectrum,
-        clear,
-        used,
-        whittle_of(spectrum, limit.highest, COARSE).density(chosen.found)
-        + chosen.found.ramp**2 * spectrum.ramp,
+        frame.clear,
+        frame.used,
+        fitted,
+        frame,
     )
+
+
+def _explained(spectrum: Spectrum, frame: Frame) -> tuple[Frame, Whittle, list[Candidate]]:
+    """Fit all models in a frame, and in another one where it explains more.
+
+    Where noise up to Nyquist, behind the filter that shows, is not explained: with processes of a
+    few sampling intervals; then without the frequencies that bend.
+    """
+
+    def fitted(tried: Frame) -> tuple[Frame, Whittle, list[Candidate]]:
+        whittle = tried.whittle(spectrum)
+        quantization = tried.shows_quantization(spectrum.rate)
+        return tried, whittle, compare(whittle, quantization=quantization)
+
+    first = fitted(frame)
+    if frame.low_pass is None:
+        return first
+    if frame.shares_its_bend(first[2][0].found.times) or not _explains(first):
+        terms = first[2][0].found.terms if _explains(first) else _FLEXIBLE
+        first = fitted(frame.refined(spectrum, replace(terms, ramp=False)))
+    if _explains(first):
+        return first
+    faster = fitted(frame.with_fast_processes(spectrum.rate))
+    if _explains(faster):
+        return faster
+    limited = frame.limited(spectrum)
+    if limited.band.highest >= frame.band.highest or limited.used.sum() < FEWEST_BINS:
+        return first
+    return fitted(limited)
+
+
+def _explains(fitted: tuple[Frame, Whittle, list[Candidate]]) -> bool:
+    return fitted[2][0].goodness.verdict == "explained"
+
+
+def _behind(
+    frame: Frame, posterior: Posterior, terms: Terms, rng: np.random.Generator
+) -> Posterior:
+    """Return draws with what is not known of the sensor's low-pass in N."""
+    if frame.low_pass is None or not frame.low_pass.readings or "N" not in terms.linear:
+        return posterior
+    parameters = posterior.parameters.copy()
+    parameters[:, terms.linear.index("N")] *= frame.low_pass.factors(len(parameters), rng)
+    return replace(posterior, parameters=parameters)
 
 
 def _with_one_more(terms: Terms) -> list[Terms]:
@@ -292,66 +354,6 @@ def _with_one_more(terms: Terms) -> list[Terms]:
         wider.append(replace(terms, linear=terms.linear.replace("N", "NF")))
         wider.append(replace(terms, gauss_markov=1))
     return wider
-
-
-def lines_and_band(
-    spectrum: Spectrum,
-    line_spectra: Sequence[LineSpectrum],
-    asked: float | None = None,
-    bandwidth: float | None = None,
-) -> tuple[list[Line], NDArray[np.bool_], NDArray[np.bool_], Band]:
-    """Find the lines of a spectrum, and the bins that show noise and nothing else.
-
-    Parameters
-    ----------
-    spectrum : Spectrum
-    line_spectra : sequence of LineSpectrum
-        As `imubench_pipeline.spectrum.spectra` gives them.
-    asked, bandwidth : float, optional
-        ``band`` and ``bandwidth`` of `fit`.
-
-    Returns
-    -------
-    lines : list of Line
-    clear, used : ndarray of bool, shape (b,)
-        The bins clear of lines, and those of them below the end of the band.
-    band : Band
-    """
-    everything = np.ones(len(spectrum.frequency), dtype=np.bool_)
-    start = min(asked or np.inf, 0.05 * spectrum.rate)
-    below = spectrum.upper <= start
-    if below.sum() < _FEWEST_BINS:
-        below = everything
-    found = whittle_of(spectrum.taken(below), start, COARSE).maximum(Terms("NFK", 1))
-    low = spectrum.block > 1
-    crossover = float(spectrum.upper[low].max()) if low.any() else 0.0
-    lines = find(line_spectra, model_of(found), spectrum.rate, crossover)
-    clear = everything
-    if lines:
-        density = whittle_of(spectrum, 0.5 * spectrum.rate, COARSE).density(found)
-        clear = without_lines(spectrum, lines, density)
-    band = find_band(spectrum, clear, asked=asked, bandwidth=bandwidth)
-    return lines, clear, clear & (spectrum.upper <= band.highest * (1.0 + 1e-9)), band
-
-
-def model_of(found: Maximum) -> NoiseModel:
-    """Return the noise model of a fit; flicker noise comes first, then processes by T_B."""
-    terms = found.terms
-    values = {letter: found.parameter(letter) for letter in terms.linear}
-    processes = [
-        GaussMarkov(float(B), float(time))
-        for B, time in zip(found.biases, found.times, strict=True)
-    ]
-    first = None if "F" in values or not processes else processes.pop(0)
-    return NoiseModel(
-        Q=values.get("Q", 0.0),
-        N=values.get("N", 0.0),
-        B=values.get("F", first.B if first else 0.0),
-        T_B=first.T_B if first else None,
-        K=values.get("K", 0.0),
-        R=found.ramp,
-        further=[process for process in processes if process.B > 0],
-    )
 
 
 def _line_parameters(line: Line) -> dict[str, Parameter]:

@@ -23,6 +23,7 @@ from imubench_pipeline.estimators.whittle_kernels import (
     shape_at,
     two_processes,
 )
+from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.spectral_shapes import Shapes
 from imubench_pipeline.spectrum import Spectrum
 
@@ -96,6 +97,27 @@ class Maximum:
         return np.asarray(np.sqrt(self.powers[len(self.terms.linear) :]))
 
 
+@dataclass(frozen=True)
+class Behind:
+    """What a low-pass leaves of the noise in each bin of a spectrum.
+
+    Attributes
+    ----------
+    white : ndarray, shape (b,)
+        Of white noise of N = 1, sampled, with what stands behind the filter in proportion to it.
+    flicker, slow : ndarray, shape (b,)
+        Gain of the power of flicker noise, whose folds show, and of slower noise.
+    """
+
+    white: Array
+    flicker: Array
+    slow: Array
+
+    def taken(self, chosen: NDArray[np.bool_]) -> Behind:
+        """Return that of chosen bins."""
+        return Behind(self.white[chosen], self.flicker[chosen], self.slow[chosen])
+
+
 @dataclass
 class Whittle:
     """The likelihood of one spectrum.
@@ -108,12 +130,15 @@ class Whittle:
         Correlation times between which a Gauss-Markov process is looked for, s.
     shapes : int
         Correlation times at which its shape is tabulated.
+    behind : Behind, optional
+        The sensor's low-pass, behind which the noise stands; quantization noise does not.
     """
 
     spectrum: Spectrum
     shortest: float
     longest: float
     shapes: int = SHAPES
+    behind: Behind | None = None
     scale: float = field(init=False)
     columns: dict[str, Array] = field(init=False)
     shape_of: Shapes = field(init=False)
@@ -129,7 +154,8 @@ class Whittle:
     @cached_property
     def table(self) -> Array:
         """Logarithms of the shapes of Gauss-Markov processes at `times`, shape (t, b)."""
-        return np.log(np.array([self.shape_of.gauss_markov(time) for time in self.times]))
+        table = np.log(np.array([self.shape_of.gauss_markov(time) for time in self.times]))
+        return table if self.behind is None else table + np.log(self.behind.slow)
 
     def of(self, spectrum: Spectrum) -> Whittle:
         """Return the likelihood of other data in the same bins."""
@@ -139,9 +165,18 @@ class Whittle:
         other.scale = float(np.median(spectrum.density))
         return other
 
+    def standing(self, behind: Behind) -> Whittle:
+        """Return the likelihood of the same data behind a low-pass; this one stands behind none."""
+        other = copy.copy(self)
+        other.columns, other.behind = {}, behind
+        vars(other)["table"] = self.table + np.log(behind.slow)
+        return other
+
     def taken(self, spectrum: Spectrum, chosen: NDArray[np.bool_]) -> Whittle:
         """Return the likelihood of other data in chosen bins."""
         other = self.of(spectrum.taken(chosen))
+        if other.behind is not None:
+            other.behind = other.behind.taken(chosen)
         other.columns = {letter: self.column(letter)[chosen] for letter in "NFK"}
         other.table = np.ascontiguousarray(self.table[:, chosen])
         return other
@@ -155,7 +190,12 @@ class Whittle:
                 "F": self.shape_of.flicker,
                 "K": self.shape_of.random_walk,
             }
-            self.columns[letter] = make[letter]()
+            shape = make[letter]()
+            if self.behind is not None and letter == "N":
+                shape = self.behind.white
+            elif self.behind is not None and letter in "FK":
+                shape = shape * (self.behind.flicker if letter == "F" else self.behind.slow)
+            self.columns[letter] = shape
         return self.columns[letter]
 
     def gauss_markov(self, time: float) -> Array:
@@ -249,7 +289,14 @@ class Whittle:
         return np.asarray(sensitivity @ sensitivity.T)
 
 
-def whittle_of(spectrum: Spectrum, highest: float, shapes: int = SHAPES) -> Whittle:
+def whittle_of(
+    spectrum: Spectrum,
+    highest: float,
+    shapes: int = SHAPES,
+    *,
+    shortest: float | None = None,
+    behind: Behind | None = None,
+) -> Whittle:
     """Return the likelihood of a spectrum, with the correlation times that it can show.
 
     Parameters
@@ -260,7 +307,32 @@ def whittle_of(spectrum: Spectrum, highest: float, shapes: int = SHAPES) -> Whit
         Frequency up to which they reach, Hz.
     shapes : int
         Correlation times to tabulate.
+    shortest : float, optional
+        Shortest correlation time, s; by default twenty sampling intervals.
+    behind : Behind, optional
+        The sensor's low-pass, in these bins.
     """
     longest = _LONGEST_CORRELATION * float(spectrum.length.max())
-    shortest = max(_SHORTEST_CORRELATION / spectrum.rate, 1.0 / (np.pi * highest))
-    return Whittle(spectrum, min(shortest, longest / 4.0), longest, shapes)
+    least = _SHORTEST_CORRELATION / spectrum.rate if shortest is None else shortest
+    least = max(least, 1.0 / (np.pi * highest))
+    return Whittle(spectrum, min(least, longest / 4.0), longest, shapes, behind)
+
+
+def model_of(found: Maximum) -> NoiseModel:
+    """Return the noise model of a fit; flicker noise comes first, then processes by T_B."""
+    terms = found.terms
+    values = {letter: found.parameter(letter) for letter in terms.linear}
+    processes = [
+        GaussMarkov(float(B), float(time))
+        for B, time in zip(found.biases, found.times, strict=True)
+    ]
+    first = None if "F" in values or not processes else processes.pop(0)
+    return NoiseModel(
+        Q=values.get("Q", 0.0),
+        N=values.get("N", 0.0),
+        B=values.get("F", first.B if first else 0.0),
+        T_B=first.T_B if first else None,
+        K=values.get("K", 0.0),
+        R=found.ramp,
+        further=[process for process in processes if process.B > 0],
+    )

@@ -28,12 +28,16 @@ class AxisNoise:
         What a reader must know of single parameters: not identified, absent, and what was done.
     least_walk : float or None
         Upper limit of K, where K is absent: what stands in a program that needs a random walk.
+    bounded : tuple of float, or None
+        Lowest and highest frequency, Hz, between which the model is above the spectral density:
+        of an overbound. None: it is no bound.
     """
 
     model: NoiseModel
     origin: str
     notes: Sequence[str] = ()
     least_walk: float | None = None
+    bounded: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

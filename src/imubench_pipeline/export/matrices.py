@@ -146,6 +146,7 @@ def write_json(imu: Imu) -> str:
             "model": axis.model.name,
             "unit": {"gyro": "rad/s", "accel": "m/s^2"}[name],
             "parameters": _parameters(axis.model),
+            "density_bounded": list(axis.bounded) if axis.bounded else None,
             "states": list(found.states),
             "continuous": {
                 "F": found.F.tolist(),
@@ -185,6 +186,8 @@ def write_npz(imu: Imu) -> bytes:
     arrays: dict[str, Array] = {"rate": np.array(imu.rate), "horizon": np.array(imu.horizon)}
     for name, axis in imu.axes.items():
         found = matrices(axis.model, imu.rate, imu.horizon)
+        if axis.bounded:
+            arrays[f"{name}_density_bounded"] = np.array(axis.bounded)
         for key in ("F", "Q", "H_continuous", "R", "Phi", "Q_d", "H", "R_d", "x0", "P0"):
             arrays[f"{name}_{key}"] = np.asarray(getattr(found, key))
     about = np.array(heading(imu, "any Kalman filter", _CONVENTION.format(rate=imu.rate)))

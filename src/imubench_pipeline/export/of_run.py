@@ -41,6 +41,7 @@ def exports(tables: Tables, settings: ExportSettings) -> Iterator[tuple[Path, st
                 inflation=settings.inflation,
                 because=settings.because,
                 overbound=settings.overbound,
+                most_excess=settings.most_excess,
             )
             try:
                 content = made(tables, request)

@@ -16,7 +16,8 @@ from imubench_pipeline.export.choice import WORST, Choice, choose, devices_of
 from imubench_pipeline.export.imu import AxisNoise, ExportError, Imu, normal_gravity
 from imubench_pipeline.export.mapping import named
 from imubench_pipeline.export.targets import TARGETS
-from imubench_pipeline.overbound import Family, overbound
+from imubench_pipeline.overbound import MOST_EXCESS, overbound
+from imubench_pipeline.smallest_model import FAMILIES, Family
 from imubench_pipeline.tables import read
 from imubench_pipeline.units import STANDARD_GRAVITY
 
@@ -42,6 +43,9 @@ class Request:
         Reason of the inflation.
     overbound : bool
         The smallest model that lies above the measured curve, in place of the fitted one.
+    most_excess : float
+        Largest Allan deviation of an overbound over the limit that it must lie above: a model that
+        is larger is refused.
     method : str or None
         Estimation method; None: the recommended one.
     latitude : float or None
@@ -57,6 +61,7 @@ class Request:
     inflation: float = 1.0
     because: str | None = None
     overbound: bool = False
+    most_excess: float = MOST_EXCESS
     method: str | None = None
     latitude: float | None = None
     rate: float | None = None
@@ -159,11 +164,40 @@ def _bounded(
         _rows(allan, sensor=request.sensor, recording=choice.recording, channel=choice.channel)
     )
     try:
-        found = overbound(curve, choice.axis.model, rate, family=family, horizon=request.horizon)
+        found = overbound(
+            curve,
+            choice.axis.model,
+            rate,
+            family=family,
+            horizon=request.horizon,
+            most_excess=request.most_excess,
+        )
     except ValueError as error:
-        raise ExportError(f"{choice.channel} of {choice.recording}: {error}") from error
+        raise ExportError(
+            f"{choice.channel} of {choice.recording}: {error}{_ways_out(family, request)}"
+        ) from error
     fitted = f"the fitted model was: {named(choice.axis.model.terms)}"
-    return replace(choice.axis, model=found.model, notes=[found.words, fitted, *choice.axis.notes])
+    notes = [found.words, found.density_words, fitted, *choice.axis.notes]
+    if found.warning:
+        notes.insert(0, f"WARNING: {found.warning}{_holding(family)}")
+    return replace(choice.axis, model=found.model, notes=notes, bounded=found.band)
+
+
+def _holding(family: Family) -> str:
+    """Name the programs that hold more terms than a family has."""
+    kinds = {
+        other: ", ".join(name for name, one in TARGETS.items() if one.family == other)
+        for other in FAMILIES
+        if set(other.split("+")) - set(family.split("+"))
+    }
+    return "".join(f"; {other} is held by {names}" for other, names in kinds.items() if names)
+
+
+def _ways_out(family: Family, request: Request) -> str:
+    return (
+        f"{_holding(family)}; or take a horizon shorter than {request.horizon:g} s, or the fitted "
+        "model without overbound, or allow a larger excess"
+    )
 
 
 def curve_of(rows: list[dict[str, Any]]) -> AllanCurve:

@@ -11,16 +11,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.estimators import likelihood
 from imubench_pipeline.estimators.estimate import Parameter
+from imubench_pipeline.estimators.frame import Frame, frame_of
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.model_choice import Candidate, compare
-from imubench_pipeline.estimators.whittle import Whittle, whittle_of
+from imubench_pipeline.estimators.whittle import Whittle, model_of
 from imubench_pipeline.missing import block_means, divided
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.spectrum import LineSpectrum, Spectrum, block_of, spectra
@@ -37,7 +38,6 @@ Array = NDArray[np.float64]
 
 _MOST_ROUNDS = 10
 _SETTLED = 0.02
-_QUANTIZATION_BAND = 1 / 10
 _SETTLING = (1 / 64, 1 / 32, 1 / 16)
 """Parts of the log at its beginning in which a sensor may settle."""
 
@@ -63,6 +63,7 @@ def fit_temperature(
     holes: bool = False,
     band: float | None = None,
     bandwidth: float | None = None,
+    resolution: float = 0.0,
     quadratic: bool | None = None,
     longest_lag: float | None = None,
     plain: Likelihood | None = None,
@@ -82,7 +83,7 @@ def fit_temperature(
         Temperature of the log; its segments are those of the log.
     holes : bool
         Samples may be missing.
-    band, bandwidth : float, optional
+    band, bandwidth, resolution : float, optional
         As in `imubench_pipeline.estimators.likelihood.fit`.
     quadratic : bool, optional
         Whether the square of the temperature is in the model; by default where the log favours
@@ -109,6 +110,13 @@ def fit_temperature(
     when block sizes are unequal", Biometrika 58, 1971.
     """
     spans = path.segments
+    find_frame = partial(frame_of, band=band, bandwidth=bandwidth, resolution=resolution)
+
+    def frame(spectrum: Spectrum, lines: list[LineSpectrum]) -> Frame:
+        if plain is not None and len(plain.frame.used) == len(spectrum.frequency):
+            return plain.frame
+        return find_frame(spectrum, lines)
+
     varies = path.range > 0.0 and path.range >= 2.0 * float(np.median(path.deviation))
     if holes:
         means = block_means(blocks(), spans)
@@ -121,21 +129,20 @@ def fit_temperature(
             segments=path.segments,
             band=band,
             bandwidth=bandwidth,
+            resolution=resolution,
             rng=rng,
         )
         model, effect = plain.estimates[0].model, np.zeros(len(path.value))
         for _ in range(2):
             log = complete(blocks, spans, model, path, effect, rate, rng)
-            fit = _Fit(log, samples, rate, spans, path, band, bandwidth, longest_lag)
+            fit = _Fit(log, samples, rate, spans, path, frame, longest_lag)
             if not (fit.possible and varies):
                 break
             found = fit.settle(quadratic)
             model, effect = _model_of(found), found.regressors.effect(found.regression)
     else:
-        fit = _Fit(blocks(), samples, rate, spans, path, band, bandwidth, longest_lag)
-        plain = plain or likelihood.fit_spectrum(
-            fit.spectrum, fit.lines, band=band, bandwidth=bandwidth, rng=rng
-        )
+        fit = _Fit(blocks(), samples, rate, spans, path, frame, longest_lag)
+        plain = plain or likelihood.fit_spectrum(fit.spectrum, fit.frame, rng=rng)
     if not fit.possible:
         return _nothing(plain, path, fit, "too short a log")
     if not varies:
@@ -162,7 +169,7 @@ def fit_temperature(
             verdict = replace(fit.judged(found, rng), compensated=True, reason=verdict.reason)
             left, lines = spectra_left()
             fit.take_fast(left)
-    return _described(fit, found, verdict, plain, path, lines, band, bandwidth, rng)
+    return _described(fit, found, verdict, plain, path, lines, find_frame, rng)
 
 
 @dataclass(frozen=True)
@@ -186,8 +193,7 @@ class _Fit:
         rate: float,
         spans: Sequence[Span],
         path: TemperaturePath,
-        band: float | None,
-        bandwidth: float | None,
+        frame: Callable[[Spectrum, list[LineSpectrum]], Frame],
         longest_lag: float | None,
     ) -> None:
         series = BlockSeries(spans, block_of(spans))
@@ -195,15 +201,14 @@ class _Fit:
         self.lines: list[LineSpectrum]
         self.spectrum, self.lines = spectra(series.watch(blocks), samples, rate, spans)
         self.series = series
-        _, _, self.used, limit = likelihood.lines_and_band(
-            self.spectrum, self.lines, band, bandwidth
-        )
+        self.frame = frame(self.spectrum, self.lines)
+        self.used = self.frame.used
         self.possible = bool(self.used.sum() >= _FEWEST_BINS)
         if not self.possible:
             return
         self.chosen = self.spectrum.taken(self.used)
-        self.whittle = whittle_of(self.chosen, limit.highest)
-        self.quantization = limit.highest >= _QUANTIZATION_BAND * rate
+        self.whittle = self.frame.whittle(self.spectrum)
+        self.quantization = self.frame.shows_quantization(rate)
         self.regressors = Regressors(
             Coefficients(self.spectrum, series), path, rate, path.mean, self.used
         )
@@ -334,7 +339,7 @@ def _error(found: _Found) -> float:
 
 
 def _model_of(found: _Found) -> NoiseModel:
-    return likelihood.model_of(found.candidates[0].found)
+    return model_of(found.candidates[0].found)
 
 
 def _described(
@@ -344,8 +349,7 @@ def _described(
     plain: Likelihood,
     path: TemperaturePath,
     lines: list[LineSpectrum],
-    band: float | None,
-    bandwidth: float | None,
+    find_frame: Callable[[Spectrum, list[LineSpectrum]], Frame],
     rng: np.random.Generator,
 ) -> ThermalFit:
     """Return the fit as it is told, with the noise that temperature leaves.
@@ -360,7 +364,7 @@ def _described(
         weights[fit.used] = fit.chosen.ordinates / found.whittle.density(found.candidates[0].found)
         left = regressors.without(fit.spectrum, found.regression, weights)
         effect = regressors.effect(found.regression)
-        without = likelihood.fit_spectrum(left, lines, band=band, bandwidth=bandwidth, rng=rng)
+        without = likelihood.fit_spectrum(left, find_frame(left, lines), rng=rng)
     added = [path.means(*place, effect) for place in fit.series.places]
     shift = float(np.concatenate(added).mean())
     candidates = found.candidates if verdict.compensated else fit.of_the_log
@@ -368,7 +372,7 @@ def _described(
     noises = [
         (with_likely_walk(model, K) if "K" in one.found.terms.linear else model, share)
         for one, share in shares(candidates)
-        for model in [likelihood.model_of(one.found)]
+        for model in [model_of(one.found)]
     ]
     # T_0 is as uncertain as the mean of the path.
     of_reference = float(np.std(path.draws.mean(axis=1))) * (verdict.sensitivity.in_model or 0.0)

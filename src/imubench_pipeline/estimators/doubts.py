@@ -1,0 +1,208 @@
+"""What is wrong with a fit, and which of its values may be wrong for that."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.estimators.estimate import Estimate, Parameter, Status
+from imubench_pipeline.estimators.frame import Frame
+from imubench_pipeline.estimators.model_choice import Candidate
+from imubench_pipeline.spectrum import Spectrum
+
+Array = NDArray[np.float64]
+
+_WORSE = 6.0
+"""BIC by which the papers' model must be the worse for the data to be against it."""
+
+_AS_FAST = 10.0
+"""Sampling intervals: a process as fast may be the sensor's filter."""
+
+_AT_LEAST = 0.5
+"""Part of N that the least density beyond the band must leave for N to be told."""
+
+_GROUP = 4
+_PLATEAU = 1.5
+"""Upper over lower end of a stretch beyond the band that shows white noise of its own."""
+
+_BELOW = 0.7
+"""Part of N^2 below which it is another density."""
+
+
+def doubted(
+    estimate: Estimate,
+    papers: Estimate,
+    spectrum: Spectrum,
+    frame: Frame,
+    candidates: Sequence[Candidate],
+    papers_candidate: Candidate,
+    fitted: Array,
+) -> tuple[Estimate, Estimate]:
+    """Return the two estimates of a likelihood with their doubts.
+
+    Parameters
+    ----------
+    estimate, papers : Estimate
+        Of the model that the data favour, and of the papers' model.
+    spectrum : Spectrum
+    frame : Frame
+        What of it was fitted.
+    candidates : sequence of Candidate
+        The best first.
+    papers_candidate : Candidate
+        The papers' model among them.
+    fitted : ndarray, shape (b,)
+        Density of the chosen model in every bin.
+    """
+    chosen = candidates[0]
+    doubt = _of_white_noise(spectrum, frame, chosen, fitted)
+    if doubt is not None:
+        estimate, papers = (_with_unknown_white_noise(one, *doubt) for one in (estimate, papers))
+    if frame.cut:
+        estimate, papers = (
+            _with_doubt_of_the_cut(one, spectrum, frame) for one in (estimate, papers)
+        )
+    against = papers_candidate.bic - chosen.bic
+    if against > _WORSE:
+        reason = (
+            f"the data favour {chosen.found.terms.name} over {papers_candidate.found.terms.name} "
+            f"by {against:.1f} in BIC"
+        )
+        papers = doubting(papers, ("B", "T_B", "K"), reason)
+    return estimate, papers
+
+
+def doubting(estimate: Estimate, names: Sequence[str], reason: str) -> Estimate:
+    """Return an estimate whose values of some parameters are doubtful.
+
+    Parameters
+    ----------
+    estimate : Estimate
+    names : sequence of str
+        Of its parameters; what has no plain value stays as it is.
+    reason : str
+    """
+    parameters = {
+        name: replace(one, status="doubtful", reason=reason)
+        if name in names and one.status == "ok"
+        else one
+        for name, one in estimate.parameters.items()
+    }
+    further = [
+        {
+            name: replace(one, status="doubtful", reason=reason)
+            if name in names and one.status == "ok"
+            else one
+            for name, one in group.items()
+        }
+        for group in estimate.further
+    ]
+    return replace(estimate, parameters=parameters, further=further)
+
+
+def _of_white_noise(
+    spectrum: Spectrum, frame: Frame, chosen: Candidate, fitted: Array
+) -> tuple[str, float, float] | None:
+    """Return why N is not told, and between which values it lies; None where it is."""
+    found = chosen.found
+    if "N" not in found.terms.linear or frame.low_pass is None:
+        return None
+    N = found.parameter("N")
+    if frame.low_pass.or_process is not None and frame.low_pass.N_behind is not None:
+        return frame.low_pass.or_process, *_range(N, frame.low_pass.N_behind)
+    fast = found.times < _AS_FAST / spectrum.rate
+    if fast.any() and frame.low_pass.behind is None:
+        power = found.powers[len(found.terms.linear) :][fast]
+        shapes = [frame.whole(spectrum).gauss_markov(float(time))[0] for time in found.times[fast]]
+        before = math.sqrt(N**2 + float(power @ np.array(shapes)))
+        time = float(found.times[fast].max())
+        reason = (
+            f"a process of T_B = {time:.3g} s, a few samples, may be the sensor's low-pass with "
+            "white noise behind it; bandwidth in the sensor file would tell"
+        )
+        return reason, *_range(N, before)
+    level = _other_level(spectrum, frame, N)
+    if level is not None:
+        reason = (
+            f"beyond {frame.band.highest:.4g} Hz, where no model follows the spectrum, it is flat "
+            "at another level: which of the two is white noise, and which a process, is not told"
+        )
+        return reason, *_range(N, level)
+    return None
+
+
+def _with_doubt_of_the_cut(estimate: Estimate, spectrum: Spectrum, frame: Frame) -> Estimate:
+    """Return an estimate from which frequencies were left out: what is there is not known.
+
+    What is white noise in the band may be a process that falls beyond it, down to the least
+    density there: N lies between the two.
+    """
+    highest = frame.band.highest
+    reason = f"beyond {highest:.4g} Hz neither a process nor a low-pass explains the spectrum"
+    N, B = estimate.parameters["N"], estimate.parameters["B"]
+    least = _least_beyond(spectrum, frame)
+    if N.value is not None and N.lower is not None and least is not None:
+        told = f"{reason}, and the density falls to {(least / N.value) ** 2:.2g} of that below"
+        lower = min(N.lower, least)
+        status: Status = "ok" if least > _AT_LEAST * N.value else "doubtful"
+        N = replace(N, lower=lower, status=status, reason=told)
+    if B.status == "absent":
+        unseen = f"{reason}: a process that is faster would not be seen"
+        B = replace(B, status="not_identified", reason=unseen, lower=None, upper=None)
+    return replace(estimate, parameters={**estimate.parameters, "N": N, "B": B})
+
+
+def _least_beyond(spectrum: Spectrum, frame: Frame) -> float | None:
+    """Return the root of the least density beyond the band, over a few bins."""
+    part = spectrum.taken(frame.clear & (spectrum.lower >= frame.band.highest * (1.0 - 1e-9)))
+    if len(part.density) < _GROUP:
+        return None
+    ones = np.ones(_GROUP)
+    mean = np.convolve(part.density * part.ordinates, ones, "valid") / np.convolve(
+        part.ordinates, ones, "valid"
+    )
+    return math.sqrt(float(mean.min()))
+
+
+def _range(first: float, second: float) -> tuple[float, float]:
+    return min(first, second), max(first, second)
+
+
+def _other_level(spectrum: Spectrum, frame: Frame, N: float) -> float | None:
+    """Return the density of a flat stretch beyond the band, if there is one well below N^2."""
+    beyond = frame.clear & (spectrum.lower > frame.band.highest)
+    if beyond.sum() < 4 or N == 0.0:
+        return None
+    part = spectrum.taken(beyond)
+    top = part.taken(part.frequency > part.frequency[-1] / _PLATEAU)
+    low = top.frequency < math.sqrt(top.frequency[0] * top.frequency[-1])
+    if not low.any() or low.all():
+        return None
+    halves = [
+        float(np.average(top.density[one], weights=top.ordinates[one])) for one in (low, ~low)
+    ]
+    level = float(np.average(top.density, weights=top.ordinates))
+    flat = abs(halves[0] / halves[1] - 1.0) < 0.1
+    return math.sqrt(level) if flat and level < _BELOW * N**2 else None
+
+
+def _with_unknown_white_noise(
+    estimate: Estimate, reason: str, lower: float, upper: float
+) -> Estimate:
+    """Return an estimate whose N is only known to lie between two values."""
+    old = estimate.parameters["N"]
+    ends = [end for end in (old.lower, old.upper, lower, upper) if end is not None]
+    N = Parameter(
+        None,
+        "not_identified",
+        reason,
+        min(ends),
+        max(ends),
+        old.duration_needed,
+        old.in_model,
+    )
+    return replace(estimate, parameters={**estimate.parameters, "N": N})

@@ -1,0 +1,208 @@
+"""What of a spectrum is fitted, and behind what: lines apart, the sensor's low-pass, the band.
+
+Noise alone and noise behind a low-pass are decided together, by likelihood over the whole spectrum
+(`imubench_pipeline.cutoff`). Frequencies are left out only where neither explains them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.cutoff import PROCESSES, Cutoff, find_cutoff, refined
+from imubench_pipeline.estimators.band import Band, find_band
+from imubench_pipeline.estimators.lines import Line, find, without_lines
+from imubench_pipeline.estimators.whittle import (
+    COARSE,
+    SHAPES,
+    Terms,
+    Whittle,
+    model_of,
+    whittle_of,
+)
+from imubench_pipeline.spectrum import LineSpectrum, Spectrum
+
+Mask = NDArray[np.bool_]
+
+_FOR_LINES = 0.05
+"""Part of the rate below which a model is fitted that lines stand out of."""
+
+_TO_NYQUIST = "found: the spectrum follows its model up to Nyquist"
+
+_FASTEST = 3.0
+"""Sampling intervals: shortest correlation of a process where longer ones explain nothing."""
+
+_APART = 60.0
+"""Correlation time of a process over that of a filter beyond which each has its own bend."""
+
+_QUANTIZATION_BAND = 1 / 10
+"""Part of the rate that the band must reach for quantization noise to show."""
+
+FEWEST_BINS = 20
+"""The papers' model can be fitted to so many, and to spare."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What of a spectrum is fitted.
+
+    Attributes
+    ----------
+    lines : sequence of Line
+    clear, used : ndarray of bool, shape (b,)
+        The bins clear of lines, and those of them that are fitted.
+    band : Band
+        Highest frequency that is fitted, and why.
+    low_pass : Cutoff or None
+        The sensor's low-pass; None where a band is asked for, which is taken as it is.
+    shortest : float or None
+        Shortest correlation time of a process, s; None: as `whittle_of` has it.
+    cut : bool
+        Frequencies are left out that neither a process nor a filter explains.
+    """
+
+    lines: Sequence[Line]
+    clear: Mask
+    used: Mask
+    band: Band
+    low_pass: Cutoff | None = None
+    shortest: float | None = None
+    cut: bool = False
+
+    def whittle(self, spectrum: Spectrum, shapes: int = SHAPES) -> Whittle:
+        """Return the likelihood of the bins that are fitted."""
+        return self._whittle(spectrum, self.used, shapes)
+
+    def whole(self, spectrum: Spectrum) -> Whittle:
+        """Return that of all bins, to carry a fit on to those that are not."""
+        return self._whittle(spectrum, np.ones(len(self.used), dtype=np.bool_), COARSE)
+
+    def _whittle(self, spectrum: Spectrum, bins: Mask, shapes: int) -> Whittle:
+        behind = self.low_pass.behind if self.low_pass is not None else None
+        return whittle_of(
+            spectrum.taken(bins),
+            self.band.highest,
+            shapes,
+            shortest=self.shortest,
+            behind=behind.taken(bins) if behind is not None else None,
+        )
+
+    def shares_its_bend(self, times: NDArray[np.float64]) -> bool:
+        """Return whether a process is as fast as the low-pass, or nearly.
+
+        Parameters
+        ----------
+        times : ndarray, shape (g,)
+            T_B of each process, s.
+        """
+        if self.low_pass is None or self.low_pass.behind is None or not len(times):
+            return False
+        cutoff = self.low_pass.frequency.in_model or np.inf
+        return bool(times.min() < _APART / (2.0 * np.pi * cutoff))
+
+    def refined(self, spectrum: Spectrum, terms: Terms) -> Frame:
+        """Return the same behind a low-pass that is fitted together with a model."""
+        if self.low_pass is None:
+            return self
+        low_pass = refined(self.low_pass, spectrum, self.used, terms)
+        source = self.band.source.replace(self.low_pass.words, low_pass.words)
+        return replace(self, low_pass=low_pass, band=replace(self.band, source=source))
+
+    def shows_quantization(self, rate: float) -> bool:
+        """Return whether quantization noise would show: no filter in front, and high enough."""
+        behind = self.low_pass is not None and self.low_pass.behind is not None
+        return not behind and self.band.highest >= _QUANTIZATION_BAND * rate
+
+    def with_fast_processes(self, rate: float) -> Frame:
+        """Return the whole spectrum behind no filter, with processes of a few samples."""
+        return replace(
+            self,
+            used=self.clear,
+            band=Band(0.5 * rate, _TO_NYQUIST),
+            low_pass=_none(self.low_pass),
+            shortest=_FASTEST / rate,
+        )
+
+    def limited(self, spectrum: Spectrum) -> Frame:
+        """Return the frequencies that no filter bends, behind none: where nothing explains all."""
+        band = find_band(spectrum, self.clear)
+        used = self.clear & (spectrum.upper <= band.highest * (1.0 + 1e-9))
+        cut = band.highest < 0.5 * spectrum.rate
+        return Frame(self.lines, self.clear, used, band, _none(self.low_pass), cut=cut)
+
+
+def _none(low_pass: Cutoff | None) -> Cutoff | None:
+    """Return a low-pass that is told, and not fitted behind."""
+    return None if low_pass is None else replace(low_pass, behind=None, readings=())
+
+
+def frame_of(
+    spectrum: Spectrum,
+    line_spectra: Sequence[LineSpectrum],
+    *,
+    band: float | None = None,
+    bandwidth: float | None = None,
+    resolution: float = 0.0,
+) -> Frame:
+    """Find the lines of a spectrum and the sensor's low-pass.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+    line_spectra : sequence of LineSpectrum
+        As `imubench_pipeline.spectrum.spectra` gives them.
+    band : float, optional
+        Highest frequency to use, Hz; by default all are used, behind the low-pass that shows.
+    bandwidth : float, optional
+        Cut-off of the sensor's own filter, where it is stated, Hz.
+    resolution : float
+        Step of the register, SI; 0 where none shows.
+
+    Returns
+    -------
+    Frame
+    """
+    lines, clear = _lines(spectrum, line_spectra, band)
+    nyquist = 0.5 * spectrum.rate
+    if band is not None:
+        limit = find_band(spectrum, clear, asked=band)
+        used = clear & (spectrum.upper <= limit.highest * (1.0 + 1e-9))
+        return Frame(lines, clear, used, limit)
+    low_pass = find_cutoff(spectrum, clear, resolution=resolution, stated=bandwidth)
+    if low_pass.or_quantization:
+        low_pass = replace(low_pass, behind=None, readings=())
+    used, source = clear, _TO_NYQUIST
+    if low_pass.behind is not None and low_pass.ruled is not None:
+        used = clear & ~low_pass.ruled
+        source = f"found: behind a {low_pass.words}, {source.removeprefix('found: ')}"
+    highest = nyquist
+    if used.any() and not used[clear][-1]:
+        highest = float(spectrum.upper[used].max())
+        source = (
+            f"{source.removesuffix(' up to Nyquist')} up to {highest:.4g} Hz; beyond, the filter "
+            "leaves nothing of it"
+        )
+    shortest = PROCESSES / spectrum.rate
+    return Frame(lines, clear, used, Band(highest, source), low_pass, shortest)
+
+
+def _lines(
+    spectrum: Spectrum, line_spectra: Sequence[LineSpectrum], band: float | None
+) -> tuple[list[Line], Mask]:
+    """Return the lines, and the bins clear of them."""
+    everything = np.ones(len(spectrum.frequency), dtype=np.bool_)
+    start = min(band or np.inf, _FOR_LINES * spectrum.rate)
+    below = spectrum.upper <= start
+    if below.sum() < FEWEST_BINS:
+        below = everything
+    found = whittle_of(spectrum.taken(below), start, COARSE).maximum(Terms("NFK", 1))
+    low = spectrum.block > 1
+    crossover = float(spectrum.upper[low].max()) if low.any() else 0.0
+    lines = find(line_spectra, model_of(found), spectrum.rate, crossover)
+    if not lines:
+        return lines, everything
+    density = whittle_of(spectrum, 0.5 * spectrum.rate, COARSE).density(found)
+    return lines, without_lines(spectrum, lines, density)
