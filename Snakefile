@@ -5,8 +5,9 @@ import gc
 import os
 from itertools import chain
 
+from imubench_pipeline.bounded_steps import BoundedSteps
 from imubench_pipeline.plan import Plan
-from imubench_pipeline.resources import asked
+from imubench_pipeline.resources import asked, time_limits
 from imubench_pipeline.schemas import (
     CALIBRATED,
     COMPARED,
@@ -34,7 +35,8 @@ try:
 except ConfigError as error:
     raise WorkflowError(str(error)) from None
 
-steps = Steps(Path(workflow.basedir) / "workflow/scripts")
+scripts = Steps(Path(workflow.basedir) / "workflow/scripts")
+steps = BoundedSteps(scripts, plan, time_limits(plan))
 ASKED = asked(plan)  # memory and time on a cluster
 RESULTS = str(plan.run.results)
 FOLDER = RESULTS + "/recordings/{sensor}/{recording}"
@@ -181,6 +183,7 @@ rule ingest:
         source=lambda w: str(plan.recordings[w.sensor, w.recording].path),
         settings=lambda w: plan.ingest_settings(w.sensor, w.recording),
         code=plan.code("ingest"),
+        attempt=lambda w: plan.attempt("ingest", w.sensor, w.recording),
     run:
         steps.run("ingest", input, output, params, wildcards)
 
@@ -199,6 +202,7 @@ rule allan:
     params:
         settings=plan.settings("allan"),
         code=plan.code("allan"),
+        attempt=lambda w: plan.attempt("allan", w.sensor, w.recording),
     run:
         steps.run("allan", input, output, params, wildcards)
 
@@ -216,6 +220,7 @@ rule estimate:
     params:
         settings=lambda w: plan.estimate_settings(w.sensor, w.recording),
         code=plan.code("estimate"),
+        attempt=lambda w: plan.attempt("estimate", w.sensor, w.recording),
     run:
         steps.run("estimate", input, output, params, wildcards)
 
@@ -236,6 +241,7 @@ rule reconstruct:
     params:
         settings=plan.settings("reconstruction"),
         code=plan.code("reconstruct"),
+        attempt=lambda w: plan.attempt("reconstruct", w.sensor, w.recording),
     run:
         steps.run("reconstruct", input, output, params, wildcards)
 
@@ -256,6 +262,7 @@ rule datasheet:
     params:
         settings=lambda w: plan.datasheet_settings(w.sensor),
         code=plan.code("datasheet"),
+        attempt=lambda w: plan.attempt("datasheet", w.sensor, w.recording),
     run:
         steps.run("datasheet", input, output, params, wildcards)
 
@@ -273,6 +280,7 @@ rule error_budget:
     params:
         settings=plan.error_budget_settings(),
         code=plan.code("error_budget"),
+        attempt=lambda w: plan.attempt("error_budget", w.sensor, w.recording),
     run:
         steps.run("error_budget", input, output, params, wildcards)
 
@@ -290,6 +298,7 @@ rule earth_rotation:
     params:
         settings=lambda w: plan.experiment_settings(w.sensor, w.recording),
         code=plan.code("earth_rotation"),
+        attempt=lambda w: plan.attempt("earth_rotation", w.sensor, w.recording),
     run:
         steps.run("earth_rotation", input, output, params, wildcards)
 
@@ -306,6 +315,7 @@ rule calibration:
     params:
         settings=lambda w: plan.experiment_settings(w.sensor, w.recording),
         code=plan.code("calibration"),
+        attempt=lambda w: plan.attempt("calibration", w.sensor, w.recording),
     run:
         steps.run("calibration", input, output, params, wildcards)
 
@@ -323,6 +333,7 @@ rule outlook:
     params:
         settings=lambda w: plan.outlook_settings(w.sensor),
         code=plan.code("outlook"),
+        attempt=lambda w: plan.attempt("outlook", w.sensor),
     run:
         steps.run("outlook", input, output, params, wildcards)
 
@@ -341,6 +352,7 @@ rule sensor_tables:
         truths=lambda w: plan.truths(w.sensor),
         catalogue=plan.catalogue(),
         code=plan.code("sensor_tables"),
+        attempt=lambda w: plan.attempt("sensor_tables", w.sensor),
     run:
         steps.run("sensor_tables", input, output, params, wildcards)
 
@@ -491,11 +503,18 @@ onstart:
     follow()
 
 
+# Tables are read at the end of a run alone: a run should begin at once.
 onsuccess:
-    print(plan.summary())
+    from imubench_pipeline.run_summary import summary
+
+    print(summary(plan.run.results))
+    if left_out := plan.faults.left_out():
+        raise WorkflowError(left_out)
 
 
 onerror:
     import sys
 
-    print(plan.failure(log), file=sys.stderr)
+    from imubench_pipeline.run_summary import failure
+
+    print(failure(log, plan.run.results), file=sys.stderr)

@@ -430,7 +430,15 @@ def standing(sensor: str, verdict: str = "passes", margin: float = 2.0) -> dict[
 def state(
     folder: Path, logs: dict[str, int], **rows: list[dict[str, Any]]
 ) -> tuple[State, dict[str, Any]]:
-    for name in ("recordings", "parameters", "fixed_bias", "findings", "drift", "ranking"):
+    for name in (
+        "recordings",
+        "parameters",
+        "fixed_bias",
+        "failures",
+        "findings",
+        "drift",
+        "ranking",
+    ):
         write(name, rows.get(name, []), folder / f"tables/{name}.parquet")
     tables = load_tables(folder)
     signatures = {f"s/{name}": ((f"{name}.csv", size, 0),) for name, size in logs.items()}
@@ -465,6 +473,7 @@ def test_what_is_known_is_fine(tmp_path: Path) -> None:
         "findings": [finding("a", "knocks")],
         "drift": [drift("a", "changed")],
         "ranking": [standing("s")],
+        "failures": [],
     }
     before, _ = state(tmp_path, {"a": 1, "b": 1}, **rows)
     before.write(tmp_path / "state.json")

@@ -5,7 +5,6 @@ from typing import Any
 
 import pytest
 
-from imubench_pipeline.plan import Plan
 from imubench_pipeline.run_summary import failure, leaders, one_line, summary, warnings
 from imubench_pipeline.tables import write
 
@@ -29,7 +28,7 @@ def standing(sensor: str, **values: object) -> dict[str, Any]:
 
 
 def said(folder: Path, **rows: list[dict[str, Any]]) -> list[str]:
-    for name in ("recordings", "findings", "ranking"):
+    for name in ("recordings", "findings", "ranking", "failures"):
         write(name, rows.get(name, []), folder / f"tables/{name}.parquet")
     return summary(folder).splitlines()
 
@@ -197,15 +196,3 @@ def test_a_job_of_several_steps_is_named_with_its_last_log(tmp_path: Path) -> No
     )
     lines = failure([str(log)], Path("out")).splitlines()
     assert lines[:2] == ["1 step failed; why stands above", "  ranking or report (2.log)"]
-
-
-def test_a_plan_says_both(tmp_path: Path) -> None:
-    (tmp_path / "sensors").mkdir()
-    (tmp_path / "logs").mkdir()
-    plan = Plan(
-        {"logs": str(tmp_path / "logs"), "sensors": str(tmp_path / "sensors"),
-         "results": str(tmp_path), "simulated": "false"}
-    )  # fmt: skip
-    said(tmp_path, recordings=[recording("a")])
-    assert plan.summary().startswith("1 recording analysed, 0 rejected\n")
-    assert plan.failure([]).startswith("a step failed; why stands above\n")

@@ -73,6 +73,7 @@ def results(tmp_path: Path) -> Path:
              "detail": "twice"},
         ],
         "ranking": RANKING,
+        "failures": [],
         "parameters": PARAMETERS,
     }  # fmt: skip
     for name, table in rows.items():
@@ -216,7 +217,7 @@ def test_results_without_tables_say_what_is_missing(
     results: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     said = refused(capsys, results / "nowhere")
-    assert "no table recordings, findings, ranking, parameters" in said
+    assert "no table recordings, findings, failures, ranking, parameters" in said
     assert "expected the folder of the results" in said and "`snakemake -c2` makes it" in said
     (results / "tables/ranking.parquet").write_bytes(b"")
     assert "`snakemake -c2` makes the tables again" in refused(capsys, results)

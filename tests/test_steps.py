@@ -207,3 +207,40 @@ def test_a_script_can_be_told_by_its_name_and_outlives_the_process_that_forked_i
         assert psutil.Process(script).name() == "wait"
         os.kill(server, signal.SIGKILL)
         running.result(timeout=10)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the system ends a fork on Linux alone")
+def test_a_script_that_runs_past_its_time_is_ended(steps: Steps, tmp_path: Path) -> None:
+    put(tmp_path, "wait", WAIT)
+    with pytest.raises(StepError, match=r"^wait.py ran for longer than 0.5 s$") as caught:
+        steps.run("wait", [], [str(tmp_path / "out")], {}, {"sensor": "s"}, seconds=0.5)
+    assert caught.value.cause == "time"
+    _, script = map(int, (tmp_path / "out").read_text().split())
+    assert not psutil.pid_exists(script)
+
+
+@pytest.mark.parametrize(
+    ("text", "cause", "reason"),
+    [
+        ("raise ValueError('upside\\ndown')", "error", "ValueError: upside down"),
+        ("import os; os.kill(os.getpid(), 9)", "killed", "SIGKILL, perhaps for want of memory"),
+        ("import os; os.kill(os.getpid(), 11)", "killed", "SIGSEGV"),
+        ("import os; os.kill(os.getpid(), 2)", None, "bad.py was killed"),
+        ("raise OSError(28, 'No space left on device')", None, "OSError: [Errno 28]"),
+    ],
+)
+def test_an_error_says_whether_what_it_was_run_for_is_to_blame(
+    text: str, cause: str | None, reason: str, steps: Steps, tmp_path: Path
+) -> None:
+    put(tmp_path, "bad", f"if __name__ == '__main__':\n    {text}\n")
+    with pytest.raises(StepError) as caught:
+        run(steps, "bad", tmp_path / "out")
+    assert caught.value.cause == cause
+    assert caught.value.reason.startswith(reason)
+
+
+def test_a_script_that_cannot_be_imported_is_nobodys_fault(steps: Steps, tmp_path: Path) -> None:
+    put(tmp_path, "bad", "import no_such_module\n")
+    with pytest.raises(StepError) as caught:
+        run(steps, "bad", tmp_path / "out")
+    assert caught.value.cause is None

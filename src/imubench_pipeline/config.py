@@ -14,6 +14,7 @@ from imubench_pipeline.earth_rate.declaration import TimeFromZero
 from imubench_pipeline.requirements import Axis, Latitude, Time
 from imubench_pipeline.validation import (
     ConfigError,
+    Duration,
     FractionOfLog,
     Frequency,
     Strict,
@@ -22,7 +23,7 @@ from imubench_pipeline.validation import (
     read_yaml,
 )
 
-_OF_NO_RECORDING = {"held_back", "exports", "report"}
+_OF_NO_RECORDING = {"held_back", "exports", "limits", "report"}
 
 
 class AllanSettings(Strict):
@@ -232,6 +233,19 @@ class EarthRateSettings(Strict):
         return goals
 
 
+class LimitSettings(Strict):
+    """How long a step may take of one recording or sensor, which is left out beyond."""
+
+    recording: Duration = Field("10 min", description="each step of a recording")
+    million_values: Duration = Field(
+        "30 s", description="of it more for each million values of the log"
+    )
+    sensor: Duration = Field("10 min", description="each step of a sensor")
+    each_recording: Duration = Field(
+        "2 s", description="of it more for each of the sensor's recordings"
+    )
+
+
 class ReportSettings(Strict):
     """The report."""
 
@@ -271,6 +285,7 @@ class Run(Strict):
     exports: ExportSettings = ExportSettings()
     fusion: FusionSettings = FusionSettings()
     earth_rate: EarthRateSettings = EarthRateSettings()
+    limits: LimitSettings = LimitSettings()
     report: ReportSettings = ReportSettings()
 
 

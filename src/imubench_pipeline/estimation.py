@@ -28,7 +28,8 @@ from imubench_pipeline.deterministic.courses import find_courses
 from imubench_pipeline.deterministic.verdict import deterministic_rows, verdict_of
 from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators import least_squares, likelihood
-from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate
+from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate, not_shown
+from imubench_pipeline.estimators.least_squares import UnfitCurveError
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.model_choice import disagreement
 from imubench_pipeline.presence import presence
@@ -111,7 +112,11 @@ def estimate_channel(
         estimates["curve"] = reading.read(curve, longest=settings.longest)
     for method in ("paper", "weighted"):
         if method in settings.methods:
-            estimates[method] = least_squares.fit(curve, method=method, longest=settings.longest)
+            try:
+                fitted = least_squares.fit(curve, method=method, longest=settings.longest)
+            except UnfitCurveError as error:
+                fitted = not_shown(method, str(error))
+            estimates[method] = fitted
     if _BY_LIKELIHOOD & set(settings.methods):
 
         def stream(use: str) -> np.random.Generator:

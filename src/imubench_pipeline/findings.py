@@ -6,6 +6,9 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
+LEFT_OUT = ("rejected", "failed")
+"""Findings that a recording is left out, with the reason: they are listed by themselves."""
+
 Severity = Literal["note", "warning", "fatal"]
 
 

@@ -7,13 +7,14 @@ import json
 import shutil
 import tempfile
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from imubench_pipeline import timebase
 from imubench_pipeline.assembly import assemble, counted, names_of
 from imubench_pipeline.config import QualitySettings
+from imubench_pipeline.faults import Failure
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.parts import Part, leave_out_knocks, read_part
 from imubench_pipeline.quality.columns import column_findings
@@ -29,6 +30,7 @@ from imubench_pipeline.readers import (
 from imubench_pipeline.recording import channel_logs, log_paths
 from imubench_pipeline.results import Quality
 from imubench_pipeline.sensor import LogFormat, RecordingNotes, UsedPart
+from imubench_pipeline.tables import write_json
 
 
 @dataclass(frozen=True)
@@ -328,6 +330,34 @@ def ingest_as_planned(
         remove_kept(folder)
         kept = rejected(error, notes)
     return kept.quality(names)
+
+
+def write_failed(settings: str, failure: Failure, path: Path) -> None:
+    """Write what is recorded of a recording of which the ingest failed, and keep nothing of it.
+
+    Parameters
+    ----------
+    settings : str
+        As of `ingest_as_planned`.
+    failure : Failure
+    path : Path
+        The ``quality.json`` of the recording.
+    """
+    given = json.loads(settings)
+    told = given.get("notes", {})
+    recording = {
+        "sensor": failure.sensor,
+        "device": told.get("device") or failure.recording,
+        "recording": failure.recording,
+        "kind": given.get("kind", "static"),
+        "simulated": given["simulated"],
+        "status": "failed",
+        "started": told.get("started"),
+        "reason": failure.reason,
+    }
+    finding = dict(failure.finding().row(failure.sensor, str(failure.recording)))
+    remove_kept(path.parent)
+    write_json(asdict(Quality(recording, [finding], {}, None, asdict(failure))), path)
 
 
 def rejected(error: RecordingError, notes: RecordingNotes) -> Ingested:

@@ -7,7 +7,7 @@ of what the rule depends on, so that an edit runs again what it touches and noth
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
@@ -16,6 +16,7 @@ from pydantic import BaseModel
 
 from imubench_pipeline.config import Run, given_beside, read_run
 from imubench_pipeline.drop_zone import Recording, fingerprint, fingerprints, found_logs
+from imubench_pipeline.faults import Faults
 from imubench_pipeline.provenance import source_digest
 from imubench_pipeline.requirements import Requirement, read_requirements
 from imubench_pipeline.sensor import (
@@ -58,6 +59,7 @@ class Plan:
 
     def __init__(self, config: Mapping[str, object]) -> None:
         self.run: Run = read_run(config)
+        self.faults = Faults(self.run.results)
         self.sensors: dict[str, Sensor] = read_sensors(self.run.sensors)
         self.requirements: dict[str, Requirement] = read_requirements(self.run.requirements)
         simulated = read_simulated(self.run.simulated, self.sensors)
@@ -109,6 +111,14 @@ class Plan:
             )
             for sensor, name in self._simulated
         ]
+
+    def attempt(self, step: str, sensor: str, name: str | None = None) -> int:
+        """Return how often a step had failed and was tried again, with this run: what failed is.
+
+        Of a recording that is held back nothing is.
+        """
+        held_back = name is not None and self.recordings[sensor, name].held_back
+        return self.faults.attempt((step, sensor, name), again=not held_back)
 
     def ingest_settings(self, sensor: str, name: str) -> str:
         """Return what the ingest of a recording depends on, its error where it cannot be read.
@@ -393,19 +403,6 @@ class Plan:
         """Return the true parameters of the simulated recordings of a sensor."""
         entries = (entry for (of, _), entry in self._simulated.items() if of == sensor)
         return _text([entry.model_dump(mode="json") for entry in entries])
-
-    def summary(self) -> str:
-        """Return what a finished run says."""
-        # Tables are read at the end of a run alone: a run should begin at once.
-        from imubench_pipeline.run_summary import summary
-
-        return summary(self.run.results)
-
-    def failure(self, logs: Sequence[str]) -> str:
-        """Return what a run says in which a step failed, from the logs of Snakemake."""
-        from imubench_pipeline.run_summary import failure
-
-        return failure(logs, self.run.results)
 
     @staticmethod
     def code(step: str) -> str:

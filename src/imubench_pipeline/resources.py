@@ -15,8 +15,10 @@ from functools import cache
 from pathlib import Path
 from typing import TypedDict
 
+from imubench_pipeline.bounded_steps import Limit, Limits
 from imubench_pipeline.drop_zone import COMPRESSED, Recording
 from imubench_pipeline.plan import Plan
+from imubench_pipeline.step_modules import OF_SENSOR
 from imubench_pipeline.units import quantity_to_si
 
 _BESIDE = 900
@@ -130,14 +132,7 @@ def asked(plan: Plan) -> dict[str, Asked]:
     ----------
     plan : Plan
     """
-
-    @cache
-    def extent(sensor: str | None, name: str | None) -> Extent:
-        if sensor is None:
-            return Extent(recordings=len(plan.recordings))
-        if name is None:
-            return Extent(recordings=sum(of == sensor for of, _ in plan.recordings))
-        return _extent(plan, plan.recordings[sensor, name])
+    extent = _extents(plan)
 
     def of_job(wildcards: Mapping[str, str], attempt: int, rulename: str) -> Resources:
         found = extent(wildcards.get("sensor"), wildcards.get("recording"))
@@ -151,6 +146,44 @@ def asked(plan: Plan) -> dict[str, Asked]:
         return of_job(wildcards, attempt, rulename)["runtime"]
 
     return {"mem_mb": mem_mb, "runtime": runtime}
+
+
+def time_limits(plan: Plan) -> Limits:
+    """Return how long each step of a recording or a sensor may take, as the plan sets it.
+
+    Parameters
+    ----------
+    plan : Plan
+    """
+    extent = _extents(plan)
+    given = plan.run.limits
+    seconds = {
+        key: quantity_to_si(value, "time") for key, value in given.model_dump(mode="json").items()
+    }
+
+    def limit(step: str, wildcards: Mapping[str, str]) -> Limit:
+        found = extent(wildcards.get("sensor"), wildcards.get("recording"))
+        if step in OF_SENSOR:
+            more = seconds["each_recording"] * found.recordings
+            return Limit(seconds["sensor"] + more, "limits.sensor, limits.each_recording")
+        more = seconds["million_values"] * found.million_samples * found.channels
+        return Limit(seconds["recording"] + more, "limits.recording, limits.million_values")
+
+    return limit
+
+
+def _extents(plan: Plan) -> Callable[[str | None, str | None], Extent]:
+    """Return what tells the extent of a recording, a sensor or all, and keeps it."""
+
+    @cache
+    def extent(sensor: str | None, name: str | None) -> Extent:
+        if sensor is None:
+            return Extent(recordings=len(plan.recordings))
+        if name is None:
+            return Extent(recordings=sum(of == sensor for of, _ in plan.recordings))
+        return _extent(plan, plan.recordings[sensor, name])
+
+    return extent
 
 
 def _extent(plan: Plan, recording: Recording) -> Extent:

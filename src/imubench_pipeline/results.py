@@ -22,6 +22,8 @@ from imubench_pipeline.estimators.estimate import (
     Parameter,
     Status,
 )
+from imubench_pipeline.failures import read_with_failures, with_failures, without
+from imubench_pipeline.faults import Failure
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.pooled import pooled_rows
 from imubench_pipeline.published import published_rows
@@ -57,6 +59,8 @@ class Quality:
     findings: list[dict[str, Any]]
     channels: dict[str, dict[str, Any]]
     samples: str | None
+    failure: dict[str, Any] | None = None
+    """Why the ingest failed (`imubench_pipeline.failures.Failure`)."""
 
     @classmethod
     def read(cls, path: Path) -> Quality:
@@ -269,7 +273,14 @@ def joined_tables(
         Every table of recordings.
     """
     qualities = [Quality.read(path) for path in parts["quality"]]
-    joined = {name: read(name, paths) for name, paths in parts.items() if name != "quality"}
+    told = [Failure(**quality.failure) for quality in qualities if quality.failure]
+    joined = {}
+    for name, paths in parts.items():
+        if name != "quality":
+            joined[name], failed = read_with_failures(name, paths)
+            told += failed
+    failures = list(dict.fromkeys(told))
+    joined = without(joined, {(one.sensor, one.recording) for one in failures})
     about = [quality.recording for quality in qualities]
     devices = {(row["sensor"], row["recording"]): row["device"] for row in about}
     recommended = joined["parameters"].filter(joined["parameters"]["recommended"])
@@ -293,7 +304,7 @@ def joined_tables(
     truth = list(truth_rows(truths))
     joined["simulated_truth"] = build("simulated_truth", truth)
     joined["published"] = build("published", published_rows(truths, truth, joined))
-    return joined
+    return with_failures(joined, failures)
 
 
 _OF_LOGS = {"step": "bias_step", "warm_up": "warm_up_drift"}

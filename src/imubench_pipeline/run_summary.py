@@ -8,11 +8,12 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from imubench_pipeline.findings import LEFT_OUT
 from imubench_pipeline.tables import read
 
 Row = Mapping[str, Any]
 
-_NEEDED = ("recordings", "findings", "ranking")
+_NEEDED = ("recordings", "findings", "ranking", "failures")
 _MOST_LINES = 10
 _MOST_LETTERS = 200
 
@@ -44,7 +45,7 @@ def summary(results: Path) -> str:
     if not all(path.is_file() for path in tables.values()):
         return ""
     try:
-        recordings, findings, ranking = (
+        recordings, findings, ranking, failures = (
             read(name, [path]).to_pylist() for name, path in tables.items()
         )
     except (OSError, ValueError) as error:
@@ -53,9 +54,12 @@ def summary(results: Path) -> str:
     rejected = list(rejections(recordings))
     warned = list(warnings(findings))
     simulated = sum(row["simulated"] for row in recordings)
-    analysed = len(recordings) - len(rejected)
+    failed = list(left_out(failures))
+    analysed = sum(row["status"] == "ok" for row in recordings)
     lines = [f"{_counted(analysed, 'recording')} analysed, {len(rejected)} rejected"]
+    lines[0] += f", {len(recordings) - analysed - len(rejected)} failed" * bool(failed)
     lines[0] += f"; {simulated} of all are simulated, not measured" * (simulated > 0)
+    lines += _bounded(f"  failed: {line}" for line in failed)
     lines += _bounded(f"  rejected: {line}" for line in rejected)
     if warned:
         lines.append(f"warnings in {len(warned)} of the recordings:")
@@ -123,13 +127,26 @@ def rejections(recordings: Iterable[Row]) -> Iterator[str]:
             yield one_line(f"{row['sensor']}/{row['recording']}: {row['reason']}")
 
 
+def left_out(failures: Iterable[Row]) -> Iterator[str]:
+    """Yield a line for each step that failed: what is left out for it, and why.
+
+    Parameters
+    ----------
+    failures : iterable of mapping
+        The table ``failures``.
+    """
+    for row in failures:
+        of = f"{row['sensor']}/{row['recording']}" if row["recording"] else row["sensor"]
+        yield one_line(f"{of}: {row['reason']}")
+
+
 def warnings(findings: Iterable[Row]) -> Iterator[str]:
     """Yield a line for each recording that has warnings, the one with the worst first.
 
     Parameters
     ----------
     findings : iterable of mapping
-        The table ``findings``; rejections and notes are left out.
+        The table ``findings``; notes, and that a recording is left out, are not.
     """
     found: dict[str, Counter[str]] = {}
     left_out: Counter[str] = Counter()
@@ -150,10 +167,10 @@ def serious(findings: Iterable[Row]) -> Iterator[Row]:
     Parameters
     ----------
     findings : iterable of mapping
-        The table ``findings``; rejections and notes are left out.
+        The table ``findings``; notes, and that a recording is left out, are not.
     """
     for row in findings:
-        if row["severity"] != "note" and row["finding"] != "rejected":
+        if row["severity"] != "note" and row["finding"] not in LEFT_OUT:
             yield row
 
 

@@ -15,6 +15,7 @@ from imubench_pipeline.columns import text as _text
 from imubench_pipeline.deterministic.columns import DETERMINISTIC_TABLES
 from imubench_pipeline.earth_rate.columns import EARTH_RATE_TABLES
 from imubench_pipeline.estimators.columns import DRAWN_TABLES
+from imubench_pipeline.faults import FAILURES
 from imubench_pipeline.fusion.columns import FUSION_TABLES
 
 __all__ = [
@@ -48,8 +49,8 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _text("kind", "static, two_position or rate_table"),
         _text("started", "date and time of the first sample, where known", required=False),
         Column("simulated", pa.bool_(), "-", "made from known parameters, not measured"),
-        _text("status", "ok or rejected"),
-        _text("reason", "why a recording is rejected", required=False),
+        _text("status", "ok, rejected, or failed: a step of its analysis did"),
+        _text("reason", "why a recording is rejected or failed", required=False),
         _number("rate", "Hz", "sampling rate used"),
         _text("rate_from", "where it is from: stamps, or stated", required=False),
         _number("rate_error", "Hz", "its standard deviation, as the stamps' scatter tells"),
@@ -69,6 +70,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _number("start", "s", "begin of the part concerned, from the first sample"),
         _number("end", "s", "its end"),
     ),
+    "failures": FAILURES,
     "allan": (
         *_KEYS,
         _number("tau", "s", "cluster length, cluster_size / rate", required=True),
@@ -364,7 +366,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
 }
 """Every table a run leaves, by name; all numbers are SI (temperatures in degC)."""
 
-PARTS_OF = {"estimate_findings": "findings"}
+PARTS_OF = {"curve": "allan", "estimate_findings": "findings"}
 """Files of a recording that hold rows of another table, and that table."""
 
 SAMPLES = ("envelope", "histogram")

@@ -11,7 +11,7 @@ from typing import Any
 
 Rows = list[Mapping[str, Any]]
 
-_NEEDED = ("recordings", "findings", "ranking", "parameters")
+_NEEDED = ("recordings", "findings", "failures", "ranking", "parameters")
 _NARROWEST = 40
 
 

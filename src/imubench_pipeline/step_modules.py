@@ -20,8 +20,24 @@ STEPS: Mapping[str, tuple[str, ...]] = {
     "coverage": ("coverage", "results"),
     "exports": ("export.of_run",),
     "sensor_tables": ("results",),
-    "tables": ("tables",),
+    "tables": ("failures",),
     "figures": ("report.static_figures.of_run",),
     "report": ("report.publish",),
 }
 """The modules that each step runs: their edit runs the step again."""
+
+OF_SENSOR = ("outlook", "sensor_tables")
+"""Steps of one sensor."""
+
+OF_ALONE = (
+    "ingest",
+    "allan",
+    "estimate",
+    "reconstruct",
+    "datasheet",
+    "error_budget",
+    "earth_rotation",
+    "calibration",
+    *OF_SENSOR,
+)
+"""Steps of one recording or one sensor, which is left out where they fail."""

@@ -23,7 +23,11 @@ from typing import Any
 
 from numba import njit
 
-from imubench_pipeline.steps import DONE, FAILED
+from imubench_pipeline.run_summary import one_line
+from imubench_pipeline.steps import BEGUN, DONE, FAILED, KILLED, LENGTH
+
+_LONGEST = 300
+"""Letters of an error in one line."""
 
 
 def serve(requests: socket.socket) -> None:
@@ -37,7 +41,7 @@ def serve(requests: socket.socket) -> None:
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the forks end, and that the run ends is seen
     signal.signal(signal.SIGCHLD, _reap)
-    ready: set[str] = set()
+    ready: dict[str, bool] = {}
     while True:
         _, descriptors, _, _ = socket.recv_fds(requests, 1, 1)
         if not descriptors:
@@ -47,29 +51,55 @@ def serve(requests: socket.socket) -> None:
                 size = int.from_bytes(stream.read(8), "big")
                 script, given = pickle.loads(stream.read(size))
             if script not in ready:
-                _import_what_it_needs(script)
-                ready.add(script)
-            if os.fork() == 0:
+                ready[script] = _import_what_it_needs(script)
+            # Until a fork is known, that it has ended must not be heard of.
+            signal.pthread_sigmask(signal.SIG_BLOCK, _ENDED)
+            fork = os.fork()
+            if fork == 0:
                 requests.close()
-                _run(connection, script, given)
+                _run(connection, script, given, imported=ready[script])
+            _running[fork] = connection.dup()
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDED)
+
+
+_ENDED = {signal.SIGCHLD}
+
+_running: dict[int, socket.socket] = {}
+"""The connection of each fork, by its process."""
 
 
 def _reap(signal_number: int, frame: FrameType | None) -> None:
+    """Say of the forks that were killed, by what: they cannot."""
     with suppress(ChildProcessError):
-        while os.waitpid(-1, os.WNOHANG)[0]:
-            pass
+        while True:
+            process, status = os.waitpid(-1, os.WNOHANG)
+            if not process:
+                return
+            connection = _running.pop(process, None)
+            if connection is None:
+                continue
+            with connection, suppress(OSError):
+                if os.WIFSIGNALED(status):
+                    connection.sendall(_message(KILLED, {"signal": os.WTERMSIG(status)}))
 
 
-def _import_what_it_needs(script: str) -> None:
+def _message(how: bytes, told: Mapping[str, Any]) -> bytes:
+    text = json.dumps(told).encode()
+    return how + len(text).to_bytes(LENGTH, "big") + text
+
+
+def _import_what_it_needs(script: str) -> bool:
+    """Import what a script does; return whether that was possible."""
     try:
         runpy.run_path(script, run_name="imports")
         # What two libraries put off until they are first used: half of what imports cost.
         importlib.import_module("pyarrow.dataset")
         _nothing()
     except (Exception, SystemExit):
-        return  # the fork meets the same error, and says it
+        return False  # the fork meets the same error, and says it
     gc.collect()
     gc.freeze()  # what the forks share stays shared
+    return True
 
 
 @njit(cache=True)
@@ -77,28 +107,36 @@ def _nothing() -> None:
     """Make numba load what every function needs that it has compiled before."""
 
 
-def _run(connection: socket.socket, script: str, given: Mapping[str, Any]) -> None:
+def _run(
+    connection: socket.socket, script: str, given: Mapping[str, Any], *, imported: bool
+) -> None:
     """Run a script in this fork, say how it ended, and end."""
-    answer = FAILED
+    how, told = FAILED, {"imported": imported, "error": "", "trace": "", "errno": None}
     try:
+        for other in _running.values():
+            other.close()
         signal.signal(signal.SIGINT, signal.SIG_DFL)
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDED)
         if sys.platform == "linux":
             _end_with_who_asked(connection)
             Path("/proc/self/comm").write_text(Path(script).stem)  # for ps and top
+        connection.sendall(BEGUN)
         runpy.run_path(
             script, init_globals={"snakemake": SimpleNamespace(**given)}, run_name="__main__"
         )
-        answer = DONE
+        how = DONE
     except BaseException as error:
-        _say(error, script)
+        told["trace"] = _said(error, script)
+        told["error"] = one_line("".join(traceback.format_exception_only(error)), _LONGEST)
+        told["errno"] = error.errno if isinstance(error, OSError) else None
     finally:
         sys.stdout.flush()
         sys.stderr.flush()
         used = resource.getrusage(resource.RUSAGE_SELF)
         cost = {"cpu": used.ru_utime + used.ru_stime, "memory": used.ru_maxrss * 1024 / 1e6}  # KiB
-        connection.sendall(answer + json.dumps(cost).encode())
-        os._exit(answer != DONE)
+        connection.sendall(_message(how, cost if how == DONE else told))
+        os._exit(how != DONE)
 
 
 def _end_with_who_asked(connection: socket.socket) -> None:
@@ -114,12 +152,14 @@ def _end_with_who_asked(connection: socket.socket) -> None:
         os._exit(1)
 
 
-def _say(error: BaseException, script: str) -> None:
-    """Print where the script failed, without how it was started."""
+def _said(error: BaseException, script: str) -> str:
+    """Print where the script failed, without how it was started, and return it."""
     trace = error.__traceback__
     while trace is not None and trace.tb_frame.f_code.co_filename != script:
         trace = trace.tb_next
-    traceback.print_exception(error.with_traceback(trace or error.__traceback__))
+    text = "".join(traceback.format_exception(error.with_traceback(trace or error.__traceback__)))
+    sys.stderr.write(text)
+    return text
 
 
 if __name__ == "__main__":

@@ -130,17 +130,26 @@ def write_arrow(table: pa.Table, path: Path) -> None:
 
 def read(table: str, paths: Sequence[Path]) -> pa.Table:
     """Read and join files of one table, in the order given."""
+    return joined(table, [read_part(table, path) for path in paths])
+
+
+def joined(table: str, parts: Sequence[pa.Table]) -> pa.Table:
+    """Join parts of one table, in the order given."""
     expected = schema(table)
-    parts = [_part(path, expected) for path in paths] or [expected.empty_table()]
-    return pa.concat_tables(parts).cast(expected)
+    plain = [part.replace_schema_metadata(None) for part in parts] or [expected.empty_table()]
+    return pa.concat_tables(plain).cast(expected)
 
 
-def _part(path: Path, expected: pa.Schema) -> pa.Table:
+def read_part(table: str, path: Path) -> pa.Table:
+    """Read one file of a table, with the metadata that it has."""
+    expected = schema(table)
     with pq.ParquetFile(path) as file:
         part = file.read(use_threads=False)
     if part.schema.names != expected.names:
         raise TableError(f"{path}: columns {part.schema.names}, expected {expected.names}")
-    return part if part.schema.equals(expected) else part.cast(expected)
+    if part.schema.equals(expected):
+        return part
+    return part.cast(expected).replace_schema_metadata(part.schema.metadata)
 
 
 def write_content(content: str | bytes, path: Path) -> None:

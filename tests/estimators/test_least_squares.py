@@ -1,3 +1,4 @@
+import contextlib
 from functools import cache
 
 import numpy as np
@@ -9,7 +10,7 @@ from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes
 from imubench_pipeline.confidence import equivalent_degrees
 from imubench_pipeline.estimators.curve import read
 from imubench_pipeline.estimators.estimate import Estimate
-from imubench_pipeline.estimators.least_squares import fit
+from imubench_pipeline.estimators.least_squares import UnfitCurveError, fit
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.simulate import channel_rng, ensemble, simulate
 
@@ -260,3 +261,50 @@ def test_wrong_arguments() -> None:
         fit(noiseless(MTI_7, samples=20))
     with pytest.raises(ValueError, match="'weighted' or 'paper'"):
         fit(noiseless(MTI_7), method="best")  # wrong on purpose
+
+
+@pytest.mark.parametrize("values", [np.zeros(2000), np.tile([0.0, 1.0], 1000)])
+def test_samples_that_repeat_exactly_are_refused_with_the_reason(values: np.ndarray) -> None:
+    curve = allan_variance(values, 100.0)
+    for method in ("weighted", "paper"):
+        with pytest.raises(UnfitCurveError, match="the samples repeat exactly"):
+            fit(curve, method=method)
+    shown = read(curve)
+    assert {one.status for one in shown.parameters.values()} == {"not_shown"}
+    assert "repeat exactly" in shown.parameters["N"].reason
+
+
+@given(
+    form=st.sampled_from(["turns", "sine", "ramp", "jump", "walk", "impulse", "relaxation"]),
+    period=st.floats(2.0, 2000.0),
+    size=st.sampled_from([1e-200, 1e-6, 1.0, 1e6, 1e70]),
+    noise=st.sampled_from([0.0, 1e-6, 1.0]),
+    lost=st.sampled_from([0.0, 0.5, 0.95]),
+    samples=st.integers(16, 3000),
+    seed=st.integers(0, 1000),
+)
+@settings(max_examples=25, deadline=None)
+def test_a_log_of_any_form_is_fitted_or_refused(
+    form: str, period: float, size: float, noise: float, lost: float, samples: int, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    t = np.arange(samples)
+    shape = {
+        "turns": np.sign(np.sin(2 * np.pi * t / period)),
+        "sine": np.sin(2 * np.pi * t / period),
+        "ramp": t / samples,
+        "jump": (t > samples / 2) * 1.0,
+        "walk": np.cumsum(rng.normal(size=samples)),
+        "impulse": (t == samples // 3) * 1.0,
+        "relaxation": np.exp(-t / period),
+    }[form]
+    values = size * (shape + noise * rng.normal(size=samples))
+    values[rng.random(samples) < lost] = np.nan
+    curve = allan_variance(values, 100.0)
+    for method in ("weighted", "paper"):
+        with contextlib.suppress(UnfitCurveError):
+            found = fit(curve, method=method)
+            for name, parameter in found.parameters.items():
+                assert (parameter.value is not None) == (parameter.status in ("ok", "at_bound")), (
+                    name
+                )

@@ -332,3 +332,16 @@ def test_errors_that_say_nothing_do_not_overflow() -> None:
     for name in ("N", "T_B"):
         assert errors.of(name) == 10.0
         assert np.isfinite(errors.factors(name, [])).all()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_process_alone_that_a_short_log_cannot_tell_has_no_value(method: str) -> None:
+    # As of a gyro that is turned: neither white noise nor a walk is there to be judged beside it.
+    truth = {"B": 1.0, "T_B": 10.0}
+    curve = curve_of(truth, 60, cluster_sizes(60, per_decade=10, longest=1 / 9))
+    found = with_limits(estimate_of(truth, method), curve, everything(curve))
+    for name in ("B", "T_B"):
+        assert found.parameters[name].status == "not_identified"
+        assert found.parameters[name].fitted == truth[name]
+    none = fit_errors(curve, everything(curve), NoiseModel(**truth), method, held=["B", "T_B"])
+    assert none.names == [] and none.covariance.shape == (0, 0)

@@ -200,8 +200,11 @@ def test_steps_that_were_killed_after_an_edit_are_run_again(project: Project) ->
             for step in steps_of(process.pid, "estimate"):
                 step.kill()
                 killed.add(step.pid)
-    assert process.returncode == 1 and len(killed) == 2
-    # Snakemake has noted the new settings for them, and has taken away what they had left.
+    # Each is run once more, and then leaves its recording out.
+    assert process.returncode == 1 and len(killed) == 4
+    failed = {row["recording"]: row["cause"] for row in project.table("failures")}
+    assert failed == {"a": "killed", "b": "killed"}
+    # Snakemake has noted the new settings for them, but what they left is no result.
     assert project.job_list() == to_do
 
 

@@ -2,11 +2,15 @@
 
 from pathlib import Path
 
-from imubench_pipeline.tables import read, write_arrow
+from imubench_pipeline.failures import read_with_failures, with_failures
+from imubench_pipeline.faults import Failure
+from imubench_pipeline.tables import write_arrow
 
 if __name__ == "__main__":
-    joined = {
-        name: read(name, [Path(path) for path in paths]) for name, paths in snakemake.input.items()
-    }
+    joined, failures = {}, dict[Failure, None]()
+    for name, paths in snakemake.input.items():
+        joined[name], failed = read_with_failures(name, [Path(path) for path in paths])
+        failures |= dict.fromkeys(failed)
+    joined = with_failures(joined, list(failures))
     for output in map(Path, snakemake.output):
         write_arrow(joined[output.stem], output)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.allan import AllanCurve
-from imubench_pipeline.estimators.estimate import CURVE, PARAMETERS, Estimate, Parameter
+from imubench_pipeline.estimators.estimate import Estimate, Parameter, not_shown
 from imubench_pipeline.noise import FLOOR, PEAK_TAU
 
 Array = NDArray[np.float64]
@@ -76,6 +76,9 @@ def read(curve: AllanCurve, *, longest: float = 1 / 9) -> Estimate:
         Parameters in SI; ``not_shown`` with the reason where the curve has no such slope.
     """
     used = curve.cluster_size <= longest * curve.samples
+    if not (curve.variance[used] > 0).all():
+        reason = "the Allan variance is 0 at some tau: the samples repeat exactly"
+        return not_shown("curve", reason)
     # Where samples are missing, white noise is averaged over fewer than n: as at a shorter tau.
     thinned = np.sqrt(curve.cluster_size / curve.averaged)[used]
     points = _Curve(
@@ -84,12 +87,8 @@ def read(curve: AllanCurve, *, longest: float = 1 / 9) -> Estimate:
         1.0 / (math.log(10.0) * np.sqrt(2.0 * curve.edf[used])),
     )
     if used.sum() < 4:
-        nothing = Parameter(
-            None, "not_shown", f"the curve has {used.sum()} points up to {longest:.3g} of the log"
-        )
-        return Estimate(
-            "curve", dict.fromkeys(PARAMETERS, nothing), curve=dict.fromkeys(CURVE, nothing)
-        )
+        reason = f"the curve has {used.sum()} points up to {longest:.3g} of the log"
+        return not_shown("curve", reason)
     bias, correlation_time = _minimum(points)
     return Estimate(
         "curve",

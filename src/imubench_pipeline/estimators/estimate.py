@@ -195,3 +195,9 @@ class Estimate:
             further=[GaussMarkov(B, T_B) for B, T_B in pairs if B and T_B],
             sinusoids=[Sinusoid(A, f) for A, f in waves if A and f],
         )
+
+
+def not_shown(method: str, reason: str) -> Estimate:
+    """Return the estimate of the papers' model where the log shows none of its parameters."""
+    nothing = Parameter(None, "not_shown", reason)
+    return Estimate(method, dict.fromkeys(PARAMETERS, nothing), curve=dict.fromkeys(CURVE, nothing))

@@ -45,6 +45,10 @@ _ABSENT = 1e-9
 """A term below this part of the variance at every tau is not there."""
 
 
+class UnfitCurveError(ValueError):
+    """An Allan variance to which no model can be fitted; the text says why."""
+
+
 def fit(
     curve: AllanCurve,
     *,
@@ -77,15 +81,19 @@ def fit(
 
     Raises
     ------
+    UnfitCurveError
+        If fewer than four points lie within ``longest``, or the Allan variance is 0 at one.
     ValueError
-        If fewer than four points lie within ``longest``, or the method is not known.
+        If the method is not known.
     """
     used = curve.cluster_size <= longest * curve.samples
     if used.sum() < _FEWEST_POINTS:
-        raise ValueError(
+        raise UnfitCurveError(
             f"the curve has {used.sum()} points up to {longest:.3g} of the log, expected "
             f"{_FEWEST_POINTS} or more"
         )
+    if not (curve.variance[used] > 0).all():
+        raise UnfitCurveError("the Allan variance is 0 at some tau: the samples repeat exactly")
     if method not in ("weighted", "paper"):
         raise ValueError(f"method {method!r} is not known, expected 'weighted' or 'paper'")
     used &= curve.cluster_size >= _first_unbent(curve, used, method)

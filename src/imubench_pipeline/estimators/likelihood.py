@@ -16,6 +16,7 @@ from imubench_pipeline.allan import of_blocks
 from imubench_pipeline.cutoff import Cutoff
 from imubench_pipeline.estimators import least_squares
 from imubench_pipeline.estimators.band import Band
+from imubench_pipeline.estimators.carried_lines import carried
 from imubench_pipeline.estimators.curve_bias import averaging_times, with_curve
 from imubench_pipeline.estimators.doubts import doubted
 from imubench_pipeline.estimators.draws import drawn_share, joint_draws
@@ -247,7 +248,7 @@ def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) 
             frame,
         )
     frame, whittle, candidates = _explained(spectrum, frame)
-    sinusoids = [_line_parameters(line) for line in frame.lines if line.narrow]
+    sinusoids = carried(frame.lines)
     chosen = candidates[0]
     draws: dict[Terms, Posterior] = {}
     # A ramp is no noise: it is believed or not, and does not widen intervals as a possibility.
@@ -354,14 +355,3 @@ def _with_one_more(terms: Terms) -> list[Terms]:
         wider.append(replace(terms, linear=terms.linear.replace("N", "NF")))
         wider.append(replace(terms, gauss_markov=1))
     return wider
-
-
-def _line_parameters(line: Line) -> dict[str, Parameter]:
-    return {
-        "amplitude": Parameter(
-            line.amplitude, lower=line.amplitude_lower, upper=line.amplitude_upper
-        ),
-        "frequency": Parameter(
-            line.frequency, lower=line.frequency_lower, upper=line.frequency_upper
-        ),
-    }

@@ -133,6 +133,8 @@ def fit_errors(
     """
     expected, derivatives = _derivatives(curve, used, model)
     names = [name for name in derivatives if name not in held]
+    if not names:
+        return Errors(names, np.empty((0, 0)))
     jacobian = np.column_stack([derivatives[name] for name in names])
     # The weights of the relative variances: w times the variance squared, to a factor.
     weight = 1.0 / curve.cluster_size[used]

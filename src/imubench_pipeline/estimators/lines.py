@@ -31,6 +31,9 @@ _LEVEL = 129
 _MEDIAN_KNOWS = 1.0 / (1.94 * 1.57)
 """Independent bins in a bin of the median: neighbours are correlated, and a median wastes some."""
 
+_MOST = 1000
+"""Lines of a spectrum, the strongest: what compares them costs the square of their number."""
+
 _DISTURBED = 2
 _FIRST = 4
 _BESIDE = 3
@@ -131,6 +134,8 @@ def find(
     for spectrum, (low, high) in zip(spectra, searched, strict=True):
         if high > low:
             new = _lines(spectrum, model, rate, low, high, total)
+            if len(new) > _MOST:
+                new = sorted(new, key=lambda line: -line.ratio)[:_MOST]
             found = _joined(found, new)
     found = [_without_alias(line, found, spectra[0].block, rate) for line in found]
     return sorted(found, key=lambda line: line.frequency)

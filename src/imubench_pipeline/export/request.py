@@ -141,7 +141,7 @@ def imu_of(tables: Tables, request: Request) -> Imu:
             )
     if not axes:
         reasons = "; ".join(row["reason"] for row in recordings if row["reason"])
-        raise ExportError(f"{request.sensor}: no estimate; its recordings were rejected: {reasons}")
+        raise ExportError(f"{request.sensor}: no estimate; its recordings are left out: {reasons}")
     gravity = STANDARD_GRAVITY if request.latitude is None else normal_gravity(request.latitude)
     return Imu(
         sensor=request.sensor,

@@ -10,7 +10,7 @@ from imubench_pipeline.units import UnitError, quantity_to_si
 
 _EPILOG = (
     "Exit status: 0 fine; 1 a log was rejected, a warning is new or a device has changed since the "
-    "last run; 2 failed, or another run goes on."
+    "last run; 2 failed, for one recording at least, or another run goes on."
 )
 
 

@@ -20,7 +20,9 @@ from typing import Any
 
 import psutil
 
-_FOLDERS = ("recordings", "sensors", "tables", "simulated", "report", "exports", "nightly")
+_FOLDERS = (
+    *("recordings", "sensors", "tables", "simulated", "report", "exports", "faults", "nightly"),
+)
 """What a run writes to, below the results: nothing else is touched."""
 
 _TEMPORARY = re.compile(r"\..+\.[a-z0-9_]{8}\.part")

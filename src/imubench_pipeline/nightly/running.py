@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import IO
 
+from imubench_pipeline.faults import TOLD
 from imubench_pipeline.nightly.lock import Lock
 from imubench_pipeline.nightly.recovery import end_group
 
@@ -49,6 +50,7 @@ def run_snakemake(arguments: Sequence[str], project: Path, output: Path, lock: L
             stdout=file,
             stderr=terminal.end if terminal else subprocess.STDOUT,
             pass_fds=(lock.descriptor,),
+            env=os.environ | {TOLD: "1"},
             start_new_session=True,  # all its steps can be ended together
         )
         try:

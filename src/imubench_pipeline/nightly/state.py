@@ -140,7 +140,7 @@ def load_tables(results: Path) -> dict[str, Rows]:
         If one is not there, or is of another form.
     """
     found: dict[str, Rows] = {}
-    for name in (*_OF_A_RECORDING, "findings", "drift", "ranking"):
+    for name in (*_OF_A_RECORDING, "failures", "findings", "drift", "ranking"):
         table = read(name, [results / f"tables/{name}.parquet"])
         if name == "parameters":
             table = table.filter(table["recommended"])

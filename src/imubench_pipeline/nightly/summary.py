@@ -19,6 +19,7 @@ from imubench_pipeline.nightly.state import (
     warned,
 )
 from imubench_pipeline.run_summary import leaders, one_line, serious
+from imubench_pipeline.run_summary import left_out as told
 
 Outcome = Literal["fine", "flagged", "failed"]
 
@@ -50,6 +51,16 @@ class Rejected(BaseModel):
     recording: str
     reason: str
     new: bool
+
+
+class Failed(BaseModel):
+    """A step that failed for a recording, or for a whole sensor, which is left out."""
+
+    sensor: str
+    recording: str | None
+    step: str
+    cause: str
+    reason: str
 
 
 class NewWarning(BaseModel):
@@ -115,6 +126,7 @@ class Summary(BaseModel):
     changed: list[Changed] = []
     removed: list[str] = []
     skipped: list[Skipped] = []
+    failed: list[Failed] = []
     rejected: list[Rejected] = []
     warnings: list[NewWarning] = []
     drift: list[Drift] = []
@@ -155,6 +167,11 @@ def compared(
             if now[name].digest != was.recordings[name].digest
         ],
         "removed": [name for name in was.recordings if name not in after.recordings],
+        "failed": [
+            Failed(**row)
+            for row in tables["failures"]
+            if row["recording"] is None or name_in(row) not in left_out
+        ],
         "rejected": [
             Rejected(
                 recording=name,
@@ -177,7 +194,8 @@ def compared(
         "first": list(_first(was, after, tables)),
     }
     flagged = any(one.new for one in found["rejected"]) or found["warnings"] or found["drift"]
-    return found | {"outcome": "flagged" if flagged else "fine"}
+    outcome = "failed" if found["failed"] else "flagged" if flagged else "fine"
+    return found | {"outcome": outcome}
 
 
 _OF_WARNING = ("channel", "finding", "detail")
@@ -218,6 +236,8 @@ def in_words(summary: Summary) -> str:
         f"{len(summary.new)} new, {len(summary.changed)} analysed again, "
         f"{len(summary.removed)} removed, {len(summary.skipped)} skipped; "
         f"{summary.recordings} in all, {len(summary.rejected)} of them rejected"
+        + f"; {len(summary.failed)} failed"
+        * bool(summary.failed)
     )
     since = f"since {_time(summary.since)}" if summary.since else "the first run"
     lines = [
@@ -228,7 +248,9 @@ def in_words(summary: Summary) -> str:
         lines += ["", "why it failed:", *(f"  {one_line(line, 500)}" for line in summary.failure)]
     else:
         lines.append(f"recordings, {since}: {counts}")
+    failed = [row.model_dump() for row in summary.failed]
     sections: list[tuple[str, list[str]]] = [
+        ("failed, left out of a report that is there, and tried again next time", [*told(failed)]),
         ("new", summary.new),
         ("analysed again", [f"{one.recording}: {one.because}" for one in summary.changed]),
         ("removed", summary.removed),

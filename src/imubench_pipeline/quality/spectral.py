@@ -5,16 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from imubench_pipeline.estimators.carried_lines import MOST, joined_finding
 from imubench_pipeline.findings import Finding
+from imubench_pipeline.sensor import quantity_of
 
 
 def line_findings(lines: Iterable[Mapping[str, Any]]) -> list[Finding]:
     """Return a note for each channel with lines, from rows of the table ``lines``.
 
+    There is a warning where they are too many for a noise model to carry each on.
+
     Parameters
     ----------
     lines : iterable of mapping
-        With ``channel``, ``kind``, ``frequency`` (Hz) and ``ratio``.
+        With ``channel``, ``kind``, ``frequency`` (Hz), ``amplitude`` (SI) and ``ratio``.
     """
     by_channel: dict[str, list[Mapping[str, Any]]] = {}
     for line in lines:
@@ -23,13 +27,16 @@ def line_findings(lines: Iterable[Mapping[str, Any]]) -> list[Finding]:
     findings = []
     for channel, found in by_channel.items():
         strongest = max(found, key=lambda line: line["ratio"])
-        sinusoids = sum(line["kind"] == "sinusoid" for line in found)
+        sinusoids = [line for line in found if line["kind"] == "sinusoid"]
+        number = len(sinusoids)
         detail = (
-            f"{channel} has {sinusoids} sinusoids and {len(found) - sinusoids} bands of noise, the "
+            f"{channel} has {number} sinusoids and {len(found) - number} bands of noise, the "
             f"strongest at {strongest['frequency']:.5g} Hz, {strongest['ratio']:.3g} times the "
             "noise there; they are left out of the likelihood"
         )
         findings.append(Finding("lines", "note", detail, strongest["frequency"], channel))
+        if number > MOST:
+            findings.append(joined_finding(channel, quantity_of(channel), sinusoids))
     return findings
 
 

@@ -69,7 +69,7 @@ def _views(site: Site, board: str) -> list[RecordingView]:
         if view.simulated
         and view.name == f"sim_{board}"
         and view.sensor in of_board
-        and not view.rejected
+        and not view.left_out
     ]
 
 

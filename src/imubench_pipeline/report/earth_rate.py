@@ -52,13 +52,13 @@ def _context(site: Site) -> dict[str, Any]:
     return {
         "truth": EARTH_RATE,
         "runs": runs,
-        "rejected": [view for view in site.turned if view.rejected],
+        "rejected": [view for view in site.turned if view.left_out],
         "published": published,
         "verdict": published_words(published),
         "needs": predicted,
         "alignments": aligned,
         "calibrations": of_all(site),
-        "not_calibrated": [view for view in site.calibrated if view.rejected],
+        "not_calibrated": [view for view in site.calibrated if view.left_out],
         "page": {
             "looks": {},
             "channels": [],
@@ -78,7 +78,7 @@ def _run(site: Site, view: RecordingView) -> dict[str, Any]:
     shown = [line(row) for row in rows if row["method"] in ESTIMATES]
     return {
         "view": view,
-        "answer": view.row["reason"] if view.rejected else answer(whole, site.system),
+        "answer": view.row["reason"] if view.left_out else answer(whole, site.system),
         "parts": [
             {
                 "part": part,

@@ -71,7 +71,7 @@ _PAGES: Mapping[str, Callable[[Site, RecordingView], Page]] = {
 def pages(site: Site) -> Iterator[Page]:
     """Yield the pages of the report, the start page last: it stands for the finished report."""
     for view in site.views:
-        page = recording_page if view.rejected else _PAGES.get(view.row["kind"], recording_page)
+        page = recording_page if view.left_out else _PAGES.get(view.row["kind"], recording_page)
         yield page(site, view)
     for sensor in site.sensors:
         yield sensor_page(site, sensor)

@@ -102,9 +102,9 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         "provenance": list(provenance(view, channels, folder)),
         "sources": metadata_of(folder).get("sources", []),
         "command": site.again(view, "scores"),
-        # Of a rejected one there is nothing to draw.
+        # Of one that is left out there is nothing to draw.
         "figures_command": None
-        if view.rejected
+        if view.left_out
         else shlex.join(
             [
                 *("imubench", "figures", site.results_name),
@@ -126,8 +126,9 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
 
 def _summary(view: RecordingView, channels: int) -> str:
     row = view.row
-    if view.rejected:
-        return "This recording could not be used; nothing of it is in the comparison."
+    if view.left_out:
+        why = "could not be used" if view.rejected else "could not be analysed: a step failed"
+        return f"This recording {why}; nothing of it is in the comparison."
     parts = [f"{duration_text(row['duration'])} at {number_text(row['rate'])} Hz"]
     if row["started"]:
         parts.append(f"from {started_text(row['started'])}")

@@ -37,6 +37,7 @@ def _start(site: Site) -> dict[str, Any]:
     warned = [view for view in views if view.warnings]
     return {
         "summary": summary(views),
+        "failures": list(_failures(site)),
         "rejected": [view for view in views if view.rejected],
         "warned": [{"view": view, "found": _grouped(view.warnings)} for view in warned],
         "warning_count": f"{counted(sum(len(v.warnings) for v in warned), 'warning')} in "
@@ -59,6 +60,13 @@ def _start(site: Site) -> dict[str, Any]:
     }
 
 
+def _failures(site: Site) -> Iterator[dict[str, Any]]:
+    """Yield the steps that failed, with the recording that is left out for it."""
+    views = {(view.sensor, view.name): view for view in site.views}
+    for row in site.tables["failures"].to_pylist():
+        yield row | {"view": views.get((row["sensor"], row["recording"]))}
+
+
 def _not_found(site: Site) -> Iterator[dict[str, Any]]:
     """Yield the recordings of turned gyros of which nothing could be estimated, and why."""
     for view in site.turned:
@@ -79,6 +87,7 @@ def summary(views: Sequence[RecordingView], several: bool = True) -> str:
     """Return what was compared: how many recordings, of when, how long, and how many are real."""
     sensors = {view.sensor for view in views}
     rejected = sum(view.rejected for view in views)
+    failed = sum(view.left_out for view in views) - rejected
     made = sum(view.simulated for view in views)
     of = f" of {counted(len(sensors), 'sensor')}" if several else ""
     parts = [counted(len(views), "recording") + of]
@@ -90,10 +99,11 @@ def summary(views: Sequence[RecordingView], several: bool = True) -> str:
         dated = f"recorded from {started[0]} to {started[-1]}"
         if started[0] == started[-1]:
             dated = f"recorded on {started[0]}"
-        if any(not view.row["started"] and not view.rejected for view in views):
+        if any(not view.row["started"] and not view.left_out for view in views):
             dated += f" ({len(started)} of {len(views)} say when)"
         parts.append(dated)
-    text = ", ".join(parts) + f": {len(views) - rejected} analysed, {rejected} rejected."
+    text = ", ".join(parts) + f": {len(views) - rejected - failed} analysed, {rejected} rejected"
+    text += f", {failed} failed." if failed else "."
     if made:
         of_them = f"{made} of them {'is' if made == 1 else 'are'}"
         whole = made == len(views)
@@ -188,8 +198,10 @@ def _margin(row: Row, group: dict[str, Any]) -> dict[str, Any]:
 
 def _sensor(site: Site, name: str) -> dict[str, Any]:
     own = [view for view in site.views if view.sensor == name]
-    rejected = sum(view.rejected for view in own)
-    counts = counted(len(own), "recording") + (f", {rejected} rejected" if rejected else "")
+    counts = counted(len(own), "recording")
+    for status in ("rejected", "failed"):
+        number = sum(view.row["status"] == status for view in own)
+        counts += f", {number} {status}" if number else ""
     if all(view.simulated for view in own):
         counts += ", simulated"
     return {

@@ -19,7 +19,7 @@ from imubench_pipeline.report.practical import (
 )
 from imubench_pipeline.report.terminal_table import fitting
 from imubench_pipeline.requirements import Requirement
-from imubench_pipeline.run_summary import one_line, rejections, serious
+from imubench_pipeline.run_summary import left_out, one_line, rejections, serious
 from imubench_pipeline.sensor import quantity_of
 
 Row = Mapping[str, Any]
@@ -50,7 +50,7 @@ def parts(
     Parameters
     ----------
     tables : mapping of str to sequence of mapping
-        ``recordings``, ``findings``, ``ranking`` and ``parameters`` of a run.
+        ``recordings``, ``findings``, ``failures``, ``ranking`` and ``parameters`` of a run.
     requirement : str or None
         The ranking for this one alone, with every limit; None: for all, with the limit that
         decides.
@@ -65,6 +65,7 @@ def parts(
     """
     about = {(row["sensor"], row["recording"]): row for row in tables["recordings"]}
     yield _compared(tables["recordings"])
+    yield from _listed("Failed", left_out(tables["failures"]))
     yield from _listed("Rejected", rejections(tables["recordings"]))
     yield from _listed("Warnings", map(_finding, serious(tables["findings"])), cut=True)
     yield from _ranking_tables(tables["ranking"], requirement, about, system, width)
@@ -84,13 +85,16 @@ def parts(
 
 
 def _compared(recordings: Sequence[Row]) -> Text:
-    rejected = sum(row["status"] == "rejected" for row in recordings)
+    rejected, failed = (
+        sum(row["status"] == status for row in recordings) for status in ("rejected", "failed")
+    )
     simulated = sum(row["simulated"] for row in recordings)
     sensors = len({row["sensor"] for row in recordings})
     return Text(
-        f"Recordings: {len(recordings)} of {sensors} sensors; {len(recordings) - rejected} "
-        f"analysed, {rejected} rejected; {simulated} simulated from published parameters, not "
-        "measured\n"
+        f"Recordings: {len(recordings)} of {sensors} sensors; "
+        f"{len(recordings) - rejected - failed} analysed, {rejected} rejected"
+        + f", {failed} failed" * bool(failed)
+        + f"; {simulated} simulated from published parameters, not measured\n"
     )
 
 

@@ -14,6 +14,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 from pandas.util import hash_pandas_object
 
+from imubench_pipeline.findings import LEFT_OUT
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.results import estimate_of
 from imubench_pipeline.schemas import BY_RECORDING
@@ -151,6 +152,11 @@ class RecordingView:
         return bool(self.row["simulated"])
 
     @property
+    def left_out(self) -> bool:
+        """Whether it could not be used, or a step failed for it."""
+        return bool(self.row["status"] != "ok")
+
+    @property
     def rejected(self) -> bool:
         """Whether it could not be used."""
         return bool(self.row["status"] == "rejected")
@@ -158,7 +164,7 @@ class RecordingView:
     @property
     def static(self) -> bool:
         """Whether it could be used, and its sensor was at rest all the time."""
-        return not self.rejected and self.row["kind"] not in ("two_position", "rate_table")
+        return not self.left_out and self.row["kind"] not in ("two_position", "rate_table")
 
     @property
     def key(self) -> str:
@@ -167,8 +173,8 @@ class RecordingView:
 
     @cached_property
     def findings(self) -> list[Row]:
-        """What is wrong with it or worth knowing, but that it is rejected."""
-        return [row for row in self.rows("findings") if row["finding"] != "rejected"]
+        """What is wrong with it or worth knowing, but that it is left out."""
+        return [row for row in self.rows("findings") if row["finding"] not in LEFT_OUT]
 
     @property
     def warnings(self) -> list[Row]:

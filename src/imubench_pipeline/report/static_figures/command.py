@@ -140,7 +140,7 @@ def select(
             )
         chosen = {name: _part(table, column, asked) for name, table in chosen.items()}
     if not chosen["allan"].num_rows:
-        raise SelectionError("the results have no curve: every recording was rejected")
+        raise SelectionError("the results have no curve: no recording could be used")
     return chosen
 
 
@@ -153,15 +153,15 @@ def _part(table: pa.Table, column: str, asked: str) -> pa.Table:
 
 
 def _rejection(recordings: pa.Table, column: str, asked: str) -> str:
-    """Return why a recording or all of a sensor have no curve, where they were rejected."""
+    """Return why a recording or all of a sensor have no curve, where they are left out."""
     if column == "channel":
         return ""
     reasons = [
-        row["reason"]
+        f"{row['status']} one ({row['reason']})"
         for row in recordings.to_pylist()
-        if row[column] == asked and row["status"] == "rejected"
+        if row[column] == asked and row["status"] != "ok"
     ]
-    return f" but a rejected one ({reasons[0]})" if reasons else ""
+    return f" but a {reasons[0]}" if reasons else ""
 
 
 def _write(

@@ -1,0 +1,60 @@
+"""A comb of lines is carried on as a few, with the power of all."""
+
+import numpy as np
+import pytest
+
+from imubench_pipeline.estimators.carried_lines import MOST, STRONGEST, carried, joined_finding
+from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.estimators.lines import Line
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.quality.spectral import line_findings
+
+
+def comb(number: int, kind: str = "sinusoid") -> list[Line]:
+    rng = np.random.default_rng(1)
+    amplitudes = rng.uniform(0.3, 1.3, number)
+    return [
+        Line(f, f - 1e-3, f + 1e-3, a, 0.9 * a, 1.1 * a, 50.0, 1e-9, 1e-2, 1e-2, kind)  # type: ignore[arg-type]
+        for f, a in zip(0.5 + 0.1 * np.arange(number), amplitudes.tolist(), strict=True)
+    ]
+
+
+def model_of(lines: list[dict[str, Parameter]]) -> NoiseModel:
+    return Estimate("likelihood", {"N": Parameter(1e-3)}, lines=lines).model
+
+
+def test_few_lines_are_carried_as_they_are() -> None:
+    lines = [*comb(MOST), *comb(5, "band")]
+    found = carried(lines)
+    assert [one["frequency"].value for one in found] == [line.frequency for line in lines[:MOST]]
+    assert line_findings([vars(line) | {"channel": "gyro_x"} for line in lines])[1:] == []
+
+
+@pytest.mark.parametrize("number", [MOST + 1, 363, 1000])
+def test_many_lines_keep_their_power_and_that_of_their_integral(number: int) -> None:
+    lines = comb(number)
+    found = carried(lines)
+    assert len(found) == MOST
+    model = model_of(found)
+    amplitudes = np.array([line.amplitude for line in lines])
+    frequencies = np.array([line.frequency for line in lines])
+    kept = np.array([part.amplitude for part in model.sinusoids])
+    at = np.array([part.frequency for part in model.sinusoids])
+    assert np.sum(kept**2) == pytest.approx(np.sum(amplitudes**2))
+    assert np.sum((kept / at) ** 2) == pytest.approx(np.sum((amplitudes / frequencies) ** 2))
+    strongest = set(np.sort(amplitudes)[-STRONGEST:].tolist())
+    assert strongest < set(kept.tolist())
+    assert np.all(np.diff(at) > 0)
+
+
+def test_a_comb_is_a_warning_that_says_how_many_and_how_much_power() -> None:
+    rows = [vars(line) | {"channel": "gyro_x"} for line in comb(363)]
+    note, warning = line_findings(rows)
+    assert (note.finding, warning.finding) == ("lines", "too_many_lines")
+    assert warning.severity == "warning" and warning.value == 363
+    powers = np.sort([0.5 * row["amplitude"] ** 2 for row in rows])
+    rest = powers[:-STRONGEST].sum()
+    assert "the other 351" in warning.detail
+    assert f"{100 * rest / powers.sum():.3g} % of that of all lines" in warning.detail
+    assert f"({np.sqrt(rest):.3g} rad/s rms)" in warning.detail
+    assert joined_finding("gyro_x", "gyro", rows) == warning

@@ -1,0 +1,172 @@
+"""Steps that fail for one recording or sensor, in real runs: the report is made all the same."""
+
+from __future__ import annotations
+
+import html
+import json
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+import imubench_pipeline
+from tests.workflow.project import Project, linked, put_log, put_sensor
+
+pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("workflow")]
+
+FAULTS = """
+    import os, time
+    if key.recording == "raises":
+        raise ValueError("need at least\\none array")
+    if key.recording == "sleeps":
+        time.sleep(600)
+    if key.recording == "dies":
+        os.kill(os.getpid(), 9)
+    estimates: dict[str, Estimate] = {}
+"""
+IN_OUTLOOK = """
+    if sensor == "two":
+        raise ZeroDivisionError("no rest")
+    rows: dict[str, list[Row]] = {"alignment": [], "earth_rate_prediction": []}
+"""
+IN_INGEST = """
+    if recording == "unread":
+        raise IndexError("list index out of range")
+    names = {"sensor": sensor, "device": notes.device or recording, "recording": recording}
+"""
+
+
+def put_fault(path: Path, before: str, fault: str) -> None:
+    text = path.read_text()
+    line = fault.strip().splitlines()[-1]
+    assert text.count(line) == 1 and line.strip() == before
+    path.write_text(text.replace(line, fault.strip("\n"), 1))
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory: pytest.TempPathFactory) -> Project:
+    folder = tmp_path_factory.mktemp("failures")
+    linked(folder)
+    for sensor in ("one", "two"):
+        put_sensor(folder / f"sensors/{sensor}.yaml")
+    for seed, name in enumerate(("good", "raises", "sleeps", "dies", "unread")):
+        put_log(folder / f"logs/one/{name}.csv", seed, samples=5000)
+    put_log(folder / "logs/two/a.csv", 9, samples=5000)
+    settings = ["logs=logs", "sensors=sensors", "results=results", "requirements=false",
+                'estimate={"methods": ["weighted"]}', 'limits={"recording": "30 s"}']  # fmt: skip
+    return Project(folder, folder / "results", folder, settings)
+
+
+@pytest.fixture(scope="module")
+def faulty(project: Project, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """The environment of a run with a package that has faults, and is compiled."""
+    place = tmp_path_factory.mktemp("code")
+    package = Path(imubench_pipeline.__file__).parent
+    copy = place / package.name
+    shutil.copytree(package, copy)  # with what numba has compiled
+    put_fault(copy / "estimation.py", "estimates: dict[str, Estimate] = {}", FAULTS)
+    names = (
+        'names = {"sensor": sensor, "device": notes.device or recording, "recording": recording}'
+    )
+    put_fault(copy / "ingest.py", names, IN_INGEST)
+    rows = 'rows: dict[str, list[Row]] = {"alignment": [], "earth_rate_prediction": []}'
+    put_fault(copy / "alignment/of_sensor.py", rows, IN_OUTLOOK)
+    project.environment = os.environ | {"PYTHONPATH": str(place)}
+    settings = project.settings.copy()
+    project.settings.pop()
+    done = project.run("results/recordings/one/good/scores.parquet")
+    assert done.returncode == 0, done.stdout + done.stderr
+    project.settings[:] = settings
+    return project.environment
+
+
+REASONS = {
+    "raises": "the step estimate failed: ValueError: need at least one array",
+    "sleeps": "the step estimate ran for longer than 30.52 s (limits.recording, ",
+    "dies": "the step estimate was killed twice: SIGKILL, perhaps for want of memory",
+    "unread": "the step ingest failed: IndexError: list index out of range",
+}
+NO_REST = "the step outlook failed: ZeroDivisionError: no rest"
+
+
+def test_the_report_says_which_recordings_a_step_failed_for(
+    project: Project, faulty: dict[str, str]
+) -> None:
+    project.environment = faulty
+    done = project.run()
+    said = done.stdout + done.stderr
+    assert done.returncode == 1, said
+    assert "2 recordings analysed, 0 rejected, 4 failed" in said, said
+    recordings = {(row["sensor"], row["recording"]): row for row in project.table("recordings")}
+    failed = {name: row["reason"] for (_, name), row in recordings.items() if row["reason"]}
+    assert failed.keys() == REASONS.keys()
+    page = html.unescape((project.results / "report/index.html").read_text())
+    logs = project.results / "faults/recordings/one"
+    for name, reason in REASONS.items():
+        assert failed[name].startswith(reason)
+        assert recordings["one", name]["status"] == "failed"
+        assert f"one/{name} is left out: {reason}" in done.stderr
+        (line,) = (line for line in page.splitlines() if f">{name}</a>: {reason}" in line)
+        assert page.index(line) < page.index('id="comparison"')
+        step = "ingest" if name == "unread" else "estimate"
+        assert reason in (logs / name / f"{step}.log").read_text()
+        own = (project.results / f"report/recordings/one/{name}.html").read_text()
+        assert reason in html.unescape(own)
+    assert 'raise ValueError("need at least' in (logs / "raises/estimate.log").read_text()
+    assert "Traceback" in done.stderr and "<li>V two: " + NO_REST in page
+    fatal = {row["recording"] for row in project.table("findings") if row["severity"] == "fatal"}
+    assert fatal == REASONS.keys()
+    failures = {(row["sensor"], row["recording"], row["step"]) for row in project.table("failures")}
+    assert failures == {("one", name, "estimate") for name in ("raises", "sleeps", "dies")} | {
+        ("one", "unread", "ingest"),
+        ("two", None, "outlook"),
+    }
+
+
+def test_what_did_not_fail_is_complete(project: Project) -> None:
+    whole = {("one", "good"), ("two", "a")}
+    for name in ("allan", "parameters", "reconstruction", "scores", "error_budget", "datasheet"):
+        assert {(row["sensor"], row["recording"]) for row in project.table(name)} == whole
+    assert {row["sensor"] for row in project.table("alignment")} == {"one"}
+    assert not list(project.results.rglob("*.part"))
+
+
+def test_what_failed_is_tried_again_and_nothing_else(project: Project) -> None:
+    jobs = project.job_list()
+    of = {step: {name for rule, name in jobs if rule == step} for step, _ in jobs}
+    assert of["ingest"] == of["allan"] == {"one/unread"}
+    assert of["estimate"] == {f"one/{name}" for name in REASONS}
+    assert of["outlook"] == {"one", "two"}
+
+
+def test_a_nightly_run_tries_again_and_says_in_its_exit_status_what_failed(
+    project: Project, faulty: dict[str, str]
+) -> None:
+    project.environment = faulty
+    done = subprocess.run(
+        project.nightly_command(), cwd=project.place, env=faulty, capture_output=True,
+        text=True, check=False, timeout=600,
+    )  # fmt: skip
+    assert done.returncode == 2
+    for name, reason in REASONS.items():
+        assert f"one/{name}: {reason}" in done.stderr
+    assert f"two: {NO_REST}" in done.stderr
+    summary = json.loads((project.results / "nightly/latest.json").read_text())
+    assert summary["outcome"] == "failed" and summary["failure"] == []
+    assert summary["recordings"] == 6 and len(summary["failed"]) == 5
+    log = Path(summary["log"]).read_text()
+    assert "Traceback" in log and "ValueError: need at least\none array" in log
+
+
+def test_a_run_of_mended_code_makes_it_good(project: Project) -> None:
+    project.environment = None
+    project.settings.pop()
+    done = project.run()
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert {row["status"] for row in project.table("recordings")} == {"ok"}
+    assert project.table("failures") == []
+    assert "failed" not in {row["finding"] for row in project.table("findings")}
+    assert project.job_list() == set()
+    assert not list(project.results.glob("faults/**/*.log"))
