@@ -109,7 +109,7 @@ CLEAN: Mapping[str, Noise] = {
 LENGTHS = ((100.0, 0.3), (100.0, 1.0), (20.0, 3.0), (10.0, 10.0))
 """Rate in Hz and hours of the logs of noise alone."""
 
-BASE = Noise(1e-4, ((1.5e-4, 80.0),), 1e-6)
+BASE = Noise(1e-4, ((1.5e-4, 80.0),), 3e-6)
 RATE, HOURS = 20.0, 4.0
 
 Change = Callable[[Array, Array, Rng], Array]

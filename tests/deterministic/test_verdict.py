@@ -46,10 +46,15 @@ def test_noise_that_grows_makes_n_doubtful() -> None:
     assert estimate.parameters["K"].status == "ok"
 
 
-def test_heavy_tails_are_no_growth() -> None:
+def test_heavy_tails_widen_the_interval_of_n_by_the_scatter_of_powers() -> None:
     rng = np.random.default_rng(4)
-    log = static_log(4)
-    assert names(verdict(log + N * np.sqrt(RATE) * rng.standard_t(3, len(log)))) == []
+    of = verdict(N * np.sqrt(RATE) * rng.laplace(size=200_000))
+    assert names(of) == ["heavy_tails"]
+    # The excess kurtosis of a Laplace distribution is 3: variances scatter by (2 + 3) / 2.
+    assert of.widening == pytest.approx(np.sqrt(2.5), rel=0.05)
+    known = Estimate("likelihood", {"N": Parameter(N, lower=0.99 * N, upper=1.01 * N)})
+    wider = of.applied(known).parameters["N"]
+    assert wider.upper == pytest.approx(N * (1.0 + 0.01 * of.widening), rel=1e-3)
 
 
 def test_a_walk_on_one_half_alone_is_a_finding() -> None:

@@ -257,6 +257,9 @@ def _described(ordinates: Ordinates, searched: Searched) -> Iterator[Course]:
         along = amplitudes / size if len(amplitudes) > 1 else np.ones(1)
         error = _LIMIT * math.sqrt(float(along @ fit.covariance[here, here] @ along))
         low, high = _limits(ordinates, fit, regressor)
+        if regressor.kind == "step":
+            # Where it is taken to be has been chosen to make it large.
+            error = math.hypot(error, _spread(ordinates, fit, regressor, here.start, (low, high)))
         place = start + regressor.where * means.interval
         period = regressor.kind == "sinusoid"
         if regressor.kind == "step":
@@ -302,6 +305,21 @@ def _limits(ordinates: Ordinates, fit: Fit, regressor: Regressor) -> tuple[float
             away *= 1.5
         limits.append(min(max(regressor.where + side * away, 1e-6), float(n)))
     return limits[0], limits[1]
+
+
+def _spread(
+    ordinates: Ordinates,
+    fit: Fit,
+    regressor: Regressor,
+    column: int,
+    limits: tuple[float, float],
+) -> float:
+    """Return half the range of a size over the limits of its place."""
+    sizes = []
+    for where in limits:
+        moved = tuple(replace(x, where=where) if x is regressor else x for x in fit.regressors)
+        sizes.append(float(ordinates.solved(moved, fit.density)[0][column]))
+    return 0.5 * float(np.ptp([fit.sizes[column], *sizes]))
 
 
 def _placed(blocks: Callable[[], Iterable[Array]], means: Means, fit: Fit) -> tuple[Regressor, ...]:

@@ -44,6 +44,8 @@ class Part:
     power : ndarray, shape (n,)
         Half the mean squared difference of neighbouring samples in each block: the variance of
         white noise, (rad/s)² or (m/s²)². NaN where a block has few samples.
+    kurtosis : float
+        Excess kurtosis of samples that are independent: twice that of their differences.
     present : float
         Share of its samples that are there.
     """
@@ -51,6 +53,7 @@ class Part:
     start: int
     mean: Array
     power: Array
+    kurtosis: float
     present: float
 
 
@@ -118,29 +121,32 @@ def means_of(
 
 
 def _rows(values: Array) -> Array:
-    """Return mean, power of differences and share present of each row, shape (3, rows)."""
+    """Return mean, power and fourth moment of differences, share present, shape (4, rows)."""
     size = values.shape[1]
     if np.isfinite(values.sum()):
         level = values[0, 0]
         mean = (values - level).mean(axis=1) + level
-        steps = np.diff(values, axis=1)
-        power = np.einsum("ij,ij->i", steps, steps) / (2.0 * max(size - 1, 1))
-        return np.array([mean, power, np.ones(len(values))])
+        squares = np.diff(values, axis=1)
+        squares *= squares
+        pairs = max(size - 1, 1)
+        power = squares.sum(axis=1) / (2.0 * pairs)
+        fourth = np.einsum("ij,ij->i", squares, squares) / pairs
+        return np.array([mean, power, fourth, np.ones(len(values))])
     there = np.isfinite(values)
     count = there.sum(axis=1)
     mean = np.where(there, values, 0.0).sum(axis=1) / np.maximum(count, 1)
     both = there[:, 1:] & there[:, :-1]
     steps = np.where(both, np.diff(np.where(there, values, 0.0), axis=1), 0.0)
     pairs = both.sum(axis=1)
-    power = np.where(
-        pairs > 0, np.einsum("ij,ij->i", steps, steps) / (2.0 * np.maximum(pairs, 1)), np.nan
-    )
-    return np.array([mean, power, count / size])
+    squares = steps**2
+    known = np.where(pairs > 0, np.maximum(pairs, 1), np.nan)
+    power = squares.sum(axis=1) / (2.0 * known)
+    return np.array([mean, power, (squares**2).sum(axis=1) / known, count / size])
 
 
 def _parts(start: int, size: int, rows: Array) -> list[Part]:
     """Divide a segment at its longest holes, and bridge the others."""
-    mean, power, share = rows
+    mean, power, fourth, share = rows
     there = np.flatnonzero(share >= 0.5)
     if len(there) < _SHORTEST_PART:
         return []
@@ -160,10 +166,18 @@ def _parts(start: int, size: int, rows: Array) -> list[Part]:
                 start + here.start * size,
                 _bridged(mean[here], share[here] >= 0.5),
                 np.where(share[here] >= 0.5, power[here], np.nan),
+                _kurtosis(power[here], fourth[here], share[here] >= 0.5),
                 float(share[here].mean()),
             )
         )
     return parts
+
+
+def _kurtosis(power: Array, fourth: Array, there: NDArray[np.bool_]) -> float:
+    """Return the excess kurtosis of samples whose differences have these moments."""
+    known = there & np.isfinite(fourth)
+    square = 2.0 * float(power[known].mean()) if known.any() else 0.0
+    return 2.0 * (float(fourth[known].mean()) / square**2 - 3.0) if square > 0.0 else 0.0
 
 
 def _bridged(mean: Array, there: NDArray[np.bool_]) -> Array:

@@ -23,10 +23,10 @@ from imubench_pipeline.deterministic.regressors import Kind, Regressor
 Array = NDArray[np.float64]
 
 FALSE_ALARM: dict[Kind, float] = {
-    "step": 0.003,
-    "exponential": 0.0008,
-    "sinusoid": 0.0008,
-    "ramp": 0.001,
+    "step": 0.004,
+    "exponential": 0.0015,
+    "sinusoid": 0.0015,
+    "ramp": 0.002,
     "pulse": 0.001,
 }
 """Chance that a log without any shows one of a kind."""

@@ -37,9 +37,9 @@ _BESIDE = (3, 16)
 
 _SAFETY: dict[Kind, float] = {
     "step": 1.0,
-    "exponential": 1.35,
-    "sinusoid": 1.35,
-    "ramp": 1.35,
+    "exponential": 1.2,
+    "sinusoid": 1.2,
+    "ramp": 1.2,
     "pulse": 1.0,
 }
 """Times the threshold for known noise: that of few ordinates is known badly itself."""

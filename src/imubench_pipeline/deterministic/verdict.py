@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -15,6 +16,9 @@ from imubench_pipeline.findings import Finding
 
 Row = Mapping[str, Any]
 
+_HEAVY = 0.3
+"""Excess kurtosis from which N is known less well than of normal samples."""
+
 _TAKEN_OUT = "it is taken out of the noise"
 
 
@@ -27,18 +31,24 @@ class Verdict:
     findings : tuple of Finding
     caveats : mapping of str to (str, str)
         Status and reason of the parameters that are not to be relied on.
+    widening : float
+        Times the interval of N that a normal distribution would give.
     """
 
     findings: tuple[Finding, ...]
     caveats: Mapping[str, tuple[Status, str]]
+    widening: float = 1.0
 
     def applied(self, estimate: Estimate) -> Estimate:
         """Return an estimate with the caveats on the parameters that have a value."""
-        if not self.caveats:
+        if not self.caveats and self.widening == 1.0:
             return estimate
 
         def of(parameters: Mapping[str, Parameter]) -> dict[str, Parameter]:
-            return {name: _with(one, self.caveats.get(name)) for name, one in parameters.items()}
+            given = {name: _with(one, self.caveats.get(name)) for name, one in parameters.items()}
+            if "N" in given and self.widening > 1.0:
+                given["N"] = _widened(given["N"], self.widening)
+            return given
 
         slow = [self.caveats[name] for name in ("B", "K") if name in self.caveats]
         # The lowest point of the curve is where its slow terms begin.
@@ -63,6 +73,18 @@ def _with(parameter: Parameter, caveat: tuple[Status, str] | None) -> Parameter:
     return replace(parameter, status=status, reason=reason)
 
 
+def _widened(parameter: Parameter, times: float) -> Parameter:
+    value, lower, upper = parameter.value, parameter.lower, parameter.upper
+    if value is None or lower is None or upper is None:
+        return parameter
+    # On the logarithm: no limit passes 0.
+    return replace(
+        parameter,
+        lower=value * (lower / value) ** times if lower > 0.0 else lower,
+        upper=value * (upper / value) ** times,
+    )
+
+
 def verdict_of(channel: str, unit: str, courses: Courses) -> Verdict:
     """Return what was found of a channel, and what it casts doubt on.
 
@@ -77,6 +99,12 @@ def verdict_of(channel: str, unit: str, courses: Courses) -> Verdict:
     caveats: dict[str, tuple[Status, str]] = {}
     if courses.means is None or courses.searched is None:
         return Verdict((), {})
+    widening = 1.0
+    kurtosis = max(courses.means.parts, key=lambda one: len(one.mean)).kurtosis
+    if kurtosis > _HEAVY:
+        # The power of L samples has a relative variance of (2 + kurtosis) / L.
+        widening = math.sqrt(1.0 + 0.5 * kurtosis)
+        findings.append(_heavy(channel, kurtosis, widening))
     steady = steadiness_of(courses.means)
     if steady is not None and (steady.grows or steady.varies):
         finding = _unsteady(channel, steady)
@@ -89,7 +117,7 @@ def verdict_of(channel: str, unit: str, courses: Courses) -> Verdict:
         )
         findings.append(Finding("telegraph_noise", "warning", reason, float(MOST), channel))
         caveats |= {name: ("doubtful", reason) for name in ("B", "T_B", "K")}
-        return Verdict(tuple(findings), caveats)
+        return Verdict(tuple(findings), caveats, widening)
     noise = courses.searched.fit.noise
     for halves in compare_halves(courses.without(), noise):
         if halves.differ:
@@ -101,7 +129,7 @@ def verdict_of(channel: str, unit: str, courses: Courses) -> Verdict:
     reason_against = courses.against_random_walk
     if reason_against is not None:
         caveats["K"] = ("not_identified", reason_against)
-    return Verdict(tuple(findings), caveats)
+    return Verdict(tuple(findings), caveats, widening)
 
 
 def deterministic_rows(key: Mapping[str, str], unit: str, courses: Courses) -> Iterator[Row]:
@@ -157,6 +185,14 @@ def _finding(channel: str, unit: str, course: Course) -> Finding:
             f"{_TAKEN_OUT}"
         )
     return Finding(name, "warning", detail, course.size, channel, course.start, course.end)
+
+
+def _heavy(channel: str, kurtosis: float, widening: float) -> Finding:
+    detail = (
+        f"the fast noise of {channel} has heavier tails than a normal distribution (excess "
+        f"kurtosis {kurtosis:.3g}); the interval of N is made {widening:.3g} times as wide"
+    )
+    return Finding("heavy_tails", "note", detail, kurtosis, channel)
 
 
 def _unsteady(channel: str, steady: Steadiness) -> Finding:
