@@ -347,11 +347,11 @@ def _limits(parts: Sequence[tuple[Array, float]], value: float) -> tuple[float, 
 
 
 def _mean(values: Sequence[float], weights: Sequence[float]) -> float:
-    """Return the weighted geometric mean; the first value where that is 0."""
-    if values[0] == 0.0:
-        return 0.0
+    """Return the weighted geometric mean; the first value where it or all weight is 0."""
     there = [(value, weight) for value, weight in zip(values, weights, strict=True) if value > 0.0]
     total = sum(weight for _, weight in there)
+    if values[0] == 0.0 or total == 0.0:
+        return values[0]
     return math.exp(sum(weight * math.log(value) for value, weight in there) / total)
 
 
