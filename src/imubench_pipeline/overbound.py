@@ -20,8 +20,8 @@ are nearly independent. Density and integrals are bounded by noise models that t
 jointly from the posterior of the fit: their limits lie above 95 % of the models everywhere at once.
 Of a fit without draws they are widened as the measured curve is, which is less sure, at the same
 time scale: the density at f by the factor at tau = 0.37 / f, where the Allan variance looks, the
-integrals at t by that at tau = t. On 100 simulated logs of 10 h of each
-of three sensors (``benchmarks/overbound.py``) the models so found lay above the true curve in 99 or
+integrals at t by that at tau = t. Widened so, on 100 simulated logs of 10 h of each of three
+sensors (``benchmarks/overbound.py``), the models lay above the true curve in 99 or
 100, and a filter that loads them was overconfident in one at most. With the noise of the MTi-7's
 gyro their Allan variance was 1.18 (N+K) and 1.12 times the true one at its minimum, in the median.
 No random walk lies close above flicker noise: there it was 5.0 times, 4.5 of them the family's.
