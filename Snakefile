@@ -444,6 +444,7 @@ rule exports:
             RESULTS + f"/tables/{t}.parquet"
             for t in ("recordings", "parameters", "allan")
         ],
+        draws=every("draws.parquet"),
     output:
         directory(RESULTS + "/exports"),
     resources:

@@ -22,6 +22,7 @@ import numpy as np
 from bands import bounds_over, highest, what_is_cut
 from imubench_pipeline.estimators.curve_bias import averaging_times, of_model
 from imubench_pipeline.estimators.estimate import Parameter
+from imubench_pipeline.estimators.frame import frame_of
 from imubench_pipeline.estimators.likelihood import fit_spectrum
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.spectrum import spectra
@@ -75,7 +76,7 @@ def of_log(case: Case, number: int) -> Found:
     log += gauss_markov(samples, case.rate, case.B, case.T_B, rng)
     log += random_walk(samples, case.rate, case.K, rng)
     spectrum, lines = spectra([log], samples, case.rate)
-    result = fit_spectrum(spectrum, lines, rng=rng)
+    result = fit_spectrum(spectrum, frame_of(spectrum, lines), rng=rng)
     figures = {one.method: {**one.parameters, **one.curve} for one in result.estimates}
     return Found(figures, result.candidates[0].found.terms.name, highest(result, case.rate))
 

@@ -31,6 +31,7 @@ from scipy.linalg import block_diag
 
 from bands import highest, what_is_cut
 from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes
+from imubench_pipeline.error_budget import draw_models
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.export.growth import growth
 from imubench_pipeline.noise import NoiseModel
@@ -84,6 +85,7 @@ def of_log(case: Case, horizon: float, number: int) -> Found:
     curve = allan_variance(log, case.rate, overlap="octave")
     result = fit(log, case.rate, rng=rng)
     fitted = result.estimates[0].model
+    drawn = draw_models(result.estimates[0], 200, rng)
     found: dict[Key, Scores] = {}
     for part in PARTS:
         longest = part * case.hours * 3600.0 if part else horizon
@@ -95,6 +97,7 @@ def of_log(case: Case, horizon: float, number: int) -> Found:
                 family=family,
                 horizon=horizon,
                 longest=longest,
+                drawn=drawn,
                 most_excess=math.inf,
             )
             found[family, longest] = scores(case, bound.model, longest, horizon)

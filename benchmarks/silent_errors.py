@@ -287,7 +287,7 @@ def _matched(
     several = truth.low < truth.high
     nearest: Mapping[str, Any] | None = None
     if given and not truth.nothing:
-        nearest = min(given, key=lambda row: abs(np.log(row["value"] / truth.high)))
+        nearest = min(given, key=lambda row: abs(np.log(max(row["value"] / truth.high, 1e-9))))
     for row in rows:
         if row["value"] is None and (row["component"] > 1 or (given and not truth.nothing)):
             continue  # another component tells it

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from scipy.signal import lfilter
+from scipy.signal import butter, lfilter, sosfilt
 
 from imubench_pipeline.cutoff import find_cutoff
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
@@ -149,16 +149,39 @@ def test_where_folds_of_other_filters_look_alike_none_is_told(seed):
 
 
 def test_a_bend_that_is_no_filter_of_these_is_not_identified():
-    # The mean of two samples: cos^2(pi f / rate), which falls to nothing at Nyquist.
-    white = 1e-3 * np.random.default_rng(6).standard_normal(100_001)
-    found = cutoff_of((white[1:] + white[:-1]) / 2.0, 100.0)
+    # The mean of means over three samples and more, which falls with three zeros.
+    white = 1e-3 * np.random.default_rng(6).standard_normal(200_000)
+    for length in (3, 4, 5):
+        white = np.convolve(white, np.ones(length) / length, "valid")
+    found = cutoff_of(white, 100.0)
     assert found.frequency.status == found.N.status == "not_identified"
     assert found.frequency.value is None and found.N.value is None
-    reason = "the spectrum bends, but not as behind a first-order or Butterworth low-pass"
-    assert found.frequency.reason == found.N.reason == reason
+    assert "but not as behind any of 9 filters" in found.frequency.reason
     assert found.frequency.fitted is not None and found.N.fitted is not None
-    # Its interval is narrow: it is the shape that refuses it.
-    assert found.frequency.upper < 1.2 * found.frequency.lower
+
+
+@pytest.mark.parametrize("samples", [2, 3, 7])
+def test_a_moving_average_is_found(samples):
+    white = 1e-3 * np.random.default_rng(6).standard_normal(200_000)
+    found = cutoff_of(np.convolve(white, np.ones(samples) / samples, "valid"), 100.0)
+    # cos^2(pi f / rate) is also a bilinear filter with its cut-off at a half of Nyquist.
+    assert (found.kind, found.order) == (("bilinear", 1) if samples == 2 else ("boxcar", 1))
+    # That of a mean over the same time, unsampled.
+    at = 25.0 if samples == 2 else 44.2946 / samples
+    assert found.frequency.value == pytest.approx(at, rel=0.01)
+    assert found.N.lower < 1e-4 < found.N.upper
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+@pytest.mark.parametrize("cutoff", [2.5, 12.0, 35.0])
+def test_digital_butterworth_filters_are_found(order, cutoff):
+    rng = np.random.default_rng(order)
+    sections = butter(order, cutoff, output="sos", fs=100.0)
+    found = cutoff_of(sosfilt(sections, 1e-3 * rng.standard_normal(202_000))[2_000:], 100.0)
+    assert (found.kind, found.order) == ("bilinear", order)
+    assert found.frequency.lower < cutoff < found.frequency.upper
+    assert found.frequency.value == pytest.approx(cutoff, rel=0.03)
+    assert 0.99 * found.N.lower < 1e-4 < 1.01 * found.N.upper
 
 
 @pytest.mark.parametrize("T_B", [1.0, 1.7, 5.0, 50.0])
@@ -186,7 +209,8 @@ def test_white_noise_behind_the_filter_is_told_from_that_before_it():
     assert cutoff_of(log, 100.0).floor == 0.0
     log += 3e-4 * math.sqrt(100.0) * rng.standard_normal(len(log))  # as of a register
     found = cutoff_of(log, 100.0)
-    assert found.floor == pytest.approx(3e-4, rel=0.1)
+    # A digital filter with more behind it looks nearly alike.
+    assert 2.5e-4 < found.floor < 5e-4
     assert found.frequency.lower < 10.0 < found.frequency.upper
     assert found.N.lower < 1e-3 < found.N.upper
 

@@ -260,3 +260,35 @@ def test_its_words_tell_how_large_it_is() -> None:
     found: Overbound = overbound(measured(GYRO), GYRO, RATE)
     assert f"{math.sqrt(found.at_minimum):.2f} times the measured one" in found.words
     assert "from 0.00167 to 2.5 Hz" in found.words
+
+
+def test_draws_of_the_fit_widen_what_is_fitted_by_what_they_leave_open(rng) -> None:
+    # Of white noise alone all limits scale with N^2: the 95 % point of N is where they all lie.
+    model = NoiseModel(N=1e-4)
+    spread = 0.02
+    drawn = [NoiseModel(N=1e-4 * math.exp(spread * x)) for x in rng.standard_normal(4000)]
+    curve = measured(model)
+    wide = limits_of(curve, model, RATE, 60.0, 60.0, (1 / 600, RATE / 2))
+    told = limits_of(curve, model, RATE, 60.0, 60.0, (1 / 600, RATE / 2), drawn=drawn)
+    assert np.array_equal(told[0].value, wide[0].value)  # the measured curve is as sure as it was
+    for limit in told[1:]:
+        fitted = limit.of_term(model.terms[0])
+        assert limit.value / fitted == pytest.approx(math.exp(2 * 1.645 * spread), rel=5e-3)
+
+
+def test_limits_from_draws_lie_above_as_many_of_them_at_every_place_at_once(rng) -> None:
+    steps = 0.3 * rng.standard_normal((400, 3))
+    drawn = [
+        replace(GYRO, N=GYRO.N * math.exp(0.1 * a), B=GYRO.B * math.exp(b), K=GYRO.K * math.exp(c))
+        for a, b, c in steps
+    ]
+    band = (1 / 600, RATE / 2)
+    limits = limits_of(measured(GYRO), GYRO, RATE, 60.0, 60.0, band, drawn=drawn)[1:]
+    below = [
+        all(
+            np.all(sum(limit.of_term(term) for term in model.terms) <= limit.value)
+            for limit in limits
+        )
+        for model in drawn
+    ]
+    assert np.mean(below) == pytest.approx(0.95, abs=0.01)

@@ -153,7 +153,7 @@ def _seconds(text: str) -> float:
 
 def _export(given: argparse.Namespace) -> int:
     from imubench_pipeline.export.imu import ExportError
-    from imubench_pipeline.export.request import Request, load, made
+    from imubench_pipeline.export.request import Request, load, made, recordings_of
 
     if given.inflate != 1.0 and not given.because:
         print("--inflate needs its reason; expected --because '...'", file=sys.stderr)
@@ -172,7 +172,7 @@ def _export(given: argparse.Namespace) -> int:
         rate=given.rate,
     )
     try:
-        content = made(load(given.results), asked)
+        content = made(load(given.results), asked, recordings_of(given.results))
     except ExportError as error:
         print(error, file=sys.stderr)
         return 2

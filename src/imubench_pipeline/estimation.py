@@ -28,6 +28,7 @@ from imubench_pipeline.deterministic.courses import find_courses
 from imubench_pipeline.deterministic.verdict import deterministic_rows, verdict_of
 from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators import least_squares, likelihood
+from imubench_pipeline.estimators.agreement import agreeing, disagreements
 from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate, not_shown
 from imubench_pipeline.estimators.least_squares import UnfitCurveError
 from imubench_pipeline.estimators.likelihood import Likelihood
@@ -159,6 +160,15 @@ def estimate_channel(
                 added = temperature_curve(log, warm, measured)
                 into.allan_compensated += compensated_rows(key, left, added)
     into.allan += allan_rows(key, final)
+    into.estimate_findings += [
+        finding.row(key.sensor, key.recording) for finding in disagreements(key.channel, estimates)
+    ]
+    if "likelihood" in estimates:
+        estimates |= {
+            method: agreeing(estimates[method], estimates["likelihood"])
+            for method in _BY_CURVE
+            if method in estimates
+        }
     best = next(method for method in _BEST_FIRST if method in settings.methods)
     for method in settings.methods:
         if method in estimates:
@@ -177,6 +187,9 @@ def _unfiltered(band: float | None, bandwidth: float | None) -> float | None:
 
 
 _BY_LIKELIHOOD = {"likelihood", "likelihood_gm", "compensated"}
+
+_BY_CURVE = ("likelihood_gm", "weighted", "paper", "curve")
+"""Methods that know one model only, or the curve alone."""
 
 _BEST_FIRST = ("likelihood", "likelihood_gm", "weighted", "paper", "curve")
 """The method to use is the first of these that is asked for."""

@@ -16,10 +16,12 @@ covariance of any linear filter that is stationary in time [1, 2].
 The limits of a measured curve hold at each tau; the true curve leaves them somewhere in a fifth to
 a third of the logs. The limits used here hold for the curve as a whole: at each tau the chance
 of an error is 5 % over the number of octaves of the curve, since Allan variances an octave apart
-are nearly independent. What is fitted is at least as sure as the measured curve at the same time
-scale, and is widened by the same factor: the density at f by that at tau = 0.37 / f, where the
-Allan variance looks, the integrals at t by that at tau = t. On 100 simulated logs of 10 h of each
-of three sensors (``benchmarks/overbound.py``) the models so found lay above the true curve in 99 or
+are nearly independent. Density and integrals are bounded by noise models that the log allows, drawn
+jointly from the posterior of the fit: their limits lie above 95 % of the models everywhere at once.
+Of a fit without draws they are widened as the measured curve is, which is less sure, at the same
+time scale: the density at f by the factor at tau = 0.37 / f, where the Allan variance looks, the
+integrals at t by that at tau = t. Widened so, on 100 simulated logs of 10 h of each of three
+sensors (``benchmarks/overbound.py``), the models lay above the true curve in 99 or
 100, and a filter that loads them was overconfident in one at most. With the noise of the MTi-7's
 gyro their Allan variance was 1.18 (N+K) and 1.12 times the true one at its minimum, in the median.
 No random walk lies close above flicker noise: there it was 5.0 times, 4.5 of them the family's.
@@ -42,7 +44,7 @@ NAVIGATION 68 (2), 2021.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -180,6 +182,7 @@ def overbound(
     longest: float | None = None,
     band: tuple[float | None, float | None] = (None, None),
     confidence: float = 0.95,
+    drawn: Sequence[NoiseModel] = (),
     most_excess: float = MOST_EXCESS,
 ) -> Overbound:
     """Return the smallest model that lies above a measured curve and its fit.
@@ -204,6 +207,9 @@ def overbound(
         half the rate. A sensor that is filtered below half the rate may say so here.
     confidence : float
         Of the limits, for all tau together.
+    drawn : sequence of NoiseModel
+        Models that the log allows, drawn jointly from the posterior of the fit; without them the
+        fitted model is widened as the measured curve is.
     most_excess : float
         Largest Allan deviation of the model over the limit that it must lie above.
 
@@ -220,7 +226,7 @@ def overbound(
     """
     reach = longest or horizon
     ends = (band[0] or _MEMORY / horizon, band[1] or 0.5 * rate)
-    limits = limits_of(curve, fitted, rate, horizon, reach, ends, confidence)
+    limits = limits_of(curve, fitted, rate, horizon, reach, ends, confidence, drawn)
     times = (2.0 / rate, _BEYOND * max(horizon, reach))
     model = smallest(limits, family, times)
     excess = _excess(limits[0], model)
@@ -320,6 +326,7 @@ def limits_of(
     longest: float,
     band: tuple[float, float],
     confidence: float = 0.95,
+    drawn: Sequence[NoiseModel] = (),
 ) -> list[Limits]:
     """Return what a model must lie above: Allan variance, density, two integrals (`overbound`)."""
     if not 2.0 / rate < horizon:
@@ -330,17 +337,36 @@ def limits_of(
     tau = np.append(curve.tau[curve.tau < longest * (1.0 - 1e-9)], longest)
     limit = np.exp(np.interp(np.log(tau), np.log(curve.tau), np.log(upper)))
 
-    def widening(tau: Array) -> Array:
-        return np.asarray(np.interp(np.log(tau), np.log(curve.tau), upper / curve.variance))
-
     frequency = np.geomspace(*band, count_of_points(*band, _POINTS_A_DECADE))
     time = np.geomspace(1.0 / rate, horizon, count_of_points(1.0 / rate, horizon, _POINTS_A_DECADE))
-    density = fitted.psd(frequency, rate) * widening(_LOOKS_AT / frequency)
-    grown, wider = growth(fitted, time, rate), widening(time)
+
+    def of_model(model: NoiseModel) -> Array:
+        grown = growth(model, time, rate)
+        return np.concatenate((model.psd(frequency, rate), grown.first, grown.second))
+
+    if drawn:
+        wider = of_model(fitted) * _above_draws(of_model(fitted), map(of_model, drawn), confidence)
+    else:
+        looked = np.concatenate((_LOOKS_AT / frequency, time, time))
+        factors = np.interp(np.log(looked), np.log(curve.tau), upper / curve.variance)
+        wider = of_model(fitted) * factors
+    density, first, second = np.split(wider, [len(frequency), len(frequency) + len(time)])
     n = tau * rate
     return [
         Limits("Allan variance", tau, limit, lambda t: t.sampled_allan_variance(n, 1.0 / rate)),
         Limits("spectral density", frequency, density, lambda t: t.psd(frequency)),
-        Limits("first integral", time, grown.first * wider, lambda t: growth_of(t, time).first),
-        Limits("second integral", time, grown.second * wider, lambda t: growth_of(t, time).second),
+        Limits("first integral", time, first, lambda t: growth_of(t, time).first),
+        Limits("second integral", time, second, lambda t: growth_of(t, time).second),
     ]
+
+
+def _above_draws(fitted: Array, drawn: Iterable[Array], confidence: float) -> Array:
+    """Return factors of a fit that lie above a share of the draws, at every place at once.
+
+    In units of the spread of its logarithm at each place, every draw has one place where it is
+    furthest above the fit: the limit lies as many above as that share of the draws stays below.
+    """
+    above = np.log(np.array([*drawn]) / fitted)
+    spread = np.maximum(np.sqrt(np.mean(above**2, axis=0)), 1e-12)
+    furthest = (above / spread).max(axis=1)
+    return np.exp(max(float(np.quantile(furthest, confidence)), 0.0) * spread)

@@ -3,6 +3,7 @@ import math
 import numpy as np
 import pytest
 
+from imubench_pipeline.estimators import curve_bias
 from imubench_pipeline.estimators.curve_bias import (
     Models,
     allan_variance,
@@ -194,3 +195,9 @@ def test_models_hold_the_terms_of_a_noise_model() -> None:
     assert isinstance(models, Models)
     assert models.parameter("F")[0] == 2.0 and models.parameter("Q")[0] == 0.0
     assert (models.biases[0, 0], models.times[0, 0]) == (4.0, 5.0)
+
+
+def test_models_of_no_weight_at_all_leave_the_value_of_the_first():
+    assert curve_bias._mean([2.0, 3.0], [0.0, 0.0]) == 2.0
+    assert curve_bias._mean([2.0, 8.0], [1.0, 1.0]) == pytest.approx(4.0)
+    assert curve_bias._mean([0.0, 8.0], [1.0, 1.0]) == 0.0

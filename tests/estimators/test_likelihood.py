@@ -6,7 +6,7 @@ import pytest
 import scipy.fft
 from scipy.signal import lfilter
 
-from imubench_pipeline.estimators.estimate import FAMILY, Parameter
+from imubench_pipeline.estimators.estimate import CURVE, FAMILY, Parameter
 from imubench_pipeline.estimators.likelihood import Likelihood, fit, fit_blocks
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
 from imubench_pipeline.simulate import channel_rng, simulate
@@ -269,8 +269,8 @@ def test_a_log_of_a_few_samples_more_gives_an_answer(rng: np.random.Generator, s
 
 
 def test_a_band_of_a_few_bins_gives_an_answer(rng: np.random.Generator) -> None:
-    # 10 s at 100 Hz behind a filter of 10 Hz: 19 ordinates lie below a tenth of its cut-off.
-    found = fit(rng.standard_normal(1000), 100.0, bandwidth=10.0)
+    # 10 s at 100 Hz: 19 ordinates lie below 1 Hz.
+    found = fit(rng.standard_normal(1000), 100.0, band=1.0)
     assert found.used.sum() == 19
     assert of(found, "N").status in ("ok", "not_shown", "not_identified")
 
@@ -504,29 +504,106 @@ def test_a_band_beyond_nyquist_is_the_whole_spectrum() -> None:
     assert_same(found_in(SHORT, samples=SHORT_SAMPLES), found)
 
 
-def test_behind_a_filter_of_a_stated_bandwidth_a_tenth_of_it_is_used() -> None:
+def test_a_filter_that_nobody_states_is_found_and_taken_out() -> None:
+    # White noise behind a first-order filter applied to the samples, whose cut-off is a third of
+    # Nyquist: a tenth of it would leave 8 % of N.
     cutoff = 0.8
     pole = np.exp(-2 * np.pi * cutoff / RATE)
     model = NoiseModel(**MTI_7)
     log = lfilter([1 - pole], [1, -pole], log_of(model, samples=SAMPLES + 1000))[1000:]
-    found = fit(log, RATE, bandwidth=cutoff)
-    assert found.band is not None and found.band.highest <= cutoff / 10
-    assert found.spectrum.upper[found.used].max() <= cutoff / 10 * (1 + 1e-6)
-    # The filter takes half a per cent of N there.
-    bound = bounds(MTI_7, RATE, SAMPLES, found.band.highest)
-    for name in ALL:
-        off = np.log(value(found, name, "likelihood_gm") / MTI_7[name])
-        assert abs(off) < 0.01 + 4 * bound[name], name
+    for stated in (None, cutoff):
+        found = fit(log, RATE, bandwidth=stated)
+        assert found.band is not None and found.band.highest == RATE / 2
+        assert "low-pass of order 1" in found.band.source
+        N = found.estimates[0].parameters["N"]
+        assert N.lower is not None and N.upper is not None
+        # Before the sampling, the same filter would have folded more noise into it.
+        assert N.lower < MTI_7["N"] < N.upper < 1.2 * N.lower
+        bound = bounds(MTI_7, RATE, SAMPLES, found.band.highest)
+        for name in ("B", "T_B", "K"):
+            off = np.log(value(found, name, "likelihood_gm") / MTI_7[name])
+            assert abs(off) < 0.01 + 4 * bound[name], name
 
 
-def test_a_filter_that_nobody_states_harms_nothing() -> None:
-    # A mean of two samples: fitted up to Nyquist, N would be 0 and B many times too large.
+def test_a_mean_of_two_samples_is_a_filter_and_harms_nothing() -> None:
+    # Fitted up to Nyquist without it, N would be 0 and B many times too large.
     log = log_of(NoiseModel(**MTI_7), samples=SAMPLES + 1)
     found = fit((log[1:] + log[:-1]) / 2, RATE)
-    assert found.band is not None and "filter" in found.band.source
+    assert found.band is not None and found.band.highest > 0.4 * RATE
     for name, bound in bounds(MTI_7, RATE, SAMPLES, found.band.highest).items():
         off = np.log(value(found, name, "likelihood_gm") / MTI_7[name])
         assert abs(off) < 0.01 + 4 * bound, name
+
+
+def process_and_walk(T_B: float, rate: float, seed: int, N: float = 1e-4) -> np.ndarray:
+    """White noise, a Gauss-Markov process of B = 3 N and a walk, by recursions alone."""
+    rng = np.random.default_rng(seed)
+    samples, decay = 144_000, np.exp(-1.0 / (T_B * rate))
+    # v = S_B T_B / 2, S_B = 2 B^2 ln 2 / (pi 0.43654^2 T_B)
+    deviation = 3.0 * N * np.sqrt(np.log(2.0) / np.pi) / 0.43654
+    driven = deviation * np.sqrt(1.0 - decay**2) * rng.standard_normal(samples)
+    driven[0] = deviation * rng.standard_normal()
+    walk = np.cumsum(2e-2 * N / np.sqrt(rate) * rng.standard_normal(samples))
+    white = N * np.sqrt(rate) * rng.standard_normal(samples)
+    return np.asarray(white + lfilter([1.0], [1.0, -decay], driven) + walk)
+
+
+@pytest.mark.parametrize("T_B", [2.0, 5.0, 8.0])
+def test_a_process_of_few_samples_is_not_taken_for_the_sensors_filter(T_B: float) -> None:
+    found = fit(process_and_walk(T_B, 10.0, 3), 10.0)
+    assert found.band is not None and found.band.highest == 5.0
+    assert found.candidates[0].goodness.verdict == "explained"
+    for name, truth in (("N", 1e-4), ("B", 3e-4), ("T_B", T_B)):
+        one = of(found, name)
+        assert one.status == "ok", name
+        assert one.lower is not None and one.upper is not None
+        assert 0.9 * one.lower < truth < 1.1 * one.upper, name
+
+
+def test_white_noise_below_a_process_as_fast_as_a_filter_is_not_told() -> None:
+    # Three samples: the sensor's low-pass and white noise behind it would look the same.
+    found = fit(process_and_walk(0.3, 10.0, 4), 10.0)
+    N = of(found, "N")
+    assert (N.value, N.status) == (None, "not_identified")
+    assert N.reason is not None and "low-pass" in N.reason
+    assert N.lower is not None and N.upper is not None
+    assert N.lower < 1e-4 < N.upper
+
+
+def test_what_a_process_hides_is_not_taken_for_white_noise_before_a_filter() -> None:
+    # 30 samples long and so strong that white noise does not show at Nyquist.
+    found = fit(process_and_walk(3.0, 10.0, 5, N=1e-4) + 0.0, 10.0)
+    hidden = fit(3e3 * process_and_walk(3.0, 10.0, 5, N=1e-4 / 3e3) + strong(), 10.0)
+    assert of(found, "N").status == "ok"
+    N = of(hidden, "N")
+    assert N.status in ("not_identified", "absent")
+    assert N.value is None
+
+
+def strong() -> np.ndarray:
+    """A process 3,000 times the white noise beside it."""
+    rng = np.random.default_rng(6)
+    decay = np.exp(-1.0 / 30.0)
+    return np.asarray(
+        lfilter([1.0], [1.0, -decay], 0.3 * np.sqrt(1.0 - decay**2) * rng.standard_normal(144_000))
+    )
+
+
+def test_where_nothing_explains_the_spectrum_what_is_left_out_is_said() -> None:
+    # A resonance: neither a process nor a low-pass; N stands below it.
+    rng = np.random.default_rng(8)
+    radius, angle = 0.97, 2 * np.pi * 1.0 / RATE
+    ringing = lfilter(
+        [1.0], [1.0, -2 * radius * np.cos(angle), radius**2], rng.normal(size=200_000)
+    )
+    log = rng.standard_normal(200_000) + 0.5 * ringing / ringing.std()
+    found = fit(log, RATE)
+    assert found.band is not None and found.band.highest < 0.9 and found.frame.cut
+    assert "beyond" in found.band.source
+    N, truth = of(found, "N"), 1 / np.sqrt(RATE)
+    assert N.lower is not None and N.upper is not None
+    assert N.lower < truth < 1.05 * N.upper
+    assert N.reason is not None and "neither a process nor a low-pass" in N.reason
 
 
 @pytest.mark.parametrize("truth", [MTI_7, FLICKER])
@@ -563,7 +640,7 @@ def test_two_processes_are_two_components() -> None:
     found = fit(simulate(model, RATE, 400_000, np.random.default_rng(7)), RATE)
     estimate = found.estimates[0]
     rows = [(number, name) for number, name, _ in estimate.components()]
-    assert rows == [(1, name) for name in FAMILY] + [(2, "B"), (2, "T_B")]
+    assert rows == [(1, name) for name in (*FAMILY, *CURVE)] + [(2, "B"), (2, "T_B")]
     for number, truth in ((1, fast), (2, slow)):  # by T_B
         parts = {name: part for n, name, part in estimate.components() if n == number}
         for name in ("B", "T_B"):

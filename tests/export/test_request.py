@@ -10,14 +10,14 @@ import yaml
 from imubench_pipeline.allan import AllanCurve, cluster_sizes
 from imubench_pipeline.cli import main
 from imubench_pipeline.config import ExportSettings
-from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.estimators.estimate import Estimate, JointDraws, Parameter
 from imubench_pipeline.export.imu import ExportError
 from imubench_pipeline.export.of_run import exports
 from imubench_pipeline.export.request import Request, imu_of, load, made
 from imubench_pipeline.export.targets import TARGETS
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.results import Key, Row, allan_rows, parameter_rows
-from imubench_pipeline.tables import build, write_arrow
+from imubench_pipeline.results import Key, Row, allan_rows, draw_rows, parameter_rows
+from imubench_pipeline.tables import build, write, write_arrow
 from tests.export.sensors import ACCEL, GYRO
 
 CHANNELS = {
@@ -92,6 +92,30 @@ def test_an_overbound_has_the_terms_that_the_program_holds(
     text = TARGETS[name].write(both)
     assert isinstance(text, str)
     assert "replaced by" not in text
+
+
+def test_an_overbound_lies_above_the_draws_of_the_recording(
+    tables: dict[str, pa.Table], tmp_path: Path
+) -> None:
+    def bounded(spread: float) -> NoiseModel:
+        model = CHANNELS["gyro_y"]
+        first = np.tile([0.0, model.N, model.B, model.T_B or np.nan, model.K, 0.0], (40, 1))
+        first[:, [1, 2, 4]] *= np.geomspace(1.0 / spread, spread, 40)[:, None]
+        drawn = JointDraws(first, np.empty((40, 0, 2)))
+        rows = draw_rows(Key("mti_7", "sim_a", "gyro_y"), Estimate("likelihood", {}, draws=drawn))
+        write("draws", rows, tmp_path / "mti_7/sim_a/draws.parquet")
+        found = imu_of(
+            tables, replace(REQUEST, overbound=True, horizon=600.0, most_excess=20.0), tmp_path
+        )
+        assert found.gyro is not None
+        return found.gyro.model
+
+    without = imu_of(tables, replace(REQUEST, overbound=True, horizon=600.0, most_excess=20.0)).gyro
+    # Sure of the fit, only the measured curve is widened; else the bound is as much larger.
+    assert without is not None
+    sure, unsure = bounded(1.001), bounded(2.0)
+    assert sure.K < without.model.K < unsure.K
+    assert 2e-4 < sure.N < 2e-4 * 1.1 < 2e-4 * 1.7 < unsure.N < 2e-4 * 2.3
 
 
 def test_an_overbound_is_larger_and_says_what_it_is(tables: dict[str, pa.Table]) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from imubench_pipeline.config import ExportSettings
 from imubench_pipeline.export.of_run import exports
-from imubench_pipeline.export.request import load
+from imubench_pipeline.export.request import load, recordings_of
 from imubench_pipeline.tables import making, write_content
 
 
@@ -13,7 +13,7 @@ def main(tables: Path, settings: str, folder: Path) -> None:
     """Write a folder a sensor, with a file a program; all appear together."""
     how = ExportSettings.model_validate(json.loads(settings))
     with making(folder) as made:
-        for place, content in exports(load(tables), how):
+        for place, content in exports(load(tables), how, recordings_of(tables)):
             write_content(content, made / place)
 
 

@@ -334,7 +334,12 @@ def _time_of_lowest(
     if outside > 0.025 * weight:
         reason = "models that the log does not rule out have no minimum within a ninth of it"
         return Parameter(None, "not_identified", reason, limits[0], None, fitted=value)
-    return Parameter(value, "ok", None, *limits)
+    lower, upper = limits
+    if lower and upper and math.log(upper / lower) > NOT_IDENTIFIED * _WIDTH_OF_INTERVAL:
+        # Such as a curve with two minima, of which either may be the lower one.
+        reason = "a log of this length does not tell it to 50 %; only its interval is given"
+        return Parameter(None, "not_identified", reason, lower, upper, fitted=value)
+    return Parameter(value, "ok", None, lower, upper)
 
 
 def _limits(parts: Sequence[tuple[Array, float]], value: float) -> tuple[float, float]:
@@ -347,11 +352,11 @@ def _limits(parts: Sequence[tuple[Array, float]], value: float) -> tuple[float, 
 
 
 def _mean(values: Sequence[float], weights: Sequence[float]) -> float:
-    """Return the weighted geometric mean; the first value where that is 0."""
-    if values[0] == 0.0:
-        return 0.0
+    """Return the weighted geometric mean; the first value where it or all weight is 0."""
     there = [(value, weight) for value, weight in zip(values, weights, strict=True) if value > 0.0]
     total = sum(weight for _, weight in there)
+    if values[0] == 0.0 or total == 0.0:
+        return values[0]
     return math.exp(sum(weight * math.log(value) for value, weight in there) / total)
 
 

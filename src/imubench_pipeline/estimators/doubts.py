@@ -19,6 +19,11 @@ Array = NDArray[np.float64]
 _WORSE = 6.0
 """BIC by which the papers' model must be the worse for the data to be against it."""
 
+_CLEARLY = 2.0
+"""AIC by which a model without a random walk must be the better for K to be doubted: so it is for
+three quarters of the walks that are processes of a twentieth of the log, and for 2 to 3 % of those
+that are walks."""
+
 _AS_FAST = 10.0
 """Sampling intervals: a process as fast may be the sensor's filter."""
 
@@ -66,6 +71,9 @@ def doubted(
         estimate, papers = (
             _with_doubt_of_the_cut(one, spectrum, frame) for one in (estimate, papers)
         )
+    rival = _without_a_walk(chosen, candidates)
+    if rival is not None:
+        estimate = doubting(estimate, ("K",), rival)
     against = papers_candidate.bic - chosen.bic
     if against > _WORSE:
         reason = (
@@ -76,6 +84,25 @@ def doubted(
     return estimate, papers
 
 
+def _without_a_walk(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
+    """Say so where AIC clearly prefers a model without the random walk of the chosen one.
+
+    A slow process passes for a walk: BIC with what is asked of such a process takes the walk.
+    """
+    if "K" not in chosen.found.terms.linear:
+        return None
+    without = [
+        one for one in candidates if "K" not in one.found.terms.linear and not one.found.terms.ramp
+    ]
+    best = min(without, key=lambda one: one.aic, default=chosen)
+    if best.aic > chosen.aic - _CLEARLY:
+        return None
+    return (
+        f"{best.found.terms.name}, which has no random walk, is better by "
+        f"{chosen.aic - best.aic:.1f} in AIC: a process as slow as the log passes for a random walk"
+    )
+
+
 def doubting(estimate: Estimate, names: Sequence[str], reason: str) -> Estimate:
     """Return an estimate whose values of some parameters are doubtful.
 
@@ -83,7 +110,8 @@ def doubting(estimate: Estimate, names: Sequence[str], reason: str) -> Estimate:
     ----------
     estimate : Estimate
     names : sequence of str
-        Of its parameters; what has no plain value stays as it is.
+        Of its parameters; what has no plain value stays as it is. With B go the figures of the
+        curve.
     reason : str
     """
     parameters = {
@@ -101,7 +129,13 @@ def doubting(estimate: Estimate, names: Sequence[str], reason: str) -> Estimate:
         }
         for group in estimate.further
     ]
-    return replace(estimate, parameters=parameters, further=further)
+    of_curve = {
+        name: replace(one, status="doubtful", reason=reason)
+        if "B" in names and one.status == "ok"
+        else one
+        for name, one in estimate.curve.items()
+    }
+    return replace(estimate, parameters=parameters, further=further, curve=of_curve)
 
 
 def _of_white_noise(

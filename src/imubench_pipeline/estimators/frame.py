@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.cutoff import PROCESSES, Cutoff, find_cutoff, refined
+from imubench_pipeline.cutoff import Cutoff, find_cutoff
 from imubench_pipeline.estimators.band import Band, find_band
+from imubench_pipeline.estimators.filter_fits import PROCESSES
 from imubench_pipeline.estimators.lines import Line, find, without_lines
 from imubench_pipeline.estimators.whittle import (
     COARSE,
@@ -23,6 +24,7 @@ from imubench_pipeline.estimators.whittle import (
     model_of,
     whittle_of,
 )
+from imubench_pipeline.joint_cutoff import refined
 from imubench_pipeline.spectrum import LineSpectrum, Spectrum
 
 Mask = NDArray[np.bool_]
@@ -170,7 +172,7 @@ def frame_of(
     if band is not None:
         limit = find_band(spectrum, clear, asked=band)
         used = clear & (spectrum.upper <= limit.highest * (1.0 + 1e-9))
-        return Frame(lines, clear, used, limit)
+        return Frame(lines, clear, used, limit, shortest=PROCESSES / spectrum.rate)
     low_pass = find_cutoff(spectrum, clear, resolution=resolution, stated=bandwidth)
     if low_pass.or_quantization:
         low_pass = replace(low_pass, behind=None, readings=())

@@ -15,7 +15,9 @@ NOT_MADE = "not_made.txt"
 """Names the programs for which there is no file, with the reason."""
 
 
-def exports(tables: Tables, settings: ExportSettings) -> Iterator[tuple[Path, str | bytes]]:
+def exports(
+    tables: Tables, settings: ExportSettings, recordings: Path | None = None
+) -> Iterator[tuple[Path, str | bytes]]:
     """Yield the files of a run, each with its place in the folder of the exports.
 
     Parameters
@@ -23,6 +25,8 @@ def exports(tables: Tables, settings: ExportSettings) -> Iterator[tuple[Path, st
     tables : mapping of str to pyarrow.Table
         ``recordings``, ``parameters`` and ``allan``.
     settings : ExportSettings
+    recordings : Path, optional
+        As `imubench_pipeline.export.request.made` takes it.
 
     Yields
     ------
@@ -44,7 +48,7 @@ def exports(tables: Tables, settings: ExportSettings) -> Iterator[tuple[Path, st
                 most_excess=settings.most_excess,
             )
             try:
-                content = made(tables, request)
+                content = made(tables, request, recordings)
             except ExportError as error:
                 refused.append(f"{target}: {error}")
                 continue

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,9 @@ from imubench_pipeline.export.choice import WORST, Choice, choose, devices_of
 from imubench_pipeline.export.imu import AxisNoise, ExportError, Imu, normal_gravity
 from imubench_pipeline.export.mapping import named
 from imubench_pipeline.export.targets import TARGETS
+from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.overbound import MOST_EXCESS, overbound
+from imubench_pipeline.results import draws
 from imubench_pipeline.smallest_model import FAMILIES, Family
 from imubench_pipeline.tables import read
 from imubench_pipeline.units import STANDARD_GRAVITY
@@ -87,7 +89,18 @@ def load(path: Path) -> dict[str, pa.Table]:
         raise ExportError(f"{folder}: {error}") from error
 
 
-def made(tables: Tables, request: Request) -> str | bytes:
+def recordings_of(path: Path) -> Path:
+    """Return the folder of the recordings of a run, of its results or the tables in them.
+
+    Parameters
+    ----------
+    path : Path
+        As `load` takes it.
+    """
+    return (path if (path / "tables").is_dir() else path.parent) / "recordings"
+
+
+def made(tables: Tables, request: Request, recordings: Path | None = None) -> str | bytes:
     """Return the content of the file.
 
     Parameters
@@ -95,6 +108,9 @@ def made(tables: Tables, request: Request) -> str | bytes:
     tables : mapping of str to pyarrow.Table
         ``recordings``, ``parameters`` and ``allan`` of a run.
     request : Request
+    recordings : Path, optional
+        Folder of the recordings of the run: their tables ``draws`` say how sure a fit is that is to
+        be bounded.
 
     Raises
     ------
@@ -105,10 +121,10 @@ def made(tables: Tables, request: Request) -> str | bytes:
         raise ExportError(
             f"target {request.target!r} is not known; there are: {', '.join(TARGETS)}"
         )
-    return TARGETS[request.target].write(imu_of(tables, request))
+    return TARGETS[request.target].write(imu_of(tables, request, recordings))
 
 
-def imu_of(tables: Tables, request: Request) -> Imu:
+def imu_of(tables: Tables, request: Request, folder: Path | None = None) -> Imu:
     """Return the sensor's noise as a request asks for it (see `made`)."""
     recordings = _rows(tables["recordings"], sensor=request.sensor)
     if not recordings:
@@ -136,8 +152,9 @@ def imu_of(tables: Tables, request: Request) -> Imu:
         axes[quantity] = choice.axis
         if request.overbound:
             family = TARGETS[request.target].family
+            drawn = _drawn(folder, request.sensor, choice)
             axes[quantity] = _bounded(
-                tables["allan"], choice, request, float(about["rate"]), family
+                tables["allan"], choice, request, float(about["rate"]), family, drawn
             )
     if not axes:
         reasons = "; ".join(row["reason"] for row in recordings if row["reason"])
@@ -156,8 +173,20 @@ def imu_of(tables: Tables, request: Request) -> Imu:
     )
 
 
+def _drawn(folder: Path | None, sensor: str, choice: Choice) -> Sequence[NoiseModel]:
+    """Return the noise models that the log of the chosen axis allows; none where none are kept."""
+    path = folder / sensor / choice.recording / "draws.parquet" if folder is not None else None
+    found = draws(path).get((choice.channel, choice.method)) if path and path.is_file() else None
+    return () if found is None else [found.model(number) for number in range(len(found))]
+
+
 def _bounded(
-    allan: pa.Table, choice: Choice, request: Request, rate: float, family: Family
+    allan: pa.Table,
+    choice: Choice,
+    request: Request,
+    rate: float,
+    family: Family,
+    drawn: Sequence[NoiseModel],
 ) -> AxisNoise:
     """Return the smallest model above the measured curve of the axis that was chosen."""
     curve = curve_of(
@@ -171,6 +200,7 @@ def _bounded(
             family=family,
             horizon=request.horizon,
             most_excess=request.most_excess,
+            drawn=drawn,
         )
     except ValueError as error:
         raise ExportError(

@@ -11,7 +11,7 @@ from imubench_pipeline.report.datasheets import delta_rows
 from imubench_pipeline.report.meaning import budget_tables, budget_words
 from imubench_pipeline.report.palette import places
 from imubench_pipeline.report.payload import FOREST, looks
-from imubench_pipeline.report.practical import limit_digits
+from imubench_pipeline.report.practical import limit_digits, symbol_text
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.start import summary
 from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView, Row
@@ -108,7 +108,7 @@ def _pooled(row: Row) -> Row:
         "axis": row["channel"].replace("_", " "),
         "digits": limit_digits(row["lower"], row["upper"], 4),
         "ref": f"{quantity}.{'signal' if bias else row['parameter']}",
-        "name": "fixed bias" if bias else row["parameter"],
+        "name": "fixed bias" if bias else symbol_text(row["parameter"]),
     }
 
 
@@ -138,7 +138,7 @@ def _device(site: Site, own: Sequence[RecordingView], rows: Sequence[Row]) -> di
             continue
         quantity, axis = channel.split("_")
         title = f"{QUANTITY_NAMES[quantity]} {axis}"
-        name = "fixed bias" if parameter == "bias" else parameter
+        name = "fixed bias" if parameter == "bias" else symbol_text(parameter)
         said = " (simulated)" if own[0].simulated else ""
         changes = [row["recording"] + said for row in series if row["verdict"] == "changed"]
         trends.setdefault(channel, []).append(
@@ -184,7 +184,7 @@ def _device(site: Site, own: Sequence[RecordingView], rows: Sequence[Row]) -> di
 
 def change_words(row: Row, *, simulated: bool) -> str:
     """Return a change of a device in words."""
-    name = "fixed bias" if row["parameter"] == "bias" else row["parameter"]
+    name = "fixed bias" if row["parameter"] == "bias" else symbol_text(row["parameter"])
     by = ""
     if row["change"] is not None:
         by = f" by {100 * row['change']:+.0f} %".replace("-", "−")

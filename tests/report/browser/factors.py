@@ -4,7 +4,7 @@ DEGREES = 57.29577951308232  # in a radian
 ARC = 206264.80624709636  # seconds of arc in a radian: degrees an hour in a radian a second
 MICRO_G = 101971.62129779283  # in a metre a second squared
 
-_ANY = {"T_B": ("s", 1.0)}
+_ANY = {"T_B": ("s", 1.0), "tau_min": ("s", 1.0)}
 FACTORS: dict[str, dict[str, dict[str, tuple[str, float]]]] = {
     "gyro": {
         "°/h and °/√h": _ANY | {
@@ -36,4 +36,7 @@ FACTORS: dict[str, dict[str, dict[str, tuple[str, float]]]] = {
         },
     },
 }  # fmt: skip
+for _choices in FACTORS.values():
+    for _units in _choices.values():
+        _units |= {"B_curve": _units["B"], "sigma_min": _units["B"]}
 """Quantity -> choice of the reader -> symbol -> sign of the unit, and factor from SI."""

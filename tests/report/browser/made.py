@@ -21,6 +21,7 @@ from imubench_pipeline.config import FusionSettings, Run
 from imubench_pipeline.coverage import by_vendor, coverage
 from imubench_pipeline.datasheet import bias_deltas, curve_rms, deltas
 from imubench_pipeline.drift import drift_rows
+from imubench_pipeline.estimators.curve_bias import averaging_times, of_model
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.expected_errors import error_rows, of_requirement, standard
 from imubench_pipeline.findings import Finding
@@ -122,12 +123,23 @@ class Log:
             for name, one in parameters.items():
                 if one.value is not None and place:
                     parameters[name] = replace(one, value=one.value * (1.0 + 0.02 * place))
-            found.append(Estimate(method, parameters))
+            found.append(Estimate(method, parameters, curve=_curve_of(parameters)))
         return found
 
     def recommended(self, channel: str) -> Estimate:
         method = self.best.get(channel, "likelihood")
         return next(one for one in self.estimates(channel) if one.method == method)
+
+
+def _curve_of(parameters: Mapping[str, Parameter]) -> dict[str, Parameter]:
+    """Return the figures of the curve, with limits as wide as those of B."""
+    found = of_model(Estimate("", parameters).model, averaging_times(10.0, 36_000.0))
+    known = {
+        name: replace(one, lower=0.9 * one.value, upper=1.13 * one.value)
+        for name, one in found.items()
+        if one.value is not None
+    }
+    return found | known
 
 
 NIGHT = Log(

@@ -10,6 +10,7 @@ from urllib.parse import unquote
 
 import pytest
 
+from imubench_pipeline.report.payload import FOREST
 from imubench_pipeline.report.publish import publish
 from imubench_pipeline.report.static_figures.files import cross_figures
 from imubench_pipeline.report.view import recording_views
@@ -73,7 +74,7 @@ def test_every_figure_is_drawn(seen: Seen, bench: Report) -> None:
     assert empty == {}
     night = seen.figures[f"recordings/alpha/{made.NIGHT.recording}.html"]
     assert night == 3 * len(("allan", "spectrum", "series", "histogram"))
-    forest, margins = 4, len(made.REQUIREMENTS)
+    forest, margins = len(FOREST), len(made.REQUIREMENTS)
     assert seen.figures["index.html"] == 1 + forest + margins
     assert seen.figures["sensors/gamma.html"] == seen.figures["recordings/gamma/only.html"] == 0
     followed = {(row["channel"], row["parameter"]) for row in bench.rows["drift"]}

@@ -53,7 +53,7 @@ kinds.trend = (figure) => {
         array: value.map((each, i) => (each === null || upper[i] === null ? 0 : upper[i] - each)),
         arrayminus: value.map((each, i) => (each === null || lower[i] === null ? 0 : each - lower[i])),
       },
-      text: value.map((each, i) => `${found.recordings[i]}<br>${found.parameter} ${each === null ? "not known" : `<b>${numberText(each, 4)} ${unit.sign}</b>`}<br>${found.verdict[i] ?? ""}`),
+      text: value.map((each, i) => `${found.recordings[i]}<br>${symbolText(found.parameter)} ${each === null ? "not known" : `<b>${numberText(each, 4)} ${unit.sign}</b>`}<br>${found.verdict[i] ?? ""}`),
       hovertemplate: "%{text}<extra></extra>",
     },
   ];
@@ -65,7 +65,7 @@ kinds.trend = (figure) => {
     ],
     layout: {
       xaxis: { ...linearAxis(found.dated ? "" : "recordings in their order"), type: found.dated ? "date" : "category", nticks: 8 },
-      yaxis: linearAxis(`${found.parameter === "bias" ? "fixed bias" : found.parameter} (${unit.sign})`),
+      yaxis: linearAxis(`${found.parameter === "bias" ? "fixed bias" : symbolMarkup(found.parameter)} (${unit.sign})`),
     },
   };
 };

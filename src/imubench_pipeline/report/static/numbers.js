@@ -19,6 +19,11 @@ function numberText(value, digits) {
 
 const chosenUnits = {};
 
+// How a parameter is written; the builder of the pages has the same names.
+const SYMBOL_TEXTS = { B_curve: "B (curve)", sigma_min: "σ_min", tau_min: "τ_min" };
+const symbolText = (symbol) => SYMBOL_TEXTS[symbol] ?? symbol;
+const symbolMarkup = (symbol) => symbolText(symbol).replace(/_(\w+)/, "<sub>$1</sub>");
+
 function unitOf(quantity, symbol) {
   const [sign, factor] = UNITS[quantity][chosenUnits[quantity]][symbol];
   return { sign, factor };

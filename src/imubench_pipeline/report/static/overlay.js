@@ -152,10 +152,6 @@ const FOREST_NAMES = {
   B: "B of the first term", T_B: "T_B, correlation time", K: "K, random walk",
 };
 
-const SYMBOL_TEXTS = { B_curve: "B (curve)", sigma_min: "σ_min", tau_min: "τ_min" };
-const symbolText = (symbol) => SYMBOL_TEXTS[symbol] ?? symbol;
-const symbolMarkup = (symbol) => symbolText(symbol).replace(/_(\w+)/, "<sub>$1</sub>");
-
 // Dot and 95 % interval of a parameter; hollow where only the interval is known.
 kinds.forest = (figure) => {
   const symbol = figure.dataset.symbol;

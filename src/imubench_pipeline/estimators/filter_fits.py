@@ -1,0 +1,341 @@
+"""Whittle fits of a spectrum behind filters: which cut-off, and how good each filter is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq, minimize_scalar
+
+from imubench_pipeline.estimators.goodness import goodness
+from imubench_pipeline.estimators.low_pass import Filter, Kind
+from imubench_pipeline.estimators.whittle import COARSE, Behind, Terms, Whittle, whittle_of
+from imubench_pipeline.estimators.whittle_kernels import best_powers
+from imubench_pipeline.spectrum import Spectrum
+
+Array = NDArray[np.float64]
+
+_POINTS = 6
+"""Frequencies of a bin over which a density is averaged."""
+
+_SCAN, _COARSE_SCAN = 24, 8
+"""Cut-offs tried before the best is polished, and to see whether a filter may be there."""
+
+_LOWEST = 1 / 500
+
+_HIGHEST: Mapping[tuple[Kind, int], float] = {
+    ("analogue", 1): 4.0,
+    ("analogue", 2): 1.0,
+    ("analogue", 3): 1.0,
+    ("analogue", 4): 1.0,
+    ("bilinear", 1): 0.42,
+    ("bilinear", 2): 0.42,
+    ("bilinear", 3): 0.42,
+    ("bilinear", 4): 0.42,
+    ("boxcar", 1): 0.222,
+}
+"""Filters that are looked for, and their highest cut-off, parts of the rate; the lowest is 1/500.
+An analogue filter of higher order is there to keep noise from folding, and beyond the rate its
+folds are those of a lower one of first order; the shortest mean is one of two samples."""
+
+FAMILY: Sequence[tuple[Kind, int]] = tuple(_HIGHEST)
+"""Kind and order of the filters that are tried."""
+
+_CORRELATIONS = (1e2, 1e5)
+"""Shortest and longest correlation time of slow noise, sampling intervals."""
+
+_SLOWER = 4.0
+"""Least correlation time of slow noise over that of the filter, 1 / (2 pi f_c)."""
+
+_FILTERS, PROCESSES = 3.0, 10.0
+"""Correlation in sampling intervals, 1 / (2 pi f_c T), below which white noise beside it is taken
+for that behind a filter of first order, and above which it is beside a process."""
+
+_A_DECADE = 6
+"""Correlation times that are tried."""
+
+_WORTH_TRYING = 1.0
+"""Log likelihood that a filter of the coarse scan must gain for more to be tried."""
+
+_MOST_SLOW = 4
+"""Terms of slow noise."""
+
+_UNFOLDED = 0.3
+"""Part of the rate up to which there is one such cut-off only: little is folded."""
+
+_BETWEEN = 24
+"""Cut-offs tried on each side, beyond that, for others that the log allows as well."""
+
+HALF_CHI_SQUARED = 1.9207
+"""Log likelihood below its maximum at the ends of a 95 % interval."""
+
+_ALONE = (("N", 0), ("NK", 0), ("NFK", 0), ("NK", 1), ("NFK", 1), ("NK", 2))
+"""Letters and processes of the models of noise that are tried."""
+
+_WITH_Q = (Terms("N"), Terms("NK"), Terms("NF"), Terms("NFK"), Terms("NK", 1))
+
+_ABOVE_ENDS = 1.01
+
+FEWEST_BINS = 24
+
+
+def inside(spectrum: Spectrum) -> Array:
+    """Return frequencies within each bin, shape (b, 6), Hz."""
+    within = (np.arange(_POINTS) + 0.5) / _POINTS
+    width = (spectrum.upper - spectrum.lower)[:, None]
+    return np.asarray(spectrum.lower[:, None] + width * within)
+
+
+def gains(spectrum: Spectrum, one: Tried) -> tuple[Array, Array, Array]:
+    """Return what a filter leaves of white noise, of flicker noise and of slow noise."""
+    low_pass, frequency = one.low_pass, inside(spectrum)
+    white = low_pass.white(frequency, spectrum.rate).mean(axis=1)
+    leak = low_pass.leak(spectrum.frequency, spectrum.length, spectrum.rate)
+    flicker = low_pass.flicker(frequency, spectrum.rate).mean(axis=1)
+    slow = low_pass.slow(frequency, spectrum.rate).mean(axis=1)
+    return white + np.where(spectrum.block == 1, leak, 0.0), flicker, slow
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A filter, where its likelihood has a maximum.
+
+    Attributes
+    ----------
+    score : float
+        Half its BIC.
+    cost : float
+        -log L.
+    kind : str
+    order : int
+    cutoff : float
+        Hz.
+    floor : bool
+        White noise stands behind it beside that of rounding.
+    """
+
+    score: float
+    cost: float
+    kind: Kind
+    order: int
+    cutoff: float
+    floor: bool
+
+    @property
+    def low_pass(self) -> Filter:
+        """The filter."""
+        return Filter(self.kind, self.order, self.cutoff)
+
+    @property
+    def is_first_order_analogue(self) -> bool:
+        """Whether white noise behind it is a Gauss-Markov process."""
+        return self.kind == "analogue" and self.order == 1
+
+    def correlation(self, rate: float) -> float:
+        """Return the correlation time of a filter of first order, sampling intervals."""
+        return rate / (2.0 * math.pi * self.cutoff)
+
+
+class FilterFits:
+    """Whittle fits of a spectrum for given filters."""
+
+    def __init__(self, spectrum: Spectrum) -> None:
+        self.rate = spectrum.rate
+        self.lowest = _LOWEST * spectrum.rate
+        self.whittle: Whittle = whittle_of(
+            spectrum, 0.5 * spectrum.rate, COARSE, shortest=PROCESSES / spectrum.rate
+        )
+        whittle = self.whittle
+        shortest, longest = (end / spectrum.rate for end in _CORRELATIONS)
+        count = 1 + round(_A_DECADE * math.log10(longest / shortest))
+        times = np.geomspace(shortest, longest, count)
+        times = times[(times >= whittle.shortest) & (times < whittle.longest)]
+        columns = [whittle.column("F"), whittle.column("K")]
+        columns += [whittle.gauss_markov(float(time)) for time in times]
+        self.everything_slow = np.column_stack(columns)
+        self.times = np.concatenate([[np.inf, np.inf], times])
+        self.slow = [0, 1, *range(2, len(columns), _A_DECADE)]  # those that are in the fits
+        self.penalty = 0.5 * math.log(len(spectrum.frequency))
+        self.rounded = 0.0  # density of rounding, parts of N^2
+
+    def choose_slow(self, one: Tried) -> None:
+        """Keep the terms of slow noise that the spectrum asks for behind a filter, by BIC.
+
+        A term that is not there can only add to a fit: together they would pull the cut-off.
+        """
+        slow: list[int] = []
+        self.slow = slow
+        best = self.cost(one)
+        while len(slow) < _MOST_SLOW:
+            wider = [
+                (self._powers(self._columns(one, [*slow, k]))[1], k)
+                for k in range(self.everything_slow.shape[1])
+                if k not in slow
+            ]
+            cost, place = min((c + self.penalty * (1 + (k > 1)), k) for c, k in wider)
+            if cost >= best:
+                break
+            best = cost - self.penalty * (1 + (place > 1))
+            slow.append(place)
+
+    def unfiltered(self) -> tuple[float, float, float, float]:
+        """Return of noise without a filter N, half its BIC, -log L, and half the BIC with Q.
+
+        The density of quantization noise rises towards Nyquist as that of what a steep filter
+        lets fold.
+        """
+
+        def score(terms: Terms) -> tuple[float, float, float]:
+            found = self.whittle.maximum(terms)
+            return found.cost + self.penalty * terms.parameters, found.cost, found.parameter("N")
+
+        plain = min(score(Terms(*one)) for one in _ALONE)
+        rounded = min(score(Terms("Q" + one.linear, one.gauss_markov)) for one in _WITH_Q)
+        return (plain if plain[0] < rounded[0] else rounded)[2], plain[0], plain[1], rounded[0]
+
+    def behind(self, one: Tried) -> float:
+        """Return half the BIC of the best model behind a filter."""
+        white, *slow = self.gains(one)
+        N, after = self.density(one)
+        behind = Behind(white + (after / N) ** 2, *slow)
+        shortest = max(PROCESSES / self.rate, _SLOWER / (2.0 * math.pi * one.cutoff))
+        spectrum = self.whittle.spectrum
+        whittle = whittle_of(spectrum, 0.5 * self.rate, COARSE, shortest=shortest, behind=behind)
+        own = 1 + one.floor
+        terms = [Terms(*alone) for alone in _ALONE]
+        return min(
+            whittle.maximum(each).cost + self.penalty * (each.parameters + own) for each in terms
+        )
+
+    def cost(self, one: Tried) -> float:
+        """Return -log L at a cut-off."""
+        return self._powers(self._columns(one))[1]
+
+    def density(self, one: Tried) -> tuple[float, float]:
+        """Return N before the filter, and the density after it."""
+        powers = self._powers(self._columns(one))[0]
+        return math.sqrt(powers[0]), math.sqrt(powers[-1]) if one.floor else 0.0
+
+    def highest(self, kind: Kind, order: int) -> float:
+        """Return the highest cut-off that is looked for, Hz."""
+        return _HIGHEST[kind, order] * self.rate
+
+    def may_bend(self, filters: Sequence[tuple[Kind, int]]) -> bool:
+        """Return whether a filter at any of a few cut-offs is nearly as good as none."""
+        _, _, alone, _ = self.unfiltered()
+        flat = np.column_stack(
+            [np.ones(len(self.whittle.spectrum.frequency)), self.everything_slow[:, self.slow]]
+        )
+        alone = min(alone, self._powers(flat)[1])
+        least = min(
+            self.cost(Tried(0.0, 0.0, kind, order, float(cutoff), False))
+            for kind, order in filters
+            for cutoff in np.geomspace(2.0 * self.lowest, self.highest(kind, order), _COARSE_SCAN)
+        )
+        return least < alone - _WORTH_TRYING
+
+    def tried(self, filters: Sequence[tuple[Kind, int]]) -> list[Tried]:
+        """Return the maxima of the likelihood, the best by BIC first."""
+        found = [one for kind, order in filters for one in self._of(kind, order)]
+        # A floor that gains next to nothing is none.
+        return sorted(found, key=lambda one: one.score + one.floor)
+
+    def _of(self, kind: Kind, order: int) -> Iterator[Tried]:
+        """Yield the maxima of the likelihood over the cut-off, without and with a floor."""
+        scan = np.linspace(math.log(self.lowest), math.log(self.highest(kind, order)), _SCAN)
+        start = Tried(0.0, 0.0, kind, order, 1.0, True)
+
+        def at(x: float, floor: bool) -> Tried:
+            return replace(start, cutoff=math.exp(x), floor=floor)
+
+        columns = [self._columns(at(float(x), True)) for x in scan]
+        for floor in (False, True):
+            costs = np.array([self._powers(c if floor else c[:, :-1])[1] for c in columns])
+            beside = np.pad(costs, 1, constant_values=np.inf)
+            for place in np.flatnonzero((costs <= beside[:-2]) & (costs < beside[2:])).tolist():
+                best = minimize_scalar(
+                    lambda x, floor=floor: self.cost(at(x, floor)),
+                    bounds=(float(scan[max(place - 1, 0)]), float(scan[min(place + 1, _SCAN - 1)])),
+                    method="bounded",
+                    options={"xatol": 1e-5},
+                )
+                one = replace(at(best.x, floor), cost=float(best.fun))
+                if (
+                    floor
+                    and order == 1
+                    and kind != "boxcar"
+                    and one.correlation(self.rate) > _FILTERS
+                ):
+                    continue  # white noise beside a process
+                before, after = self.density(one)
+                # Where what is behind the filter is the greater, it is a process of slow noise.
+                if before > after and one.cutoff > _ABOVE_ENDS * self.lowest:
+                    yield replace(one, score=one.cost + self.penalty * (1 + floor))
+
+    def explains(self, one: Tried) -> bool:
+        """Return whether the filter gives the spectrum where it bends."""
+        columns = self._columns(one)
+        fitted = columns @ self._powers(columns)[0]
+        spectrum = self.whittle.spectrum
+        bent = spectrum.frequency > min(0.1 * one.cutoff, spectrum.frequency[-FEWEST_BINS])
+        shown = spectrum.taken(bent)
+        judged = goodness(
+            shown.ordinates, shown.density, fitted[bent], shown.frequency, 2 + one.floor
+        )
+        return judged.verdict == "explained"
+
+    def limits(self, one: Tried) -> tuple[float, float]:
+        """Return the ends of the 95 % interval, by the profile of the likelihood.
+
+        Above Nyquist the profile may have several hollows: the ends are the outermost.
+        """
+        most = self.cost(one) + HALF_CHI_SQUARED
+
+        def beyond(x: float) -> float:
+            return self.cost(replace(one, cutoff=math.exp(x))) - most
+
+        def end_of(sign: float, end: float) -> float:
+            inside = math.log(one.cutoff)
+            step, outside = 1e-3, inside
+            while sign * ((outside := inside + sign * step) - end) < 0.0:
+                if beyond(outside) > 0.0:
+                    return float(brentq(beyond, inside, outside, xtol=1e-6))
+                inside, step = outside, 2.0 * step
+            return end
+
+        ends = []
+        for sign, end in ((-1.0, self.lowest), (1.0, self.highest(one.kind, one.order))):
+            found = end_of(sign, math.log(end))
+            first = max(math.log(end), min(found, math.log(_UNFOLDED * self.rate)))
+            further = np.linspace(first, found, _BETWEEN, endpoint=False)
+            allowed = next((k for k, x in enumerate(further) if beyond(float(x)) < 0.0), None)
+            if allowed is not None:
+                inside = float(further[allowed])
+                outside = float(further[allowed - 1]) if allowed else inside
+                found = brentq(beyond, inside, outside, xtol=1e-6) if allowed else inside
+            ends.append(math.exp(found))
+        return ends[0], ends[1]
+
+    def gains(self, one: Tried) -> tuple[Array, Array, Array]:
+        """Return what a filter leaves of white noise, with rounding, of flicker and slow noise."""
+        white, flicker, slow = gains(self.whittle.spectrum, one)
+        return white + self.rounded, flicker, slow
+
+    def _columns(self, one: Tried, slow: Sequence[int] | None = None) -> Array:
+        white, flicker, gain = self.gains(one)
+        kept = np.array(self.slow if slow is None else slow, dtype=np.int64)
+        # A process as fast as the filter is the filter.
+        kept = kept[self.times[kept] >= _SLOWER / (2.0 * math.pi * one.cutoff)]
+        gains = np.where(kept == 0, flicker[:, None], gain[:, None])
+        columns = np.column_stack([white, self.everything_slow[:, kept] * gains])
+        return np.column_stack([columns, np.ones(len(white))]) if one.floor else columns
+
+    def _powers(self, columns: Array) -> tuple[Array, float]:
+        norm = columns.mean(axis=0)
+        powers, _, cost = best_powers(
+            np.ascontiguousarray(columns / norm), self.whittle.bins(), False
+        )
+        return powers / norm * self.whittle.scale, cost

@@ -1,0 +1,37 @@
+"""What is doubted of a fit."""
+
+import numpy as np
+
+from imubench_pipeline.estimators.doubts import doubting
+from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.estimators.likelihood import fit
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.simulate import simulate
+
+RATE, SAMPLES = 10.0, 40_000
+
+
+def k_of(model: NoiseModel, seed: int) -> Parameter:
+    log = simulate(model, RATE, SAMPLES, np.random.default_rng(seed))
+    return fit(log, RATE).estimates[0].parameters["K"]
+
+
+def test_a_walk_that_may_be_a_slow_process_is_doubted() -> None:
+    # A process of a twentieth of the log: BIC takes many for a walk, whose K is then no K.
+    statuses = [k_of(NoiseModel(N=1e-4, B=1e-4, T_B=170.0), seed).status for seed in range(5)]
+    assert "doubtful" in statuses
+    assert statuses.count("ok") <= 2
+
+
+def test_a_walk_is_hardly_ever_doubted() -> None:
+    statuses = [k_of(NoiseModel(N=1e-4, K=1e-5), seed).status for seed in range(5)]
+    assert statuses.count("ok") >= 4
+
+
+def test_with_b_the_figures_of_the_curve_are_doubted() -> None:
+    curve = {name: Parameter(1.0) for name in ("B_curve", "sigma_min")}
+    estimate = Estimate("likelihood", {"B": Parameter(1.0), "K": Parameter(1.0)}, curve=curve)
+    found = doubting(estimate, ("B", "K"), "another model")
+    assert {one.status for one in found.curve.values()} == {"doubtful"}
+    found = doubting(estimate, ("K",), "another model")
+    assert {one.status for one in found.curve.values()} == {"ok"}
