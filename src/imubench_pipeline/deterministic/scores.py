@@ -23,7 +23,7 @@ from imubench_pipeline.deterministic.regressors import Kind, Regressor
 Array = NDArray[np.float64]
 
 FALSE_ALARM: dict[Kind, float] = {
-    "step": 0.004,
+    "step": 0.001,
     "exponential": 0.0015,
     "sinusoid": 0.0015,
     "ramp": 0.002,

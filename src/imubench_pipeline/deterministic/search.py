@@ -29,7 +29,11 @@ _HELD_OUT = 16
 _NEARLY = 6.0
 """Below the threshold by so much, a candidate is still judged by the noise fitted anew."""
 
-_UNDECIDED = 4.0
+_SLOW: tuple[Kind, ...] = ("exponential", "sinusoid")
+_SEEN = 6.0
+"""Gain from which a slow course is judged: noise fitted without it hides the most of it."""
+
+_UNDECIDED = 6.0
 """Below it by so much after that, it is not told from noise, nor noise from it."""
 
 _BESIDE = (3, 16)
@@ -37,9 +41,9 @@ _BESIDE = (3, 16)
 
 _SAFETY: dict[Kind, float] = {
     "step": 1.0,
-    "exponential": 1.2,
-    "sinusoid": 1.2,
-    "ramp": 1.2,
+    "exponential": 1.15,
+    "sinusoid": 1.15,
+    "ramp": 1.15,
     "pulse": 1.0,
 }
 """Times the threshold for known noise: that of few ordinates is known badly itself."""
@@ -149,18 +153,22 @@ def _level_beside(ordinates: Ordinates, fit: Fit, sinusoid: Regressor) -> float:
     centre = 2.0 * sinusoid.where * ordinates.sizes[sinusoid.part]
     away = np.abs(np.arange(1, len(ratio) + 1) - centre)
     beside = ratio[(away >= _BESIDE[0]) & (away <= _BESIDE[1])]
-    return max(float(beside.mean()), 1.0) if len(beside) else 1.0
+    if not len(beside):
+        return 1.0
+    # Two standard errors of the mean of as many chi-squared ordinates are chance.
+    return max(float(beside.mean()) - 2.0 * float(np.sqrt(2.0 / len(beside))), 1.0)
 
 
 def _candidates(ordinates: Ordinates, fit: Fit) -> list[Score]:
     """Return the candidates that may pass: one of a kind and noise, none twice."""
     found: dict[Regressor, Score] = {}
     for score in best_scores(ordinates, fit, fit.density):
-        if score.gain > score.threshold - _NEARLY:
+        slow = score.regressor.kind in _SLOW
+        if score.gain > (_SEEN if slow else score.threshold - _NEARLY):
             found[score.regressor] = score
     carried_on = ordinates.carried_on(fit, _HELD_OUT)
     for score in best_scores(ordinates, fit, carried_on, smooth=True):
-        if score.gain > score.threshold * _SAFETY[score.regressor.kind]:
+        if score.gain > score.threshold:
             found[score.regressor] = score
     return list(found.values())
 
