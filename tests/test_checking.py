@@ -62,7 +62,9 @@ def test_lines_and_the_band_are_notes(
 ) -> None:
     model = NoiseModel(N=8.4e-5, sinusoids=(Sinusoid(2e-4, 17.0),))
     log = simulate(model, RATE, 400_000, rng)
-    drop(logs, "line", 0.5 * (log[1:] + log[:-1]))
+    for taps in (3, 4, 5):  # such a cascade is no filter that is tried
+        log = np.convolve(log, np.ones(taps) / taps, "valid")
+    drop(logs, "line", log)
     assert check(logs) == 0
     printed = capsys.readouterr().out
     assert "note     lines: gyro_x has 1 sinusoids and 0 bands of noise" in printed

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 
-from imubench_pipeline.estimators.frame import frame_of
+from imubench_pipeline.estimators.frame import FEWEST_BINS, frame_of
+from imubench_pipeline.estimators.likelihood import explaining
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.ingest import ingest_as_planned
 from imubench_pipeline.plan import Plan
@@ -52,5 +53,7 @@ def spectral_findings(channel: str, log: ChannelLog, bandwidth: float | None) ->
         return []
     spectrum, line_spectra = spectra(log.blocks(), log.grid, log.rate, log.segments)
     frame = frame_of(spectrum, line_spectra, bandwidth=bandwidth)
+    if frame.used.sum() >= FEWEST_BINS:
+        frame, _, _ = explaining(spectrum, frame)
     rows = [asdict(line) | {"channel": channel} for line in frame.lines]
     return [*line_findings(rows), *band_finding(channel, frame.band.highest, frame.band.source)]

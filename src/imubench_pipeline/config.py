@@ -55,8 +55,8 @@ class EstimateSettings(Strict):
     )
     band: Frequency | None = Field(
         None,
-        description="highest frequency in the likelihood; null: found from the spectrum and the "
-        "bandwidth that the sensor file states",
+        description="highest frequency in the likelihood; null: all, behind the low-pass that the "
+        "spectrum shows",
     )
     seed: int = Field(
         20260101, ge=0, description="of the draws that give the intervals, and fill holes"

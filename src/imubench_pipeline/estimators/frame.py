@@ -62,6 +62,8 @@ class Frame:
         The sensor's low-pass; None where a band is asked for, which is taken as it is.
     shortest : float or None
         Shortest correlation time of a process, s; None: as `whittle_of` has it.
+    stated : float or None
+        Cut-off of the sensor's own filter, where it is stated, Hz.
     cut : bool
         Frequencies are left out that neither a process nor a filter explains.
     """
@@ -72,6 +74,7 @@ class Frame:
     band: Band
     low_pass: Cutoff | None = None
     shortest: float | None = None
+    stated: float | None = None
     cut: bool = False
 
     def whittle(self, spectrum: Spectrum, shapes: int = SHAPES) -> Whittle:
@@ -130,7 +133,7 @@ class Frame:
 
     def limited(self, spectrum: Spectrum) -> Frame:
         """Return the frequencies that no filter bends, behind none: where nothing explains all."""
-        band = find_band(spectrum, self.clear)
+        band = find_band(spectrum, self.clear, bandwidth=self.stated)
         used = self.clear & (spectrum.upper <= band.highest * (1.0 + 1e-9))
         cut = band.highest < 0.5 * spectrum.rate
         return Frame(self.lines, self.clear, used, band, _none(self.low_pass), cut=cut)
@@ -188,7 +191,7 @@ def frame_of(
             "leaves nothing of it"
         )
     shortest = PROCESSES / spectrum.rate
-    return Frame(lines, clear, used, Band(highest, source), low_pass, shortest)
+    return Frame(lines, clear, used, Band(highest, source), low_pass, shortest, bandwidth)
 
 
 def _lines(

@@ -247,7 +247,7 @@ def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) 
             np.full(len(frame.used), np.nan),
             frame,
         )
-    frame, whittle, candidates = _explained(spectrum, frame)
+    frame, whittle, candidates = explaining(spectrum, frame)
     sinusoids = carried(frame.lines)
     chosen = candidates[0]
     draws: dict[Terms, Posterior] = {}
@@ -301,11 +301,25 @@ def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) 
     )
 
 
-def _explained(spectrum: Spectrum, frame: Frame) -> tuple[Frame, Whittle, list[Candidate]]:
+def explaining(spectrum: Spectrum, frame: Frame) -> tuple[Frame, Whittle, list[Candidate]]:
     """Fit all models in a frame, and in another one where it explains more.
 
     Where noise up to Nyquist, behind the filter that shows, is not explained: with processes of a
     few sampling intervals; then without the frequencies that bend.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+    frame : Frame
+        As `imubench_pipeline.estimators.frame.frame_of` gives it.
+
+    Returns
+    -------
+    frame : Frame
+    whittle : Whittle
+        The likelihood in it.
+    candidates : list of Candidate
+        The models tried, the best first.
     """
 
     def fitted(tried: Frame) -> tuple[Frame, Whittle, list[Candidate]]:
