@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.estimators.estimate import Estimate, Parameter, Status
+from imubench_pipeline.estimators.estimate import CURVE, Estimate, Parameter, Status
 from imubench_pipeline.estimators.frame import Frame
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.spectrum import Spectrum
@@ -23,6 +23,9 @@ _CLEARLY = 2.0
 """AIC by which a model without a random walk must be the better for K to be doubted: so it is for
 three quarters of the walks that are processes of a twentieth of the log, and for 2 to 3 % of those
 that are walks."""
+
+_HARDLY = 4.0
+"""BIC up to which a model with fewer terms is as good."""
 
 _AS_FAST = 10.0
 """Sampling intervals: a process as fast may be the sensor's filter."""
@@ -74,6 +77,10 @@ def doubted(
     rival = _without_a_walk(chosen, candidates)
     if rival is not None:
         estimate = doubting(estimate, ("K",), rival)
+    simpler = _with_fewer_terms(chosen, candidates)
+    if simpler is not None:
+        estimate = doubting(estimate, ("B", "T_B"), simpler, of_curve=False)
+    estimate = _with_one_bias(estimate)
     against = papers_candidate.bic - chosen.bic
     if against > _WORSE:
         reason = (
@@ -103,39 +110,69 @@ def _without_a_walk(chosen: Candidate, candidates: Sequence[Candidate]) -> str |
     )
 
 
-def doubting(estimate: Estimate, names: Sequence[str], reason: str) -> Estimate:
+def _with_fewer_terms(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
+    """Say so where two terms of bias instability are hardly better than one."""
+    terms = chosen.found.terms
+    if _biases(chosen) < 2:
+        return None
+    fewer = [one for one in candidates if _biases(one) < 2]
+    best = min(fewer, key=lambda one: one.bic, default=None)
+    if best is None or best.bic > chosen.bic + _HARDLY:
+        return None
+    return (
+        f"{best.found.terms.name} is hardly worse than {terms.name}, by "
+        f"{best.bic - chosen.bic:.1f} in BIC, and has another B; B_curve is that of both"
+    )
+
+
+def _biases(one: Candidate) -> int:
+    return ("F" in one.found.terms.linear) + one.found.terms.gauss_markov
+
+
+def _with_one_bias(estimate: Estimate) -> Estimate:
+    """Return an estimate whose bias of the curve is as sure as the only term that it is of."""
+    B, of_curve = estimate.parameters["B"], estimate.curve.get("B_curve")
+    if estimate.further or of_curve is None or of_curve.status != "ok":
+        return estimate
+    if B.status not in ("not_identified", "doubtful"):
+        return estimate
+    value = of_curve.value if B.status == "doubtful" else None
+    unsure = replace(
+        of_curve, value=value, status=B.status, reason=B.reason, fitted=of_curve.in_model
+    )
+    return replace(estimate, curve={**estimate.curve, "B_curve": unsure})
+
+
+def doubting(
+    estimate: Estimate, names: Sequence[str], reason: str, *, of_curve: bool = True
+) -> Estimate:
     """Return an estimate whose values of some parameters are doubtful.
 
     Parameters
     ----------
     estimate : Estimate
     names : sequence of str
-        Of its parameters; what has no plain value stays as it is. With B go the figures of the
-        curve.
+        Of its parameters; what has no plain value stays as it is.
     reason : str
+    of_curve : bool
+        With B go the figures of the curve.
     """
-    parameters = {
-        name: replace(one, status="doubtful", reason=reason)
-        if name in names and one.status == "ok"
-        else one
-        for name, one in estimate.parameters.items()
-    }
-    further = [
-        {
+
+    def doubted_in(group: Mapping[str, Parameter], these: Container[str]) -> dict[str, Parameter]:
+        return {
             name: replace(one, status="doubtful", reason=reason)
-            if name in names and one.status == "ok"
+            if name in these and one.status == "ok"
             else one
             for name, one in group.items()
         }
-        for group in estimate.further
-    ]
-    of_curve = {
-        name: replace(one, status="doubtful", reason=reason)
-        if "B" in names and one.status == "ok"
-        else one
-        for name, one in estimate.curve.items()
-    }
-    return replace(estimate, parameters=parameters, further=further, curve=of_curve)
+
+    figures = CURVE if of_curve and "B" in names else ()
+    return replace(
+        estimate,
+        parameters=doubted_in(estimate.parameters, names),
+        further=[doubted_in(group, names) for group in estimate.further],
+        curve=doubted_in(estimate.curve, figures),
+    )
 
 
 def _of_white_noise(
