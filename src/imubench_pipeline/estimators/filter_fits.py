@@ -50,12 +50,14 @@ _CORRELATIONS = (1e2, 1e5)
 _SLOWER = 4.0
 """Least correlation time of slow noise over that of the filter, 1 / (2 pi f_c)."""
 
-_FILTERS, PROCESSES = 3.0, 10.0
+_FILTERS, PROCESSES = 4.0, 10.0
 """Correlation in sampling intervals, 1 / (2 pi f_c T), below which white noise beside it is taken
 for that behind a filter of first order, and above which it is beside a process."""
 
 _A_DECADE = 6
 """Correlation times that are tried."""
+
+_SAME = 0.01
 
 _WORTH_TRYING = 1.0
 """Log likelihood that a filter of the coarse scan must gain for more to be tried."""
@@ -240,8 +242,11 @@ class FilterFits:
     def tried(self, filters: Sequence[tuple[Kind, int]]) -> list[Tried]:
         """Return the maxima of the likelihood, the best by BIC first."""
         found = [one for kind, order in filters for one in self._of(kind, order)]
-        # A floor that gains next to nothing is none.
-        return sorted(found, key=lambda one: one.score + one.floor)
+        # A floor that gains next to nothing is none. Of first order, with a floor, digital and
+        # analogue filters are the same but for N.
+        return sorted(
+            found, key=lambda one: one.score + one.floor + _SAME * (one.kind != "analogue")
+        )
 
     def _of(self, kind: Kind, order: int) -> Iterator[Tried]:
         """Yield the maxima of the likelihood over the cut-off, without and with a floor."""

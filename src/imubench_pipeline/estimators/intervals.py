@@ -28,9 +28,9 @@ Array = NDArray[np.float64]
 _AT_BOUND = 0.985
 _WIDTH_OF_INTERVAL = 3.92
 _ABOUT_AS_GOOD = 2.0
-_MOST_ABOVE, _MOST_BELOW = 2.3, 2.6
-"""Ratios of the upper limit to a value, and of the value to the lower one, beyond which it is no
-number to quote; an amplitude that is weak has more room below."""
+_MOST_ABOVE = 2.3
+"""Ratio of the upper limit to a value beyond which it is no number to quote. Below, limits go far
+where a model that the log hardly rules out shares the power with another term."""
 
 _ABSENT = "the data do not ask for it"
 _ABSENT_BELOW = f"{_ABSENT}; with 95 % it is below the upper limit"
@@ -192,7 +192,7 @@ def _parameter(
     if name == "R" and lower < 0.0 < upper:
         reason = "its interval contains 0; only that is given"
         return Parameter(None, "not_identified", reason, lower, upper, needed, value)
-    if name != "R" and (upper > _MOST_ABOVE * value or lower * _MOST_BELOW < value):
+    if name != "R" and upper > _MOST_ABOVE * value:
         reason = "it may be more than twice off; only its interval is given"
         return Parameter(None, "not_identified", reason, lower, upper, needed, value)
     if error > most:
