@@ -69,6 +69,7 @@ def put_at_rest(
         for row in parameter_rows(key, Estimate(method, known), recommended=method == "likelihood")
     ]
     write("parameters", rows, folder / "parameters.parquet")
+    write("draws", [], folder / "draws.parquet")
     return folder
 
 

@@ -58,6 +58,7 @@ def put_with_limits(folder: Path, spread: float) -> Path:
     key = Key("s", folder.name, "gyro_x")
     rows = list(parameter_rows(key, Estimate("likelihood", known), recommended=True))
     write("parameters", rows, folder / "parameters.parquet")
+    write("draws", [], folder / "draws.parquet")
     return folder
 
 
