@@ -21,7 +21,9 @@ LOGS = 60
 METHODS = ("weighted", "paper")
 
 
-def allan(n: np.ndarray, N: float, B: float = 0.0, T_B: float = 1.0, K: float = 0.0) -> np.ndarray:
+def allan(
+    n: np.ndarray, N: float = 0.0, B: float = 0.0, T_B: float = 1.0, K: float = 0.0
+) -> np.ndarray:
     """Allan variance at n samples of 1 Hz, from the sums of the covariances of the samples."""
     p = np.exp(-1 / T_B)
     v = B**2 * np.log(2) / (np.pi * 0.4365**2)

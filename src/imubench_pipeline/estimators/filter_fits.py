@@ -50,7 +50,7 @@ _CORRELATIONS = (1e2, 1e5)
 _SLOWER = 4.0
 """Least correlation time of slow noise over that of the filter, 1 / (2 pi f_c)."""
 
-_FILTERS, PROCESSES = 4.0, 10.0
+_FILTERS, PROCESSES = 2.0, 10.0
 """Correlation in sampling intervals, 1 / (2 pi f_c T), below which white noise beside it is taken
 for that behind a filter of first order, and above which it is beside a process."""
 

@@ -192,14 +192,14 @@ def _parameter(
     if name == "R" and lower < 0.0 < upper:
         reason = "its interval contains 0; only that is given"
         return Parameter(None, "not_identified", reason, lower, upper, needed, value)
-    if name != "R" and upper > _MOST_ABOVE * value:
-        reason = "it may be more than twice off; only its interval is given"
-        return Parameter(None, "not_identified", reason, lower, upper, needed, value)
     if error > most:
         reason = (
             f"a log of this length tells it to {100 * error:.0f} % (standard error); only "
             "its interval is given"
         )
+        return Parameter(None, "not_identified", reason, lower, upper, needed, value)
+    if name != "R" and upper > _MOST_ABOVE * value:
+        reason = "it may be more than twice off; only its interval is given"
         return Parameter(None, "not_identified", reason, lower, upper, needed, value)
     return Parameter(value, "ok", None, lower, upper, needed)
 
