@@ -256,8 +256,8 @@ def test_a_log_without_a_filter_has_the_row_that_says_so(found: Estimation) -> N
 
 
 def test_a_filter_has_its_cutoff_order_and_the_noise_on_both_sides(tmp_path: Path) -> None:
-    # A first-order filter of 1 Hz, exactly: an AR(1) sequence of variance N^2 pi f_c.
-    rng, N, cutoff = np.random.default_rng(4), 1e-3, 1.0
+    # A first-order filter of 0.5 Hz, exactly: an AR(1) sequence of variance N^2 pi f_c.
+    rng, N, cutoff = np.random.default_rng(4), 1e-3, 0.5
     decay = np.exp(-2 * np.pi * cutoff / RATE)
     driven = N * np.sqrt(np.pi * cutoff * (1 - decay**2)) * rng.standard_normal(SAMPLES)
     log = np.empty(SAMPLES)

@@ -212,15 +212,16 @@ def test_quantiles_are_those_of_a_long_chain(monkeypatch, model: NoiseModel, ter
     weighted = sample(whittle, found, np.random.default_rng(1))
     assert weighted.effective > 1000
     monkeypatch.setattr(posteriors, "_LEAST_WORTH", 0)
-    chain = sample(whittle, found, np.random.default_rng(2), 100_000)
+    chain = sample(whittle, found, np.random.default_rng(2), 300_000)
     assert np.isnan(chain.effective)
     columns = (np.column_stack([one.parameters, one.times, one.ramps]) for one in (weighted, chain))
     for ours, theirs in zip(*(part.T for part in columns), strict=True):
         if theirs.std() > 0.0:
             theirs = np.sort(theirs)
             chance = np.searchsorted(theirs, np.quantile(ours, [0.025, 0.5, 0.975])) / len(theirs)
-            # Both have their Monte Carlo error: some thousand independent draws.
-            assert (np.abs(chance - [0.025, 0.5, 0.975]) < [0.016, 0.05, 0.016]).all(), chance
+            # Both have their Monte Carlo error: some thousand independent draws. That of the lower
+            # limit of a term that hardly shows is the largest: few draws lie near 0.
+            assert (np.abs(chance - [0.025, 0.5, 0.975]) < [0.019, 0.05, 0.016]).all(), chance
 
 
 def test_where_the_draws_start_does_not_matter(rng) -> None:
