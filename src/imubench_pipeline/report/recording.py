@@ -213,7 +213,8 @@ def _answer(channel: ChannelView, system: System) -> str:
         unit = page_unit(channel.quantity, symbol, system)
         for row in channel.named(channel.recommended, symbol)[:1]:
             if row["value"] is not None:
-                known = precision(row, unit)
+                doubt = "doubtful" if row["status"] == "doubtful" else ""
+                known = ", ".join(filter(None, [precision(row, unit), doubt]))
                 text = f"{symbol_text(symbol)} {unit.text(row['value'], 3)} {unit.sign}"
                 parts.append(f"{text} ({known})" if known else text)
     if channel.fixed_bias is not None:
