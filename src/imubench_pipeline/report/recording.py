@@ -185,13 +185,25 @@ def _untold(symbols: Sequence[str], cells: Sequence[Mapping[str, Any]]) -> Itera
     """Yield what the log does not tell."""
     of = dict(zip(symbols, cells, strict=True))
     statuses = {symbol: {part["status"] for part in cell["parts"]} for symbol, cell in of.items()}
+    words, of_time = (of[one]["words"] if one in of else "" for one in ("sigma_min", "tau_min"))
+    together = _of_lowest_point(words, of_time)
     for symbol, cell in of.items():
         if symbol == "T_B" and statuses["T_B"] == {"absent"}:
             # Where B is absent, that says it.
             if statuses["B"] != {"absent"}:
                 yield "B is flicker noise here, which has no correlation time T_B."
-        elif cell["words"]:
+        elif symbol == "sigma_min" and together:
+            yield together
+        elif cell["words"] and not (symbol == "tau_min" and together):
             yield cell["words"]
+
+
+def _of_lowest_point(words: str, of_time: str) -> str:
+    """Return what is said of the lowest point and of its time, if that is the same."""
+    lowest, time = (symbol_text(symbol) for symbol in ("sigma_min", "tau_min"))
+    reason = words.removeprefix(f"{lowest}: ")
+    same = reason not in ("", words) and of_time == f"{time}: {reason}"
+    return f"{lowest} and {time}: {reason}" if same else ""
 
 
 def _answer(channel: ChannelView, system: System) -> str:

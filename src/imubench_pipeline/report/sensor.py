@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import Any
 
+from imubench_pipeline.drift import LEVEL
 from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.datasheets import delta_rows
 from imubench_pipeline.report.meaning import budget_tables, budget_words
@@ -141,14 +142,17 @@ def _device(site: Site, own: Sequence[RecordingView], rows: Sequence[Row]) -> di
         name = "fixed bias" if parameter == "bias" else symbol_text(parameter)
         said = " (simulated)" if own[0].simulated else ""
         changes = [row["recording"] + said for row in series if row["verdict"] == "changed"]
+        outside = [
+            row["recording"] + said
+            for row in series
+            if row["verdict"] == "as before" and row["p_value"] < LEVEL
+        ]
         trends.setdefault(channel, []).append(
             {
                 "title": title,
                 "number": len(payload),
                 "label": f"{name} of {title} in {counted(len(series), 'recording')}",
-                "caption": f"{name}: changed in {', '.join(changes)}."
-                if changes
-                else f"{name}: no change.",
+                "caption": f"{name}: {_trend_words(changes, outside)}",
             }
         )
         columns = ("value", "lower", "upper", "expected_lower", "expected_upper", "verdict")
@@ -180,6 +184,16 @@ def _device(site: Site, own: Sequence[RecordingView], rows: Sequence[Row]) -> di
         "trends": list(trends.items()),
         "page": {"trends": payload, "arrays": []},
     }
+
+
+def _trend_words(changes: Sequence[str], outside: Sequence[str]) -> str:
+    """Say which recordings are changed, and which would be if their figure were the only one."""
+    words = f"changed in {', '.join(changes)}." if changes else "no change."
+    if outside:
+        lie = "lies" if len(outside) == 1 else "lie"
+        names = ", ".join(outside)
+        words += f" {names} {lie} outside the band; among so many figures that may be chance."
+    return words
 
 
 def change_words(row: Row, *, simulated: bool) -> str:

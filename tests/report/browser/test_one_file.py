@@ -5,6 +5,7 @@ from pathlib import Path
 
 from playwright.sync_api import Page, expect
 
+from imubench_pipeline.report.payload import FOREST
 from tests.report.browser import made
 from tests.report.browser.reader import Open, Reader, toggle, traces
 
@@ -20,7 +21,7 @@ def test_one_file_needs_no_other(read: Open, alone: Path) -> None:
     assert [path.name for path in alone.parent.iterdir()] == [alone.name]
     reader = read(alone.parent, alone.name)
     assert head(reader.page) == made.TITLE
-    assert reader.draw_all() == 6
+    assert reader.draw_all() == 1 + len(FOREST) + len(made.REQUIREMENTS)
     figure = reader.figure("overlay")
     toggle(figure, "Other B").uncheck()
     assert {one["name"] for one in traces(figure) if one["name"]} == {

@@ -158,7 +158,7 @@ def test_a_sensor_without_a_datasheet_says_so(seen: Seen) -> None:
 def test_a_report_of_one_recording(read: Open, tmp_path: Path) -> None:
     publish(made.single(tmp_path), tmp_path / "report")
     reader = read(tmp_path / "report")
-    assert reader.draw_all() == 1 + 4 + len(made.REQUIREMENTS)
+    assert reader.draw_all() == 1 + len(FOREST) + len(made.REQUIREMENTS)
     for path in ("sensors/beta.html", "recordings/beta/alone.html"):
         reader.open(path)
         assert reader.draw_all() > 0
