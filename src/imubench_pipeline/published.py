@@ -52,8 +52,9 @@ def published_rows(
             units = SI_UNITS[quantity]
             for figure in settings.published:
                 key = (entry.sensor, entry.recording, str(channel), figure.parameter)
-                found = best.get(key, {})
+                found = _as_shown(best.get(key, {}))
                 sheet = printed.get(key, [])
+                shown = true.get((*key[:3], f"{figure.parameter} in the log"), true.get(key, {}))
                 yield {
                     "sensor": entry.sensor,
                     "recording": entry.recording,
@@ -68,13 +69,22 @@ def published_rows(
                         figure.parameter,
                         units["B"] + "/K" * (figure.parameter == "sensitivity"),
                     ),
-                    "truth": true.get(key, {}).get("value"),
+                    "truth": shown.get("value"),
                     "curve": curve.get(key),
                     **{name: found.get(name) for name in ("value", "lower", "upper")},
                     "datasheet": min(sheet, default=None),
                     "datasheet_upper": max(sheet) if len(set(sheet)) > 1 else None,
                     "reason": figure.why,
                 }
+
+
+def _as_shown(row: Row) -> Row:
+    """Return an estimate as the log shows it: what is printed was read off the curve of a log."""
+    if row.get("parameter") != "N" or row.get("fitted") is None or not row["value"]:
+        return row
+    factor = row["fitted"] / row["value"]
+    limits = {name: row[name] and row[name] * factor for name in ("lower", "upper")}
+    return {**row, **limits, "value": row["fitted"]}
 
 
 def _place(row: Row, parameter: str | None = None) -> _Place:

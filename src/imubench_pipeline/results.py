@@ -376,7 +376,7 @@ def sensors_of(catalogue: str) -> dict[str, Sensor]:
 
 
 def truth_rows(truths: str) -> Iterator[Row]:
-    """Yield the rows of the table ``simulated_truth``: N as the log shows it."""
+    """Yield the rows of the table ``simulated_truth``."""
     for entry in json.loads(truths):
         recording = SimulatedRecording.model_validate(entry)
         rate = quantity_to_si(recording.rate, "frequency")

@@ -31,7 +31,7 @@ __all__ = [
     "Column",
 ]
 
-_FITTED = _number("fitted", "as in unit", "what the model has where value is null; no estimate")
+_FITTED = _number("fitted", "as in unit", "what the model has where that is not value; no estimate")
 _SENSOR = _text("sensor", "name of the sensor file")
 _RECORDING = _text("recording", "name of the recording")
 _CHANNEL = _text("channel", "axis and quantity, gyro_x to accel_z")

@@ -197,7 +197,6 @@ def test_the_truth_of_a_simulation_stands_beside_it() -> None:
         "sensitivity": 91 * HOUR,
         "lag": 30.0,
         "cutoff": 60.0,
-        "N before the low-pass": 0.9 * MODEL.N,
         "bias": 2 * DEGREE,
     }
     rows["simulated_truth"] += [
@@ -208,8 +207,8 @@ def test_the_truth_of_a_simulation_stands_beside_it() -> None:
     found = lines(channel(rows))
     assert found["temperature_sensitivity"]["truth"] == 91 * HOUR
     assert found["thermal_lag"]["truth"] == 30.0 and found["cutoff"]["truth"] == 60.0
-    # N of the log is another than N before the low-pass.
-    assert found["N_before_low_pass"]["truth"] == 0.9 * MODEL.N != MODEL.N
+    # N before the low-pass is that of the parameters.
+    assert found["N_before_low_pass"]["truth"] == MODEL.N
     # The true bias is that at the reference of the simulation, not at the mean of the log.
     assert found["bias_at_reference"]["truth"] is None
     assert all(line["truth"] is None for line in lines(warm()).values())

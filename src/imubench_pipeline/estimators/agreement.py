@@ -57,23 +57,18 @@ def _doubted(name: str, one: Parameter, known: Parameter | None) -> Parameter:
 def _contradiction(name: str, one: Parameter, known: Parameter) -> str | None:
     """Return how the likelihood contradicts a value; None where it does not."""
     value = one.value or 0.0
-    if known.value is None and known.upper is None:
-        if known.status in ("absent", "not_identified", "not_shown"):
-            return f"the likelihood gives no {name}: {known.reason or known.status}"
-        return None
+    if known.value is None:
+        return f"the likelihood gives no {name}: {known.reason or known.status}"
     lower, upper = known.lower, known.upper
     if lower is None or upper is None:
         return None
     between = f"the likelihood has {name} between {lower:.3g} and {upper:.3g} (SI)"
-    if known.status == "absent" and value > upper:
-        return f"{between}: the data do not ask for it"
     if one.lower is None or one.upper is None:
         apart = value < lower / _READ or value > upper * _READ
     else:
         apart = one.upper < lower or one.lower > upper
         apart |= value < lower / _TWICE or value > upper * _TWICE
-    if known.value is not None:
-        apart |= not 1.0 / _TWICE < value / known.value < _TWICE
+    apart |= not 1.0 / _TWICE < value / known.value < _TWICE
     return between if apart else None
 
 

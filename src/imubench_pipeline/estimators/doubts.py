@@ -24,7 +24,7 @@ _CLEARLY = 2.0
 three quarters of the walks that are processes of a twentieth of the log, and for 2 to 3 % of those
 that are walks."""
 
-_HARDLY = 4.0
+_HARDLY = 6.0
 """BIC up to which a model with fewer terms is as good."""
 
 _AS_FAST = 10.0

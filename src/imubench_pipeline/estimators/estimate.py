@@ -80,7 +80,8 @@ class Parameter:
     duration_needed : float or None
         Length of a log that would tell the value to 10 %, s.
     fitted : float or None
-        What the fitted model has, where ``value`` is not to be quoted; not an estimate.
+        What the model of the log has, where that is not the value: where there is none to quote,
+        and for N before a low-pass, whose folds are in the log.
     """
 
     value: float | None
@@ -93,8 +94,8 @@ class Parameter:
 
     @property
     def in_model(self) -> float | None:
-        """What the model takes."""
-        return self.fitted if self.value is None else self.value
+        """What the model of the log takes."""
+        return self.value if self.fitted is None else self.fitted
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,6 +6,7 @@ Noise alone and noise behind a low-pass are decided together, by likelihood over
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -16,6 +17,7 @@ from imubench_pipeline.cutoff import Cutoff, find_cutoff
 from imubench_pipeline.estimators.band import Band, find_band
 from imubench_pipeline.estimators.filter_fits import PROCESSES
 from imubench_pipeline.estimators.lines import Line, find, without_lines
+from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.whittle import (
     COARSE,
     SHAPES,
@@ -116,6 +118,42 @@ class Frame:
         source = self.band.source.replace(self.low_pass.words, low_pass.words)
         return replace(self, low_pass=low_pass, band=replace(self.band, source=source))
 
+    @property
+    def folding(self) -> float:
+        """Density of white noise that the log shows at low frequencies, over N^2."""
+        if self.low_pass is None or self.low_pass.behind is None:
+            return 1.0
+        return float(self.low_pass.behind.white[0])
+
+    def in_the_log(self, posterior: Posterior, terms: Terms) -> Posterior:
+        """Return draws with N as the low frequencies of the log show it.
+
+        Parameters
+        ----------
+        posterior : Posterior
+            Of a model behind the low-pass.
+        terms : Terms
+            The model.
+        """
+        return _scaled(posterior, terms, np.array(math.sqrt(self.folding)))
+
+    def before_the_filter(
+        self, posterior: Posterior, terms: Terms, rng: np.random.Generator
+    ) -> Posterior:
+        """Return draws with what is not known of the sensor's low-pass in N.
+
+        Parameters
+        ----------
+        posterior : Posterior
+            Of a model behind the low-pass.
+        terms : Terms
+            The model.
+        rng : numpy.random.Generator
+        """
+        if self.low_pass is None or not self.low_pass.readings:
+            return posterior
+        return _scaled(posterior, terms, self.low_pass.factors(len(posterior.parameters), rng))
+
     def shows_quantization(self, rate: float) -> bool:
         """Return whether quantization noise would show: no filter in front, and high enough."""
         behind = self.low_pass is not None and self.low_pass.behind is not None
@@ -137,6 +175,14 @@ class Frame:
         used = self.clear & (spectrum.upper <= band.highest * (1.0 + 1e-9))
         cut = band.highest < 0.5 * spectrum.rate
         return Frame(self.lines, self.clear, used, band, _none(self.low_pass), cut=cut)
+
+
+def _scaled(posterior: Posterior, terms: Terms, factors: NDArray[np.float64]) -> Posterior:
+    if "N" not in terms.linear:
+        return posterior
+    parameters = posterior.parameters.copy()
+    parameters[:, terms.linear.index("N")] *= factors
+    return replace(posterior, parameters=parameters)
 
 
 def _none(low_pass: Cutoff | None) -> Cutoff | None:

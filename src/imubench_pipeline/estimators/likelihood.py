@@ -250,6 +250,8 @@ def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) 
     frame, whittle, candidates = explaining(spectrum, frame)
     sinusoids = carried(frame.lines)
     chosen = candidates[0]
+    # As the log shows them, and with N before the sensor's low-pass.
+    shown: dict[Terms, Posterior] = {}
     draws: dict[Terms, Posterior] = {}
     # A ramp is no noise: it is believed or not, and does not widen intervals as a possibility.
     alike = [chosen] + [
@@ -261,7 +263,8 @@ def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) 
         if candidate in alike or candidate in wider or terms == PAPERS:
             part = 1.0 if terms == PAPERS or candidate is chosen else candidate.share
             number = max(_FEWEST_DRAWS, round(part * DRAWS))
-            draws[terms] = _behind(frame, sample(whittle, candidate.found, rng, number), terms, rng)
+            shown[terms] = sample(whittle, candidate.found, rng, number)
+            draws[terms] = frame.before_the_filter(shown[terms], terms, rng)
     estimate = describe("likelihood", whittle, chosen, alike, draws, frame.band)
     estimate = with_upper_limits(estimate, alike, wider, draws)
     tau = averaging_times(spectrum.rate, float(spectrum.length.max()))
@@ -273,13 +276,21 @@ def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) 
     estimate, gauss_markov = doubted(
         estimate, gauss_markov, spectrum, frame, candidates, papers, fitted
     )
+    estimate, gauss_markov = (_with_folds(one, frame) for one in (estimate, gauss_markov))
     return Likelihood(
         (
             replace(
                 estimate,
                 lines=sinusoids,
                 draws=joint_draws(
-                    [(c.found.terms, draws[c.found.terms], drawn_share(c)) for c in alike],
+                    [
+                        (
+                            c.found.terms,
+                            frame.in_the_log(shown[c.found.terms], c.found.terms),
+                            drawn_share(c),
+                        )
+                        for c in alike
+                    ],
                     whittle.longest,
                 ),
             ),
@@ -287,7 +298,9 @@ def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) 
                 gauss_markov,
                 parameters=papers_only(gauss_markov.parameters),
                 lines=sinusoids,
-                draws=joint_draws([(PAPERS, draws[PAPERS], 1.0)], whittle.longest),
+                draws=joint_draws(
+                    [(PAPERS, frame.in_the_log(shown[PAPERS], PAPERS), 1.0)], whittle.longest
+                ),
             ),
         ),
         candidates,
@@ -299,6 +312,15 @@ def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) 
         fitted,
         frame,
     )
+
+
+def _with_folds(estimate: Estimate, frame: Frame) -> Estimate:
+    """Return an estimate whose model has the white noise that the log shows."""
+    N = estimate.parameters["N"]
+    if frame.folding == 1.0 or N.in_model is None:
+        return estimate
+    N = replace(N, fitted=N.in_model * math.sqrt(frame.folding))
+    return replace(estimate, parameters={**estimate.parameters, "N": N})
 
 
 def explaining(spectrum: Spectrum, frame: Frame) -> tuple[Frame, Whittle, list[Candidate]]:
@@ -346,17 +368,6 @@ def explaining(spectrum: Spectrum, frame: Frame) -> tuple[Frame, Whittle, list[C
 
 def _explains(fitted: tuple[Frame, Whittle, list[Candidate]]) -> bool:
     return fitted[2][0].goodness.verdict == "explained"
-
-
-def _behind(
-    frame: Frame, posterior: Posterior, terms: Terms, rng: np.random.Generator
-) -> Posterior:
-    """Return draws with what is not known of the sensor's low-pass in N."""
-    if frame.low_pass is None or not frame.low_pass.readings or "N" not in terms.linear:
-        return posterior
-    parameters = posterior.parameters.copy()
-    parameters[:, terms.linear.index("N")] *= frame.low_pass.factors(len(parameters), rng)
-    return replace(posterior, parameters=parameters)
 
 
 def _with_one_more(terms: Terms) -> list[Terms]:

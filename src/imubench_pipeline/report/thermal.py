@@ -23,7 +23,7 @@ _TEMPERATURE = (
     ("bias", "bias_at_reference", "bias at T₀"),
 )
 _LOW_PASS = (("cutoff", "cutoff", "cut-off"), ("N", "N_before_low_pass", "N before the low-pass"))
-_TRUTHS = {"bias": None, "N": "N before the low-pass"}
+_TRUTHS = {"bias": None}
 _SWITCHED = {"sensitivity": "sensitivity", "quadratic": "quadratic", "bias": "signal", "N": "N"}
 """Unit of the page of what is shown in the units that the reader chooses."""
 

@@ -39,8 +39,8 @@ class Figure:
 def figures_of(settings: AxisSettings, channel: str, rate: float) -> Iterator[Figure]:
     """Yield the true figures of an axis.
 
-    N is the density that the low frequencies of its log show; ``N before the low-pass`` stands
-    beside it where there is a low-pass.
+    N is the density before the low-pass; ``N in the log``, that its low frequencies show, stands
+    beside it where there is one.
 
     Parameters
     ----------
@@ -54,7 +54,11 @@ def figures_of(settings: AxisSettings, channel: str, rate: float) -> Iterator[Fi
     model = axis_model(settings, channel)
     for name, value in settings.si(channel).items():
         if name == "N":
-            yield Figure(name, in_the_log(model, rate), units[name], name)
+            shown = in_the_log(model, rate)
+            N = model.noise.N if model.low_pass is not None else shown
+            yield Figure(name, N, units[name], name)
+            if model.low_pass is not None:
+                yield Figure("N in the log", shown, units[name], name)
         elif name in ("Q", "K", "R"):
             yield Figure(name, value, units[name], name)
         elif name == "bias":
@@ -77,7 +81,6 @@ def figures_of(settings: AxisSettings, channel: str, rate: float) -> Iterator[Fi
             yield Figure(name, value, of_drift[name], "drift")
     if model.low_pass is not None:
         yield Figure("cutoff", model.low_pass.cutoff, "Hz", "low_pass")
-        yield Figure("N before the low-pass", model.noise.N, units["N"], "N")
 
 
 def _processes(settings: AxisSettings, channel: str) -> list[tuple[dict[str, float], str]]:

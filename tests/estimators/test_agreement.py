@@ -1,0 +1,65 @@
+import pytest
+
+from imubench_pipeline.estimators.agreement import agreeing, disagreements
+from imubench_pipeline.estimators.estimate import Estimate, Parameter
+
+KNOWN = Estimate(
+    "likelihood",
+    {
+        "N": Parameter(1.0, lower=0.98, upper=1.02),
+        "B": Parameter(2.0, lower=1.8, upper=2.2),
+        "T_B": Parameter(None, "absent", "flicker noise has no correlation time"),
+        "K": Parameter(None, "not_identified", "too short a log", 0.0, 5.0),
+    },
+    curve={"B_curve": Parameter(2.0, lower=1.8, upper=2.2)},
+)
+
+
+def other(method: str = "weighted", **parameters: Parameter) -> Estimate:
+    return Estimate(method, parameters)
+
+
+@pytest.mark.parametrize(
+    ("N", "status"),
+    [
+        (Parameter(1.01, lower=0.97, upper=1.05), "ok"),
+        (
+            Parameter(1.1, lower=1.05, upper=1.15),
+            "doubtful",
+        ),  # intervals apart
+        (Parameter(1.9, lower=0.9, upper=3.8), "doubtful"),  # nearly twice, however unsure
+        (Parameter(1.2), "ok"),  # read off a curve, without limits
+        (Parameter(1.4), "doubtful"),
+        (Parameter(None, "not_shown", "short"), "not_shown"),
+    ],
+)
+def test_a_value_that_the_likelihood_rules_out_is_doubtful(N: Parameter, status: str) -> None:
+    found = agreeing(other(N=N), KNOWN).parameters["N"]
+    assert (found.status, found.value) == (status, N.value)
+    if status == "doubtful":
+        assert found.reason is not None and "between 0.98 and 1.02" in found.reason
+
+
+def test_a_value_of_what_the_likelihood_does_not_tell_is_doubtful() -> None:
+    found = agreeing(
+        other("curve", T_B=Parameter(30.0), K=Parameter(1.0, lower=0.5, upper=2.0)), KNOWN
+    )
+    assert {one.status for one in found.parameters.values()} == {"doubtful"}
+    assert "flicker" in (found.parameters["T_B"].reason or "")
+    assert "too short" in (found.parameters["K"].reason or "")
+
+
+def test_where_several_terms_make_the_bias_that_of_the_curve_is_compared() -> None:
+    terms = {"B": Parameter(1.0, lower=0.9, upper=1.1), "T_B": Parameter(3.0, lower=2.0, upper=4.0)}
+    several = Estimate("likelihood", KNOWN.parameters | terms, [terms], curve=KNOWN.curve)
+    assert agreeing(other(B=Parameter(2.1)), several).parameters["B"].status == "ok"
+
+
+def test_two_n_that_differ_beyond_their_intervals_are_a_finding() -> None:
+    far = other(N=Parameter(1.1, lower=1.05, upper=1.15))
+    (found,) = disagreements("gyro_x", {"weighted": far, "likelihood": KNOWN})
+    assert (found.finding, found.channel) == ("N_differs", "gyro_x")
+    assert found.value == pytest.approx(1.1)
+    near = other(N=Parameter(1.03, lower=1.01, upper=1.05))
+    assert not list(disagreements("gyro_x", {"weighted": near, "likelihood": KNOWN}))
+    assert not list(disagreements("gyro_x", {"weighted": far}))
