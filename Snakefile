@@ -515,7 +515,6 @@ onsuccess:
 
 onerror:
     import sys
-
     from imubench_pipeline.run_summary import failure
 
     print(failure(log, plan.run.results), file=sys.stderr)
