@@ -3,6 +3,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.optimize import brentq
 from scipy.signal import butter, lfilter, sosfilt
 
 from imubench_pipeline.cutoff import find_cutoff
@@ -166,10 +167,14 @@ def test_a_moving_average_is_found(samples):
     found = cutoff_of(np.convolve(white, np.ones(samples) / samples, "valid"), 100.0)
     # cos^2(pi f / rate) is also a bilinear filter with its cut-off at a half of Nyquist.
     assert (found.kind, found.order) == (("bilinear", 1) if samples == 2 else ("boxcar", 1))
-    # That of a mean over the same time, unsampled.
-    at = 25.0 if samples == 2 else 44.2946 / samples
+    at = brentq(lambda f: response(f, samples) - 0.5, 1e-3, 99.0 / samples)
     assert found.frequency.value == pytest.approx(at, rel=0.01)
     assert found.N.lower < 1e-4 < found.N.upper
+
+
+def response(f, samples):
+    """Power that a moving average at 100 Hz leaves."""
+    return (np.sin(samples * np.pi * f / 100) / (samples * np.sin(np.pi * f / 100))) ** 2
 
 
 @pytest.mark.parametrize("order", [1, 2, 3, 4])

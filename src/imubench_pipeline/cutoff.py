@@ -238,6 +238,11 @@ def find_cutoff(
     limits = [fits.limits(one) for one in alike]
     lower, upper = min(low for low, _ in limits), max(high for _, high in limits)
     N, after = fits.density(best)
+    highest = upper >= 0.999 * fits.highest(best.kind, best.order)
+    shown, lower, upper = (
+        replace(best, cutoff=cutoff).low_pass.half_power(spectrum.rate)
+        for cutoff in (best.cutoff, lower, upper)
+    )
     readings = [
         Reading(
             math.exp(best.cost - one.cost),
@@ -264,19 +269,19 @@ def find_cutoff(
             "the spectrum rises towards Nyquist, by quantization noise as well as by a low-pass "
             f"with a cut-off from {lower:.4g} to {upper:.4g} Hz"
         )
-    elif upper > WIDEST * lower or upper >= 0.999 * fits.highest(best.kind, best.order):
+    elif upper > WIDEST * lower or highest:
         reason = f"the log allows cut-offs from {lower:.4g} to {upper:.4g} Hz"
     elif not fits.explains(best):
         reason = (
             f"the spectrum bends, but not as behind any of {len(filters)} filters that were tried"
         )
     if reason:
-        found = Parameter(None, "not_identified", reason, lower, upper, fitted=best.cutoff)
+        found = Parameter(None, "not_identified", reason, lower, upper, fitted=shown)
         density = replace(
             density, value=None, status="not_identified", reason=reason, fitted=density.value
         )
     else:
-        found = Parameter(best.cutoff, lower=lower, upper=upper)
+        found = Parameter(shown, lower=lower, upper=upper)
     whole = FilterFits(spectrum)
     whole.rounded = fits.rounded
     white, *slow = whole.gains(best)

@@ -63,24 +63,26 @@ def refined(found: Cutoff, spectrum: Spectrum, clear: NDArray[np.bool_], terms: 
                 outside = middle
         ends.append(math.exp(best.x + sign * outside))
         relative.append(math.log(joint.at(best.x + sign * outside)[1] / N))
-    lower, upper = ends
-    cutoff = math.exp(best.x)
+    one = Tried(0.0, 0.0, found.kind, found.order, math.exp(best.x), False)
+    lower, shown, upper = (
+        replace(one, cutoff=cutoff).low_pass.half_power(spectrum.rate)
+        for cutoff in (ends[0], one.cutoff, ends[1])
+    )
     told = upper <= WIDEST * lower
     reason = None if told else f"the log allows cut-offs from {lower:.4g} to {upper:.4g} Hz"
     frequency = Parameter(
-        cutoff if told else None,
+        shown if told else None,
         "ok" if told else "not_identified",
         reason,
         lower,
         upper,
-        fitted=None if told else cutoff,
+        fitted=None if told else shown,
     )
     reading = Reading(1.0, relative[0], 0.0, relative[1])
-    one = Tried(0.0, 0.0, found.kind, found.order, cutoff, False)
     readings = [reading]
     if one.is_first_order_analogue:
         readings.append(also_after_sampling(reading, one, spectrum.rate))
-    behind = joint.behind(spectrum, cutoff)
+    behind = joint.behind(spectrum, one.cutoff)
     return replace(found, frequency=frequency, behind=behind, readings=readings)
 
 

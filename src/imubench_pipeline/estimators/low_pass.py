@@ -8,7 +8,7 @@ White noise of density N behind a filter has the density N^2 G(f) in the samples
 - boxcar, the mean over a time d: the autocovariance is a triangle, so that G = T/d (1 +
   2 sum_(k T < d) (1 - k T/d) cos(2 pi f k T)); d = m T is the moving average of m samples.
 
-f_c is where the power is halved; for the boxcar 0.443 / d.
+f_c is where the power is halved; for the boxcar 0.443 / d, before the sampling.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
 
 from imubench_pipeline.sensor_model.low_pass import LowPass
 
@@ -101,6 +102,24 @@ class Filter:
         if self.kind == "boxcar":
             return np.asarray(np.sinc(f * BOXCAR / self.cutoff) ** 2)
         return LowPass(self.cutoff, self.order).power(f)
+
+    def half_power(self, rate: float) -> float:
+        """Return the frequency at which white noise behind the filter has lost half its density.
+
+        That is ``cutoff`` but for a boxcar, of which sampling folds the skirts: the running mean
+        of three samples has lost it at 0.155 of the rate, and the mean over that time at 0.148.
+
+        Parameters
+        ----------
+        rate : float
+            f_s, Hz.
+        """
+        if self.kind != "boxcar":
+            return self.cutoff
+        half = 0.5 * float(self.white(0.0, rate))
+        return float(
+            brentq(lambda f: float(self.white(f, rate)) - half, 0.5 * self.cutoff, 0.5 * rate)
+        )
 
     def flicker(self, frequency: ArrayLike, rate: float) -> Array:
         """Return what the filter leaves of flicker noise as sampled without it, folds included.
