@@ -175,7 +175,7 @@ def test_log_that_the_steps_cannot_use_is_a_failure(monkeypatch):
 @pytest.mark.parametrize("name", CASES)
 def test_case_has_a_log_of_its_own_with_a_truth(name):
     if name in ("mti_7_gyro", "c102_accelerometer"):
-        pytest.skip("long")
+        pytest.skip("10 h logs: the release command has them")
     log = CASES[name](silent_errors.rng_of(name, 0))
     assert 1_000 <= len(log.samples) <= 800_000
     assert np.isfinite(log.samples).all()

@@ -14,7 +14,7 @@ def comb(number: int, kind: str = "sinusoid") -> list[Line]:
     rng = np.random.default_rng(1)
     amplitudes = rng.uniform(0.3, 1.3, number)
     return [
-        Line(f, f - 1e-3, f + 1e-3, a, 0.9 * a, 1.1 * a, 50.0, 1e-9, 1e-2, 1e-2, kind)  # type: ignore[arg-type]
+        Line(f, f - 1e-3, f + 1e-3, a, 0.9 * a, 1.1 * a, 50.0, 1e-9, 1e-2, 1e-2, kind)  # type: ignore[arg-type]  # a literal
         for f, a in zip(0.5 + 0.1 * np.arange(number), amplitudes.tolist(), strict=True)
     ]
 
