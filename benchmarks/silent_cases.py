@@ -19,7 +19,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,6 +78,8 @@ class Log:
         ``gyro`` or ``accel``.
     stamps : ndarray, shape (L,), optional
         s; None: the log has none, and its rate is stated.
+    bounds : dict of str to float
+        How well the log can tell its parameters at most, relative standard errors, of clean logs.
     """
 
     samples: Array
@@ -84,6 +87,7 @@ class Log:
     truth: dict[str, Truth]
     quantity: str = "gyro"
     stamps: Array | None = None
+    bounds: dict[str, float] = field(default_factory=dict)
 
 
 Case = Callable[[Rng], Log]
@@ -113,7 +117,15 @@ class Noise:
 
     def log(self, samples: int, rate: float, rng: Rng) -> Log:
         """Return a log."""
-        return Log(self.make(rng)(samples, rate), rate, self.truth(), self.quantity)
+        made = self.make(rng)(samples, rate)
+        return Log(made, rate, self.truth(), self.quantity, bounds=self.bounds(samples, rate))
+
+    def bounds(self, samples: int, rate: float) -> dict[str, float]:
+        """Return how well a log can tell its parameters at most, relative standard errors."""
+        there = {"N": self.N, "B": self.B, "T_B": self.T_B, "K": self.K}
+        known = {name: value for name, value in there.items() if value > 0.0}
+        found = sim.bounds(samples, rate, partial(_density, rate=rate), known)
+        return found | ({"B_curve": found["B"]} if "B" in found else {})
 
     def truth(self, **others: Truth) -> dict[str, Truth]:
         """Return what its parameters are, and others."""
@@ -143,6 +155,20 @@ class Noise:
     def with_walk(self, cycles: float, duration: float) -> Noise:
         """Return it with a walk that is the stronger below so many cycles in the log."""
         return replace(self, K=2.0 * math.pi * cycles / duration * math.sqrt(self.level()))
+
+
+def _density(frequency: Array, of: Mapping[str, float], *, rate: float) -> Array:
+    """Return the density of N, of two processes or flicker noise (F), and of K."""
+    total = sim.white_density(frequency, rate, of.get("N", 0.0))
+    for number in ("", " 2"):
+        if f"B{number}" in of:
+            process = of[f"B{number}"], of[f"T_B{number}"]
+            total = total + sim.gauss_markov_density(frequency, rate, *process)
+    if "F" in of:
+        total = total + sim.flicker_density(frequency, rate, of["F"])
+    if "K" in of:
+        total = total + sim.random_walk_density(frequency, rate, of["K"])
+    return total
 
 
 def between(rng: Rng, low: float, high: float) -> float:
@@ -258,7 +284,10 @@ def _flicker(rng: Rng, *, fractional: bool, walk: bool) -> Log:
     known = Truth(math.sqrt(max(noise.N**2 - differs, 0.0)), math.sqrt(noise.N**2 + differs))
     truth = noise.truth(N=known, B=exactly(B), B_curve=exactly(B), K=exactly(K))
     truth.pop("T_B")  # there is none; of a process that stands for it, anything
-    return Log(log, rate, truth, noise.quantity)
+    there = {"N": noise.N, "F": B} | ({"K": K} if walk else {})
+    bounds = sim.bounds(samples, rate, partial(_density, rate=rate), there)
+    bounds |= {"B": bounds["F"], "B_curve": bounds["F"]}
+    return Log(log, rate, truth, noise.quantity, bounds=bounds)
 
 
 def white_flicker(rng: Rng) -> Log:
@@ -299,7 +328,13 @@ def _two_processes(rng: Rng, *, walk: bool) -> Log:
     highest = sim.instability_of_curve([(noise.sigma, fast), (second.sigma, slow)], duration / 9.0)
     B = Truth(min(noise.B, second.B), max(noise.B, second.B, highest))
     truth = noise.truth(B=B, B_curve=exactly(highest), T_B=Truth(fast, slow), K=exactly(K))
-    return Log(log, rate, truth, noise.quantity)
+    there = {"N": noise.N, "B": noise.B, "T_B": fast, "B 2": second.B, "T_B 2": slow}
+    bounds = sim.bounds(
+        samples, rate, partial(_density, rate=rate), there | ({"K": K} if walk else {})
+    )
+    for name in ("B", "T_B"):
+        bounds[name] = max(bounds[name], bounds[f"{name} 2"])
+    return Log(log, rate, truth, noise.quantity, bounds=bounds | {"B_curve": bounds["B"]})
 
 
 def two_processes(rng: Rng) -> Log:

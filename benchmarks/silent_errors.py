@@ -105,6 +105,10 @@ CLASSES = ("silent", "loud", "refused", "right", "doubted", "none", "failed")
 _TELLING = 20.0
 """s between two words about how far a run is."""
 
+IDENTIFIED = 0.2
+"""Least relative standard error of a parameter, by the Cramér-Rao bound of the true model, up to
+which a log is meant to give it."""
+
 SHOWN = ("N", "B", "B_curve", "T_B", "K", "Q", "R")
 
 
@@ -124,6 +128,7 @@ class Judged:
     value: float | None = None
     lower: float | None = None
     upper: float | None = None
+    bound: float | None = None
     status: str = ""
     model: str = ""
     verdict: str = ""
@@ -251,6 +256,7 @@ def judge(case: str, number: int, log: Log, tables: Mapping[str, list[Any]]) -> 
                 value=row["value"],
                 lower=row["lower"],
                 upper=row["upper"],
+                bound=log.bounds.get(parameter),
                 status=row["status"],
                 model=row["model"] or "",
                 verdict=verdict,
@@ -443,8 +449,10 @@ def summary(judged: Sequence[Judged]) -> Iterator[str]:
             there = {(one.case, one.log) for one in told}
             right = {(one.case, one.log) for one in told if one.judgement == "right"}
             warned = {(one.case, one.log) for one in told if one.warned_by}
-            text = f"clean cases, {name} right and ok: {share(len(right), len(there))}"
-            yield f"{text}; warned of: {len(warned)}"
+            known = {(one.case, one.log) for one in told if (one.bound or 0.0) <= IDENTIFIED}
+            text = f"clean cases, {name} right and ok: {share(len(right & known), len(known))}"
+            text += f" that can be told to {100 * IDENTIFIED:.0f} %; of all "
+            yield f"{text}{share(len(right), len(there))}; warned of: {len(warned)}"
 
 
 def filter_summary(judged: Sequence[Judged]) -> Iterator[str]:

@@ -9,7 +9,7 @@ process 2 S_v T_B / (1 + (2 pi f T_B)^2) with the variance S_v = B^2 ln 2 / (pi 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -157,6 +157,62 @@ def instability_of_curve(processes: Sequence[tuple[float, float]], longest: floa
         for tau in np.geomspace(min(shortest, longest), longest, 400)
     )
     return math.sqrt(highest) / FLOOR
+
+
+def white_density(frequency: Array, rate: float, N: float) -> Array:
+    """Return the sampled density of white noise."""
+    return np.full(frequency.shape, N**2)
+
+
+def gauss_markov_density(frequency: Array, rate: float, B: float, T_B: float) -> Array:
+    """Return the sampled density of a first-order Gauss-Markov process."""
+    phi = math.exp(-1.0 / (rate * T_B))
+    cosine = np.cos(2.0 * np.pi * frequency / rate)
+    return np.asarray(VARIANCE * B**2 / rate * (1.0 - phi**2) / (1.0 - 2.0 * phi * cosine + phi**2))
+
+
+def random_walk_density(frequency: Array, rate: float, K: float) -> Array:
+    """Return the sampled density of a random walk."""
+    return np.asarray((K / (2.0 * rate * np.sin(np.pi * frequency / rate))) ** 2)
+
+
+def flicker_density(frequency: Array, rate: float, B: float) -> Array:
+    """Return the density of flicker noise."""
+    return np.asarray(B**2 / (2.0 * np.pi * frequency))
+
+
+def bounds(
+    samples: int,
+    rate: float,
+    density: Callable[[Array, Mapping[str, float]], Array],
+    truth: Mapping[str, float],
+) -> dict[str, float]:
+    """Return how well a log can tell its parameters at most: their relative standard errors.
+
+    This is the Cramér-Rao bound for Gaussian noise whose cosine transform is independent at
+    k rate / (2 samples), with one degree of freedom each (P. Whittle, 1953).
+
+    Parameters
+    ----------
+    samples : int
+    rate : float
+        Hz.
+    density : callable
+        Of the frequency in Hz and the parameters.
+    truth : mapping of str to float
+        The parameters, above 0; each is unknown.
+    """
+    every = np.unique(np.geomspace(1, samples, 4000).round().astype(np.int64))
+    many = np.diff(every)
+    f = np.asarray(0.5 * (every[:-1] + every[1:] - 1) * rate / (2.0 * samples), dtype=np.float64)
+    slopes: list[Array] = []
+    for name, value in truth.items():
+        low, high = (density(f, {**truth, name: value * math.exp(step)}) for step in (-1e-4, 1e-4))
+        slopes.append(np.asarray(np.log(high / low) / 2e-4))
+    information = np.array([[0.5 * np.sum(many * a * b) for a in slopes] for b in slopes])
+    # What is not told at all leaves no inverse.
+    error = np.sqrt(np.diag(np.linalg.pinv(information, hermitian=True)))
+    return dict(zip(truth, error.tolist(), strict=True))
 
 
 def telegraph(

@@ -114,3 +114,36 @@ def test_resonant_low_pass_has_its_quality_at_the_cutoff(rng):
     frequency, measured = density(log)
     assert np.mean(measured[frequency < 0.1]) == pytest.approx(1.0, rel=0.1)
     assert np.mean(measured[np.abs(frequency - 1.0) < 0.02]) == pytest.approx(1.6**2, rel=0.1)
+
+
+def test_bounds_are_those_of_the_whole_covariance():
+    # White noise and a process of a few samples: the information from the dense covariance.
+    samples, truth = 600, {"N": 1.0, "B": 2.0, "T_B": 0.8}
+
+    def covariance(N: float, B: float, T_B: float) -> np.ndarray:
+        lag = np.abs(np.subtract.outer(np.arange(samples), np.arange(samples))) / RATE
+        return N**2 * RATE * np.eye(samples) + sim.VARIANCE * B**2 * np.exp(-lag / T_B)
+
+    inverse = np.linalg.inv(covariance(**truth))
+    slopes = []
+    for name, value in truth.items():
+        low, high = (covariance(**truth | {name: value * (1.0 + step)}) for step in (-1e-4, 1e-4))
+        slopes.append(inverse @ (high - low) / 2e-4)
+    information = np.array([[0.5 * np.trace(a @ b) for a in slopes] for b in slopes])
+    exact = np.sqrt(np.diag(np.linalg.inv(information)))
+
+    def density(frequency, of):
+        process = sim.gauss_markov_density(frequency, RATE, of["B"], of["T_B"])
+        return sim.white_density(frequency, RATE, of["N"]) + process
+
+    found = sim.bounds(samples, RATE, density, truth)
+    np.testing.assert_allclose([found[name] for name in truth], exact, rtol=0.05)
+
+
+def test_bound_of_one_density_alone_is_that_of_so_many_degrees_of_freedom():
+    def walk(frequency, of):
+        return sim.random_walk_density(frequency, RATE, of["K"])
+
+    assert sim.bounds(20_000, RATE, walk, {"K": 3.0})["K"] == pytest.approx(
+        1.0 / np.sqrt(2 * 20_000), rel=1e-3
+    )
