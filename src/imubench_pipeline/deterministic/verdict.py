@@ -69,7 +69,9 @@ def _with(parameter: Parameter, caveat: tuple[Status, str] | None) -> Parameter:
         return parameter
     status, reason = caveat
     if status == "not_identified":
-        return replace(parameter, value=None, status=status, reason=reason, fitted=parameter.value)
+        return replace(
+            parameter, value=None, status=status, reason=reason, fitted=parameter.in_model
+        )
     return replace(parameter, status=status, reason=reason)
 
 

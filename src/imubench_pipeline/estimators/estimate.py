@@ -81,7 +81,8 @@ class Parameter:
         Length of a log that would tell the value to 10 %, s.
     fitted : float or None
         What the model of the log has, where that is not the value: where there is none to quote,
-        and for N before a low-pass, whose folds are in the log.
+        for N before a low-pass, whose folds are in the log, and for K, whose value is the median
+        over all models that the log does not rule out.
     """
 
     value: float | None

@@ -17,8 +17,11 @@ Array = NDArray[np.float64]
 NOT_IDENTIFIED = 0.5
 """Relative standard deviation beyond which a B is not given as a number."""
 
-NOT_IDENTIFIED_TIME = 0.4
-"""That of T_B: of weak processes those whose T_B seems known have it wrong."""
+NOT_IDENTIFIED_TIME = 0.3
+"""That of T_B: one of six values with a greater one is more than twice off."""
+
+NOT_IDENTIFIED_WALK = 0.35
+"""That of K: beyond it more than one value of a hundred is more than twice off."""
 
 NOT_IDENTIFIED_LEVEL = 0.9
 """That of the other parameters: their bound at the fitted value scatters with the value."""
