@@ -1,6 +1,7 @@
 """What is doubted of a fit."""
 
 import numpy as np
+import pytest
 
 from imubench_pipeline.estimators.doubts import doubting
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
@@ -26,6 +27,17 @@ def test_a_walk_that_may_be_a_slow_process_is_doubted() -> None:
 def test_a_walk_is_hardly_ever_doubted() -> None:
     statuses = [k_of(NoiseModel(N=1e-4, K=1e-5), seed).status for seed in range(5)]
     assert statuses.count("ok") >= 4
+
+
+@pytest.mark.parametrize("seed", [0, 2, 5])
+def test_a_ramp_that_passes_for_a_walk_is_doubted(seed: int) -> None:
+    # BIC asks more of a ramp than of a walk: one of four sigma of the process is hardly found.
+    model = NoiseModel(N=1e-4, B=1e-4, T_B=20.0)
+    log = simulate(model, RATE, SAMPLES, np.random.default_rng(seed))
+    ramp = 4.3e-4 * np.arange(SAMPLES) / SAMPLES
+    found = fit(log + ramp, RATE)
+    assert found.candidates[0].found.terms.name == "N+GM+K"
+    assert found.estimates[0].parameters["K"].status in ("doubtful", "not_identified")
 
 
 def test_with_b_the_figures_of_the_curve_are_doubted() -> None:

@@ -24,6 +24,10 @@ _CLEARLY = 2.0
 three quarters of the walks that are processes of a twentieth of the log, and for 2 to 3 % of those
 that are walks."""
 
+_LITTLE = 0.25
+"""Part of K that is left beside a ramp below which the ramp may stand for the walk: so it does, and
+AIC clearly prefers it, for 1 % of the walks that are walks."""
+
 _HARDLY = 6.0
 """BIC up to which a model with fewer terms is as good."""
 
@@ -74,7 +78,7 @@ def doubted(
         estimate, papers = (
             _with_doubt_of_the_cut(one, spectrum, frame) for one in (estimate, papers)
         )
-    rival = _without_a_walk(chosen, candidates)
+    rival = _without_a_walk(chosen, candidates) or _beside_a_ramp(chosen, candidates)
     if rival is not None:
         estimate = doubting(estimate, ("K",), rival)
     simpler = _with_fewer_terms(chosen, candidates)
@@ -107,6 +111,24 @@ def _without_a_walk(chosen: Candidate, candidates: Sequence[Candidate]) -> str |
     return (
         f"{best.found.terms.name}, which has no random walk, is better by "
         f"{chosen.aic - best.aic:.1f} in AIC: a process as slow as the log passes for a random walk"
+    )
+
+
+def _beside_a_ramp(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
+    """Say so where AIC prefers a ramp beside the random walk, which leaves little of the walk."""
+    terms = chosen.found.terms
+    if "K" not in terms.linear or terms.ramp:
+        return None
+    beside = replace(terms, ramp=True)
+    best = next((one for one in candidates if one.found.terms == beside), None)
+    if best is None or best.aic > chosen.aic - _CLEARLY:
+        return None
+    K, least = chosen.found.parameter("K"), best.found.parameter("K")
+    if least > _LITTLE * K:
+        return None
+    return (
+        f"{beside.name} is better by {chosen.aic - best.aic:.1f} in AIC, and the ramp leaves "
+        f"{least / K:.2g} of K"
     )
 
 
