@@ -28,6 +28,7 @@ from imubench_pipeline.spectrum import LineSpectrum, Spectrum, block_of, spectra
 from imubench_pipeline.thermal.effect import complete, shifted
 from imubench_pipeline.thermal.level import mean_error, with_likely_walk
 from imubench_pipeline.thermal.path import TemperaturePath
+from imubench_pipeline.thermal.path_errors import without_errors
 from imubench_pipeline.thermal.products import BlockSeries, Coefficients
 from imubench_pipeline.thermal.register import Span
 from imubench_pipeline.thermal.regression import Regression, Regressors
@@ -363,6 +364,8 @@ def _described(
         weights = np.zeros(len(fit.used))
         weights[fit.used] = fit.chosen.ordinates / found.whittle.density(found.candidates[0].found)
         left = regressors.without(fit.spectrum, found.regression, weights)
+        terms = found.candidates[0].found.terms
+        left = without_errors(left, fit.used, found.whittle, terms, verdict.path_errors)
         effect = regressors.effect(found.regression)
         without = likelihood.fit_spectrum(left, find_frame(left, lines), rng=rng)
     added = [path.means(*place, effect) for place in fit.series.places]

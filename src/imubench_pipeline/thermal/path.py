@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import ndtri
 
+from imubench_pipeline.thermal.dwells import dwells
 from imubench_pipeline.thermal.jumps import at_jumps
 from imubench_pipeline.thermal.path_kernels import drawn, propagate
 from imubench_pipeline.thermal.register import Readings, Span, readings
@@ -184,6 +185,7 @@ def temperature_path(
         value[part], variance[part], _, precision, shift = evidence.part(part, q, noise)
         normals = rng.standard_normal((DRAWS, part.stop - part.start, 2))
         draws[:, part] = drawn(evidence.steps(part), q, spread, precision, shift, normals)
+        draws[:, part] += evidence.dwelling(part, q, noise, variance[part], rng)
     value, draws = value + level, draws + level
     if noise < _COARSE * read.step:
         inside = read.high == read.low
@@ -254,7 +256,7 @@ class _Evidence:
         # The share of a block is given, not the x that it tells: with dx = noise dz.
         height += 0.5 * np.log((noise**2 * self._known[part] + least) / variance)[two].sum()
         height += float((-0.5 * at**2 / variance)[two | many].sum())
-        half = np.maximum(0.5 * read.step - noise * self._clear[part], 0.05 * read.step)
+        half = self._half(part, noise)
         path, spread, evidence = propagate(
             self.steps(part),
             q,
@@ -267,6 +269,28 @@ class _Evidence:
             shift,
         )
         return path, spread, evidence + float(height), precision, shift
+
+    def _half(self, part: slice, noise: float) -> Array:
+        """Return half the width of what a cell allows the path in each block."""
+        step = self._read.step
+        return np.maximum(0.5 * step - noise * self._clear[part], 0.05 * step)
+
+    def dwelling(
+        self, part: slice, q: float, noise: float, variance: Array, rng: np.random.Generator
+    ) -> Array:
+        """Draw what a path may be off by for as long as it stays in a cell, shape (d, k).
+
+        With the variance of the wandering path it has that of a level anywhere in the cell.
+        """
+        inside, mean, half = self._cell[part], self._read.mean[part], self._half(part, noise)
+        off = np.zeros((DRAWS, len(inside)))
+        if not inside.any():
+            return off
+        for dwell in dwells(inside, mean, float(np.median(half[inside])), q):
+            missing = np.maximum(half**2 / 3.0 - variance, 0.0)[dwell.blocks]
+            level = math.sqrt(3.0) * (2.0 * rng.random((DRAWS, 1)) - 1.0)
+            off[:, dwell.blocks] = level * dwell.taper * np.sqrt(missing)
+        return off
 
     def best(self) -> tuple[float, float, float]:
         """Return q and the noise that make the readings most likely, and log their evidence."""

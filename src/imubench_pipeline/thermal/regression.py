@@ -167,11 +167,36 @@ class Regressors:
         """Return the regressors of temperature at the knots."""
         terms = [knots, knots**2] if self.quadratic else [knots]
         if self.settling > 0.0:
-            begin = self.path.sample[0] + self.settling * self.rate
-            end = int(np.searchsorted(self.path.sample, begin))
+            end = self._settled_from()
             settled = knots[min(end, len(knots) - 1)]
             terms.append(np.where(np.arange(len(knots)) < end, knots - settled, 0.0))
         return terms
+
+    def slope(self, found: Regression) -> Array:
+        """Return how what temperature adds to the log changes with it, at the knots of the path.
+
+        Parameters
+        ----------
+        found : Regression
+            Of these regressors.
+
+        Returns
+        -------
+        ndarray, shape (k,)
+            SI per K.
+        """
+        knots = self.knots(found.lag)
+        slope = np.full(len(knots), found.beta[0])
+        if self.quadratic:
+            slope += 2.0 * found.beta[1] * knots
+        if self.settling > 0.0:
+            slope[: self._settled_from()] += found.beta[self.thermal - 1]
+        return slope
+
+    def _settled_from(self) -> int:
+        """Return the first knot at which the sensor has settled."""
+        begin = self.path.sample[0] + self.settling * self.rate
+        return int(np.searchsorted(self.path.sample, begin))
 
     def means(self, lag: float) -> Array:
         """Return the mean over the log of each regressor of temperature.

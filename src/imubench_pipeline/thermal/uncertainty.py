@@ -18,7 +18,7 @@ from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.posterior import sample
 from imubench_pipeline.estimators.whittle import Maximum, Whittle
-from imubench_pipeline.thermal.lag import lagged_path
+from imubench_pipeline.thermal.path_errors import path_errors
 from imubench_pipeline.thermal.regression import Regression, Regressors
 
 Array = NDArray[np.float64]
@@ -60,6 +60,8 @@ class Verdict:
     reason : str
     temperature_error : float
         Standard deviation of the mean of what temperature adds to the log, SI.
+    path_errors : ndarray, shape (b,)
+        Density of what errors of the path leave in each bin, (rad/s)²/Hz or (m/s²)²/Hz.
     """
 
     sensitivity: Parameter
@@ -68,6 +70,7 @@ class Verdict:
     compensated: bool
     reason: str
     temperature_error: float
+    path_errors: Array
 
 
 def judge(
@@ -102,10 +105,11 @@ def judge(
     """
     weights = whittle.spectrum.ordinates / whittle.density(candidates[0].found)
     p = regressors.thermal
-    shift = _path_errors(regressors, found, weights)
+    errors = path_errors(regressors, found, weights)
     fine = _fine(regressors, weights, lags)
     betas, drawn_lags = _drawn(regressors, whittle, candidates, fine, rng)
-    extra = rng.standard_normal((len(betas), 1)) * np.sqrt(np.mean(shift**2, axis=0))[None, :]
+    moved = np.sqrt(np.mean(errors.moved**2, axis=0))
+    extra = rng.standard_normal((len(betas), 1)) * moved[None, :]
     betas, drawn_lags = betas[:, :p] + extra[:, :p], np.maximum(drawn_lags + extra[:, p], 0.0)
     lower, upper = np.quantile(betas, [0.025, 0.975], axis=0)
     lower, upper = np.minimum(lower, found.beta[:p]), np.maximum(upper, found.beta[:p])
@@ -130,6 +134,7 @@ def judge(
         compensated,
         reason,
         float(np.std(betas @ at_mean)),
+        errors.density,
     )
 
 
@@ -328,31 +333,3 @@ def _densities(whittle: Whittle, found: Maximum, number: int, rng: np.random.Gen
         powers, times = posterior.parameters[row] ** 2, posterior.times[row]
         rows.append(whittle.matrix(found.terms, times) @ powers)
     return np.array(rows)
-
-
-def _path_errors(regressors: Regressors, found: Regression, weights: Array) -> Array:
-    """Return how the drawn paths move s, q and the lag, shape (d, p + 1)."""
-    path, p = regressors.path, regressors.thermal
-    knots = regressors.knots(found.lag)
-    slope = found.beta[0] + (2.0 * found.beta[1] * knots if regressors.quadratic else 0.0)
-    step = max(0.05 * found.lag, 0.5 * float(np.median(np.diff(path.sample))) / regressors.rate)
-    by_lag = slope * (regressors.knots(found.lag + step) - knots) / step
-    columns = regressors.columns(found.lag)
-    columns.extend(regressors.coefficients.of_knots(path, [by_lag]))
-    full = np.zeros(len(regressors.used))
-    full[regressors.used] = weights
-    gram = regressors.coefficients.products(columns).gram
-    information = np.einsum("b,bij->ij", full, gram)
-    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
-    # A lag that the log hardly tells must not carry the error of the path away.
-    inverse = np.linalg.inv(information / np.outer(scale, scale) + 1e-6 * np.eye(len(scale)))
-    errors = [
-        slope * lagged_path(path, draw - path.value, regressors.rate, found.lag)
-        for draw in path.draws
-    ]
-    moved = []
-    for other in regressors.coefficients.of_knots(path, errors):
-        shared = regressors.coefficients.products([*columns, other]).gram[:, :-1, -1]
-        moved.append(inverse @ ((full @ shared) / scale) / scale)
-    at = np.array(moved)
-    return np.column_stack([at[:, :p], at[:, -1]])
