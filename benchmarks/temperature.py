@@ -154,6 +154,16 @@ def of_log(number: int) -> dict[str, object]:
         and bias.lower <= made.bias <= bias.upper,
         "reason": fit.reason,
     }
+    truth = MODELS[number % len(MODELS)]
+    for name, true in (("N", truth.N), ("B", truth.B), ("K", truth.K)):
+        found = fit.without_temperature.estimates[0].parameters[name]
+        limits = found.lower is not None and found.upper is not None
+        row |= {
+            f"{name}_true": true,
+            f"{name}_found": found.value,
+            f"{name}_told": limits and true > 0.0,
+            f"{name}_inside": limits and found.lower <= true <= found.upper,
+        }
     return row
 
 
@@ -163,6 +173,14 @@ def summary(rows: pd.DataFrame) -> list[tuple[str, str]]:
     nothing, something = told[told.true == 0.0], told[told.true != 0.0]
     lagged = something[(something.lag_status == "ok") & (something.lag > 0)]
     given = something[something.compensated]
+    left = [
+        (
+            f"coverage of {name}, temperature taken out",
+            f"{100 * those[f'{name}_inside'].mean():.1f} % of {len(those)}",
+        )
+        for name in ("N", "B", "K")
+        for those in [given[given[f"{name}_told"]]]
+    ]
     lag_error = (lagged.lag_found.astype(float) - lagged.lag) / lagged.lag_bound
     return [
         ("logs", f"{len(rows)}, s told in {len(told)}"),
@@ -180,6 +198,7 @@ def summary(rows: pd.DataFrame) -> list[tuple[str, str]]:
             "error of the lag over its bound, median",
             f"{lag_error.abs().median():.2f}",
         ),
+        *left,
     ]
 
 
