@@ -157,12 +157,12 @@ def of_log(number: int) -> dict[str, object]:
     truth = MODELS[number % len(MODELS)]
     for name, true in (("N", truth.N), ("B", truth.B), ("K", truth.K)):
         found = fit.without_temperature.estimates[0].parameters[name]
-        limits = found.lower is not None and found.upper is not None
+        low, high = found.lower, found.upper
         row |= {
             f"{name}_true": true,
             f"{name}_found": found.value,
-            f"{name}_told": limits and true > 0.0,
-            f"{name}_inside": limits and found.lower <= true <= found.upper,
+            f"{name}_told": low is not None and high is not None and true > 0.0,
+            f"{name}_inside": low is not None and high is not None and low <= true <= high,
         }
     return row
 
