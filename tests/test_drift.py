@@ -261,6 +261,21 @@ def test_the_level_is_shared_by_the_tests_of_a_recording() -> None:
     assert found[7]["verdict"] == "as before"
 
 
+@pytest.mark.parametrize(("model", "verdict"), [("N+GM+K", "changed"), ("N+F+GM", "as before")])
+def test_b_of_a_single_term_and_that_of_the_curve_are_one_test(model: str, verdict: str) -> None:
+    values = [1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 0.0, 4.3]
+    listed = names(8)
+    rows = [
+        parameter(name, math.exp(value), term=term, model=model)
+        for term in ("B", "B_curve")
+        for name, value in zip(listed, values, strict=True)
+    ]
+    found = list(drift_rows(rows, [], [recording(name) for name in listed]))
+    last = [row for row in found if row["recording"] == listed[7]]
+    assert all(LEVEL / 2 < row["p_value"] < LEVEL for row in last)
+    assert [row["verdict"] for row in last] == [verdict] * 2
+
+
 # Which recordings, and in which order
 
 

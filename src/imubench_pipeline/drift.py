@@ -11,7 +11,8 @@ pass for spread and hide itself for ever. The distance of the next estimate from
 of v + tau^2 + var mu (v is its own half towards mu), is Student's t (of a bias exactly) with
 Satterthwaite's degrees of freedom, at most n - 1, about a line n - 2.
 
-A recording is ``changed`` where p is below `LEVEL` over its number of tests (Bonferroni). It begins
+A recording is ``changed`` where p is below `LEVEL` over its number of tests (Bonferroni). B of a
+single term and ``B_curve`` are one quantity and one test, that of ``B_curve``. It begins
 a new level, so a step is flagged once. If the next recording is nearer to the old level, the
 flagged one stood alone, and the old level goes on without it.
 
@@ -154,7 +155,8 @@ def _rows(series: Series, cells: Sequence[dict[tuple[str, str], Row]]) -> Iterat
     data = np.full((3, len(cells), len(columns)), np.nan)
     for column, index in columns.items():
         data[:, list(points[column]), index] = np.transpose(list(points[column].values()))
-    found = np.moveaxis(_Levels(data).found, 0, 2).tolist()
+    tested_as = [columns.get(_tested_as(key), index) for key, index in columns.items()]
+    found = np.moveaxis(_Levels(data, np.array(tested_as, dtype=int)).found, 0, 2).tolist()
     for key in sorted(units, key=lambda key: (key[0][0] != "g", key[0], _NAMES.index(key[1]))):
         noise = key[1] != "bias"
         for place, recording in enumerate(series.recordings):
@@ -183,6 +185,12 @@ def _kind(row: Row) -> str:
     """Return what B and T_B are parameters of, such as ``F`` or ``GM``; of others nothing."""
     terms = row["model"].split("+") if row.get("parameter") in ("B", "T_B") else []
     return "+".join(term for term in terms if term in ("F", "GM"))
+
+
+def _tested_as(column: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the channel, parameter and kind that say whether this one has changed."""
+    channel, parameter, kind = column
+    return (channel, "B_curve", "") if parameter == "B" and kind in ("F", "GM") else column
 
 
 def _point(row: Row) -> tuple[float, ...]:
@@ -215,12 +223,14 @@ class _Levels:
     ``points`` (3, n, c) are y, and the variances of its error where the truth lies below and above;
     NaN is no value. ``found`` (7, n, c) are the expected y and its limits, p-value (NaN: not
     judged), 1 or -1 where changed, how many the level has before it (-1: no value), and the flagged
-    recording that this one shows to have stood alone (-1: none).
+    recording that this one shows to have stood alone (-1: none). A column has the p-value and the
+    verdict of the one that it is ``tested_as`` (c,), wherever that is judged.
     """
 
-    def __init__(self, points: NDArray[np.float64]) -> None:
+    def __init__(self, points: NDArray[np.float64], tested_as: NDArray[np.int64]) -> None:
         _, recordings, columns = points.shape
         self._points = points
+        self._tested_as = tested_as
         self.found = np.tile(np.reshape(_NOTHING, (-1, 1, 1)), (recordings, columns))
         self._member = np.zeros((recordings, columns), dtype=bool)
         self._state = np.zeros((7, columns))
@@ -244,7 +254,10 @@ class _Levels:
         judged = present & (count >= _FEWEST) & (own[0] > 0.0) & (degrees[0] >= 1.0)
         p_value = 2.0 * stdtr(degrees[0], -np.abs(y - mean) / error[0])
         half = stdtrit(np.maximum(degrees[1:], 1.0), 0.975) * error[1:]
-        changed = judged & (p_value < LEVEL / max(judged.sum(), 1))
+        here = np.arange(len(y))
+        test = np.where(judged[self._tested_as], self._tested_as, here)
+        p_value = p_value[test]
+        changed = judged & (p_value < LEVEL / max((judged & (test == here)).sum(), 1))
         of_judged = np.stack([mean - half[0], mean + half[1], p_value, changed * np.sign(y - mean)])
         self.found[1:5, place, judged] = of_judged[:, judged]
         self.found[5, place, present] = count[present]
