@@ -5,7 +5,7 @@ import pytest
 
 from imubench_pipeline.deterministic.courses import find_courses
 from imubench_pipeline.deterministic.verdict import Verdict, deterministic_rows, verdict_of
-from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.estimators.estimate import FAMILY, Estimate, JointDraws, Parameter, Status
 from imubench_pipeline.schemas import TABLES
 from tests.deterministic.logs import RATE, SIGMA, K, N, static_log, times
 
@@ -55,6 +55,41 @@ def test_heavy_tails_widen_the_interval_of_n_by_the_scatter_of_powers() -> None:
     known = Estimate("likelihood", {"N": Parameter(N, lower=0.99 * N, upper=1.01 * N)})
     wider = of.applied(known).parameters["N"]
     assert wider.upper == pytest.approx(N * (1.0 + 0.01 * of.widening), rel=1e-3)
+
+
+def of_draws(first_N: np.ndarray) -> Estimate:
+    first = np.zeros((len(first_N), len(FAMILY)))
+    first[:, FAMILY.index("N")] = first_N
+    first[:, FAMILY.index("K")] = np.geomspace(1e-6, 2e-6, len(first_N))
+    draws = JointDraws(first, np.empty((len(first_N), 0, 2)))
+    return Estimate("likelihood", {"N": Parameter(N)}, draws=draws)
+
+
+def drawn_white(of: Estimate) -> np.ndarray:
+    assert of.draws is not None
+    return of.draws.first[:, FAMILY.index("N")]
+
+
+def test_the_draws_are_widened_as_the_interval_of_n_is() -> None:
+    given = of_draws(N * np.exp(0.01 * np.linspace(-1.0, 1.0, 201)))
+    wider = Verdict((), {}, widening=2.0).applied(given)
+    assert np.ptp(np.log(drawn_white(wider))) == pytest.approx(0.04)
+    assert given.draws is not None
+    assert wider.draws is not None
+    place = FAMILY.index("K")
+    assert np.array_equal(wider.draws.first[:, place], given.draws.first[:, place])
+
+
+def test_the_draws_have_n_of_all_the_log_where_it_grows_or_varies() -> None:
+    doubt: dict[str, tuple[Status, str]] = {"N": ("doubtful", "it grows")}
+    given = of_draws(np.append(np.full(200, N), 0.0))
+    grown = drawn_white(Verdict((), doubt, growth=0.3).applied(given))
+    assert grown[-1] == 0.0
+    assert np.log(np.quantile(grown[:-1] / N, [0.0, 0.5, 1.0])) == pytest.approx(
+        [-0.15, 0.0, 0.15], abs=2e-3
+    )
+    varied = drawn_white(Verdict((), doubt, scatter=0.2).applied(given))
+    assert np.std(np.log(varied[:-1])) == pytest.approx(0.2, rel=0.02)
 
 
 def test_a_walk_on_one_half_alone_is_a_finding() -> None:

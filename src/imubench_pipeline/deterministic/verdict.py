@@ -7,11 +7,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+from scipy.special import ndtri
+
 from imubench_pipeline.deterministic.courses import Course, Courses
 from imubench_pipeline.deterministic.halves import Halves, compare_halves
 from imubench_pipeline.deterministic.search import MOST
 from imubench_pipeline.deterministic.steadiness import Steadiness, steadiness_of
-from imubench_pipeline.estimators.estimate import Estimate, Parameter, Status
+from imubench_pipeline.estimators.estimate import FAMILY, Estimate, JointDraws, Parameter, Status
 from imubench_pipeline.findings import Finding
 
 Row = Mapping[str, Any]
@@ -33,11 +36,17 @@ class Verdict:
         Status and reason of the parameters that are not to be relied on.
     widening : float
         Times the interval of N that a normal distribution would give.
+    growth : float
+        Logarithm of N at the end of the log over that at its beginning, where it grows.
+    scatter : float
+        Standard deviation of the logarithm of N over the log, where it varies otherwise.
     """
 
     findings: tuple[Finding, ...]
     caveats: Mapping[str, tuple[Status, str]]
     widening: float = 1.0
+    growth: float = 0.0
+    scatter: float = 0.0
 
     def applied(self, estimate: Estimate) -> Estimate:
         """Return an estimate with the caveats on the parameters that have a value."""
@@ -60,7 +69,25 @@ class Verdict:
             parameters=of(estimate.parameters),
             further=[of(group) for group in estimate.further],
             curve={name: _with(one, of_curve.get(name)) for name, one in estimate.curve.items()},
+            draws=self._drawn(estimate.draws),
         )
+
+    def _drawn(self, draws: JointDraws | None) -> JointDraws | None:
+        """Return draws with N as wide as its interval, each with N of some time of the log."""
+        if draws is None:
+            return None
+        first, place = draws.first.copy(), FAMILY.index("N")
+        N = first[:, place]
+        there = N > 0.0
+        if not there.any():
+            return draws
+        middle = float(np.median(N[there]))
+        # Evenly over the log, and in an order that no other parameter has.
+        even = (np.arange(len(N)) + 0.5) / len(N)
+        even = np.random.default_rng(len(N)).permutation(even)
+        other_times = np.exp(self.growth * (even - 0.5) + self.scatter * ndtri(even))
+        first[there, place] = (middle * (N / middle) ** self.widening * other_times)[there]
+        return replace(draws, first=first)
 
 
 def _with(parameter: Parameter, caveat: tuple[Status, str] | None) -> Parameter:
@@ -107,11 +134,13 @@ def verdict_of(channel: str, unit: str, courses: Courses) -> Verdict:
         # The power of L samples has a relative variance of (2 + kurtosis) / L.
         widening = math.sqrt(1.0 + 0.5 * kurtosis)
         findings.append(_heavy(channel, kurtosis, widening))
+    growth = scatter = 0.0
     steady = steadiness_of(courses.means)
     if steady is not None and (steady.grows or steady.varies):
         finding = _unsteady(channel, steady)
         findings.append(finding)
         caveats["N"] = ("doubtful", finding.detail)
+        growth, scatter = (math.log1p(steady.trend), 0.0) if steady.grows else (0.0, steady.spread)
     if courses.telegraph:
         reason = (
             f"the bias of {channel} steps {MOST} times or more, as telegraph noise does: the steps "
@@ -119,7 +148,7 @@ def verdict_of(channel: str, unit: str, courses: Courses) -> Verdict:
         )
         findings.append(Finding("telegraph_noise", "warning", reason, float(MOST), channel))
         caveats |= {name: ("doubtful", reason) for name in ("B", "T_B", "K")}
-        return Verdict(tuple(findings), caveats, widening)
+        return Verdict(tuple(findings), caveats, widening, growth, scatter)
     noise = courses.searched.fit.noise
     for halves in compare_halves(courses.without(), noise):
         if halves.differ:
@@ -131,7 +160,7 @@ def verdict_of(channel: str, unit: str, courses: Courses) -> Verdict:
     reason_against = courses.against_random_walk
     if reason_against is not None:
         caveats["K"] = ("not_identified", reason_against)
-    return Verdict(tuple(findings), caveats, widening)
+    return Verdict(tuple(findings), caveats, widening, growth, scatter)
 
 
 def deterministic_rows(key: Mapping[str, str], unit: str, courses: Courses) -> Iterator[Row]:
