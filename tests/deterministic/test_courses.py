@@ -105,3 +105,25 @@ def test_steps_are_found_among_missing_samples() -> None:
 
 def test_a_log_too_short_to_be_searched_has_none() -> None:
     assert courses_of(np.random.default_rng(3).standard_normal(100)).found == ()
+
+
+def test_a_part_of_a_cycle_is_found_though_a_walk_would_hide_it() -> None:
+    log = static_log(12, walk=0.0)
+    (drift,) = courses_of(log + 40.0 * SIGMA * np.sin(2.0 * np.pi * times(log) / 15_000.0)).found
+    assert drift.kind == "periodic_drift"
+    assert drift.time_lower is not None
+    assert drift.time_upper is not None
+    assert drift.time_lower < 15_000.0 < drift.time_upper
+    assert drift.size_lower < 40.0 * SIGMA < drift.size_upper
+
+
+def test_a_weak_part_of_a_cycle_rivals_the_walk_that_it_looks_like() -> None:
+    log = static_log(12, walk=0.0)
+    found = courses_of(log + 3.0 * SIGMA * np.sin(2.0 * np.pi * times(log) / 15_000.0))
+    assert found.found == ()
+    assert "periodic drift" in (found.against_random_walk or "")
+
+
+def test_a_walk_that_is_well_seen_has_no_rival() -> None:
+    for seed in range(20, 24):
+        assert courses_of(static_log(seed, walk=2e-5)).against_random_walk is None

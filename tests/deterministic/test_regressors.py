@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.fft
 
 from imubench_pipeline.deterministic.regressors import Regressor
 
@@ -28,3 +29,14 @@ def test_a_step_has_the_sines_of_its_place_as_coefficients() -> None:
     sines = np.sin(np.pi * k * place / n) / (2.0 * np.sin(np.pi * k / (2.0 * n)))
     found = Regressor("step", 0, float(place)).coefficients(n)[0]
     assert found == pytest.approx(-np.sqrt(2.0 / n) * sines, abs=1e-12)
+
+
+@pytest.mark.parametrize("n", [64, 251])
+@pytest.mark.parametrize("where", [0.25, 1.0, 3.37, 8.5])
+def test_the_closed_forms_are_the_cosine_transforms(n: int, where: float) -> None:
+    for regressor in (
+        Regressor("sinusoid", 0, where / n),
+        Regressor("exponential", 0, 4.0 * where),
+    ):
+        expected = scipy.fft.dct(regressor.means(n), type=2, norm="ortho", axis=1)[:, 1:]
+        assert regressor.coefficients(n) == pytest.approx(expected, abs=1e-12)

@@ -33,6 +33,20 @@ def test_the_best_step_of_the_transform_gains_what_least_squares_say() -> None:
     assert step.gain == pytest.approx(left[0] - left[1], rel=1e-6)
 
 
+@pytest.mark.parametrize("cycles", [0.3, 0.7, 2.4])
+def test_a_sinusoid_gains_what_least_squares_of_both_amplitudes_say(cycles: float) -> None:
+    log = static_log(4, hours=0.5)
+    ordinates = Ordinates(means_of([log], len(log), RATE))
+    fit = ordinates.fit([Regressor("step", 0, 100.0)])
+    sinusoid = Regressor("sinusoid", 0, cycles / ordinates.sizes[0])
+    scale = np.sqrt(ordinates.weights(fit.density))
+    rows = [ordinates.columns(x) * scale for x in (*fit.regressors, sinusoid)]
+    data = ordinates.coefficient * scale
+    left = [float(np.linalg.lstsq(np.concatenate(part).T, data)[1][0]) for part in (rows[:1], rows)]
+    gain = Gain(ordinates, fit.regressors, fit.density, 0).of(sinusoid)
+    assert gain == pytest.approx(left[0] - left[1], rel=1e-6)
+
+
 def test_leverages_sum_up_to_the_number_of_amplitudes() -> None:
     log = static_log(2, hours=0.5)
     ordinates = Ordinates(means_of([log], len(log), RATE))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from imubench_pipeline.deterministic.means import Means, means_of
 from imubench_pipeline.deterministic.ordinates import Fit, Ordinates
 from imubench_pipeline.deterministic.regressors import Regressor
-from imubench_pipeline.deterministic.scores import Gain
+from imubench_pipeline.deterministic.scores import FEWEST_CYCLES, Gain
 from imubench_pipeline.deterministic.search import Searched, again, search
 
 Array = NDArray[np.float64]
@@ -35,9 +35,6 @@ _MOST_STEPS = 8
 
 _LIMIT = 1.96
 _HALF_LOG_LIKELIHOOD = 1.92
-_FEWER = 0.25
-"""Part of its power that a random walk keeps beside what may stand for it, to be told from it."""
-
 _MOST_LEVERAGE = 0.5
 """Part of what a log tells of its random walk that may go to what is taken out."""
 
@@ -159,14 +156,11 @@ class Courses:
         """Why a random walk cannot be told from a deterministic course, or None."""
         if self.searched is None or self.means is None or self.searched.many:
             return None
-        undecided = self.searched.undecided
-        fit = self.searched.fit
-        if undecided is not None:
-            walk, left = fit.noise.parameter("K") ** 2, undecided.noise.parameter("K") ** 2
-            if left < _FEWER * walk:
-                what = _in_words(undecided.regressors[-1], self.means)
-                return f"{what} would explain the log about as well as a random walk"
-        if self.found and _leverage_on_walk(fit) > _MOST_LEVERAGE:
+        rival = self.searched.rival
+        if rival is not None:
+            what = _in_words(rival.regressors[-1], self.means)
+            return f"{what} would explain the log about as well as a random walk"
+        if self.found and _leverage_on_walk(self.searched.fit) > _MOST_LEVERAGE:
             return (
                 "what is taken out as deterministic takes most of what the log tells of a random "
                 "walk with it"
@@ -181,9 +175,7 @@ def _in_words(regressor: Regressor, means: Means) -> str:
         return f"a step of the bias at {start + where:.5g} s"
     if regressor.kind == "exponential":
         return f"a warm-up with a time constant of {where:.3g} s"
-    if regressor.kind == "sinusoid":
-        return f"a periodic drift with a period of {means.interval / regressor.where:.3g} s"
-    return "a constant drift"
+    return f"a periodic drift with a period of {means.interval / regressor.where:.3g} s"
 
 
 def _leverage_on_walk(fit: Fit) -> float:
@@ -253,13 +245,14 @@ def _described(ordinates: Ordinates, searched: Searched) -> Iterator[Course]:
         part = means.parts[regressor.part]
         start = part.start / means.rate
         end = start + len(part.mean) * means.interval
-        size = float(np.hypot(*amplitudes)) if len(amplitudes) > 1 else float(amplitudes[0])
+        size = _size(amplitudes)
         along = amplitudes / size if len(amplitudes) > 1 else np.ones(1)
         error = _LIMIT * math.sqrt(float(along @ fit.covariance[here, here] @ along))
         low, high = _limits(ordinates, fit, regressor)
-        if regressor.kind == "step":
-            # Where it is taken to be has been chosen to make it large.
-            error = math.hypot(error, _spread(ordinates, fit, regressor, here.start, (low, high)))
+        if regressor.kind != "exponential":
+            # Where it is taken to be has been chosen to make it large; and of a swing that is
+            # shorter than its period the size hangs on the period.
+            error = math.hypot(error, _spread(ordinates, fit, regressor, here, (low, high)))
         place = start + regressor.where * means.interval
         period = regressor.kind == "sinusoid"
         if regressor.kind == "step":
@@ -293,17 +286,18 @@ def _limits(ordinates: Ordinates, fit: Fit, regressor: Regressor) -> tuple[float
     best = gain.of(regressor)
     n = ordinates.sizes[regressor.part]
     unit = {"step": 0.25, "exponential": 0.02 * regressor.where, "sinusoid": 0.02 / n}
+    least = FEWEST_CYCLES / n if regressor.kind == "sinusoid" else 1e-6
     limits = []
     for side in (-1.0, 1.0):
         away = unit[regressor.kind]
         for _ in range(24):
             moved = regressor.where + side * away
-            if not 0.0 < moved < n:
+            if not least < moved < n:
                 break
             if best - gain.of(replace(regressor, where=moved)) > 2.0 * _HALF_LOG_LIKELIHOOD:
                 break
             away *= 1.5
-        limits.append(min(max(regressor.where + side * away, 1e-6), float(n)))
+        limits.append(min(max(regressor.where + side * away, least), float(n)))
     return limits[0], limits[1]
 
 
@@ -311,15 +305,20 @@ def _spread(
     ordinates: Ordinates,
     fit: Fit,
     regressor: Regressor,
-    column: int,
+    here: slice,
     limits: tuple[float, float],
 ) -> float:
     """Return half the range of a size over the limits of its place."""
     sizes = []
     for where in limits:
         moved = tuple(replace(x, where=where) if x is regressor else x for x in fit.regressors)
-        sizes.append(float(ordinates.solved(moved, fit.density)[0][column]))
-    return 0.5 * float(np.ptp([fit.sizes[column], *sizes]))
+        sizes.append(ordinates.solved(moved, fit.density)[0][here])
+    return 0.5 * float(np.ptp([_size(one) for one in (fit.sizes[here], *sizes)]))
+
+
+def _size(amplitudes: Array) -> float:
+    """Return the amplitude of a sinusoid, or the signed size of another course."""
+    return float(np.hypot(*amplitudes)) if len(amplitudes) > 1 else float(amplitudes[0])
 
 
 def _placed(blocks: Callable[[], Iterable[Array]], means: Means, fit: Fit) -> tuple[Regressor, ...]:

@@ -158,7 +158,9 @@ class Ordinates:
             )
         )
 
-    def fit(self, regressors: Sequence[Regressor], start: Array | None = None) -> Fit:
+    def fit(
+        self, regressors: Sequence[Regressor], start: Array | None = None, terms: Terms = NOISE
+    ) -> Fit:
         """Fit noise and regressors together.
 
         Parameters
@@ -166,6 +168,8 @@ class Ordinates:
         regressors : sequence of Regressor
         start : ndarray, shape (k,), optional
             Density of the noise that the first weights are taken from.
+        terms : Terms
+            The noise model.
         """
         weight = np.ones_like(self.coefficient)
         residual, leverage = self.coefficient, np.zeros_like(weight)
@@ -177,7 +181,7 @@ class Ordinates:
                 sizes, covariance, residual, leverage = self.solved(regressors, density)
                 weight = np.maximum(1.0 - leverage, _LEAST_WEIGHT)
             whittle = self._whittle.of(self.spectrum(residual, weight))
-            noise = whittle.maximum(NOISE)
+            noise = whittle.maximum(terms)
             density = self.density(noise)
         if density is None:
             raise ValueError("no round was made")
@@ -201,7 +205,7 @@ class Ordinates:
         if beyond.sum() < 4 * NOISE.parameters:
             return fit.density
         whittle = self._whittle.taken(spectrum, beyond)
-        return self.density(whittle.maximum(NOISE))
+        return self.density(whittle.maximum(fit.noise.terms))
 
     def log_likelihood(self, residual: Array, density: Array) -> float:
         """Return the log likelihood of coefficients, up to a constant."""

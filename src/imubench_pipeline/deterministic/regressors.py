@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -14,6 +15,9 @@ import scipy.fft
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+_ALIKE = 1e-9
+"""Difference of two frequencies below which their beat is constant over any part."""
 
 Kind = Literal["step", "exponential", "sinusoid", "ramp", "pulse"]
 
@@ -60,6 +64,11 @@ class Regressor:
 
     def coefficients(self, n: int) -> Array:
         """Return its orthonormal DCT-II coefficients 1 ... n - 1, shape (columns, n - 1)."""
+        if self.kind == "sinusoid":
+            return np.sinc(self.where) * _of_sinusoid(n, 2.0 * np.pi * self.where)
+        if self.kind == "exponential":
+            left = math.exp(-1.0 / self.where)
+            return self.where * (1.0 - left) * _of_exponential(n, left)
         return np.asarray(scipy.fft.dct(self.means(n), type=2, norm="ortho", axis=1)[:, 1:])
 
     def at(self, blocks: Array) -> Array:
@@ -79,3 +88,35 @@ class Regressor:
             return np.exp(-blocks / self.where)[None]
         phase = 2.0 * np.pi * self.where * blocks
         return np.array([np.cos(phase), np.sin(phase)])
+
+
+@lru_cache(maxsize=8)
+def _half_angles(n: int) -> tuple[Array, Array, Array]:
+    """Return cosine and sine of pi k / 2 n, and (-1)^k, for k = 1 ... n - 1."""
+    k = np.arange(1, n, dtype=np.float64)
+    half = np.asarray(0.5 * np.pi * k / n)
+    return np.cos(half), np.sin(half), np.asarray(1.0 - 2.0 * (k % 2.0))
+
+
+def _of_sinusoid(n: int, angle: float) -> Array:
+    """Return the coefficients of cos and sin of angle (i + 1/2), shape (2, n - 1).
+
+    By sum_i cos(t (i + 1/2)) = sin(n t) / (2 sin(t / 2)), and likewise of the sine, for sum and
+    difference t of both angles.
+    """
+    cos, sin, sign = _half_angles(n)
+    a, b = math.sin(0.5 * angle) * cos, math.cos(0.5 * angle) * sin
+    both = np.zeros((2, n - 1))
+    for half in (a + b, a - b):
+        beats = np.abs(half) > _ALIKE
+        below = 1.0 / np.where(beats, 2.0 * half, 1.0)
+        both[0] += np.where(beats, math.sin(n * angle) * sign * below, float(n))
+        both[1] += np.where(beats, (1.0 - math.cos(n * angle) * sign) * below, 0.0)
+    return 0.5 * math.sqrt(2.0 / n) * both
+
+
+def _of_exponential(n: int, left: float) -> Array:
+    """Return the coefficients of left^i, shape (1, n - 1): a geometric sum."""
+    cos, sin, sign = _half_angles(n)
+    below = (1.0 - left) ** 2 + 4.0 * left * sin**2
+    return math.sqrt(2.0 / n) * ((1.0 - left**n * sign) * (1.0 - left) * cos / below)[None]

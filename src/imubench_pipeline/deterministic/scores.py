@@ -47,7 +47,9 @@ _MOST_CYCLES = 64
 _CYCLES = 0.25
 """Distance of the frequencies that are tried, cycles in the part."""
 
-_FEWEST_CYCLES = 1.0
+FEWEST_CYCLES = 0.25
+"""A day in a log of six hours; of less a sinusoid is a ramp and a bend."""
+
 _KNOWN = 1e-3
 """Part of a regressor that others leave: less is told by rounding errors."""
 
@@ -133,12 +135,12 @@ class Gain:
         columns = regressor.coefficients(self._ordinates.sizes[regressor.part])
         if len(columns) == 1:
             return float(_gains(columns, self._weight, self._residual, self._basis)[0])
-        first = columns[:1]
-        both = np.concatenate([self._basis, _orthonormal([self._beside(first[0])], self._weight)])
-        return float(
-            _gains(first, self._weight, self._residual, self._basis)[0]
-            + _gains(columns[1:], self._weight, self._residual, both)[0]
-        )
+        # Cosine and sine of a few cycles are not orthogonal: what the one takes, the other lacks.
+        first = _orthonormal([self._beside(columns[0])], self._weight)
+        taken = first @ (self._weight * self._residual)
+        both = np.concatenate([self._basis, first])
+        left = self._residual - taken @ first
+        return float(taken @ taken + _gains(columns[1:], self._weight, left, both)[0])
 
     def _beside(self, column: Array) -> Array:
         return np.asarray(column - (self._basis @ (self._weight * column)) @ self._basis)
@@ -249,7 +251,7 @@ def _exponentials(number: int, n: int, w: Array, r: Array, basis: Array, parts: 
 def _sinusoid_columns(n: int) -> tuple[Array, Array, int]:
     """Return cycles in the part, coefficients of cosine and sine (2, c, k), and how many k."""
     most = min(_MOST_CYCLES, n // 8)
-    cycles = np.arange(_FEWEST_CYCLES, most + 1e-9, _CYCLES)
+    cycles = np.arange(FEWEST_CYCLES, most + 1e-9, _CYCLES)
     kept = min(n - 1, 4 * most)
     columns = np.empty((2, len(cycles), kept))
     # The low ordinates of a slow course are those of fewer, longer blocks.

@@ -1,0 +1,85 @@
+"""Whether a course explains a log better than its random walk does, or about as well.
+
+A walk and a course are two models of the same rise towards low frequencies. They are compared as
+such: the noise without a walk and the course in its stead, over the noise with the walk. A course
+that leaves a walk needed beside it says nothing against the walk. What the course gains has the
+choice of its kind, place, time constant or period in it, and so must come near the threshold that
+counts them; the walk's own parameter, one and never looked for, counts for nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from imubench_pipeline.deterministic.candidates import SAFETY, candidates, with_candidate
+from imubench_pipeline.deterministic.ordinates import NOISE, Fit, Ordinates
+from imubench_pipeline.estimators.whittle import Terms
+
+_NEAR = 4.0
+"""Below its threshold by so much, in twice the log likelihood, a course is about as good."""
+
+_FITTED_ANEW = 8.0
+"""What the noise may add to a gain as it is fitted anew: what is below by more is not tried."""
+
+_WITHOUT_WALK = Terms("NF", NOISE.gauss_markov)
+
+
+@dataclass(frozen=True)
+class Rival:
+    """What explains a log without a random walk, by one course more.
+
+    Attributes
+    ----------
+    fit : Fit
+        Its last regressor is the course.
+    beyond : float
+        Twice the log likelihood over that of the noise with the walk, less what the search for
+        the course makes of noise alone.
+    """
+
+    fit: Fit
+    beyond: float
+
+    @property
+    def better(self) -> bool:
+        """Whether the course is to be taken, and the walk seen beside it anew."""
+        return self.beyond > 0.0
+
+    @property
+    def as_good(self) -> bool:
+        """Whether the log does not tell the walk from the course."""
+        return self.beyond > -_NEAR
+
+
+def rival_of_walk(ordinates: Ordinates, fit: Fit) -> Rival | None:
+    """Return the course that explains a log best in the place of a random walk.
+
+    Steps, warm-ups and periodic drift are tried. A ramp is a term of the noise models, whose
+    choice weighs it against a walk itself.
+
+    Parameters
+    ----------
+    ordinates : Ordinates
+    fit : Fit
+        What was found so far.
+
+    Returns
+    -------
+    Rival or None
+        None where there is no walk, or no course that may be as good.
+    """
+    if fit.noise.parameter("K") == 0.0:
+        return None
+    bare = ordinates.fit(fit.regressors, fit.density, _WITHOUT_WALK)
+    walk = 2.0 * (fit.log_likelihood - bare.log_likelihood)
+    best: Rival | None = None
+    for score, density in candidates(ordinates, bare):
+        wanted = walk + score.threshold * SAFETY[score.regressor.kind]
+        hopeless = score.gain < wanted - _NEAR - _FITTED_ANEW
+        if hopeless or score.regressor.kind in ("ramp", "pulse"):
+            continue
+        tried, gain = with_candidate(ordinates, bare, score, density)
+        beyond = gain - wanted
+        if best is None or beyond > best.beyond:
+            best = Rival(tried, beyond)
+    return best
