@@ -15,6 +15,7 @@ from imubench_pipeline.deterministic.ordinates import Fit, Ordinates
 from imubench_pipeline.deterministic.regressors import Regressor
 from imubench_pipeline.deterministic.scores import FEWEST_CYCLES, Gain
 from imubench_pipeline.deterministic.search import Searched, again, search
+from imubench_pipeline.deterministic.uncertainty import covariance_of_sizes
 
 Array = NDArray[np.float64]
 
@@ -235,6 +236,7 @@ def find_courses(
 def _described(ordinates: Ordinates, searched: Searched) -> Iterator[Course]:
     """Yield the courses with their sizes and intervals."""
     fit, means = searched.fit, ordinates.means
+    covariance = covariance_of_sizes(ordinates, fit)
     column = 0
     for regressor, gain in zip(fit.regressors, searched.gains, strict=True):
         here = slice(column, column + regressor.columns)
@@ -247,7 +249,7 @@ def _described(ordinates: Ordinates, searched: Searched) -> Iterator[Course]:
         end = start + len(part.mean) * means.interval
         size = _size(amplitudes)
         along = amplitudes / size if len(amplitudes) > 1 else np.ones(1)
-        error = _LIMIT * math.sqrt(float(along @ fit.covariance[here, here] @ along))
+        error = _LIMIT * math.sqrt(float(along @ covariance[here, here] @ along))
         low, high = _limits(ordinates, fit, regressor)
         if regressor.kind != "exponential":
             # Where it is taken to be has been chosen to make it large; and of a swing that is
