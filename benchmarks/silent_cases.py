@@ -115,6 +115,13 @@ class Noise:
 
         return made
 
+    def behind_analogue(
+        self, samples: int, rate: float, cutoff: float, order: int, rng: Rng
+    ) -> Array:
+        """Return the samples of it behind an analogue Butterworth low-pass."""
+        slow = replace(self, N=0.0).make(rng)
+        return sim.analogue(slow, self.N, samples, rate, cutoff, order, rng)
+
     def log(self, samples: int, rate: float, rng: Rng) -> Log:
         """Return a log."""
         made = self.make(rng)(samples, rate)
@@ -516,7 +523,7 @@ def _for_filter(rng: Rng) -> tuple[int, float, Noise, float]:
 
 def _analogue(rng: Rng, order: int) -> Log:
     samples, rate, noise, cutoff = _for_filter(rng)
-    log = sim.analogue(noise.make(rng), samples, rate, cutoff, order)
+    log = noise.behind_analogue(samples, rate, cutoff, order, rng)
     return Log(log, rate, noise.truth(cutoff=exactly(cutoff)), noise.quantity)
 
 
@@ -568,7 +575,7 @@ def moving_mean(rng: Rng) -> Log:
 def filtered_and_rounded(rng: Rng) -> Log:
     """An analogue low-pass of any order, then a register of 0.3 to 1.5 sigma of what is left."""
     samples, rate, noise, cutoff = _for_filter(rng)
-    log = sim.analogue(noise.make(rng), samples, rate, cutoff, int(rng.integers(1, 5)))
+    log = noise.behind_analogue(samples, rate, cutoff, int(rng.integers(1, 5)), rng)
     step = between(rng, 0.3, 1.5) * float(np.std(np.diff(log))) / math.sqrt(2.0)
     truth = noise.truth(cutoff=exactly(cutoff), N=_rounded(noise.N, step, rate))
     return Log(sim.rounded(log, step), rate, truth, noise.quantity)
@@ -591,7 +598,7 @@ def filtered_walk(rng: Rng) -> Log:
     noise = any_white(rng)
     cutoff = between(rng, 0.1, 0.8) * 0.5 * rate
     noise = replace(noise, K=2.0 * math.pi * between(rng, 0.02, 0.3) * cutoff * noise.N)
-    log = sim.analogue(noise.make(rng), samples, rate, cutoff, int(rng.integers(1, 5)))
+    log = noise.behind_analogue(samples, rate, cutoff, int(rng.integers(1, 5)), rng)
     return Log(log, rate, noise.truth(cutoff=exactly(cutoff)), noise.quantity)
 
 

@@ -31,6 +31,9 @@ VARIANCE = math.log(2.0) / (math.pi * _PEAK**2)
 _OVERSAMPLED = 16
 """Samples of an analogue process for each that is kept."""
 
+_FOLDS = 32
+"""Folds on each side that are added one by one."""
+
 _SETTLED = 64
 """Cut-off periods after which a filter has forgotten its start."""
 
@@ -228,27 +231,65 @@ def telegraph(
 
 
 def analogue(
-    make: Callable[[int, float], Array], samples: int, rate: float, cutoff: float, order: int
+    slow: Callable[[int, float], Array],
+    N: float,
+    samples: int,
+    rate: float,
+    cutoff: float,
+    order: int,
+    rng: np.random.Generator,
 ) -> Array:
-    """Return a process behind an analogue Butterworth low-pass, sampled without a further one.
+    """Return white noise and slower noise behind an analogue Butterworth low-pass, then sampled.
+
+    The white noise has its whole folded density; of the slow noise, what lies beyond eight times
+    the rate is left out.
 
     Parameters
     ----------
-    make : callable
-        Gives the process for a number of samples and a rate.
+    slow : callable
+        Gives the process beside the white noise for a number of samples and a rate.
+    N : float
+        Density of the white noise before the filter.
     samples : int
     rate : float
         Hz, after the filter.
     cutoff : float
         Hz (-3 dB).
     order : int
+    rng : numpy.random.Generator
     """
     inner = _OVERSAMPLED * rate
     settled = math.ceil(_SETTLED * rate / cutoff)
-    made = make(_OVERSAMPLED * (samples + settled), inner)
+    made = slow(_OVERSAMPLED * (samples + settled), inner)
     sections = signal.butter(order, cutoff, fs=inner, output="sos")
     start = signal.sosfilt_zi(sections) * made[0]
-    return np.asarray(signal.sosfilt(sections, made, zi=start)[0][::_OVERSAMPLED][settled:])
+    behind = signal.sosfilt(sections, made, zi=start)[0][::_OVERSAMPLED][settled:]
+    white = of_density(samples, rate, lambda f: N**2 * folded(f, rate, cutoff, order), rng)
+    return np.asarray(behind + white)
+
+
+def folded(frequency: Array, rate: float, cutoff: float, order: int) -> Array:
+    """Return the density of white noise of N = 1 behind an analogue Butterworth filter, sampled.
+
+    Parameters
+    ----------
+    frequency : ndarray
+        Hz, up to Nyquist.
+    rate : float
+        Hz.
+    cutoff : float
+        Hz (-3 dB), below the rate.
+    order : int
+    """
+    steep = 2 * order
+    total = np.zeros(frequency.shape)
+    for k in range(-_FOLDS, _FOLDS + 1):
+        total += 1.0 / (1.0 + np.abs((frequency + k * rate) / cutoff) ** steep)
+    # The others by the integral of (cutoff / f)^(2 n), from half a fold before the first of them.
+    for side in (-1.0, 1.0):
+        end = (_FOLDS + 0.5) * rate + side * frequency
+        total += cutoff / rate / (steep - 1.0) * (cutoff / end) ** (steep - 1)
+    return np.asarray(total)
 
 
 def resonant(

@@ -74,10 +74,17 @@ def test_second_order_process_has_its_covariance_and_instability(rng):
     assert sim.second_order_instability() * sim.FLOOR == pytest.approx(highest, rel=0.03)
 
 
+def nothing(samples, rate):
+    return np.zeros(samples)
+
+
 @pytest.mark.parametrize("order", [1, 2, 4])
-@pytest.mark.parametrize("kind", [sim.analogue, sim.digital])
+@pytest.mark.parametrize("kind", ["analogue", "digital"])
 def test_low_pass_has_lost_half_of_the_power_at_its_cutoff(rng, kind, order):
-    log = kind(lambda samples, rate: sim.white(samples, rate, 1.0, rng), 200_000, RATE, 0.5, order)
+    if kind == "analogue":
+        log = sim.analogue(nothing, 1.0, 200_000, RATE, 0.5, order, rng)
+    else:
+        log = sim.digital(lambda n, rate: sim.white(n, rate, 1.0, rng), 200_000, RATE, 0.5, order)
     assert len(log) == 200_000
     frequency, measured = density(log)
     assert np.mean(measured[frequency < 0.05]) == pytest.approx(1.0, rel=0.1)
@@ -86,6 +93,36 @@ def test_low_pass_has_lost_half_of_the_power_at_its_cutoff(rng, kind, order):
     assert np.mean(measured[np.abs(frequency - 1.0) < 0.05]) == pytest.approx(
         1.0 / (1.0 + 2.0 ** (2 * order)), rel=0.15
     )
+
+
+@pytest.mark.parametrize("cutoff", [0.3, 2.0, 4.0])
+def test_folds_of_first_order_are_those_of_the_sampled_process(rng, cutoff):
+    # White noise behind it is a Gauss-Markov process, sampled an AR(1) sequence.
+    frequency = np.linspace(0.0, 0.5, 11) * RATE
+    decay = math.exp(-2.0 * math.pi * cutoff / RATE)
+    variance = math.pi * cutoff
+    gap = 1.0 - 2.0 * decay * np.cos(2.0 * np.pi * frequency / RATE) + decay**2
+    exact = variance / RATE * (1.0 - decay**2) / gap
+    assert sim.folded(frequency, RATE, cutoff, 1) == pytest.approx(exact, rel=1e-5)
+    log = sim.analogue(nothing, 1.0, LENGTH, RATE, cutoff, 1, rng)
+    assert log.var() == pytest.approx(variance, rel=0.02)
+
+
+@pytest.mark.parametrize("order", [2, 3, 4])
+def test_folds_add_up_to_the_variance_before_the_sampling(order):
+    cutoff = 3.0
+    frequency = (np.arange(2000) + 0.5) / 2000 * 0.5 * RATE
+    whole = math.pi * cutoff / order / math.sin(math.pi / (2 * order))
+    sampled = RATE * np.mean(sim.folded(frequency, RATE, cutoff, order))
+    assert sampled == pytest.approx(whole, rel=1e-5)
+
+
+def test_slow_noise_passes_an_analogue_low_pass(rng):
+    walk = sim.analogue(
+        lambda n, rate: 7.0 + sim.random_walk(n, rate, 1e-2, rng), 0.0, LENGTH, RATE, 1.0, 2, rng
+    )
+    assert walk[0] == pytest.approx(7.0, abs=0.4)
+    assert allan_deviation(walk, 300) == pytest.approx(1e-2 * math.sqrt(10.0), rel=0.1)
 
 
 def test_moving_mean_has_its_cutoff():
@@ -107,6 +144,14 @@ def test_bias_instability_of_a_curve_is_b_of_one_process_and_the_root_of_the_sum
     two = sim.instability_of_curve([(sigma, 5.0), (sigma, 5.0)], 100.0)
     assert two == pytest.approx(math.sqrt(2.0) * 3e-4, rel=1e-3)
     assert sim.instability_of_curve([(sigma, 5.0)], 2.0) < 2.5e-4
+
+
+@pytest.mark.parametrize("cutoff", [1.0, 4.0])
+def test_resonant_low_pass_keeps_what_folds(rng, cutoff):
+    quality = 1.6
+    log = sim.resonant(lambda n, r: sim.white(n, r, 1.0, rng), LENGTH, RATE, cutoff, quality)
+    # Both sides of |H|^2: pi f_c Q, by residues.
+    assert log.var() == pytest.approx(math.pi * cutoff * quality, rel=0.02)
 
 
 def test_resonant_low_pass_has_its_quality_at_the_cutoff(rng):
