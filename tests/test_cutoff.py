@@ -70,6 +70,15 @@ def test_folds_are_those_of_the_sampled_covariance(order, cutoff):
     )
 
 
+@pytest.mark.parametrize("order", [2, 3, 4, 7])
+@pytest.mark.parametrize("cutoff", [0.2, 2.5, 40.0, 150.0])
+def test_folds_that_are_not_added_one_by_one_are_not_lost(order, cutoff):
+    f = np.array([0.0, 1.0, 13.0, 50.0])
+    folds = f[:, None] + 100.0 * np.arange(-3000, 3001)
+    every = (1.0 / (1.0 + (folds / cutoff) ** (2 * order))).sum(axis=1)
+    assert LowPass(cutoff, order).folded_power(f, 100.0) == pytest.approx(every, rel=1e-5)
+
+
 @pytest.mark.parametrize(
     "cutoff, rate, hours", [(10.0, 100.0, 0.5), (60.0, 500.0, 0.2), (64.0, 100.0, 2.0)]
 )

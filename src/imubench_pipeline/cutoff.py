@@ -13,8 +13,8 @@ be either: then nothing is said.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +29,15 @@ from imubench_pipeline.estimators.filter_fits import (
     inside,
 )
 from imubench_pipeline.estimators.low_pass import Filter, Kind
-from imubench_pipeline.estimators.whittle import Behind
-from imubench_pipeline.sensor_model.low_pass import LowPass
+from imubench_pipeline.estimators.whittle import Behind, Terms
+from imubench_pipeline.filter_readings import (
+    SIGMAS,
+    Allowed,
+    OfModel,
+    Reading,
+    also_after_sampling,
+    drawn,
+)
 from imubench_pipeline.spectrum import Spectrum
 
 Array = NDArray[np.float64]
@@ -38,20 +45,24 @@ Array = NDArray[np.float64]
 _SHOWS = 2.0
 """Log likelihood that white noise beside a process must gain to be there."""
 
-_ENDS_RULE = 0.03
+_ENDS_RULE = 0.01
 """Part of the density that the ends of the transform may add; beyond, a bin says nothing."""
 
 _STEEP = 0.4
 """Least over greatest gain in a bin below which its mean is ruled by one end of it."""
 
-_SOMETHING_ELSE = 3.0
-"""Measured over expected density from which it is not those ends."""
+_SOMETHING_ELSE = 10.0
+"""Measured over expected density from which it is not those ends: what the two ends of a log leave
+is exponentially distributed, and beyond this in one of 20,000."""
+
+_PASSES = 3
+"""Fits, each without the bins in which the ends rule behind the filter found before."""
 
 _NEAR = 1 / 300
 """Part of the cut-off from which frequencies count: drift, as with temperature, is not as any noise
 is, and far below the bend it says nothing of it."""
 
-_RULED_OUT = 3.0
+RULED_OUT = 3.0
 """Log likelihood by which another filter must be the worse not to count: its share is 5 %."""
 
 _BEYOND_BIC = 6.0
@@ -60,33 +71,13 @@ _BEYOND_BIC = 6.0
 WIDEST = 1.2
 """Ratio of the limits of a cut-off beyond which it is not called known."""
 
-_SIGMAS = 1.96
+_LEAST_WIDTH = 1e-5
+"""Half of an interval of a logarithm."""
+
+NOT_AS_BEHIND = "the spectrum bends, but not as behind any of {} filters that were tried"
 
 _AS_STATED = 1.6
 """Ratio to the stated cut-off up to which a filter is the stated one."""
-
-_TWIN = 0.1
-"""Weight of the same first-order filter applied to the samples: it looks like that before the
-sampling, whose folds are in N."""
-
-
-@dataclass(frozen=True)
-class Reading:
-    """What a filter that the log allows makes of N.
-
-    Attributes
-    ----------
-    weight : float
-        Of the filter, by its likelihood.
-    below, at, above : float
-        Logarithm of N at the lower limit of the cut-off, at its best and at its upper limit, less
-        that of the filter that was chosen.
-    """
-
-    weight: float
-    below: float
-    at: float
-    above: float
 
 
 @dataclass(frozen=True)
@@ -119,6 +110,12 @@ class Cutoff:
         Bins in which the ends of the transform rule, and not the noise.
     readings : sequence of Reading
         Of all filters that the log does not rule out.
+    allowed : sequence of Allowed
+        Those filters, the chosen one first.
+    rounded : float
+        Density of rounding, parts of N^2.
+    models : mapping of Terms to OfModel
+        Where the cut-off was fitted together with models of the noise.
     """
 
     frequency: Parameter
@@ -133,6 +130,9 @@ class Cutoff:
     behind: Behind | None = None
     ruled: NDArray[np.bool_] | None = None
     readings: Sequence[Reading] = ()
+    allowed: Sequence[Allowed] = ()
+    rounded: float = 0.0
+    models: Mapping[Terms, OfModel] = field(default_factory=dict)
 
     @property
     def words(self) -> str:
@@ -142,19 +142,21 @@ class Cutoff:
             return ""
         return f"{Filter(self.kind, self.order, cutoff).name} at {cutoff:.4g} Hz"
 
-    def factors(self, number: int, rng: np.random.Generator) -> Array:
-        """Return draws of N over its value for the filter that was chosen, shape (number,)."""
-        if not self.readings:
+    def factors(self, number: int, rng: np.random.Generator, terms: Terms) -> Array:
+        """Return draws of N over its value for the filter that was chosen, shape (number,).
+
+        Parameters
+        ----------
+        number : int
+        rng : numpy.random.Generator
+        terms : Terms
+            The model of the noise.
+        """
+        of_model = self.models.get(replace(terms, ramp=False))
+        readings = self.readings if of_model is None else of_model.readings
+        if not readings:
             return np.ones(number)
-        weight = np.array([one.weight for one in self.readings])
-        which = rng.choice(len(weight), number, p=weight / weight.sum())
-        below, at, above = (
-            np.array([getattr(one, name) for one in self.readings])[which]
-            for name in ("below", "at", "above")
-        )
-        normal = rng.standard_normal(number)
-        side = np.where(normal < 0.0, at - below, above - at)
-        return np.asarray(np.exp(at + normal / _SIGMAS * side))
+        return drawn(readings, number, rng)
 
 
 def find_cutoff(
@@ -203,17 +205,21 @@ def find_cutoff(
         return Cutoff(absent, None, Parameter(fits.unfiltered()[0]), 0.0, 0.0)
     tried = fits.tried(filters)
     rounding = resolution**2 / (12.0 * spectrum.rate)
-    ruled = np.zeros(len(used), dtype=np.bool_)
-    if tried:
-        near = used & (spectrum.frequency > _NEAR * tried[0].cutoff)
-        ruled = _ruled_by_ends(spectrum, fits, tried[0], rounding)
-        if (near & ~ruled).sum() >= FEWEST_BINS:
-            used = near & ~ruled
+    usable, ruled = used, np.zeros(len(used), dtype=np.bool_)
+    for passed in range(_PASSES if tried else 0):
+        earlier, ruled = ruled, _ruled_by_ends(spectrum, fits, tried[0], rounding)
+        if passed and bool((ruled == earlier).all()):
+            break
+        near = usable & ~ruled & (spectrum.frequency > _NEAR * tried[0].cutoff)
+        if near.sum() >= FEWEST_BINS:
+            used = near
             fits = FilterFits(spectrum.taken(used))
         if rounding > 0.0:
             fits.rounded = rounding / fits.density(tried[0])[0] ** 2
         fits.choose_slow(tried[0])
         tried = fits.tried(filters)
+        if not tried:
+            break
     N_alone, without, cost_alone, rising = fits.unfiltered()
     behind = fits.behind(tried[0]) if tried else math.inf
     gained = 2.0 * (without - behind)
@@ -233,7 +239,7 @@ def find_cutoff(
     alike = [
         one
         for one in tried
-        if one.floor <= best.floor and one.cost + one.floor < best.cost + best.floor + _RULED_OUT
+        if one.floor <= best.floor and one.cost + one.floor < best.cost + best.floor + RULED_OUT
     ]
     limits = [fits.limits(one) for one in alike]
     lower, upper = min(low for low, _ in limits), max(high for _, high in limits)
@@ -258,7 +264,7 @@ def find_cutoff(
         for reading, one in zip(readings, alike, strict=True)
         if one.is_first_order_analogue
     ]
-    error = _SIGMAS / math.sqrt(2.0 * float(spectrum.ordinates[used].sum()))
+    error = SIGMAS / math.sqrt(2.0 * float(spectrum.ordinates[used].sum()))
     ends = [end for one in readings for end in (one.below, one.above)]
     density = Parameter(
         N, lower=N * math.exp(min(0.0, *ends) - error), upper=N * math.exp(max(0.0, *ends) + error)
@@ -272,9 +278,7 @@ def find_cutoff(
     elif upper > WIDEST * lower or highest:
         reason = f"the log allows cut-offs from {lower:.4g} to {upper:.4g} Hz"
     elif not fits.explains(best):
-        reason = (
-            f"the spectrum bends, but not as behind any of {len(filters)} filters that were tried"
-        )
+        reason = NOT_AS_BEHIND.format(len(filters))
     if reason:
         found = Parameter(None, "not_identified", reason, lower, upper, fitted=shown)
         density = replace(
@@ -296,25 +300,11 @@ def find_cutoff(
         behind=Behind(white + (after / N) ** 2, *slow),
         ruled=ruled,
         readings=readings,
-    )
-
-
-def also_after_sampling(reading: Reading, one: Tried, rate: float) -> Reading:
-    """Return the reading of the same first-order filter applied to the samples.
-
-    Its shape is the same, and it folds nothing into N.
-
-    Parameters
-    ----------
-    reading : Reading
-    one : Tried
-        An analogue filter of first order.
-    rate : float
-        Hz.
-    """
-    gain = 0.5 * math.log(float(LowPass(one.cutoff).folded_power(0.0, rate)))
-    return Reading(
-        _TWIN * reading.weight, reading.below + gain, reading.at + gain, reading.above + gain
+        allowed=[
+            Allowed(one, max(0.5 * math.log(high / low), _LEAST_WIDTH))
+            for one, (low, high) in zip(alike, limits, strict=True)
+        ],
+        rounded=fits.rounded,
     )
 
 

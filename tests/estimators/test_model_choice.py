@@ -1,5 +1,6 @@
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from imubench_pipeline.estimators.model_choice import (
     Candidate,
     compare,
     disagreement,
+    rescored,
 )
 from imubench_pipeline.estimators.whittle import Maximum, Terms, whittle_of
 from imubench_pipeline.noise import NoiseModel
@@ -402,3 +404,26 @@ def test_a_ramp_must_be_the_better_and_more_so_in_place_of_a_walk() -> None:
                 plain = 2.0 * found.cost + found.terms.parameters * penalty
                 assert candidate.bic - plain == pytest.approx(10.0 if alone else 6.0, abs=1e-6)
     assert seen == {True, False}
+
+
+def test_what_models_gain_counts_for_their_scores_and_their_order(rng: np.random.Generator) -> None:
+    candidates = candidates_of(simulate(NoiseModel(N=N), RATE, 4_000, rng), quantization=False)
+    second = candidates[1]
+    gain = 0.5 * (second.bic - candidates[0].bic) + 1.0
+    found = rescored(candidates, {second.found.terms: gain})
+    assert found[0].found is second.found
+    assert found[0].bic == pytest.approx(candidates[0].bic - 2.0)
+    assert found[0].aic == pytest.approx(second.aic - 2.0 * gain)
+    assert sum(one.share for one in found) == pytest.approx(1.0)
+    ratio = found[0].weight / found[1].weight
+    assert ratio == pytest.approx(np.exp(0.5 * (found[1].bic - found[0].bic)))
+    assert [one.found for one in rescored(candidates, {})] == [one.found for one in candidates]
+
+
+def test_a_model_with_a_ramp_gains_what_it_gains_without(rng: np.random.Generator) -> None:
+    candidates = candidates_of(simulate(NoiseModel(N=N), RATE, 4_000, rng), quantization=False)
+    ramped = next(one for one in candidates if one.found.terms.ramp)
+    plain = replace(ramped.found.terms, ramp=False)
+    found = rescored(candidates, {plain: 3.0})
+    again = next(one for one in found if one.found is ramped.found)
+    assert again.bic == pytest.approx(ramped.bic - 6.0)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
 from imubench_pipeline.estimators.goodness import goodness
-from imubench_pipeline.estimators.low_pass import Filter, Kind
+from imubench_pipeline.estimators.low_pass import BOXCAR, Filter, Kind
 from imubench_pipeline.estimators.whittle import COARSE, Behind, Terms, Whittle, whittle_of
 from imubench_pipeline.estimators.whittle_kernels import best_powers
 from imubench_pipeline.spectrum import Spectrum
@@ -23,6 +23,10 @@ _POINTS = 6
 
 _SCAN, _COARSE_SCAN = 24, 8
 """Cut-offs tried before the best is polished, and to see whether a filter may be there."""
+
+_WHOLE = 20
+"""Samples up to which each mean of a whole number of them is tried: near its nulls another length
+is far off."""
 
 _LOWEST = 1 / 500
 
@@ -65,7 +69,7 @@ _WORTH_TRYING = 1.0
 _MOST_SLOW = 4
 """Terms of slow noise."""
 
-_UNFOLDED = 0.3
+UNFOLDED = 0.3
 """Part of the rate up to which there is one such cut-off only: little is folded."""
 
 _BETWEEN = 24
@@ -141,6 +145,23 @@ class Tried:
         return rate / (2.0 * math.pi * self.cutoff)
 
 
+def explained(spectrum: Spectrum, fitted: Array, one: Tried) -> bool:
+    """Return whether a fit behind a filter gives the spectrum where that bends it.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+    fitted : ndarray, shape (b,)
+        Density of the fit in each bin.
+    one : Tried
+        The filter.
+    """
+    bent = spectrum.frequency > min(0.1 * one.cutoff, spectrum.frequency[-FEWEST_BINS])
+    shown = spectrum.taken(bent)
+    judged = goodness(shown.ordinates, shown.density, fitted[bent], shown.frequency, 2 + one.floor)
+    return judged.verdict == "explained"
+
+
 class FilterFits:
     """Whittle fits of a spectrum for given filters."""
 
@@ -170,10 +191,11 @@ class FilterFits:
         """
         slow: list[int] = []
         self.slow = slow
+        left = self.gains(one)
         best = self.cost(one)
         while len(slow) < _MOST_SLOW:
             wider = [
-                (self._powers(self._columns(one, [*slow, k]))[1], k)
+                (self._powers(self._behind(one, left, [*slow, k]))[1], k)
                 for k in range(self.everything_slow.shape[1])
                 if k not in slow
             ]
@@ -235,7 +257,7 @@ class FilterFits:
         least = min(
             self.cost(Tried(0.0, 0.0, kind, order, float(cutoff), False))
             for kind, order in filters
-            for cutoff in np.geomspace(2.0 * self.lowest, self.highest(kind, order), _COARSE_SCAN)
+            for cutoff in self._cutoffs(kind, order, 2.0 * self.lowest, _COARSE_SCAN)
         )
         return least < alone - _WORTH_TRYING
 
@@ -250,7 +272,7 @@ class FilterFits:
 
     def _of(self, kind: Kind, order: int) -> Iterator[Tried]:
         """Yield the maxima of the likelihood over the cut-off, without and with a floor."""
-        scan = np.linspace(math.log(self.lowest), math.log(self.highest(kind, order)), _SCAN)
+        scan = np.log(self._cutoffs(kind, order, self.lowest, _SCAN))
         start = Tried(0.0, 0.0, kind, order, 1.0, True)
 
         def at(x: float, floor: bool) -> Tried:
@@ -263,7 +285,10 @@ class FilterFits:
             for place in np.flatnonzero((costs <= beside[:-2]) & (costs < beside[2:])).tolist():
                 best = minimize_scalar(
                     lambda x, floor=floor: self.cost(at(x, floor)),
-                    bounds=(float(scan[max(place - 1, 0)]), float(scan[min(place + 1, _SCAN - 1)])),
+                    bounds=(
+                        float(scan[max(place - 1, 0)]),
+                        float(scan[min(place + 1, len(scan) - 1)]),
+                    ),
                     method="bounded",
                     options={"xatol": 1e-5},
                 )
@@ -280,17 +305,19 @@ class FilterFits:
                 if before > after and one.cutoff > _ABOVE_ENDS * self.lowest:
                     yield replace(one, score=one.cost + self.penalty * (1 + floor))
 
+    def _cutoffs(self, kind: Kind, order: int, lowest: float, number: int) -> Array:
+        """Return the cut-offs from which a search starts, rising, Hz."""
+        scan = np.geomspace(lowest, self.highest(kind, order), number)
+        if kind != "boxcar":
+            return scan
+        lengths = np.arange(_WHOLE, 2, -1)
+        return np.unique(np.concatenate([scan, BOXCAR * self.rate / lengths]))
+
     def explains(self, one: Tried) -> bool:
         """Return whether the filter gives the spectrum where it bends."""
         columns = self._columns(one)
         fitted = columns @ self._powers(columns)[0]
-        spectrum = self.whittle.spectrum
-        bent = spectrum.frequency > min(0.1 * one.cutoff, spectrum.frequency[-FEWEST_BINS])
-        shown = spectrum.taken(bent)
-        judged = goodness(
-            shown.ordinates, shown.density, fitted[bent], shown.frequency, 2 + one.floor
-        )
-        return judged.verdict == "explained"
+        return explained(self.whittle.spectrum, fitted, one)
 
     def limits(self, one: Tried) -> tuple[float, float]:
         """Return the ends of the 95 % interval, by the profile of the likelihood.
@@ -314,8 +341,9 @@ class FilterFits:
         ends = []
         for sign, end in ((-1.0, self.lowest), (1.0, self.highest(one.kind, one.order))):
             found = end_of(sign, math.log(end))
-            first = max(math.log(end), min(found, math.log(_UNFOLDED * self.rate)))
-            further = np.linspace(first, found, _BETWEEN, endpoint=False)
+            first = max(math.log(end), min(found, math.log(UNFOLDED * self.rate)))
+            number = _BETWEEN if first != found else 0
+            further = np.linspace(first, found, number, endpoint=False)
             allowed = next((k for k, x in enumerate(further) if beyond(float(x)) < 0.0), None)
             if allowed is not None:
                 inside = float(further[allowed])
@@ -329,9 +357,13 @@ class FilterFits:
         white, flicker, slow = gains(self.whittle.spectrum, one)
         return white + self.rounded, flicker, slow
 
-    def _columns(self, one: Tried, slow: Sequence[int] | None = None) -> Array:
-        white, flicker, gain = self.gains(one)
-        kept = np.array(self.slow if slow is None else slow, dtype=np.int64)
+    def _columns(self, one: Tried) -> Array:
+        return self._behind(one, self.gains(one), self.slow)
+
+    def _behind(self, one: Tried, left: tuple[Array, Array, Array], slow: Sequence[int]) -> Array:
+        """Return the terms behind a filter, as columns."""
+        white, flicker, gain = left
+        kept = np.array(slow, dtype=np.int64)
         # A process as fast as the filter is the filter.
         kept = kept[self.times[kept] >= _SLOWER / (2.0 * math.pi * one.cutoff)]
         gains = np.where(kept == 0, flicker[:, None], gain[:, None])

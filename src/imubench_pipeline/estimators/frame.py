@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.cutoff import Cutoff, find_cutoff
 from imubench_pipeline.estimators.band import Band, find_band
-from imubench_pipeline.estimators.filter_fits import PROCESSES
+from imubench_pipeline.estimators.filter_fits import PROCESSES, UNFOLDED
 from imubench_pipeline.estimators.lines import Line, find, without_lines
+from imubench_pipeline.estimators.model_choice import Candidate, rescored
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.whittle import (
     COARSE,
@@ -97,26 +98,37 @@ class Frame:
             behind=behind.taken(bins) if behind is not None else None,
         )
 
-    def shares_its_bend(self, times: NDArray[np.float64]) -> bool:
-        """Return whether a process is as fast as the low-pass, or nearly.
+    def has_a_bend_of_each_model(self, spectrum: Spectrum, times: NDArray[np.float64]) -> bool:
+        """Return whether each model of the noise has a cut-off of its own.
+
+        So it is where the low-pass bends the spectrum well below Nyquist; higher up, what folds
+        decides, unless a process is as fast as the low-pass, or nearly.
 
         Parameters
         ----------
+        spectrum : Spectrum
         times : ndarray, shape (g,)
             T_B of each process, s.
         """
-        if self.low_pass is None or self.low_pass.behind is None or not len(times):
+        if self.low_pass is None or self.low_pass.behind is None:
             return False
-        cutoff = self.low_pass.frequency.in_model or np.inf
-        return bool(times.min() < _APART / (2.0 * np.pi * cutoff))
+        cutoffs = [one.filter.cutoff for one in self.low_pass.allowed]
+        shared = len(times) > 0 and times.min() < _APART / (2.0 * np.pi * cutoffs[0])
+        return bool(shared or max(cutoffs) < UNFOLDED * spectrum.rate)
 
-    def refined(self, spectrum: Spectrum, terms: Terms) -> Frame:
-        """Return the same behind a low-pass that is fitted together with a model."""
+    def refined(self, spectrum: Spectrum, candidates: Sequence[Candidate]) -> Frame:
+        """Return the same behind a low-pass that is fitted together with the best of models."""
         if self.low_pass is None:
             return self
-        low_pass = refined(self.low_pass, spectrum, self.used, terms)
+        low_pass = refined(self.low_pass, spectrum, self.used, candidates)
         source = self.band.source.replace(self.low_pass.words, low_pass.words)
         return replace(self, low_pass=low_pass, band=replace(self.band, source=source))
+
+    def rescored(self, candidates: Sequence[Candidate]) -> list[Candidate]:
+        """Return models by what they explain with a cut-off of their own, the best first."""
+        models = self.low_pass.models if self.low_pass is not None else {}
+        gained = {terms: one.gained for terms, one in models.items()}
+        return rescored(candidates, gained)
 
     @property
     def folding(self) -> float:
@@ -152,7 +164,9 @@ class Frame:
         """
         if self.low_pass is None or not self.low_pass.readings:
             return posterior
-        return _scaled(posterior, terms, self.low_pass.factors(len(posterior.parameters), rng))
+        return _scaled(
+            posterior, terms, self.low_pass.factors(len(posterior.parameters), rng, terms)
+        )
 
     def shows_quantization(self, rate: float) -> bool:
         """Return whether quantization noise would show: no filter in front, and high enough."""
@@ -187,7 +201,7 @@ def _scaled(posterior: Posterior, terms: Terms, factors: NDArray[np.float64]) ->
 
 def _none(low_pass: Cutoff | None) -> Cutoff | None:
     """Return a low-pass that is told, and not fitted behind."""
-    return None if low_pass is None else replace(low_pass, behind=None, readings=())
+    return None if low_pass is None else replace(low_pass, behind=None, readings=(), models={})
 
 
 def frame_of(

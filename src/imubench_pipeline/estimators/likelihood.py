@@ -27,6 +27,7 @@ from imubench_pipeline.estimators.lines import Line
 from imubench_pipeline.estimators.model_choice import PAPERS, Candidate, compare
 from imubench_pipeline.estimators.posterior import DRAWS, Posterior, sample
 from imubench_pipeline.estimators.whittle import Terms, Whittle, model_of
+from imubench_pipeline.joint_cutoff import joined
 from imubench_pipeline.missing import block_means, divided, filled, slow_part
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.spectrum import Spectrum, spectra
@@ -347,14 +348,17 @@ def explaining(spectrum: Spectrum, frame: Frame) -> tuple[Frame, Whittle, list[C
     def fitted(tried: Frame) -> tuple[Frame, Whittle, list[Candidate]]:
         whittle = tried.whittle(spectrum)
         quantization = tried.shows_quantization(spectrum.rate)
-        return tried, whittle, compare(whittle, quantization=quantization)
+        candidates = compare(whittle, quantization=quantization)
+        return tried, whittle, tried.rescored(candidates)
 
     first = fitted(frame)
     if frame.low_pass is None:
         return first
-    if frame.shares_its_bend(first[2][0].found.times) or not _explains(first):
-        terms = first[2][0].found.terms if _explains(first) else _FLEXIBLE
-        first = fitted(frame.refined(spectrum, replace(terms, ramp=False)))
+    if not _explains(first):
+        flexible = [one for one in first[2] if one.found.terms == _FLEXIBLE]
+        first = fitted(frame.refined(spectrum, flexible))
+    if _explains(first) and first[0].has_a_bend_of_each_model(spectrum, first[2][0].found.times):
+        first = fitted(first[0].refined(spectrum, joined(first[2], PAPERS)))
     if _explains(first):
         return first
     faster = fitted(frame.with_fast_processes(spectrum.rate))

@@ -30,7 +30,6 @@ Kind = Literal["analogue", "bilinear", "boxcar"]
 BOXCAR = 0.442946
 """Cut-off of a boxcar times its length: sinc^2 is one half there."""
 
-_MOST_FOLDS = 6
 _SLOW_FOLDS = 3
 """Folds on each side of flicker noise, of which little is left there."""
 
@@ -82,9 +81,7 @@ class Filter:
             return self._bilinear(f, rate)
         if self.kind == "boxcar":
             return self._triangle(f, rate)
-        if self.order == 1:
-            return LowPass(self.cutoff).folded_power(f, rate)
-        return self._folded(f, rate)
+        return LowPass(self.cutoff, self.order).folded_power(f, rate)
 
     def slow(self, frequency: ArrayLike, rate: float) -> Array:
         """Return what the filter leaves of noise that is slow against the rate: no folds.
@@ -180,16 +177,11 @@ class Filter:
 
     def _triangle(self, f: Array, rate: float) -> Array:
         length = BOXCAR / self.cutoff * rate  # in samples
-        total = np.ones(f.shape)
-        for k in range(1, math.ceil(length)):
-            total += 2.0 * (1.0 - k / length) * np.cos(2.0 * np.pi * k * f / rate)
+        whole = math.ceil(length)
+        # 1 - k / length is 1 - k / whole in the most part: the kernels of Fejer and of Dirichlet.
+        half = np.pi * np.maximum(f, 1e-9 * rate) / rate
+        fejer = (np.sin(whole * half) / np.sin(half)) ** 2 / whole
+        dirichlet = np.sin((2 * whole - 1) * half) / np.sin(half)
+        part = whole / length
+        total = part * fejer + (1.0 - part) * dirichlet
         return np.asarray(np.maximum(total, 1e-12) / length)
-
-    def _folded(self, f: Array, rate: float) -> Array:
-        folds = min(_MOST_FOLDS, 2 + math.ceil(4.0 * self.cutoff / rate))
-        total = np.zeros(f.shape)
-        for k in range(-folds, folds + 1):
-            square = ((f + k * rate) / self.cutoff) ** 2
-            total += 1.0 / (1.0 + math.prod([square] * self.order))
-        rest, steep = (folds + 0.5) * rate / self.cutoff, 2 * self.order - 1
-        return np.asarray(total + 2.0 * self.cutoff / rate / (rest**steep * steep))

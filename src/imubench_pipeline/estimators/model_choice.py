@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -139,6 +139,31 @@ def compare(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
             ),
         )
         for i, found in enumerate(order)
+    ]
+
+
+def rescored(candidates: Sequence[Candidate], gained: Mapping[Terms, float]) -> list[Candidate]:
+    """Return candidates with more explained, sorted anew.
+
+    Parameters
+    ----------
+    candidates : sequence of Candidate
+    gained : mapping of Terms to float
+        Log likelihood that models gain; with a ramp as without it.
+    """
+    more = [gained.get(replace(one.found.terms, ramp=False), 0.0) for one in candidates]
+    bics = np.array([one.bic for one in candidates]) - 2.0 * np.array(more)
+    aics = np.array([one.aic for one in candidates]) - 2.0 * np.array(more)
+    weights, shares = _relative(bics), _relative(aics)
+    return [
+        replace(
+            candidates[i],
+            bic=float(bics[i]),
+            aic=float(aics[i]),
+            weight=float(weights[i]),
+            share=float(shares[i]),
+        )
+        for i in np.argsort(bics, kind="stable")
     ]
 
 

@@ -14,8 +14,8 @@ Array = NDArray[np.float64]
 
 _HIGHEST_ORDER = 10
 
-_FOLDS = 8
-"""Folds on each side that are added one by one; those beyond are an integral."""
+_FOLDS = 2
+"""Folds on each side that are added one by one, besides those up to four times the cut-off."""
 
 
 @dataclass(frozen=True)
@@ -128,12 +128,18 @@ class LowPass:
             decay = math.exp(-h)
             sine, cosine = 0.5 * -math.expm1(-2.0 * h), 0.5 * (1.0 + decay**2)
             return np.asarray(0.5 * h * sine / (cosine - decay * np.cos(2.0 * np.pi * f / rate)))
-        folds = int(_FOLDS + math.ceil(4.0 * self.cutoff / rate))
-        k = np.arange(-folds, folds + 1) * rate
-        total = self.power(f[..., None] + k).sum(axis=-1)
-        # Folds beyond: the integral of (f / f_c)^(-2 n) on both sides.
-        rest, steep = (folds + 0.5) * rate / self.cutoff, 2 * self.order - 1
-        return np.asarray(total + 2.0 * self.cutoff / rate / (rest**steep * steep))
+        folds = _FOLDS + math.ceil(4.0 * self.cutoff / rate)
+        total = np.zeros(f.shape)
+        for k in range(-folds, folds + 1):
+            total += self.power(f + k * rate)
+        # Folds beyond: the integral of (f / f_c)^(-2 n) on each side, with the next term of the
+        # sum formula of Euler and Maclaurin.
+        steep = 2 * self.order
+        for side in (f, -f):
+            end = (folds + 0.5) + side / rate
+            rest = (self.cutoff / rate) ** steep / math.prod([end] * (steep - 1)) / (steep - 1)
+            total += rest * (1.0 - steep * (steep - 1) / 24.0 / end**2)
+        return np.asarray(total)
 
     def response(self, frequency: float) -> complex:
         """Return H: gain and phase of a sinusoid.
