@@ -58,6 +58,9 @@ is exponentially distributed, and beyond this in one of 20,000."""
 _PASSES = 3
 """Fits, each without the bins in which the ends rule behind the filter found before."""
 
+_COARSE = 1e-3
+"""Part of a cut-off to which the first of them finds it."""
+
 _NEAR = 1 / 300
 """Part of the cut-off from which frequencies count: drift, as with temperature, is not as any noise
 is, and far below the bend it says nothing of it."""
@@ -203,7 +206,7 @@ def find_cutoff(
     if not fits.may_bend(filters):
         absent = Parameter(None, "absent", "the spectrum shows no low-pass")
         return Cutoff(absent, None, Parameter(fits.unfiltered()[0]), 0.0, 0.0)
-    tried = fits.tried(filters)
+    tried = fits.tried(filters, _COARSE)
     rounding = resolution**2 / (12.0 * spectrum.rate)
     usable, ruled = used, np.zeros(len(used), dtype=np.bool_)
     for passed in range(_PASSES if tried else 0):

@@ -43,10 +43,10 @@ _REFINED_WITHIN = math.log(2.0)
 _REACH = 6.0
 """Half widths of the interval of a cut-off within which it is looked for first."""
 
-_FINE = 0.02
+_FINE = 0.04
 """Part of that half width to which a cut-off is found."""
 
-_WORTH_JOINING = 8.0
+_WORTH_JOINING = 6.0
 """BIC over the best up to which a model may be the best with a cut-off of its own."""
 
 _LEAST_SHARE = 0.03

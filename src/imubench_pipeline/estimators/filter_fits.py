@@ -261,16 +261,24 @@ class FilterFits:
         )
         return least < alone - _WORTH_TRYING
 
-    def tried(self, filters: Sequence[tuple[Kind, int]]) -> list[Tried]:
-        """Return the maxima of the likelihood, the best by BIC first."""
-        found = [one for kind, order in filters for one in self._of(kind, order)]
+    def tried(self, filters: Sequence[tuple[Kind, int]], within: float = 1e-5) -> list[Tried]:
+        """Return the maxima of the likelihood, the best by BIC first.
+
+        Parameters
+        ----------
+        filters : sequence of (str, int)
+            Kinds and orders.
+        within : float
+            Error up to which a cut-off is found, parts of it.
+        """
+        found = [one for kind, order in filters for one in self._of(kind, order, within)]
         # A floor that gains next to nothing is none. Of first order, with a floor, digital and
         # analogue filters are the same but for N.
         return sorted(
             found, key=lambda one: one.score + one.floor + _SAME * (one.kind != "analogue")
         )
 
-    def _of(self, kind: Kind, order: int) -> Iterator[Tried]:
+    def _of(self, kind: Kind, order: int, within: float) -> Iterator[Tried]:
         """Yield the maxima of the likelihood over the cut-off, without and with a floor."""
         scan = np.log(self._cutoffs(kind, order, self.lowest, _SCAN))
         start = Tried(0.0, 0.0, kind, order, 1.0, True)
@@ -290,7 +298,7 @@ class FilterFits:
                         float(scan[min(place + 1, len(scan) - 1)]),
                     ),
                     method="bounded",
-                    options={"xatol": 1e-5},
+                    options={"xatol": within},
                 )
                 one = replace(at(best.x, floor), cost=float(best.fun))
                 if (
