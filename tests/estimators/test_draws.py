@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.error_budget import Start, budget, draw_models
-from imubench_pipeline.estimators.draws import joint_draws
+from imubench_pipeline.estimators.draws import drawn_share, joint_draws
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.estimators.goodness import Goodness
 from imubench_pipeline.estimators.likelihood import fit
+from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.posterior import Posterior
-from imubench_pipeline.estimators.whittle import Terms
+from imubench_pipeline.estimators.whittle import Maximum, Terms
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.simulate import simulate
 
@@ -75,6 +77,38 @@ def test_a_process_as_slow_as_a_walk_counts_less_than_a_walk() -> None:
     names = [drawn.model(number).name for number in range(1000)]
     # BIC asks for 4 more: odds of e^-2.
     assert names.count("N+GM") / names.count("N+K") == pytest.approx(math.exp(-2.0), abs=2e-3)
+
+
+def candidate(terms: Terms, cost: float) -> Candidate:
+    processes = terms.gauss_markov
+    found = Maximum(
+        terms, np.ones(len(terms.linear) + processes), np.full(processes, 50.0), 0.0, cost
+    )
+    aic = 2.0 * (cost + terms.parameters)
+    fitted = Goodness(1.0, 0.5, "explained", "")
+    return Candidate(found, aic, aic, 0.5, math.exp(-0.5 * aic), fitted)
+
+
+def test_an_amplitude_costs_its_model_what_aic_asks_and_a_correlation_time_what_bic_asks() -> None:
+    bins = 200
+
+    def odds(terms: Terms) -> float:
+        plain = candidate(Terms("N"), 0.0)
+        return drawn_share(candidate(terms, 0.0), bins) / drawn_share(plain, bins)
+
+    assert odds(Terms("NFK")) == pytest.approx(math.exp(-2.0))
+    assert odds(Terms("N", 1)) == pytest.approx(math.exp(-1.0) / math.sqrt(bins))
+    assert odds(Terms("NK", 2)) == pytest.approx(math.exp(-3.0) / bins)
+    # Few sensors have quantization noise, or a ramp: 6 of BIC, as in the choice.
+    assert odds(Terms("QN")) == pytest.approx(math.exp(-1.0 - 3.0))
+    assert odds(Terms("NK", ramp=True)) == pytest.approx(math.exp(-2.0 - 3.0))
+
+
+def test_a_weak_term_that_is_there_has_its_part_of_the_draws() -> None:
+    # Better by 2 in log likelihood: the 95 % limits must hold what only that model says.
+    without, having = candidate(Terms("NK"), 0.0), candidate(Terms("NFK"), -2.0)
+    part = drawn_share(having, 200) / (drawn_share(without, 200) + drawn_share(having, 200))
+    assert part == pytest.approx(1.0 / (1.0 + math.exp(-1.0)))
 
 
 def test_without_a_share_there_is_nothing_to_draw() -> None:

@@ -15,7 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.estimate import FAMILY, JointDraws
-from imubench_pipeline.estimators.model_choice import LIKE_A_WALK, UNIT_ROOT, Candidate
+from imubench_pipeline.estimators.model_choice import (
+    LIKE_A_WALK,
+    UNIT_ROOT,
+    UNLIKELY,
+    Candidate,
+)
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.whittle import Terms
 
@@ -25,18 +30,25 @@ NUMBER = 200
 """Draws that are kept of an estimate."""
 
 
-def drawn_share(candidate: Candidate) -> float:
-    """Return the share of a model among the draws: halfway between those by AIC and by BIC.
+def drawn_share(candidate: Candidate, bins: int) -> float:
+    """Return the share of a model among the draws, of any sum: by AIC, but for T_B by BIC.
 
-    By AIC alone, a term that is not there is in half of the draws, can only add, and leaves the
-    truth below the limits; by BIC alone, a weak term that is there is in none. On simulated logs of
-    N+K, N+GM, N+GM+K and N+F+K the limits of error budgets hold most evenly in between.
+    An amplitude may be anything from 0, and AIC gives a weak one that is there its part; by BIC it
+    is in no draw, and the truth lies above the limits. A correlation time must be looked for over
+    decades, of which a fit takes a small part: that costs what BIC asks. That a process as slow as
+    a walk counts less than the walk is left to `joint_draws`: counted here as well, a log that
+    shows such a process nearly as well as a walk has none among its draws.
 
     Parameters
     ----------
     candidate : Candidate
+    bins : int
+        Bins of the spectrum that it was fitted to.
     """
-    return math.sqrt(candidate.share * candidate.weight)
+    terms = candidate.found.terms
+    of_times = terms.gauss_markov * (0.5 * math.log(bins) - 1.0)
+    of_unlikely = 0.5 * UNLIKELY * (terms.ramp + ("Q" in terms.linear))
+    return candidate.share * math.exp(-of_times - of_unlikely)
 
 
 def joint_draws(

@@ -288,7 +288,7 @@ def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) 
                         (
                             c.found.terms,
                             frame.in_the_log(shown[c.found.terms], c.found.terms),
-                            drawn_share(c),
+                            drawn_share(c, len(whittle.spectrum.density)),
                         )
                         for c in alike
                     ],
