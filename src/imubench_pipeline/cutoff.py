@@ -71,6 +71,14 @@ RULED_OUT = 3.0
 _BEYOND_BIC = 6.0
 """Gain of BIC below which there is no filter: strong evidence, on the scale that is used of it."""
 
+_BEYOND_DOUBT = 20.0
+"""That below which N without a filter is in the interval as well, with the weight `_WITHOUT`."""
+
+_WITHOUT = 0.1
+
+_LEAST_N = 1e-6
+"""N at an end of the interval of a cut-off that stands for none, over that at the best one."""
+
 WIDEST = 1.2
 """Ratio of the limits of a cut-off beyond which it is not called known."""
 
@@ -144,6 +152,14 @@ class Cutoff:
         if self.kind is None or self.order is None or cutoff is None:
             return ""
         return f"{Filter(self.kind, self.order, cutoff).name} at {cutoff:.4g} Hz"
+
+    @property
+    def beside(self) -> float:
+        """Power of the white noise that does not pass the filter, less rounding, over that of N."""
+        N = self.N.in_model
+        if self.behind is None or not N:
+            return 0.0
+        return max((self.floor / N) ** 2 - self.rounded, 0.0)
 
     def factors(self, number: int, rng: np.random.Generator, terms: Terms) -> Array:
         """Return draws of N over its value for the filter that was chosen, shape (number,).
@@ -256,7 +272,7 @@ def find_cutoff(
         Reading(
             math.exp(best.cost - one.cost),
             *(
-                math.log(fits.density(replace(one, cutoff=cutoff))[0] / N)
+                math.log(max(fits.density(replace(one, cutoff=cutoff))[0] / N, _LEAST_N))
                 for cutoff in (low, one.cutoff, high)
             ),
         )
@@ -267,6 +283,10 @@ def find_cutoff(
         for reading, one in zip(readings, alike, strict=True)
         if one.is_first_order_analogue
     ]
+    if gained < _BEYOND_DOUBT and N_alone > 0.0:
+        # Of so many filters one may be there by chance.
+        alone = math.log(N_alone / N)
+        readings.append(Reading(_WITHOUT, alone, alone, alone))
     error = SIGMAS / math.sqrt(2.0 * float(spectrum.ordinates[used].sum()))
     ends = [end for one in readings for end in (one.below, one.above)]
     density = Parameter(

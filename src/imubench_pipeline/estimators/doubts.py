@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from imubench_pipeline.cutoff import Cutoff
 from imubench_pipeline.estimators.estimate import CURVE, Estimate, Parameter, Status
 from imubench_pipeline.estimators.frame import Frame
 from imubench_pipeline.estimators.model_choice import Candidate
@@ -34,6 +35,9 @@ _HARDLY = 6.0
 _AS_FAST = 10.0
 """Sampling intervals: a process as fast may be the sensor's filter."""
 
+_SOME_FLOOR = 0.03
+"""White noise beside a low-pass, parts of the power of that behind it, from which N is doubted."""
+
 _AT_LEAST = 0.5
 """Part of N that the least density beyond the band must leave for N to be told."""
 
@@ -53,6 +57,7 @@ def doubted(
     candidates: Sequence[Candidate],
     papers_candidate: Candidate,
     fitted: Array,
+    drift: str | None = None,
 ) -> tuple[Estimate, Estimate]:
     """Return the two estimates of a likelihood with their doubts.
 
@@ -69,6 +74,8 @@ def doubted(
         The papers' model among them.
     fitted : ndarray, shape (b,)
         Density of the chosen model in every bin.
+    drift : str, optional
+        Why the random walk may be a smooth drift.
     """
     chosen = candidates[0]
     doubt = _of_white_noise(spectrum, frame, chosen, fitted)
@@ -78,7 +85,11 @@ def doubted(
         estimate, papers = (
             _with_doubt_of_the_cut(one, spectrum, frame) for one in (estimate, papers)
         )
-    rival = _without_a_walk(chosen, candidates) or _beside_a_ramp(chosen, candidates)
+    if frame.low_pass is not None:
+        estimate, papers = (
+            _with_doubt_of_the_floor(one, frame.low_pass) for one in (estimate, papers)
+        )
+    rival = drift or _without_a_walk(chosen, candidates) or _beside_a_ramp(chosen, candidates)
     if rival is not None:
         estimate = doubting(estimate, ("K",), rival)
     simpler = _with_fewer_terms(chosen, candidates)
@@ -247,6 +258,24 @@ def _with_doubt_of_the_cut(estimate: Estimate, spectrum: Spectrum, frame: Frame)
         unseen = f"{reason}: a process that is faster would not be seen"
         B = replace(B, status="not_identified", reason=unseen, lower=None, upper=None)
     return replace(estimate, parameters={**estimate.parameters, "N": N, "B": B})
+
+
+def _with_doubt_of_the_floor(estimate: Estimate, low_pass: Cutoff) -> Estimate:
+    """Return an estimate whose N may be that of all white noise that a low-pass lets stand.
+
+    Samples interpolated between those of a sensor look like white noise behind a filter and beside
+    it, and are both of one N.
+    """
+    N, share = estimate.parameters["N"], low_pass.beside
+    if N.value is None or N.lower is None or N.upper is None or share < _SOME_FLOOR:
+        return estimate
+    times = math.sqrt(1.0 + share)
+    reason = (
+        f"white noise of {100 * share:.2g} % of its power stands beside the {low_pass.words}, and "
+        f"not behind it, as in a log of interpolated samples: N may be up to {times:.3g} times this"
+    )
+    N = replace(N, upper=N.upper * times, status="doubtful", reason=reason)
+    return replace(estimate, parameters={**estimate.parameters, "N": N})
 
 
 def _least_beyond(spectrum: Spectrum, frame: Frame) -> float | None:

@@ -26,6 +26,7 @@ from imubench_pipeline.estimators.intervals import describe, papers_only, with_u
 from imubench_pipeline.estimators.lines import Line
 from imubench_pipeline.estimators.model_choice import PAPERS, Candidate, compare
 from imubench_pipeline.estimators.posterior import DRAWS, Posterior, sample
+from imubench_pipeline.estimators.smooth_drift import instead_of_walk
 from imubench_pipeline.estimators.whittle import Terms, Whittle, model_of
 from imubench_pipeline.joint_cutoff import joined
 from imubench_pipeline.missing import block_means, divided, filled, slow_part
@@ -274,8 +275,9 @@ def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) 
     gauss_markov = describe("likelihood_gm", whittle, papers, [papers], draws, frame.band)
     gauss_markov = with_curve(gauss_markov, [papers], (), draws, tau)
     fitted = frame.whole(spectrum).density(chosen.found) + chosen.found.ramp**2 * spectrum.ramp
+    drift = instead_of_walk(whittle, candidates)
     estimate, gauss_markov = doubted(
-        estimate, gauss_markov, spectrum, frame, candidates, papers, fitted
+        estimate, gauss_markov, spectrum, frame, candidates, papers, fitted, drift
     )
     estimate, gauss_markov = (_with_folds(one, frame) for one in (estimate, gauss_markov))
     return Likelihood(
