@@ -47,6 +47,23 @@ def test_stamps_rounded_to_milliseconds(rate: float) -> None:
     assert base.rate == pytest.approx(rate, rel=5e-6)
 
 
+@pytest.mark.parametrize("every", [3, 5, 10])
+def test_regular_losses_and_rounding_are_told_by_the_rate_alone(every: int) -> None:
+    stamps = np.delete(GRID, np.s_[every::every])
+    base, _ = found(stamps)
+    assert "coarse_stamps" in names(base)
+    base, points = found(stamps, 100.0)
+    assert "coarse_stamps" not in names(base)
+    assert base.rate == pytest.approx(100.0, rel=1e-9)
+    np.testing.assert_array_equal(points, np.round(stamps * 100.0))
+    rate = 100.0 * (every - 1) / every
+    rounded = np.floor(np.arange(20_000) / rate * 100.0) / 100.0
+    assert "coarse_stamps" in names(found(rounded)[0])
+    base, _ = found(rounded, rate)
+    assert "coarse_stamps" not in names(base)
+    assert base.rate == pytest.approx(rate, rel=1e-4)
+
+
 def test_stamps_in_single_precision_far_from_zero() -> None:
     base, _ = found((1e5 + GRID).astype(np.float32).astype(np.float64))
     assert base.missing == 0

@@ -19,32 +19,62 @@ _TRACKING = 0.02
 """Gain with which the grid follows the stamps; its interval, with a quarter of
 the square."""
 
+_LONG, _TWO = 1.75, 2.2
+"""Steps, over their median, that are more than one, and no more than two."""
+
+_MIDDLE = 0.45
+"""Level of the quantile that stands for the median: of as many short and long steps the short."""
+
 _ENOUGH = 1 << 17
 """Stamps of a block that tell its typical interval; all are then followed."""
 
 
-def typical_interval(stamps: Stamps) -> float | None:
-    """Return the mean of the intervals between which no sample is missing, in s.
+@dataclass(frozen=True)
+class Interval:
+    """The interval between samples that stamps show at first sight.
 
-    None where the stamps do not advance.
+    Attributes
+    ----------
+    mean : float
+        Mean of the intervals between which no sample is missing, s.
+    with_losses : float or None
+        That, if the long ones among regular steps of one and two are samples lost; None where
+        there are none. Stamps rounded coarsely look the same, and are taken to be there.
     """
+
+    mean: float
+    with_losses: float | None = None
+
+
+def typical_interval(stamps: Stamps) -> Interval | None:
+    """Return the interval between samples; None where the stamps do not advance."""
     medians, rounded = [], []
     for block in stamps():
         steps = _advances(block)
         if len(steps):
-            medians.append(float(np.median(steps)))
+            medians.append(float(np.quantile(steps, _MIDDLE, method="lower")))
             rounded.append(_long_steps_are_regular(steps, medians[-1]))
     if not medians:
         return None
-    # Stamps rounded coarsely advance by one step or two in turn; else two are a missing sample.
-    limit = (2.2 if np.mean(rounded) > 0.5 else 1.75) * float(np.median(medians))
+    median = float(np.median(medians))
+    # Two steps for one are a missing sample.
+    total, count = _steps_up_to(stamps, _LONG * median)
+    lossy = total / count
+    if np.mean(rounded) <= 0.5:
+        return Interval(lossy)
+    total, count = _steps_up_to(stamps, _TWO * median)
+    return Interval(total / count, lossy)
+
+
+def _steps_up_to(stamps: Stamps, limit: float) -> tuple[float, int]:
+    """Return the sum of the steps up to a limit, s, and their number."""
     total, count = 0.0, 0
     for block in stamps():
         steps = _advances(block)
         steps = steps[steps <= limit]
         total += float(steps.sum())
         count += len(steps)
-    return total / count
+    return total, count
 
 
 def _advances(block: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -59,7 +89,7 @@ def _advances(block: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _long_steps_are_regular(steps: NDArray[np.float64], median: float) -> bool:
     """Tell rounding, whose long steps come at regular distances, from losses, which do not."""
-    long = np.flatnonzero((steps > 1.75 * median) & (steps < 2.2 * median))
+    long = np.flatnonzero((steps > _LONG * median) & (steps < _TWO * median))
     if len(long) < 10:
         return False
     distances = np.diff(long)

@@ -101,9 +101,12 @@ def from_stamps(stamps: Stamps, stated: float | None, settings: QualitySettings)
     RecordingError
         If the stamps do not advance.
     """
-    interval = typical_interval(stamps)
-    if interval is None:
+    typical = typical_interval(stamps)
+    if typical is None:
         raise RecordingError("the time stamps do not advance; is the right column named?")
+    interval = typical.mean
+    if typical.with_losses is not None and _is(stated, typical.with_losses, settings):
+        interval = typical.with_losses
     found = tracked(stamps, interval, settings.longest_hole)
     mean = found.mean_interval or interval
     if abs(mean / interval - 1.0) > _SAME:
@@ -117,6 +120,8 @@ def from_stamps(stamps: Stamps, stated: float | None, settings: QualitySettings)
     exact = found.mean_interval or interval
     findings = _grid_findings(found, exact)
     rate = 1.0 / exact
+    if typical.with_losses is not None and stated is None:
+        findings.append(_coarse(rate, 1.0 / typical.with_losses))
     findings += _rate_findings(rate, stated, settings)
     findings += _drift_findings(found, settings)
     jitter = math.sqrt(found.scatter / max(found.steps, 1))
@@ -150,6 +155,23 @@ def positions(
     track = Track(base.tracking_interval, settings.longest_hole)
     for block in stamps():
         yield track.follow(block)
+
+
+def _is(stated: float | None, interval: float, settings: QualitySettings) -> bool:
+    """Return whether a stated rate is that of an interval."""
+    return stated is not None and abs(interval * stated - 1.0) <= settings.rate_tolerance
+
+
+def _coarse(rate: float, lossy: float) -> Finding:
+    """Return the finding of stamps that advance by one step and two, in regular turn."""
+    return Finding(
+        "coarse_stamps",
+        "warning",
+        f"the stamps advance by one step or two in regular turn: taken as rounded, at {rate:.6g} "
+        f"Hz; if samples are lost so regularly instead, the rate is {lossy:.6g} Hz and N is "
+        f"{100 * (1.0 - math.sqrt(rate / lossy)):.2g} % less; state 'rate' in the sensor file",
+        rate,
+    )
 
 
 def _grid_findings(found: Track, interval: float) -> list[Finding]:
