@@ -47,3 +47,15 @@ def test_with_b_the_figures_of_the_curve_are_doubted() -> None:
     assert {one.status for one in found.curve.values()} == {"doubtful"}
     found = doubting(estimate, ("K",), "another model")
     assert {one.status for one in found.curve.values()} == {"ok"}
+
+
+def test_bias_instability_that_a_walk_hides_is_no_plain_value() -> None:
+    # The walk is the stronger below a tenth of the frequency at which the process begins.
+    model = NoiseModel(N=1e-4, B=1e-4, T_B=20.0, K=6e-5)
+    for seed in range(4):
+        log = simulate(model, RATE, SAMPLES, np.random.default_rng(seed))
+        found = fit(log, RATE)
+        B = found.estimates[0].parameters["B"]
+        assert B.status != "ok" or B.value == pytest.approx(1e-4, rel=0.9)
+        if B.status == "doubtful":
+            assert found.estimates[0].curve["B_curve"].status == "doubtful"

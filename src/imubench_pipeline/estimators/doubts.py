@@ -32,6 +32,9 @@ AIC clearly prefers it, for 1 % of the walks that are walks."""
 _HARDLY = 6.0
 """BIC up to which a model with fewer terms is as good."""
 
+_AS_GOOD = 2.0
+"""BIC up to which a model without bias instability is about as good as one with it."""
+
 _AS_FAST = 10.0
 """Sampling intervals: a process as fast may be the sensor's filter."""
 
@@ -95,6 +98,9 @@ def doubted(
     simpler = _with_fewer_terms(chosen, candidates)
     if simpler is not None:
         estimate = doubting(estimate, ("B", "T_B"), simpler, of_curve=False)
+    unquantized = _without_quantization(chosen, candidates)
+    if unquantized is not None:
+        estimate = doubting(estimate, ("Q",), unquantized)
     estimate = _with_one_bias(estimate)
     against = papers_candidate.bic - chosen.bic
     if against > _WORSE:
@@ -144,17 +150,30 @@ def _beside_a_ramp(chosen: Candidate, candidates: Sequence[Candidate]) -> str | 
 
 
 def _with_fewer_terms(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
-    """Say so where two terms of bias instability are hardly better than one."""
-    terms = chosen.found.terms
-    if _biases(chosen) < 2:
+    """Say so where two terms of bias instability are hardly better than one, or one than none."""
+    terms, biases = chosen.found.terms, _biases(chosen)
+    if biases == 0:
         return None
-    fewer = [one for one in candidates if _biases(one) < 2]
+    fewer = [one for one in candidates if _biases(one) < min(biases, 2)]
     best = min(fewer, key=lambda one: one.bic, default=None)
-    if best is None or best.bic > chosen.bic + _HARDLY:
+    if best is None or best.bic > chosen.bic + (_HARDLY if biases > 1 else _AS_GOOD):
+        return None
+    worse = f"{best.found.terms.name} is hardly worse than {terms.name}, by "
+    worse += f"{best.bic - chosen.bic:.1f} in BIC, and has "
+    return worse + ("another B; B_curve is that of both" if biases > 1 else "no B")
+
+
+def _without_quantization(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
+    """Say so where quantization noise is hardly needed."""
+    terms = chosen.found.terms
+    if "Q" not in terms.linear:
+        return None
+    without = replace(terms, linear=terms.linear.replace("Q", ""))
+    other = next((one for one in candidates if one.found.terms == without), None)
+    if other is None or other.bic > chosen.bic + _HARDLY:
         return None
     return (
-        f"{best.found.terms.name} is hardly worse than {terms.name}, by "
-        f"{best.bic - chosen.bic:.1f} in BIC, and has another B; B_curve is that of both"
+        f"{without.name}, which has none, is hardly worse, by {other.bic - chosen.bic:.1f} in BIC"
     )
 
 
