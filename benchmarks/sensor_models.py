@@ -37,7 +37,6 @@ from imubench_pipeline.results import Key, estimate_of
 from imubench_pipeline.sensor_model.imu import ImuModel, simulate_imu
 from imubench_pipeline.sensor_model.low_pass import LowPass
 from imubench_pipeline.sensor_model.model import SensorModel, TemperatureDrift
-from imubench_pipeline.sensor_model.noise_in_log import in_the_log
 from imubench_pipeline.sensor_model.profiles import DayCycle, Profile, Steps, Sum, WarmUp
 from temperature import behind, bounds
 
@@ -299,7 +298,7 @@ def true_figures(made: Case, found: Found) -> dict[str, float | None]:
     if at is None:
         at = float(behind(made.truth(), made.rate, drift.lag).mean())
     return {
-        "N": in_the_log(model, made.rate),
+        "N": noise.N,
         "B": noise.B,
         "T_B": noise.T_B,
         "K": noise.K,
