@@ -94,7 +94,7 @@ def doubted(
         )
     rival = drift or _without_a_walk(chosen, candidates) or _beside_a_ramp(chosen, candidates)
     if rival is not None:
-        estimate = doubting(estimate, ("K",), rival)
+        estimate, papers = (doubting(one, ("K",), rival) for one in (estimate, papers))
     simpler = _with_fewer_terms(chosen, candidates)
     if simpler is not None:
         estimate = doubting(estimate, ("B", "T_B"), simpler, of_curve=False)
