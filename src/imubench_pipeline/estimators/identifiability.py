@@ -14,7 +14,7 @@ from imubench_pipeline.spectrum import SINGLE, WIDTH, Spectrum
 
 Array = NDArray[np.float64]
 
-NOT_IDENTIFIED = 0.5
+NOT_IDENTIFIED = 0.3
 """Relative standard deviation beyond which a B is not given as a number."""
 
 NOT_IDENTIFIED_TIME = 0.3
