@@ -35,9 +35,6 @@ _HARDLY = 6.0
 _AS_GOOD = 4.0
 """BIC up to which a model without bias instability is about as good as one with it."""
 
-_FAR_BELOW = 4.0
-"""K over its lower limit from which any model without it that AIC prefers is a reason to doubt."""
-
 _AS_FAST = 10.0
 """Sampling intervals: a process as fast may be the sensor's filter."""
 
@@ -95,11 +92,7 @@ def doubted(
         estimate, papers = (
             _with_doubt_of_the_floor(one, frame.low_pass) for one in (estimate, papers)
         )
-    rival = (
-        drift
-        or _without_a_walk(estimate.parameters["K"], chosen, candidates)
-        or _beside_a_ramp(chosen, candidates)
-    )
+    rival = drift or _without_a_walk(chosen, candidates) or _beside_a_ramp(chosen, candidates)
     if rival is not None:
         estimate, papers = (doubting(one, ("K",), rival) for one in (estimate, papers))
     simpler = _with_fewer_terms(chosen, candidates)
@@ -119,7 +112,7 @@ def doubted(
     return estimate, papers
 
 
-def _without_a_walk(K: Parameter, chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
+def _without_a_walk(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
     """Say so where AIC clearly prefers a model without the random walk of the chosen one.
 
     A slow process passes for a walk: BIC with what is asked of such a process takes the walk.
@@ -130,8 +123,7 @@ def _without_a_walk(K: Parameter, chosen: Candidate, candidates: Sequence[Candid
         one for one in candidates if "K" not in one.found.terms.linear and not one.found.terms.ramp
     ]
     best = min(without, key=lambda one: one.aic, default=chosen)
-    weak = bool(K.value and K.lower is not None and K.lower * _FAR_BELOW < K.value)
-    if best.aic > chosen.aic - (0.0 if weak else _CLEARLY):
+    if best.aic > chosen.aic - _CLEARLY:
         return None
     return (
         f"{best.found.terms.name}, which has no random walk, is better by "
