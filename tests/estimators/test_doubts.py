@@ -59,3 +59,11 @@ def test_bias_instability_that_a_walk_hides_is_no_plain_value() -> None:
         assert B.status != "ok" or B.value == pytest.approx(1e-4, rel=0.9)
         if B.status == "doubtful":
             assert found.estimates[0].curve["B_curve"].status == "doubtful"
+
+
+@pytest.mark.parametrize("seed", [1, 7, 8])
+def test_a_ramp_beside_a_walk_that_hardly_needs_it_is_doubted(seed: int) -> None:
+    log = simulate(NoiseModel(N=1e-4, K=1e-5), RATE, SAMPLES, np.random.default_rng(seed))
+    # Three times what the walk does over the log on average.
+    ramp = 3e-5 * np.sqrt(SAMPLES / RATE) * np.arange(SAMPLES) / SAMPLES
+    assert fit(log + ramp, RATE).estimates[0].parameters["R"].status == "doubtful"

@@ -32,6 +32,9 @@ AIC clearly prefers it, for 1 % of the walks that are walks."""
 _HARDLY = 6.0
 """BIC up to which a model with fewer terms is as good."""
 
+_NEEDLESS = 8.0
+"""BIC up to which quantization noise or a ramp may be chance, or part of a walk."""
+
 _AS_GOOD = 4.0
 """BIC up to which a model without bias instability is about as good as one with it."""
 
@@ -98,9 +101,10 @@ def doubted(
     simpler = _with_fewer_terms(chosen, candidates)
     if simpler is not None:
         estimate = doubting(estimate, ("B", "T_B"), simpler, of_curve=False)
-    unquantized = _without_quantization(chosen, candidates)
-    if unquantized is not None:
-        estimate = doubting(estimate, ("Q",), unquantized)
+    for name in ("Q", "R"):
+        needless = _hardly_needed(name, chosen, candidates)
+        if needless is not None:
+            estimate = doubting(estimate, (name,), needless)
     estimate = _with_one_bias(estimate)
     against = papers_candidate.bic - chosen.bic
     if against > _WORSE:
@@ -163,18 +167,15 @@ def _with_fewer_terms(chosen: Candidate, candidates: Sequence[Candidate]) -> str
     return worse + ("another B; B_curve is that of both" if biases > 1 else "no B")
 
 
-def _without_quantization(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
-    """Say so where quantization noise is hardly needed."""
+def _hardly_needed(name: str, chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
+    """Say so where a model without its quantization noise (Q) or ramp (R) is hardly worse."""
     terms = chosen.found.terms
-    if "Q" not in terms.linear:
-        return None
-    without = replace(terms, linear=terms.linear.replace("Q", ""))
+    without = replace(terms, linear=terms.linear.replace(name, ""), ramp=terms.ramp and name != "R")
     other = next((one for one in candidates if one.found.terms == without), None)
-    if other is None or other.bic > chosen.bic + _HARDLY:
+    if without == terms or other is None or other.bic > chosen.bic + _NEEDLESS:
         return None
-    return (
-        f"{without.name}, which has none, is hardly worse, by {other.bic - chosen.bic:.1f} in BIC"
-    )
+    worse = f"{other.bic - chosen.bic:.1f} in BIC"
+    return f"{without.name}, which has none, is hardly worse than {terms.name}, by {worse}"
 
 
 def _biases(one: Candidate) -> int:
