@@ -24,6 +24,7 @@ from imubench_pipeline.estimators.filter_fits import (
     Tried,
     explained,
     gains,
+    highest_cutoff,
 )
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.whittle import (
@@ -240,10 +241,14 @@ class _Joint:
         def beyond(x: float) -> float:
             return self.at(fit.allowed, x, fit.terms).cost - most
 
+        highest = self._highest(fit.allowed)
+
         def end(sign: float) -> float:
             inside, step = fit.x, fit.allowed.half_width
             while abs(inside - fit.x) < _REFINED_WITHIN:
                 outside = inside + sign * step
+                if outside >= highest:
+                    return highest
                 if beyond(outside) > 0.0:
                     return float(brentq(beyond, inside, outside, xtol=_FINE * step))
                 inside, step = outside, 2.0 * step
@@ -251,12 +256,16 @@ class _Joint:
 
         return end(-1.0), end(1.0)
 
+    def _highest(self, allowed: Allowed) -> float:
+        one = allowed.filter
+        return math.log(highest_cutoff(one.kind, one.order, self._taken.rate))
+
     def _best(self, allowed: Allowed, terms: Terms) -> _Fit:
         around = math.log(allowed.filter.cutoff)
         for reach in (_REACH * allowed.half_width, _REFINED_WITHIN):
             best = minimize_scalar(
                 lambda x: self.at(allowed, x, terms).cost,
-                bounds=(around - reach, around + reach),
+                bounds=(around - reach, min(around + reach, self._highest(allowed))),
                 method="bounded",
                 options={"xatol": _FINE * allowed.half_width},
             )

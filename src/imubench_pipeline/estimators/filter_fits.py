@@ -95,6 +95,11 @@ def inside(spectrum: Spectrum) -> Array:
     return np.asarray(spectrum.lower[:, None] + width * within)
 
 
+def highest_cutoff(kind: Kind, order: int, rate: float) -> float:
+    """Return the highest cut-off of a filter that is looked for at a rate, Hz."""
+    return _HIGHEST[kind, order] * rate
+
+
 def gains(spectrum: Spectrum, one: Tried) -> tuple[Array, Array, Array]:
     """Return what a filter leaves of white noise, of flicker noise and of slow noise."""
     low_pass, frequency = one.low_pass, inside(spectrum)
@@ -245,7 +250,7 @@ class FilterFits:
 
     def highest(self, kind: Kind, order: int) -> float:
         """Return the highest cut-off that is looked for, Hz."""
-        return _HIGHEST[kind, order] * self.rate
+        return highest_cutoff(kind, order, self.rate)
 
     def may_bend(self, filters: Sequence[tuple[Kind, int]]) -> bool:
         """Return whether a filter at any of a few cut-offs is nearly as good as none."""
