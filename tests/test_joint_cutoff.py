@@ -1,14 +1,20 @@
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 from scipy.signal import butter, lfilter, sosfilt
 
+from imubench_pipeline.estimators.filter_fits import highest_cutoff
+from imubench_pipeline.estimators.frame import frame_of
 from imubench_pipeline.estimators.likelihood import Likelihood, fit
-from imubench_pipeline.estimators.model_choice import PAPERS
+from imubench_pipeline.estimators.low_pass import Filter
+from imubench_pipeline.estimators.model_choice import PAPERS, compare
+from imubench_pipeline.joint_cutoff import refined
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.simulate import simulate
+from imubench_pipeline.spectrum import spectra
 
 RATE = 100.0
 SAMPLES = 150_000
@@ -89,3 +95,22 @@ def test_a_register_leaves_n_before_the_filter_inside_its_interval():
     white = found.estimates[0].parameters["N"]
     assert white.lower < N < white.upper
     assert found.low_pass.floor == pytest.approx(step / math.sqrt(12.0 * RATE), rel=0.2)
+
+
+@pytest.mark.parametrize("seed", [0, 2, 7])
+def test_no_mean_is_shorter_than_of_two_samples(seed):
+    # Of a short log the interval of its length goes beyond; a shorter one has no cut-off.
+    rate, samples = 10.0, 1500
+    log = simulate(
+        NoiseModel(N=1e-4, B=3e-4, T_B=2.0), rate, samples + 1, np.random.default_rng(seed)
+    )
+    spectrum, lines = spectra([0.5 * (log[1:] + log[:-1])], samples, rate)
+    frame = frame_of(spectrum, lines)
+    means = [one for one in frame.low_pass.allowed if one.filter.kind == "boxcar"]
+    assert means
+    candidates = compare(frame.whittle(spectrum), quantization=False)
+    found = refined(
+        replace(frame.low_pass, allowed=means, kind="boxcar"), spectrum, frame.used, candidates[:2]
+    )
+    highest = Filter("boxcar", 1, highest_cutoff("boxcar", 1, rate)).half_power(rate)
+    assert found.frequency.lower < found.frequency.upper <= highest * (1.0 + 1e-9)
