@@ -230,7 +230,7 @@ class _Joint:
         whittle = self._plain.standing(self.behind(self._taken, allowed.at(x)))
         if allowed.filter.floor:
             # White noise behind the filter stands where quantization noise would.
-            whittle.columns["Q"] = np.ones(len(self._taken.density))
+            whittle = whittle.with_column("Q", np.ones(len(self._taken.density)))
             terms = replace(terms, linear="Q" + terms.linear)
         return whittle, whittle.maximum(terms)
 

@@ -7,7 +7,6 @@ that of a random walk as f^-2. The two are compared as noise models with as many
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Sequence
 
@@ -44,11 +43,7 @@ def instead_of_walk(whittle: Whittle, candidates: Sequence[Candidate]) -> str | 
     if "K" not in chosen.found.terms.linear or chosen.found.parameter("K") == 0.0:
         return None
     frequency = whittle.spectrum.frequency
-    _ = whittle.table  # made once for both
-    drift = copy.copy(whittle)
-    drift.columns = whittle.columns | {
-        "K": whittle.column("K") * (frequency[0] / frequency) ** 2,
-    }
+    drift = whittle.with_column("K", whittle.column("K") * (frequency[0] / frequency) ** 2)
     best, beside = -math.inf, ""
     for one in candidates:
         terms = one.found.terms

@@ -172,6 +172,21 @@ class Whittle:
         vars(other)["table"] = self.table + np.log(behind.slow)
         return other
 
+    def with_column(self, letter: str, shape: Array) -> Whittle:
+        """Return the likelihood with another density in the place of a linear term.
+
+        Parameters
+        ----------
+        letter : str
+            Of the term: Q, N, F or K.
+        shape : ndarray, shape (b,)
+            Its density in each bin, for a parameter of 1.
+        """
+        _ = self.table  # made once for both
+        other = copy.copy(self)
+        other.columns = self.columns | {letter: shape}
+        return other
+
     def taken(self, spectrum: Spectrum, chosen: NDArray[np.bool_]) -> Whittle:
         """Return the likelihood of other data in chosen bins."""
         other = self.of(spectrum.taken(chosen))
