@@ -981,6 +981,33 @@ def one_hole(rng: Rng) -> Log:
     return _without(log, lost)
 
 
+def _with_pauses(rng: Rng, log: Log, sigma: float) -> Log:
+    """Stop a logger 1 to 12 times for 5 to 300 s; the bias after each is another by sigma."""
+    stamps = np.arange(len(log.samples)) / log.rate
+    lost = np.zeros(len(stamps), dtype=np.bool_)
+    mean = np.zeros(len(stamps))
+    for _ in range(rng.integers(1, 13)):
+        start, length = rng.uniform(0.05, 0.9) * stamps[-1], between(rng, 5.0, 300.0)
+        length = min(length, 0.05 * stamps[-1])
+        lost |= (stamps >= start) & (stamps < start + length)
+        mean[stamps >= start + length] += sigma * rng.standard_normal()
+    return _without(replace(log, samples=log.samples + mean, stamps=stamps), lost)
+
+
+def restarts(rng: Rng) -> Log:
+    """A process; 1 to 12 pauses, and the bias after each differs by 0.3 to 10 of its sigma."""
+    samples, rate = any_length(rng)
+    noise = any_process(rng, samples, rate)
+    log = _with_mean(rng, noise, samples, rate, np.zeros(samples))
+    return _with_pauses(rng, log, noise.sigma * between(rng, 0.3, 10.0))
+
+
+def pauses(rng: Rng) -> Log:
+    """A process and a walk; 1 to 12 pauses through which both go on."""
+    samples, rate = any_length(rng)
+    return _with_pauses(rng, of_four(rng, samples, rate).log(samples, rate, rng), 0.0)
+
+
 CLEAN: Mapping[str, Case] = {
     case.__name__: case
     for case in (
@@ -1064,6 +1091,8 @@ HARD: Mapping[str, Case] = {
         lost_samples,
         lost_pieces,
         one_hole,
+        restarts,
+        pauses,
     )
 }
 """Logs that are not, or in which a parameter is hardly to be seen."""

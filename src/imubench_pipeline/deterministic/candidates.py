@@ -33,6 +33,7 @@ _BESIDE = (3, 16)
 
 SAFETY: dict[Kind, float] = {
     "step": 1.0,
+    "restart": 1.0,
     "exponential": 1.15,
     "sinusoid": 1.15,
     "ramp": 1.15,
@@ -102,7 +103,7 @@ def polished(
         Of the noise, SI²/Hz.
     """
     best = regressors[which]
-    if best.kind in ("ramp", "pulse"):
+    if best.kind in ("ramp", "pulse", "restart"):
         return tuple(regressors)
     n = ordinates.sizes[best.part]
     step = {"step": 0.5, "exponential": 0.12 * best.where, "sinusoid": 0.125 / n}[best.kind]

@@ -5,14 +5,21 @@ such: the noise without a walk and the course in its stead, over the noise with 
 that leaves a walk needed beside it says nothing against the walk. What the course gains has the
 choice of its kind, place, time constant or period in it, and so must come near the threshold that
 counts them; the walk's own parameter, one and never looked for, counts for nothing.
+
+A sensor that began anew at the pauses of a log has another bias after each. Their places are known
+beforehand, and their number is what counts.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+from scipy.special import chdtri
+
 from imubench_pipeline.deterministic.candidates import SAFETY, candidates, with_candidate
 from imubench_pipeline.deterministic.ordinates import NOISE, Fit, Ordinates
+from imubench_pipeline.deterministic.regressors import Regressor
+from imubench_pipeline.deterministic.scores import FALSE_ALARM
 from imubench_pipeline.estimators.whittle import Terms
 
 _NEAR = 4.0
@@ -21,24 +28,32 @@ _NEAR = 4.0
 _FITTED_ANEW = 8.0
 """What the noise may add to a gain as it is fitted anew: what is below by more is not tried."""
 
+_AS_GOOD = 0.5
+"""AIC by which steps at known places may be worse and still be as good."""
+
 _WITHOUT_WALK = Terms("NF", NOISE.gauss_markov)
 
 
 @dataclass(frozen=True)
 class Rival:
-    """What explains a log without a random walk, by one course more.
+    """What explains a log without a random walk, by one course more or by steps at its pauses.
 
     Attributes
     ----------
     fit : Fit
-        Its last regressor is the course.
+    courses : tuple of Regressor
+        The course, or the steps.
     beyond : float
         Twice the log likelihood over that of the noise with the walk, less what the search for
         the course makes of noise alone.
+    near : float
+        Below 0 by so much, the course is about as good.
     """
 
     fit: Fit
+    courses: tuple[Regressor, ...]
     beyond: float
+    near: float = _NEAR
 
     @property
     def better(self) -> bool:
@@ -48,14 +63,14 @@ class Rival:
     @property
     def as_good(self) -> bool:
         """Whether the log does not tell the walk from the course."""
-        return self.beyond > -_NEAR
+        return self.beyond > -self.near
 
 
 def rival_of_walk(ordinates: Ordinates, fit: Fit) -> Rival | None:
     """Return the course that explains a log best in the place of a random walk.
 
-    Steps, warm-ups and periodic drift are tried. A ramp is a term of the noise models, whose
-    choice weighs it against a walk itself.
+    Steps, also at all pauses together, warm-ups and periodic drift are tried. A ramp is a term of
+    the noise models, whose choice weighs it against a walk itself.
 
     Parameters
     ----------
@@ -72,7 +87,7 @@ def rival_of_walk(ordinates: Ordinates, fit: Fit) -> Rival | None:
         return None
     bare = ordinates.fit(fit.regressors, fit.density, _WITHOUT_WALK)
     walk = 2.0 * (fit.log_likelihood - bare.log_likelihood)
-    best: Rival | None = None
+    best = _anew_at_pauses(ordinates, bare, walk)
     for score, density in candidates(ordinates, bare):
         wanted = walk + score.threshold * SAFETY[score.regressor.kind]
         hopeless = score.gain < wanted - _NEAR - _FITTED_ANEW
@@ -80,6 +95,34 @@ def rival_of_walk(ordinates: Ordinates, fit: Fit) -> Rival | None:
             continue
         tried, gain = with_candidate(ordinates, bare, score, density)
         beyond = gain - wanted
-        if best is None or beyond > best.beyond:
-            best = Rival(tried, beyond)
+        if best is None or beyond + _NEAR > best.beyond + best.near:
+            best = Rival(tried, tried.regressors[-1:], beyond)
     return best
+
+
+def _anew_at_pauses(ordinates: Ordinates, bare: Fit, walk: float) -> Rival | None:
+    """Return the rival that is a step at each pause, or None where there are none.
+
+    As good is what has the same AIC.
+    """
+    steps = tuple(
+        Regressor("restart", number, middle, length)
+        for number, part in enumerate(ordinates.means.parts)
+        for middle, length in part.pauses
+        if not _is_there(bare, number, middle, length)
+    )
+    if not steps:
+        return None
+    tried = ordinates.fit((*bare.regressors, *steps), bare.density, bare.noise.terms)
+    gain = 2.0 * (tried.log_likelihood - bare.log_likelihood)
+    threshold = float(chdtri(len(steps), FALSE_ALARM["restart"]))
+    as_many = 2.0 * (len(steps) - 1)
+    return Rival(tried, steps, gain - walk - threshold, threshold - as_many + _AS_GOOD)
+
+
+def _is_there(fit: Fit, part: int, middle: float, length: float) -> bool:
+    """Return whether a step of a fit lies in or beside a pause."""
+    return any(
+        x.part == part and x.kind in ("step", "restart") and abs(x.where - middle) <= length
+        for x in fit.regressors
+    )

@@ -23,6 +23,7 @@ Kind = Literal["bias_step", "warm_up_drift", "periodic_drift"]
 
 _NAMES: dict[str, Kind] = {
     "step": "bias_step",
+    "restart": "bias_step",
     "exponential": "warm_up_drift",
     "sinusoid": "periodic_drift",
 }
@@ -159,7 +160,7 @@ class Courses:
             return None
         rival = self.searched.rival
         if rival is not None:
-            what = _in_words(rival.regressors[-1], self.means)
+            what = _in_words(rival.courses, self.means)
             return f"{what} would explain the log about as well as a random walk"
         if self.found and _leverage_on_walk(self.searched.fit) > _MOST_LEVERAGE:
             return (
@@ -169,7 +170,11 @@ class Courses:
         return None
 
 
-def _in_words(regressor: Regressor, means: Means) -> str:
+def _in_words(courses: Sequence[Regressor], means: Means) -> str:
+    regressor = courses[0]
+    if regressor.kind == "restart":
+        many = f"steps of the bias at the {len(courses)} pauses" if len(courses) > 1 else "a step"
+        return many + (" of the log" if len(courses) > 1 else " of the bias at the pause of the log")
     start = means.parts[regressor.part].start / means.rate
     where = regressor.where * means.interval
     if regressor.kind == "step":
@@ -223,7 +228,7 @@ def find_courses(
         return Courses((), None, None)
     searched = search(ordinates)
     if searched.many:
-        steps = sum(x.kind == "step" for x in searched.fit.regressors)
+        steps = sum(x.kind in ("step", "restart") for x in searched.fit.regressors)
         # Bursts of noise look like pulses, and are another finding.
         return Courses((), means, searched, telegraph=steps > _MOST_STEPS)
     if any(x.kind == "step" for x in searched.fit.regressors):
@@ -251,19 +256,19 @@ def _described(ordinates: Ordinates, searched: Searched) -> Iterator[Course]:
         along = amplitudes / size if len(amplitudes) > 1 else np.ones(1)
         error = _LIMIT * math.sqrt(float(along @ covariance[here, here] @ along))
         low, high = _limits(ordinates, fit, regressor)
-        if regressor.kind != "exponential":
+        if regressor.kind not in ("exponential", "restart"):
             # Where it is taken to be has been chosen to make it large; and of a swing that is
             # shorter than its period the size hangs on the period.
             error = math.hypot(error, _spread(ordinates, fit, regressor, here, (low, high)))
         place = start + regressor.where * means.interval
         period = regressor.kind == "sinusoid"
-        if regressor.kind == "step":
+        step = regressor.kind in ("step", "restart")
+        if step:
             times: tuple[float | None, ...] = (None, None, None)
         elif period:
             times = tuple(means.interval / f for f in (regressor.where, high, low))
         else:
             times = tuple(means.interval * t for t in (regressor.where, low, high))
-        step = regressor.kind == "step"
         yield Course(
             kind=_NAMES[regressor.kind],
             start=place if step else start,
@@ -283,6 +288,9 @@ def _described(ordinates: Ordinates, searched: Searched) -> Iterator[Course]:
 
 def _limits(ordinates: Ordinates, fit: Fit, regressor: Regressor) -> tuple[float, float]:
     """Return 95 % limits of a place, time constant or frequency: those of its likelihood."""
+    if regressor.kind == "restart":
+        half = 0.5 * regressor.length
+        return regressor.where - half, regressor.where + half
     others = tuple(x for x in fit.regressors if x is not regressor)
     gain = Gain(ordinates, others, fit.density, regressor.part)
     best = gain.of(regressor)

@@ -30,6 +30,11 @@ _MAD = 1.4826
 _LONGEST_HOLE = 1 / 5
 """Part of a segment: a longer hole divides it."""
 
+_SHORTEST_PAUSE = 2.0
+"""s: a sensor or its host takes as long to begin anew."""
+
+_MOST_PAUSES = 48
+
 
 @dataclass(frozen=True)
 class Part:
@@ -48,6 +53,9 @@ class Part:
         Excess kurtosis of samples that are independent: twice that of their differences.
     present : float
         Share of its samples that are there.
+    pauses : tuple of (float, float)
+        Middle and length, in blocks, of holes so long that the sensor may have begun anew; the
+        longest of them, in order.
     """
 
     start: int
@@ -55,6 +63,7 @@ class Part:
     power: Array
     kurtosis: float
     present: float
+    pauses: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -116,7 +125,7 @@ def means_of(
     parts: list[Part] = []
     for (start, _), rows in zip(spans, gathered, strict=True):
         if rows:
-            parts += _parts(start, size, np.concatenate(rows, axis=1))
+            parts += _parts(start, size, np.concatenate(rows, axis=1), size / rate)
     return Means(size, rate, tuple(parts))
 
 
@@ -144,7 +153,7 @@ def _rows(values: Array) -> Array:
     return np.array([mean, power, (squares**2).sum(axis=1) / known, count / size])
 
 
-def _parts(start: int, size: int, rows: Array) -> list[Part]:
+def _parts(start: int, size: int, rows: Array, interval: float) -> list[Part]:
     """Divide a segment at its longest holes, and bridge the others."""
     mean, power, fourth, share = rows
     there = np.flatnonzero(share >= 0.5)
@@ -168,9 +177,20 @@ def _parts(start: int, size: int, rows: Array) -> list[Part]:
                 np.where(share[here] >= 0.5, power[here], np.nan),
                 _kurtosis(power[here], fourth[here], share[here] >= 0.5),
                 float(share[here].mean()),
+                _pauses(share[here] < 0.5, interval),
             )
         )
     return parts
+
+
+def _pauses(missing: NDArray[np.bool_], interval: float) -> tuple[tuple[float, float], ...]:
+    """Return middle and length of the longest runs of missing blocks, in order."""
+    edges = np.flatnonzero(np.diff(missing.astype(np.int8), prepend=0, append=0))
+    first, end = edges[::2].astype(np.float64), edges[1::2].astype(np.float64)
+    long = np.flatnonzero((end - first) * interval >= _SHORTEST_PAUSE)
+    longest = long[np.argsort(first[long] - end[long], kind="stable")][:_MOST_PAUSES]
+    kept = np.sort(longest)
+    return tuple(zip(0.5 * (first + end)[kept], (end - first)[kept], strict=True))
 
 
 def _kurtosis(power: Array, fourth: Array, there: NDArray[np.bool_]) -> float:

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 _ALIKE = 1e-9
 """Difference of two frequencies below which their beat is constant over any part."""
 
-Kind = Literal["step", "exponential", "sinusoid", "ramp", "pulse"]
+Kind = Literal["step", "restart", "exponential", "sinusoid", "ramp", "pulse"]
 
 
 @dataclass(frozen=True)
@@ -29,18 +29,22 @@ class Regressor:
     Attributes
     ----------
     kind : str
-        ``step``: 0 before its place, 1 from it on; ``exponential``: 1 at the beginning of the
+        ``step``: 0 before its place, 1 from it on; ``restart``: the same at a pause, over which its
+        means are interpolated as those of the log are; ``exponential``: 1 at the beginning of the
         part; ``sinusoid``: a cosine and a sine; ``ramp``: 1 a block; ``pulse``: 1 in one block.
     part : int
         Number of the part.
     where : float
         Place of a step or pulse, time constant of an exponential, both in blocks; frequency of a
         sinusoid in cycles a block.
+    length : float
+        Of the pause of a restart, blocks.
     """
 
     kind: Kind
     part: int
     where: float = 0.0
+    length: float = 0.0
 
     @property
     def columns(self) -> int:
@@ -52,6 +56,9 @@ class Regressor:
         i = np.arange(n, dtype=np.float64)
         if self.kind == "step":
             return np.clip(i + 1.0 - self.where, 0.0, 1.0)[None]
+        if self.kind == "restart":
+            first = self.where - 0.5 * self.length
+            return np.clip((i + 1.0 - first) / (self.length + 1.0), 0.0, 1.0)[None]
         if self.kind == "pulse":
             return (i == self.where).astype(np.float64)[None]
         if self.kind == "ramp":
@@ -78,7 +85,7 @@ class Regressor:
         -------
         ndarray, shape (columns, s)
         """
-        if self.kind == "step":
+        if self.kind in ("step", "restart"):
             return (blocks >= self.where).astype(np.float64)[None]
         if self.kind == "pulse":
             return ((blocks >= self.where) & (blocks < self.where + 1.0)).astype(np.float64)[None]

@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 
 FALSE_ALARM: dict[Kind, float] = {
     "step": 0.001,
+    "restart": 0.001,
     "exponential": 0.0015,
     "sinusoid": 0.0015,
     "ramp": 0.002,

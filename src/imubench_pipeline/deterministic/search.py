@@ -34,6 +34,7 @@ MOST = 16
 
 _KEPT: dict[Kind, float] = {
     "step": 16.0,
+    "restart": 4.0,  # its place is known
     "exponential": 12.0,
     "sinusoid": 18.0,
     "ramp": 8.0,
@@ -59,15 +60,15 @@ class Searched:
         For each regressor, twice the log likelihood that is lost without it.
     many : bool
         There are `MOST` or more.
-    rival : Fit or None
-        Explains the log about as well without a random walk, by its last regressor.
+    rival : Rival or None
+        Explains the log about as well without a random walk.
     """
 
     fit: Fit
     without: Fit
     gains: tuple[float, ...]
     many: bool
-    rival: Fit | None = None
+    rival: Rival | None = None
 
 
 def search(ordinates: Ordinates) -> Searched:
@@ -93,7 +94,7 @@ def search(ordinates: Ordinates) -> Searched:
     if len(fit.regressors) > 1:
         fit = _all_polished(ordinates, fit)
     fit, gains = _eliminated(ordinates, fit)
-    alike = rival.fit if rival is not None and rival.as_good else None
+    alike = rival if rival is not None and rival.as_good else None
     return Searched(fit, without, gains, False, alike)
 
 
