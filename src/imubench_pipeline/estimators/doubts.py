@@ -35,6 +35,10 @@ _HARDLY = 6.0
 _NEEDLESS = 8.0
 """BIC up to which quantization noise or a ramp may be chance, or part of a walk."""
 
+_OTHERWISE = 4.0
+"""AIC by which a model with other terms of bias instability must be the better for B and T_B to be
+doubted."""
+
 _AS_GOOD = 4.0
 """BIC up to which a model without bias instability is about as good as one with it."""
 
@@ -98,9 +102,9 @@ def doubted(
     rival = drift or _without_a_walk(chosen, candidates) or _beside_a_ramp(chosen, candidates)
     if rival is not None:
         estimate, papers = (doubting(one, ("K",), rival) for one in (estimate, papers))
-    simpler = _with_fewer_terms(chosen, candidates)
-    if simpler is not None:
-        estimate = doubting(estimate, ("B", "T_B"), simpler, of_curve=False)
+    other = _with_fewer_terms(chosen, candidates) or _with_other_terms(chosen, candidates)
+    if other is not None:
+        estimate = doubting(estimate, ("B", "T_B"), other, of_curve=False)
     for name in ("Q", "R"):
         needless = _hardly_needed(name, chosen, candidates)
         if needless is not None:
@@ -167,6 +171,20 @@ def _with_fewer_terms(chosen: Candidate, candidates: Sequence[Candidate]) -> str
     return worse + ("another B; B_curve is that of both" if biases > 1 else "no B")
 
 
+def _with_other_terms(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
+    """Say so where AIC clearly prefers other terms of bias instability.
+
+    BIC asks more of processes that are as slow as a walk, and may so join two terms to one.
+    """
+    best = min(candidates, key=lambda one: one.aic)
+    if _kinds_of_bias(best) == _kinds_of_bias(chosen) or _biases(chosen) == 0:
+        return None
+    better = chosen.aic - best.aic
+    if better < _OTHERWISE:
+        return None
+    return f"{best.found.terms.name}, with other terms for B, is better by {better:.1f} in AIC"
+
+
 def _hardly_needed(name: str, chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
     """Say so where a model without its quantization noise (Q) or ramp (R) is hardly worse."""
     terms = chosen.found.terms
@@ -176,6 +194,10 @@ def _hardly_needed(name: str, chosen: Candidate, candidates: Sequence[Candidate]
         return None
     worse = f"{other.bic - chosen.bic:.1f} in BIC"
     return f"{without.name}, which has none, is hardly worse than {terms.name}, by {worse}"
+
+
+def _kinds_of_bias(one: Candidate) -> tuple[bool, int]:
+    return "F" in one.found.terms.linear, one.found.terms.gauss_markov
 
 
 def _biases(one: Candidate) -> int:

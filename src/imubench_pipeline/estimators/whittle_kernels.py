@@ -25,6 +25,7 @@ _SCAN_TOLERANCE = 1e-2
 
 _POLISH_TOLERANCE = 1e-6
 _MOST_STEPS = 60
+_MOST_TURNS = 8
 _GOLDEN = 0.6180339887498949
 
 
@@ -276,6 +277,29 @@ def _polished(
 
 
 @njit(cache=True)
+def _scanned(
+    places: Array,
+    which: int,
+    low: float,
+    high: float,
+    fixed: Array,
+    bins: Bins,
+    with_ramp: bool,
+    table: ShapeTable,
+) -> tuple[float, float]:
+    """Return the best of one correlation time on a grid between limits, and its cost."""
+    here = places.copy()
+    best, lowest = places[which], np.inf
+    for i in range(0, table.logarithms.shape[0], _SCAN_STEP):
+        here[which] = table.first + i * table.step
+        if low <= here[which] <= high:
+            cost = _cost_at(here, fixed, bins, with_ramp, table, _SCAN_TOLERANCE)
+            if cost < lowest:
+                best, lowest = here[which], cost
+    return best, lowest
+
+
+@njit(cache=True)
 def one_process(
     fixed: Array,
     bins: Bins,
@@ -285,13 +309,8 @@ def one_process(
     """Scan the correlation time, then polish the best."""
     first, step, logarithms = table
     last = first + step * (logarithms.shape[0] - 1)
-    best, lowest = first, np.inf
-    place = np.empty(1)
-    for i in range(0, logarithms.shape[0], _SCAN_STEP):
-        place[0] = first + i * step
-        cost = _cost_at(place, fixed, bins, with_ramp, table, _SCAN_TOLERANCE)
-        if cost < lowest:
-            best, lowest = place[0], cost
+    place = np.array([first])
+    best, lowest = _scanned(place, 0, first, last, fixed, bins, with_ramp, table)
     reach = _SCAN_STEP * step
     place[0] = best
     found, cost = _polished(
@@ -315,12 +334,16 @@ def two_processes(
     with_ramp: bool,
     table: ShapeTable,
 ) -> Array:
-    """Scan pairs of correlation times, then polish each in turn."""
+    """Begin with the best pair of a coarse grid and with the best single process; take the better.
+
+    A strong process has a sharp correlation time, beside which no pair of a coarse grid shows that
+    it needs another.
+    """
     first, step, logarithms = table
     last = first + step * (logarithms.shape[0] - 1)
     apart = np.log(_CLOSEST_PAIR)
     lowest = np.inf
-    best = np.array([first, last])
+    pair = np.array([first, last])
     places = np.empty(2)
     for i in range(0, logarithms.shape[0], _PAIR_STEP):
         for j in range(i + _PAIR_STEP, logarithms.shape[0], _PAIR_STEP):
@@ -330,9 +353,40 @@ def two_processes(
             cost = _cost_at(places, fixed, bins, with_ramp, table, _SCAN_TOLERANCE)
             if cost < lowest:
                 lowest = cost
-                best = places.copy()
+                pair = places.copy()
+    pair, lowest = _descended(pair, lowest, fixed, bins, with_ramp, table)
+    single = one_process(fixed, bins, with_ramp, table)[0]
+    for slower in range(2):
+        beside = np.array([single, single])
+        low, high = (single + apart, last) if slower == 0 else (first, single - apart)
+        if high <= low:
+            continue
+        which = 1 if slower == 0 else 0
+        beside[which], cost = _scanned(beside, which, low, high, fixed, bins, with_ramp, table)
+        if cost == np.inf:
+            continue
+        beside, cost = _descended(beside, cost, fixed, bins, with_ramp, table)
+        if cost < lowest:
+            pair, lowest = beside, cost
+    return pair
+
+
+@njit(cache=True)
+def _descended(
+    pair: Array,
+    lowest: float,
+    fixed: Array,
+    bins: Bins,
+    with_ramp: bool,
+    table: ShapeTable,
+) -> tuple[Array, float]:
+    """Polish each of two correlation times in turn."""
+    first, step, logarithms = table
+    last = first + step * (logarithms.shape[0] - 1)
+    apart = np.log(_CLOSEST_PAIR)
+    best = pair.copy()
     reach = _PAIR_STEP * step
-    for _ in range(6):
+    for _ in range(_MOST_TURNS):
         before = lowest
         for g in range(2):
             low, high = max(first, best[g] - reach), min(last, best[g] + reach)
@@ -342,20 +396,11 @@ def two_processes(
                 low = max(low, best[0] + apart)
             if high <= low:
                 continue
-            found, cost = _polished(
-                best,
-                g,
-                low,
-                high,
-                fixed,
-                bins,
-                with_ramp,
-                table,
-            )
+            found, cost = _polished(best, g, low, high, fixed, bins, with_ramp, table)
             if cost < lowest:
                 lowest = cost
                 best[g] = found
-        reach *= 0.5
+        reach = max(0.7 * reach, 0.1 * step)
         if before - lowest < 1e-4:
             break
-    return best
+    return best, lowest
