@@ -130,6 +130,7 @@ class Judged:
     upper: float | None = None
     bound: float | None = None
     status: str = ""
+    reason: str = ""
     model: str = ""
     verdict: str = ""
     warned_by: str = ""
@@ -258,6 +259,7 @@ def judge(case: str, number: int, log: Log, tables: Mapping[str, list[Any]]) -> 
                 upper=row["upper"],
                 bound=log.bounds.get(parameter),
                 status=row["status"],
+                reason=row["reason"] or "",
                 model=row["model"] or "",
                 verdict=verdict,
                 warned_by=", ".join(dict.fromkeys(warned)),

@@ -124,6 +124,40 @@ def test_a_weak_part_of_a_cycle_rivals_the_walk_that_it_looks_like() -> None:
     assert "periodic drift" in (found.against_random_walk or "")
 
 
+def with_pauses(log: Array, size: float) -> Array:
+    """Leave out 60 s at six places; the bias after each is another, by six draws of a size."""
+    rng = np.random.default_rng(6)
+    for place in np.linspace(0.1, 0.9, 6):
+        start = int(place * len(log))
+        log[start : start + int(60.0 * RATE)] = np.nan
+        log[start:] += size * rng.standard_normal()
+    return log
+
+
+@pytest.mark.parametrize("seed", range(30, 34))
+@pytest.mark.parametrize("size", [1.0, 3.0, 20.0])
+def test_another_bias_after_each_pause_is_no_random_walk(seed: int, size: float) -> None:
+    found = courses_of(with_pauses(static_log(seed, walk=0.0), size * SIGMA))
+    assert found.searched is not None
+    K_left = found.searched.fit.noise.parameter("K")
+    # Steps of 20 sigma look like 3.5e-5; a log of noise alone may show a little.
+    alone = courses_of(static_log(seed, walk=0.0)).searched
+    assert alone is not None
+    assert K_left < 2.0 * alone.fit.noise.parameter("K") + 2e-6 or "pauses" in (found.against_random_walk or "")
+    if size >= 20.0:
+        assert {course.kind for course in found.found} == {"bias_step"}
+        inside = [round((course.start / 10_800 - 0.1) / 0.16, 1) % 1 for course in found.found]
+        assert inside == [0.0] * len(inside)
+
+
+def test_a_walk_through_pauses_stays_one() -> None:
+    for seed in range(21, 25):
+        found = courses_of(with_pauses(static_log(seed, walk=2e-5), 0.0))
+        assert found.against_random_walk is None
+        assert found.searched is not None
+        assert found.searched.fit.noise.parameter("K") > 1e-5
+
+
 def test_a_walk_that_is_well_seen_has_no_rival() -> None:
     for seed in range(20, 24):
         assert courses_of(static_log(seed, walk=2e-5)).against_random_walk is None

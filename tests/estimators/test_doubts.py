@@ -40,6 +40,22 @@ def test_a_ramp_that_passes_for_a_walk_is_doubted(seed: int) -> None:
     assert found.estimates[0].parameters["K"].status in ("doubtful", "not_identified")
 
 
+def test_a_process_joined_to_a_walk_is_doubted_where_aic_has_others() -> None:
+    # Process and walk pass for one slower process, and AIC sees that they are two.
+    wrong = []
+    for seed in range(12):
+        model = NoiseModel(N=7e-4, B=7e-4, T_B=12.8, K=1.8e-4)
+        log = simulate(model, 50.0, 128_000, np.random.default_rng(seed))
+        found = fit(log, 50.0)
+        T_B = found.estimates[0].parameters["T_B"]
+        best = min(found.candidates, key=lambda one: one.aic)
+        if best.aic < found.candidates[0].aic - 4.0 and best.found.terms.gauss_markov == 2:
+            assert T_B.status != "ok"
+        if T_B.status == "ok" and not 6.4 < T_B.value < 25.6:
+            wrong.append(seed)
+    assert wrong == []
+
+
 def test_with_b_the_figures_of_the_curve_are_doubted() -> None:
     curve = {name: Parameter(1.0) for name in ("B_curve", "sigma_min")}
     estimate = Estimate("likelihood", {"B": Parameter(1.0), "K": Parameter(1.0)}, curve=curve)

@@ -168,6 +168,25 @@ def test_the_exact_density_of_two_processes_gives_both_back() -> None:
     assert found.parameter("N") == pytest.approx(1e-3, rel=5e-3)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_sharp_process_does_not_hide_another_beside_a_walk(seed: int) -> None:
+    # A process a hundred times as dense as the white noise has a sharp time, beside which no pair
+    # of a coarse grid shows what else is there.
+    model = NoiseModel(N=5e-4, B=5e-3, T_B=0.6, K=4e-4, further=[GaussMarkov(3e-3, 20.0)])
+    log = simulate(model, 50.0, 72_000, np.random.default_rng(seed))
+    whittle = whittle_to(spectrum_of(log, 50.0))
+    wider = whittle.maximum(Terms("NK", 2))
+    truth = model.N**2, model.K**2, model.B**2, model.further[0].B ** 2
+    times = np.array([0.6, 20.0])
+    density = whittle.matrix(Terms("NK", 2), times) @ np.array(truth)
+    data, nu = whittle.spectrum.density, whittle.spectrum.ordinates
+    at_truth = 0.5 * float(np.sum(nu * (np.log(density / whittle.scale) + data / density)))
+    assert wider.cost < at_truth
+    assert wider.cost < whittle.maximum(Terms("N", 2)).cost
+    assert wider.cost < whittle.maximum(Terms("NK", 1)).cost
+    assert wider.times[0] == pytest.approx(0.6, rel=0.15)
+
+
 def test_the_exact_density_of_flicker_and_quantization_gives_them_back() -> None:
     n = 8000
     spectrum = spectrum_of(np.random.default_rng(0).standard_normal(n))

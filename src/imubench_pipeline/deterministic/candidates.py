@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 _HELD_OUT = 16
 """Lowest ordinates that a noise is carried on to, not fitted to."""
 
+_NEAR_A_PAUSE = 2.0
+"""Blocks from the end of a pause to a step that may be in it."""
+
 _NEARLY = 6.0
 """Below the threshold by so much, a candidate is still judged by the noise fitted anew."""
 
@@ -52,7 +55,9 @@ def candidates(ordinates: Ordinates, fit: Fit) -> list[tuple[Score, Array]]:
         What is there already.
     """
     found: dict[Regressor, tuple[Score, Array]] = {}
-    for score in best_scores(ordinates, fit, fit.density):
+    pauses = restarts(ordinates)
+    for seen in best_scores(ordinates, fit, fit.density):
+        score = _at_its_pause(seen, pauses, fit)
         slow = score.regressor.kind in _SLOW
         if score.gain > (_SEEN if slow else score.threshold - _NEARLY):
             found[score.regressor] = score, fit.density
@@ -61,6 +66,30 @@ def candidates(ordinates: Ordinates, fit: Fit) -> list[tuple[Score, Array]]:
         if score.gain > score.threshold:
             found[score.regressor] = score, carried_on
     return list(found.values())
+
+
+def restarts(ordinates: Ordinates) -> tuple[Regressor, ...]:
+    """Return a step at each pause of a log."""
+    return tuple(
+        Regressor("restart", number, middle, length)
+        for number, part in enumerate(ordinates.means.parts)
+        for middle, length in part.pauses
+    )
+
+
+def beside(regressor: Regressor, pause: Regressor) -> bool:
+    """Return whether a step lies in a pause, or so near that it may be one in it."""
+    near = abs(regressor.where - pause.where) <= 0.5 * pause.length + _NEAR_A_PAUSE
+    return regressor.part == pause.part and near
+
+
+def _at_its_pause(score: Score, pauses: Sequence[Regressor], fit: Fit) -> Score:
+    """Put a step that lies in a pause at the pause, over which the means are no step."""
+    if score.regressor.kind == "step":
+        for pause in pauses:
+            if pause not in fit.regressors and beside(score.regressor, pause):
+                return replace(score, regressor=pause)
+    return score
 
 
 def with_candidate(

@@ -16,7 +16,13 @@ from dataclasses import dataclass
 
 from scipy.special import chdtri
 
-from imubench_pipeline.deterministic.candidates import SAFETY, candidates, with_candidate
+from imubench_pipeline.deterministic.candidates import (
+    SAFETY,
+    beside,
+    candidates,
+    restarts,
+    with_candidate,
+)
 from imubench_pipeline.deterministic.ordinates import NOISE, Fit, Ordinates
 from imubench_pipeline.deterministic.regressors import Regressor
 from imubench_pipeline.deterministic.scores import FALSE_ALARM
@@ -87,7 +93,7 @@ def rival_of_walk(ordinates: Ordinates, fit: Fit) -> Rival | None:
         return None
     bare = ordinates.fit(fit.regressors, fit.density, _WITHOUT_WALK)
     walk = 2.0 * (fit.log_likelihood - bare.log_likelihood)
-    best = _anew_at_pauses(ordinates, bare, walk)
+    best = anew_at_pauses(ordinates, bare, walk)
     for score, density in candidates(ordinates, bare):
         wanted = walk + score.threshold * SAFETY[score.regressor.kind]
         hopeless = score.gain < wanted - _NEAR - _FITTED_ANEW
@@ -100,29 +106,27 @@ def rival_of_walk(ordinates: Ordinates, fit: Fit) -> Rival | None:
     return best
 
 
-def _anew_at_pauses(ordinates: Ordinates, bare: Fit, walk: float) -> Rival | None:
-    """Return the rival that is a step at each pause, or None where there are none.
+def anew_at_pauses(ordinates: Ordinates, fit: Fit, walk: float = 0.0) -> Rival | None:
+    """Return a fit with a step at each pause that has none, or None where there are none.
 
-    As good is what has the same AIC.
+    Parameters
+    ----------
+    ordinates : Ordinates
+    fit : Fit
+    walk : float
+        What a random walk in their place gains over the fit, twice the log likelihood.
+
+    Returns
+    -------
+    Rival or None
+        As good as a walk is what has the same AIC.
     """
-    steps = tuple(
-        Regressor("restart", number, middle, length)
-        for number, part in enumerate(ordinates.means.parts)
-        for middle, length in part.pauses
-        if not _is_there(bare, number, middle, length)
-    )
+    taken = [x for x in fit.regressors if x.kind in ("step", "restart")]
+    steps = tuple(x for x in restarts(ordinates) if not any(beside(one, x) for one in taken))
     if not steps:
         return None
-    tried = ordinates.fit((*bare.regressors, *steps), bare.density, bare.noise.terms)
-    gain = 2.0 * (tried.log_likelihood - bare.log_likelihood)
+    tried = ordinates.fit((*fit.regressors, *steps), fit.density, fit.noise.terms)
+    gain = 2.0 * (tried.log_likelihood - fit.log_likelihood)
     threshold = float(chdtri(len(steps), FALSE_ALARM["restart"]))
     as_many = 2.0 * (len(steps) - 1)
     return Rival(tried, steps, gain - walk - threshold, threshold - as_many + _AS_GOOD)
-
-
-def _is_there(fit: Fit, part: int, middle: float, length: float) -> bool:
-    """Return whether a step of a fit lies in or beside a pause."""
-    return any(
-        x.part == part and x.kind in ("step", "restart") and abs(x.where - middle) <= length
-        for x in fit.regressors
-    )

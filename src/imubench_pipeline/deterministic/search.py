@@ -22,7 +22,7 @@ from imubench_pipeline.deterministic.candidates import (
     polished,
     with_candidate,
 )
-from imubench_pipeline.deterministic.contest import Rival, rival_of_walk
+from imubench_pipeline.deterministic.contest import Rival, anew_at_pauses, rival_of_walk
 from imubench_pipeline.deterministic.ordinates import Fit, Ordinates
 from imubench_pipeline.deterministic.regressors import Kind, Regressor
 from imubench_pipeline.deterministic.scores import Gain
@@ -83,6 +83,11 @@ def search(ordinates: Ordinates) -> Searched:
     rival: Rival | None = None
     while len(fit.regressors) < MOST:
         taken = _next(ordinates, fit)
+        if taken is None:
+            # Steps at the pauses that hide in a slow process together, none being large.
+            together = anew_at_pauses(ordinates, fit)
+            if together is not None and together.better:
+                taken = together.fit
         if taken is None:
             rival = rival_of_walk(ordinates, fit)
             if rival is None or not rival.better:
