@@ -29,15 +29,16 @@ _LITTLE = 0.25
 """Part of K that is left beside a ramp below which the ramp may stand for the walk: so it does, and
 AIC clearly prefers it, for 1 % of the walks that are walks."""
 
-_HARDLY = 6.0
-"""BIC up to which a model with fewer terms is as good."""
+_HARDLY = 9.0
+"""BIC up to which a model with fewer terms may be the true one: up to so much, flicker noise beside
+a process stands for chance in one log of a few hundred."""
 
 _NEEDLESS = 8.0
 """BIC up to which quantization noise or a ramp may be chance, or part of a walk."""
 
 _OTHERWISE = 4.0
-"""AIC by which a model with other terms of bias instability must be the better for B and T_B to be
-doubted."""
+"""AIC by which a model with other terms of bias instability must be better than processes alone
+for B and T_B to be doubted."""
 
 _AS_GOOD = 4.0
 """BIC up to which a model without bias instability is about as good as one with it."""
@@ -172,17 +173,21 @@ def _with_fewer_terms(chosen: Candidate, candidates: Sequence[Candidate]) -> str
 
 
 def _with_other_terms(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
-    """Say so where AIC clearly prefers other terms of bias instability.
+    """Say so where AIC clearly prefers other terms of bias instability to processes without a walk.
 
-    BIC asks more of processes that are as slow as a walk, and may so join two terms to one.
+    BIC asks more of processes that are as slow as a walk, and may so join one to another process.
     """
     best = min(candidates, key=lambda one: one.aic)
-    if _kinds_of_bias(best) == _kinds_of_bias(chosen) or _biases(chosen) == 0:
+    terms = chosen.found.terms
+    if terms.gauss_markov == 0 or "K" in terms.linear:
+        return None
+    if _kinds_of_bias(best) == _kinds_of_bias(chosen):
         return None
     better = chosen.aic - best.aic
     if better < _OTHERWISE:
         return None
-    return f"{best.found.terms.name}, with other terms for B, is better by {better:.1f} in AIC"
+    name = best.found.terms.name
+    return f"{name}, with other terms of bias instability, is better by {better:.1f} in AIC"
 
 
 def _hardly_needed(name: str, chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
