@@ -173,8 +173,9 @@ class Courses:
 def _in_words(courses: Sequence[Regressor], means: Means) -> str:
     regressor = courses[0]
     if regressor.kind == "restart":
-        many = f"steps of the bias at the {len(courses)} pauses" if len(courses) > 1 else "a step"
-        return many + (" of the log" if len(courses) > 1 else " of the bias at the pause of the log")
+        if len(courses) == 1:
+            return "a step of the bias at a pause of the log"
+        return f"steps of the bias at {len(courses)} pauses of the log"
     start = means.parts[regressor.part].start / means.rate
     where = regressor.where * means.interval
     if regressor.kind == "step":
