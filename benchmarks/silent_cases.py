@@ -825,6 +825,53 @@ def ramp(rng: Rng) -> Log:
     return replace(log, truth=log.truth | {"R": Truth(abs(R), abs(R), loose=True)})
 
 
+def _drifting(rng: Rng, course: Callable[[Array], NDArray[np.floating]]) -> Log:
+    """Add to white noise and a process 1 to 30 sigma of it, peak to peak, of a course over 0..1."""
+    samples, rate = any_length(rng)
+    noise = any_process(rng, samples, rate)
+    mean = course(np.arange(samples) / samples)
+    size = between(rng, 1.0, 30.0) * noise.sigma / float(np.ptp(mean))
+    return _with_mean(rng, noise, samples, rate, size * mean)
+
+
+def part_of_day(rng: Rng) -> Log:
+    """N, B, T_B, and 0.1 to 1 of a cycle."""
+    cycles, phase = rng.uniform(0.1, 1.0), rng.uniform(0.0, 2.0 * np.pi)
+    return _drifting(rng, lambda t: np.sin(2.0 * np.pi * cycles * t + phase))
+
+
+def parabola(rng: Rng) -> Log:
+    """N, B, T_B, and a parabola whose vertex lies in the log or up to its length from it."""
+    vertex = rng.uniform(-1.0, 2.0)
+    return _drifting(rng, lambda t: (t - vertex) ** 2)
+
+
+def linear_pieces(rng: Rng) -> Log:
+    """N, B, T_B, and a drift whose slope changes 2 to 8 times, as of weather."""
+    kinks = np.concatenate(([0.0], np.sort(rng.random(rng.integers(2, 9))), [1.0]))
+    values = rng.standard_normal(len(kinks))
+    return _drifting(rng, lambda t: np.interp(t, kinks, values))
+
+
+def smooth_drift(rng: Rng) -> Log:
+    """N, B, T_B, and a smooth random course that turns a few times (a kernel of 0.1 to 0.5)."""
+    centres, width = rng.uniform(-0.5, 1.5, 60), rng.uniform(0.1, 0.5)
+    heights = rng.standard_normal(60)
+
+    def course(t: Array) -> Array:
+        coarse = np.linspace(0.0, 1.0, 2001)
+        bells = np.exp(-0.5 * ((coarse[:, None] - centres) / width) ** 2) @ heights
+        return np.asarray(np.interp(t, coarse, bells))
+
+    return _drifting(rng, course)
+
+
+def two_warm_ups(rng: Rng) -> Log:
+    """N, B, T_B, and two exponentials, of T/50 to T/10 and T/5 to T."""
+    fast, slow, share = between(rng, 0.02, 0.1), between(rng, 0.2, 1.0), rng.uniform(-1.0, 1.0)
+    return _drifting(rng, lambda t: np.exp(-t / slow) + share * np.exp(-t / fast))
+
+
 # What the noise does
 
 
@@ -1079,6 +1126,11 @@ HARD: Mapping[str, Case] = {
         pulses,
         slow_line,
         ramp,
+        part_of_day,
+        parabola,
+        linear_pieces,
+        smooth_drift,
+        two_warm_ups,
         growing_noise,
         bursts,
         heavy_tails,

@@ -25,6 +25,11 @@ _CLEARLY = 2.0
 three quarters of the walks that are processes of a twentieth of the log, and for 2 to 3 % of those
 that are walks."""
 
+_RATHER = 0.5
+_LEAST_BELOW = 0.16
+"""The same, and the lower limit of K over its value: both together are a doubt, for most of the
+walks that are such processes and are left, and for 2 % of those that are walks."""
+
 _LITTLE = 0.25
 """Part of K that is left beside a ramp below which the ramp may stand for the walk: so it does, and
 AIC clearly prefers it, for 1 % of the walks that are walks."""
@@ -100,7 +105,11 @@ def doubted(
         estimate, papers = (
             _with_doubt_of_the_floor(one, frame.low_pass) for one in (estimate, papers)
         )
-    rival = drift or _without_a_walk(chosen, candidates) or _beside_a_ramp(chosen, candidates)
+    rival = (
+        drift
+        or _without_a_walk(chosen, candidates, estimate.parameters["K"])
+        or _beside_a_ramp(chosen, candidates)
+    )
     if rival is not None:
         estimate, papers = (doubting(one, ("K",), rival) for one in (estimate, papers))
     other = _with_fewer_terms(chosen, candidates) or _with_other_terms(chosen, candidates)
@@ -121,7 +130,7 @@ def doubted(
     return estimate, papers
 
 
-def _without_a_walk(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
+def _without_a_walk(chosen: Candidate, candidates: Sequence[Candidate], K: Parameter) -> str | None:
     """Say so where AIC clearly prefers a model without the random walk of the chosen one.
 
     A slow process passes for a walk: BIC with what is asked of such a process takes the walk.
@@ -132,7 +141,8 @@ def _without_a_walk(chosen: Candidate, candidates: Sequence[Candidate]) -> str |
         one for one in candidates if "K" not in one.found.terms.linear and not one.found.terms.ramp
     ]
     best = min(without, key=lambda one: one.aic, default=chosen)
-    if best.aic > chosen.aic - _CLEARLY:
+    hardly_any = K.value and K.lower is not None and K.lower < _LEAST_BELOW * K.value
+    if best.aic > chosen.aic - (_RATHER if hardly_any else _CLEARLY):
         return None
     return (
         f"{best.found.terms.name}, which has no random walk, is better by "
@@ -210,9 +220,14 @@ def _biases(one: Candidate) -> int:
 
 
 def _with_one_bias(estimate: Estimate) -> Estimate:
-    """Return an estimate whose bias of the curve is as sure as the only term that it is of."""
+    """Return an estimate whose bias of the curve is as sure as its only term, and the reverse."""
     B, of_curve = estimate.parameters["B"], estimate.curve.get("B_curve")
-    if estimate.further or of_curve is None or of_curve.status != "ok":
+    if estimate.further or of_curve is None:
+        return estimate
+    if of_curve.status == "not_identified":
+        reason = f"the bias instability of the curve is not told: {of_curve.reason}"
+        return doubting(estimate, ("B", "T_B"), reason, of_curve=False)
+    if of_curve.status != "ok":
         return estimate
     if B.status not in ("not_identified", "doubtful"):
         return estimate

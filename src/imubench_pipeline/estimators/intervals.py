@@ -33,6 +33,10 @@ _MOST_ABOVE = 2.3
 """Ratio of the upper limit to a value beyond which it is no number to quote. Below, limits go far
 where a model that the log hardly rules out shares the power with another term."""
 
+_LEAST_BELOW = 0.2
+"""Ratio of the lower limit to a value below which it is none either. A random walk is doubted by
+what else explains it."""
+
 _ABSENT = "the data do not ask for it"
 _ABSENT_BELOW = f"{_ABSENT}; with 95 % it is below the upper limit"
 
@@ -208,7 +212,8 @@ def _parameter(
             "its interval is given"
         )
         return Parameter(None, "not_identified", reason, lower, upper, needed, value)
-    if name != "R" and upper > _MOST_ABOVE * value:
+    below = name not in ("R", "K") and lower < _LEAST_BELOW * value
+    if below or (name != "R" and upper > _MOST_ABOVE * value):
         reason = "it may be more than twice off; only its interval is given"
         return Parameter(None, "not_identified", reason, lower, upper, needed, value)
     return Parameter(value, "ok", None, lower, upper, needed)

@@ -275,7 +275,7 @@ def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) 
     gauss_markov = describe("likelihood_gm", whittle, papers, [papers], draws, frame.band)
     gauss_markov = with_curve(gauss_markov, [papers], (), draws, tau)
     fitted = frame.whole(spectrum).density(chosen.found) + chosen.found.ramp**2 * spectrum.ramp
-    drift = instead_of_walk(whittle, candidates)
+    drift = instead_of_walk(whittle, chosen.found)
     estimate, gauss_markov = doubted(
         estimate, gauss_markov, spectrum, frame, candidates, papers, fitted, drift
     )

@@ -1,63 +1,76 @@
-"""Whether what looks like a random walk is a smooth drift.
+"""Whether what looks like a random walk is a drift with temperature or time.
 
-A drift with temperature or time that is a smooth curve over the log, and does not end where it
-began, has a cosine transform that falls with the square of its number: its spectrum falls as f^-4,
-that of a random walk as f^-2. The two are compared as noise models with as many parameters.
+A drift that turns a few times over a log has its power in the lowest cosines of the transform,
+where a weak random walk has most of its own; beyond them, it falls as f^-4 and a walk as f^-2. So a
+walk is believed that is still needed without the lowest cosines, and whose spectrum is not steeper.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from dataclasses import replace
 
-from imubench_pipeline.estimators.model_choice import Candidate
-from imubench_pipeline.estimators.whittle import Whittle
+import numpy as np
 
-_AS_GOOD = 0.5
-"""AIC up to which a drift is as good as a walk beside the same terms: so it is for a tenth of the
-walks that are known to a fourth, and for hardly any that is known better."""
+from imubench_pipeline.estimators.whittle import Maximum, Whittle
 
-_BETTER_BESIDE_OTHERS = 4.0
-"""The same beside terms of which the best are looked for."""
+_OF_DRIFT = 8
+"""Lowest cosines of a log, half a period to four, that a drift is granted."""
 
-_TRIED = 15.0
-"""BIC over the best up to which the terms of a model are tried."""
+_NEEDED = 2.0
+"""Gain, twice the log likelihood, from which a walk is needed beyond them: so it is for 98 % of the
+walks that are known to a fifth, and for a third of the drifts that pass for a walk."""
+
+_STEEPER = 4.0
+"""The same by which a spectrum of f^-4 must be the better: so it is for 1 % of the walks, and for a
+fifth of the drifts that are left."""
+
+_WITHOUT = (0, 4)
+"""Lowest cosines without which the slope is looked at: chance in a few of them hides it."""
 
 
-def instead_of_walk(whittle: Whittle, candidates: Sequence[Candidate]) -> str | None:
-    """Say so where a smooth drift explains a spectrum as well as its random walk does, or better.
+def instead_of_walk(whittle: Whittle, chosen: Maximum) -> str | None:
+    """Say so where a drift explains a spectrum about as well as its random walk does.
 
     Parameters
     ----------
     whittle : Whittle
-        The likelihood to which the candidates were fitted.
-    candidates : sequence of Candidate
-        The best first.
+    chosen : Maximum
+        The model that the data favour, fitted to it.
 
     Returns
     -------
     str or None
-        None where the best model has no random walk, or only that explains as much.
+        None where the model has no random walk, or only that explains as much.
     """
-    chosen = candidates[0]
-    if "K" not in chosen.found.terms.linear or chosen.found.parameter("K") == 0.0:
+    terms = chosen.terms
+    if "K" not in terms.linear or chosen.parameter("K") == 0.0:
         return None
-    frequency = whittle.spectrum.frequency
-    drift = whittle.with_column("K", whittle.column("K") * (frequency[0] / frequency) ** 2)
-    best, beside = -math.inf, ""
-    for one in candidates:
-        terms = one.found.terms
-        if "K" not in terms.linear or one.bic > chosen.bic + _TRIED:
-            continue
-        cost = drift.maximum(terms).cost
-        better = chosen.aic - (one.aic + 2.0 * (cost - one.found.cost))
-        wanted = -_AS_GOOD if one is chosen else _BETTER_BESIDE_OTHERS
-        if better > max(wanted, best):
-            best, beside = better, terms.name.replace("+K", "")
-    if not beside:
-        return None
-    how = f"better by {best:.1f} in AIC" if best > _AS_GOOD else "as good"
-    return (
-        f"a smooth drift, whose spectrum falls as f^-4, and {beside} are {how}: a drift with "
-        "temperature or time passes for a random walk"
-    )
+    beyond = _beyond(whittle, _OF_DRIFT)
+    bare = replace(terms, linear=terms.linear.replace("K", ""))
+    if len(beyond.spectrum.density) <= terms.parameters:
+        return f"the log has too few frequencies beyond the {_OF_DRIFT} lowest, which drift has too"
+    if 2.0 * (beyond.maximum(bare).cost - beyond.maximum(terms).cost) < _NEEDED:
+        return (
+            f"beyond the {_OF_DRIFT} lowest frequencies {bare.name} explains the log as well, and "
+            "in these a drift with temperature or time passes for a random walk"
+        )
+    first = float(whittle.spectrum.frequency[0])
+    for number in _WITHOUT:
+        rest = _beyond(whittle, number)
+        steep = (first / rest.spectrum.frequency) ** 2
+        drift = rest.with_column("K", rest.column("K") * steep)
+        better = 2.0 * (rest.maximum(terms).cost - drift.maximum(terms).cost)
+        if better > _STEEPER:
+            return (
+                f"a smooth drift, whose spectrum falls as f^-4, and {bare.name} are better by "
+                f"{better:.1f} in AIC: a drift with temperature or time passes for a random walk"
+            )
+    return None
+
+
+def _beyond(whittle: Whittle, number: int) -> Whittle:
+    """Return the likelihood without the lowest cosines of each part of the log."""
+    spectrum = whittle.spectrum
+    place = 2.0 * spectrum.frequency * spectrum.length
+    kept = place > number + 0.5
+    return whittle if bool(np.all(kept)) else whittle.taken(spectrum, kept)

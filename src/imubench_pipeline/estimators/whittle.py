@@ -192,7 +192,7 @@ class Whittle:
         other = self.of(spectrum.taken(chosen))
         if other.behind is not None:
             other.behind = other.behind.taken(chosen)
-        other.columns = {letter: self.column(letter)[chosen] for letter in "NFK"}
+        other.columns = {letter: self.column(letter)[chosen] for letter in "QNFK"}
         other.table = np.ascontiguousarray(self.table[:, chosen])
         return other
 
