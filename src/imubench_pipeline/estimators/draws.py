@@ -84,18 +84,13 @@ def joint_draws(
     drawn = [_of_model(terms, posterior, most) for terms, posterior, _ in parts]
     first = np.concatenate([one for one, _ in drawn])
     further = np.concatenate([one for _, one in drawn])
-    mass = np.concatenate([share * _weights(posterior) for _, posterior, share in parts])
+    counts = [len(posterior.parameters) for _, posterior, _ in parts]
+    mass = np.repeat([share / n for (_, _, share), n in zip(parts, counts, strict=True)], counts)
     times = np.column_stack((first[:, FAMILY.index("T_B")], further[:, :, 1]))
     slow = (times > LIKE_A_WALK * longest).any(axis=1)
     mass = np.cumsum(np.where(slow, math.exp(-0.5 * UNIT_ROOT), 1.0) * mass)
     rows = np.searchsorted(mass, (np.arange(number) + 0.5) / number * mass[-1])
     return JointDraws(first[rows], further[rows])
-
-
-def _weights(posterior: Posterior) -> Array:
-    """Return the weights of the draws of a posterior, of the sum 1."""
-    drawn = len(posterior.parameters)
-    return np.full(drawn, 1.0 / drawn)
 
 
 def _of_model(terms: Terms, posterior: Posterior, most: int) -> tuple[Array, Array]:
