@@ -351,6 +351,7 @@ rule sensor_tables:
     params:
         truths=lambda w: plan.truths(w.sensor),
         catalogue=plan.catalogue(),
+        decide=plan.settings("decide"),
         code=plan.code("sensor_tables"),
         attempt=lambda w: plan.attempt("sensor_tables", w.sensor),
     run:
@@ -385,7 +386,8 @@ rule tables:
 
 rule ranking:
     input:
-        RESULTS + "/tables/error_budget.parquet",
+        errors=RESULTS + "/tables/error_budget.parquet",
+        recordings=RESULTS + "/tables/recordings.parquet",
     output:
         as_files("ranking"),
     group:

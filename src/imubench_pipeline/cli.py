@@ -120,7 +120,9 @@ def _add_export(exporting: argparse.ArgumentParser) -> None:
     exporting.add_argument(
         "--inflate", type=float, default=1.0, metavar="FACTOR", help="multiplies every deviation"
     )
-    exporting.add_argument("--because", help="reason of --inflate, for the file")
+    exporting.add_argument(
+        "--because", help="reason of --inflate, or of the use of unfit recordings"
+    )
     exporting.add_argument(
         "--overbound",
         action="store_true",

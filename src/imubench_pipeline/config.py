@@ -155,6 +155,15 @@ class ErrorBudgetSettings(Strict):
     seed: int = Field(20260101, ge=0)
 
 
+class DecideSettings(Strict):
+    """Which recordings decide although something speaks against it."""
+
+    include: tuple[HeldBack, ...] = Field(
+        (),
+        description="unfit recordings that enter rankings, pools and exports all the same",
+    )
+
+
 class ExportSettings(Strict):
     """The files that filters and simulators load, of every sensor."""
 
@@ -166,7 +175,10 @@ class ExportSettings(Strict):
         "60 s", description="of coasting, for which terms that a program lacks are mapped"
     )
     inflation: float = Field(1.0, ge=1, description="multiplies every deviation")
-    because: Text | None = Field(None, description="reason of the inflation, for the files")
+    because: Text | None = Field(
+        None,
+        description="reason of the inflation, or of the use of unfit recordings, for the files",
+    )
     overbound: bool = Field(
         False, description="the smallest model above the upper limit of the curve instead"
     )
@@ -282,6 +294,7 @@ class Run(Strict):
     quality: QualitySettings = QualitySettings()
     datasheet: DatasheetSettings = DatasheetSettings()
     error_budget: ErrorBudgetSettings = ErrorBudgetSettings()
+    decide: DecideSettings = DecideSettings()
     exports: ExportSettings = ExportSettings()
     fusion: FusionSettings = FusionSettings()
     earth_rate: EarthRateSettings = EarthRateSettings()

@@ -24,6 +24,8 @@ _METADATA = b"imubench.failure"
 _BESIDE = ("earth_rotation", "calibration")
 """Steps that need more than a static log: the rest of what it tells stands without them."""
 
+_NOT_JUDGED = {"fitness": None, "decides": False}
+
 _NAMED = ("recordings", "findings", "estimate_findings", "failures")
 """Tables that say why a recording is left out of the others."""
 
@@ -104,7 +106,9 @@ def with_failures(
     marked["recordings"] = build(
         "recordings",
         (
-            row | {"status": "failed", "reason": reasons[key]} if key in reasons else row
+            row | {"status": "failed", "reason": reasons[key]} | _NOT_JUDGED
+            if key in reasons
+            else row
             for row in tables["recordings"].to_pylist()
             for key in [(row["sensor"], row["recording"])]
         ),

@@ -25,6 +25,7 @@ from imubench_pipeline.estimators.estimate import (
 from imubench_pipeline.failures import read_with_failures, with_failures, without
 from imubench_pipeline.faults import Failure
 from imubench_pipeline.findings import Finding
+from imubench_pipeline.fitness import doubts, judged, left_out, undecided
 from imubench_pipeline.pooled import pooled_rows
 from imubench_pipeline.published import published_rows
 from imubench_pipeline.quality.spectral import band_finding, line_findings
@@ -254,7 +255,7 @@ def _by(table: pa.Table, *names: str) -> dict[tuple[str, ...], pa.Table]:
 
 
 def joined_tables(
-    parts: Mapping[str, list[Path]], truths: str, catalogue: str
+    parts: Mapping[str, list[Path]], truths: str, catalogue: str, decide: str = "{}"
 ) -> dict[str, pa.Table]:
     """Join the results of the recordings of a sensor.
 
@@ -266,6 +267,8 @@ def joined_tables(
         Those that are simulated, as the plan wrote them.
     catalogue : str
         The sensor files, likewise.
+    decide : str
+        The section of the configuration that says which recordings decide, as JSON.
 
     Returns
     -------
@@ -284,23 +287,25 @@ def joined_tables(
     about = [quality.recording for quality in qualities]
     devices = {(row["sensor"], row["recording"]): row["device"] for row in about}
     recommended = joined["parameters"].filter(joined["parameters"]["recommended"])
-    joined["pooled"] = build(
-        "pooled",
-        pooled_rows(recommended.to_pylist(), joined["fixed_bias"].to_pylist(), devices),
-    )
-    joined["drift"] = build(
-        "drift", drift_rows(recommended.to_pylist(), joined["fixed_bias"].to_pylist(), about)
-    )
-    joined["recordings"] = build("recordings", about)
+    estimated, biases = recommended.to_pylist(), joined["fixed_bias"].to_pylist()
+    joined["drift"] = build("drift", drift_rows(estimated, biases, about))
     of_logs = without_doubles(
         (row for quality in qualities for row in quality.findings),
         joined["deterministic"],
         {(row["sensor"], row["recording"]): row.get("duration") or 0.0 for row in about},
     )
-    unusual = unusual_rows(recommended.to_pylist(), catalogue)
+    unusual = unusual_rows(estimated, catalogue)
     of_estimates = joined.pop("estimate_findings").to_pylist()
     found = [*of_logs, *of_estimates, *spectral_rows(joined), *unusual]
     joined["findings"] = build("findings", found)
+    doubted = list(doubts(joined["findings"].to_pylist(), estimated, joined["models"].to_pylist()))
+    about = judged(about, doubted, json.loads(decide).get("include", ()))
+    joined["recordings"] = build("recordings", about)
+    joined["doubts"] = build("doubts", (one.row() for one in doubted))
+    apart = left_out(about)
+    joined["pooled"] = build(
+        "pooled", pooled_rows(undecided(estimated, apart), undecided(biases, apart), devices)
+    )
     truth = list(truth_rows(truths))
     joined["simulated_truth"] = build("simulated_truth", truth)
     joined["published"] = build("published", published_rows(truths, truth, joined))

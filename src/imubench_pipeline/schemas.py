@@ -16,6 +16,7 @@ from imubench_pipeline.deterministic.columns import DETERMINISTIC_TABLES
 from imubench_pipeline.earth_rate.columns import EARTH_RATE_TABLES
 from imubench_pipeline.estimators.columns import DRAWN_TABLES
 from imubench_pipeline.faults import FAILURES
+from imubench_pipeline.fitness import DOUBTS, JUDGED
 from imubench_pipeline.fusion.columns import FUSION_TABLES
 
 __all__ = [
@@ -58,7 +59,9 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _number("duration", "s", "from the first to the last sample"),
         _number("temperature_min", "degC", "lowest temperature"),
         _number("temperature_max", "degC", "highest temperature"),
+        *JUDGED,
     ),
+    "doubts": DOUBTS,
     "findings": (
         _SENSOR,
         _RECORDING,
@@ -329,6 +332,8 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _number("share", "-", "its part of the variance"),
         _number("reached_after", "s", "time after which the limit is reached"),
         _text("reason", "what is not known", required=False),
+        _text("doubts", "of the recording that answers; empty: none", required=False),
+        _text("left_out", "recordings that do not decide, and why", required=False),
     ),
     "published": (
         *_KEYS,
@@ -387,6 +392,7 @@ OUTLOOK = ("alignment", "earth_rate_prediction")
 BY_RECORDING = (
     "recordings",
     "findings",
+    "doubts",
     "allan",
     "parameters",
     "reconstruction",

@@ -8,12 +8,16 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from imubench_pipeline.fitness import left_out
 from imubench_pipeline.requirements import Requirement
 
 Row = Mapping[str, Any]
 
 _SURE = 0.975
 """Chance from which a verdict is sure."""
+
+_NOTHING = {"sigma": None, "lower": None, "upper": None, "within": None, "reached_after": None}
+"""What is known from a recording that does not decide."""
 
 _VAGUE = 4.0
 """Upper over lower limit of an error beyond which the logs say too little."""
@@ -77,6 +81,7 @@ def ranking_rows(
     errors: Iterable[Row],
     requirements: Mapping[str, Requirement],
     sensors: Mapping[str, Mapping[str, Any]],
+    recordings: Iterable[Row] = (),
 ) -> Iterator[Row]:
     """Rank the sensors for each requirement.
 
@@ -91,15 +96,22 @@ def ranking_rows(
     requirements : mapping of str to Requirement
     sensors : mapping of str to mapping
         ``price_class`` of each sensor.
+    recordings : iterable of mapping
+        Rows of the table ``recordings``: those that do not decide are left out.
 
     Yields
     ------
     mapping
         One a requirement, sensor and limit.
     """
+    about = {(row["sensor"], row["recording"]): row for row in recordings}
+    apart = left_out(about.values())
     by_requirement = defaultdict(list)
     for row in errors:
-        by_requirement[row["requirement"]].append(row)
+        key = row["sensor"], row["recording"]
+        by_requirement[row["requirement"]].append(
+            row if key not in apart else {**row, **_NOTHING, "reason": apart[key]}
+        )
     for name, requirement in requirements.items():
         standings = _standings(by_requirement[name], requirement)
         deciding = {sensor: _deciding(found) for sensor, found in standings.items()}
@@ -126,6 +138,13 @@ def ranking_rows(
                     "at_most": standing.total["limit"] * requirement.sigmas,
                     "decides": standing is one,
                     **_limit_row(standing),
+                    "doubts": about.get((sensor, standing.total["recording"]), {}).get(
+                        "doubts", ""
+                    ),
+                    "left_out": "; ".join(
+                        reason for (of, _), reason in apart.items() if of == sensor
+                    )
+                    or None,
                 }
 
 

@@ -128,20 +128,24 @@ def verdict(*groups: dict[str, Any]) -> str:
 
 def test_the_best_sensor_is_named_with_the_figure_that_decides_and_its_data() -> None:
     said = verdict(group("a", "passes", 1))
-    assert said == f"A is the best of 1 and passes. {FIGURES} Data of a."
+    assert said == f"A, the only one, passes. {FIGURES} Data of a."
 
 
 @pytest.mark.parametrize("how", ["probably passes", "probably fails", "surely fails"])
 def test_a_best_sensor_that_may_fail_is_not_said_to_pass(how: str) -> None:
     said = verdict(group("a", how, 1), group("b", "surely fails", 2))
     begin = f"No sensor surely passes. The best of 2, A, {how}. {FIGURES} Data of a."
+    if how != "probably passes":
+        begin = f"No sensor passes. Of 2 the nearest is A, which {how}. {FIGURES} Data of a."
     assert said == f"{begin} Surely fail: B."
 
 
 def test_a_simulated_best_sensor_is_called_so() -> None:
-    assert verdict(group("a", "passes", 1, simulated=True)).startswith("A (simulated) is the best")
+    assert verdict(group("a", "passes", 1, simulated=True)).startswith(
+        "A (simulated), the only one, passes"
+    )
     said = verdict(group("a", "probably fails", 1, simulated=True))
-    assert said.startswith("No sensor surely passes. The best of 1, A (simulated), probably fails.")
+    assert said.startswith("No sensor surely passes. A (simulated), the only one, probably fails.")
 
 
 def test_what_the_decisive_figure_leaves_out_is_said() -> None:
@@ -207,7 +211,9 @@ def test_where_no_sensor_can_be_ranked_none_is_the_best() -> None:
 
 def test_a_ranked_sensor_stands_before_one_that_cannot_be_judged() -> None:
     said = verdict(group("b", "not enough data"), group("a", "passes", 1))
-    assert said.startswith("A is the best of 2 and passes. ")
+    assert said.startswith("A, the only one of 2 that could be judged, passes. ")
+    said = verdict(group("b", "not enough data"), *(group(one, "passes", 1) for one in "ac"))
+    assert said.startswith("A is the best of 2 that could be judged and passes. ")
 
 
 def asked(**changes: Any) -> str:

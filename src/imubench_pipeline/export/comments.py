@@ -30,6 +30,7 @@ def heading(imu: Imu, program: str, convention: str) -> list[str]:
     said = [f"Noise of the {imu.sensor} for {program}, by imubench."]
     if imu.simulated:
         said.append("The recordings are SIMULATED, not measured.")
+    said += [f"CAUTION: {caution}." for caution in imu.cautions]
     said.append(convention)
     units = {"gyro": "rad, s", "accel": "m, s"}
     estimated = {"gyro": imu.gyro, "accel": imu.accel}

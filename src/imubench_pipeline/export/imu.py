@@ -59,9 +59,11 @@ class Imu:
     inflation : float
         Factor on all densities and amplitudes, not on variances.
     because : str or None
-        The reason for it.
+        The reason for it, or for the use of a recording that does not decide.
     simulated : bool
         The recordings are simulated.
+    cautions : sequence of str
+        What speaks against the recordings that were used, and which were left out.
 
     Raises
     ------
@@ -78,6 +80,7 @@ class Imu:
     inflation: float = 1.0
     because: str | None = None
     simulated: bool = False
+    cautions: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         for name in ("rate", "horizon", "gravity", "inflation"):

@@ -16,6 +16,7 @@ from imubench_pipeline.export.choice import WORST, Choice, choose, devices_of
 from imubench_pipeline.export.imu import AxisNoise, ExportError, Imu, normal_gravity
 from imubench_pipeline.export.mapping import named
 from imubench_pipeline.export.targets import TARGETS
+from imubench_pipeline.fitness import left_out
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.overbound import MOST_EXCESS, overbound
 from imubench_pipeline.results import draws
@@ -42,7 +43,7 @@ class Request:
         s.
     inflation : float
     because : str or None
-        Reason of the inflation.
+        Reason of the inflation, or of the use of recordings that do not decide.
     overbound : bool
         The smallest model that lies above the measured curve, in place of the fitted one.
     most_excess : float
@@ -131,7 +132,7 @@ def imu_of(tables: Tables, request: Request, folder: Path | None = None) -> Imu:
         there = sorted(set(tables["recordings"]["sensor"].to_pylist()))
         raise ExportError(f"no sensor {request.sensor!r}; there are: {', '.join(there)}")
     by_name = {row["recording"]: row for row in recordings}
-    rows = _rows(tables["parameters"], sensor=request.sensor)
+    rows, cautions = _deciding(tables, request, recordings)
     axes: dict[str, AxisNoise] = {}
     rates: list[float] = []
     simulated = False
@@ -147,6 +148,8 @@ def imu_of(tables: Tables, request: Request, folder: Path | None = None) -> Imu:
             method=request.method,
         )
         about = by_name[choice.recording]
+        if about["doubts"]:
+            cautions.append(f"{choice.recording} is in doubt: {about['doubts']}")
         simulated = simulated or bool(about["simulated"])
         rates.append(float(f"{about['rate']:.9g}"))  # stamps are not sure of more
         axes[quantity] = choice.axis
@@ -170,7 +173,28 @@ def imu_of(tables: Tables, request: Request, folder: Path | None = None) -> Imu:
         inflation=request.inflation,
         because=request.because,
         simulated=simulated,
+        cautions=tuple(dict.fromkeys(cautions)),
     )
+
+
+def _deciding(
+    tables: Tables, request: Request, recordings: Sequence[Mapping[str, Any]]
+) -> tuple[list[dict[str, Any]], list[str]]:
+    """Return the estimates that an export may stand on, and what is to be said of the others."""
+    rows = _rows(tables["parameters"], sensor=request.sensor)
+    apart = left_out(recordings)
+    if not apart:
+        return rows, []
+    reasons = "; ".join(apart.values())
+    if (request.because or "").strip():
+        return rows, [f"{reasons}; used all the same, because: {request.because}"]
+    kept = [row for row in rows if (row["sensor"], row["recording"]) not in apart]
+    if rows and not kept:
+        raise ExportError(
+            f"{request.sensor}: {reasons}; look at the findings, or say why it may be used all the "
+            "same (--because; exports: because; decide: include)"
+        )
+    return kept, [f"left out: {reasons}"]
 
 
 def _drawn(folder: Path | None, sensor: str, choice: Choice) -> Sequence[NoiseModel]:

@@ -164,7 +164,7 @@ def _basis(site: Site, row: Row) -> str:
     devices = {view.row["device"] for view in own}
     chosen = next((view for view in own if view.name == row["recording"]), None)
     if chosen is None:
-        return ""
+        return f"Left out: {row['left_out']}." if row["left_out"] else ""
     text = (
         f"Judged by recording {chosen.name} ({duration_text(chosen.row['duration'])}, "
         f"{counted(len(chosen.recommended()), 'axis', 'axes')}), one of "
@@ -181,6 +181,8 @@ def _basis(site: Site, row: Row) -> str:
     doubts = list(dict.fromkeys(finding["finding"] for finding in chosen.warnings))
     if doubts:
         text += f" Doubts: {', '.join(term(name).name for name in doubts)}."
+    if row["left_out"]:
+        text += f" Left out: {row['left_out']}."
     return text
 
 

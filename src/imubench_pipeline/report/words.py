@@ -92,11 +92,8 @@ def requirement_verdict(
     best = ranked[0]
     decides = next(limit for limit in best["limits"] if limit["decides"])
     said = names[best["sensor"]] + (" (simulated)" if best["simulated"] else "")
-    begin = f"{said} is the best of {len(groups)} and {best['verdict']}"
-    if best["verdict"] != "passes":
-        begin = f"No sensor surely passes. The best of {len(groups)}, {said}, {best['verdict']}"
     text = (
-        f"{begin}. The limit that decides is {decides['limit']}: {decides['sigma']} "
+        f"{_first(said, best['verdict'], len(ranked), len(groups))}. The limit that decides is {decides['limit']}: {decides['sigma']} "
         f"{decides['unit']} expected ({decides['interval']}), {decides['allowed']} "
         f"{decides['unit']} allowed (1σ)."
     )
@@ -107,6 +104,20 @@ def requirement_verdict(
         tied = ", ".join(names.get(one, one) for one in listed_names(best["tied_with"], names))
         text += f" It cannot be told apart from {tied}."
     return text + " " + _others([g for g in groups if g is not best], names)
+
+
+def _first(sensor: str, verdict: str, judged: int, asked: int) -> str:
+    """Return how the sensor with the largest margin stands: one that fails is not the best."""
+    of = f"{judged} that could be judged" if judged < asked else f"{judged}"
+    if judged == 1:
+        alone = f"the only one of {asked} that could be judged" if asked > 1 else "the only one"
+        surely = "" if verdict == "passes" else "No sensor surely passes. "
+        return f"{surely}{sensor}, {alone}, {verdict}"
+    if verdict == "passes":
+        return f"{sensor} is the best of {of} and passes"
+    if verdict == "probably passes":
+        return f"No sensor surely passes. The best of {of}, {sensor}, probably passes"
+    return f"No sensor passes. Of {of} the nearest is {sensor}, which {verdict}"
 
 
 def listed_names(text: str, known: Mapping[str, str]) -> list[str]:

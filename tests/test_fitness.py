@@ -1,0 +1,127 @@
+"""Whether recordings decide: what findings, statuses and verdicts on models make of them."""
+
+from typing import Any
+
+import pytest
+
+from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.fitness import doubts, fitness, judged, left_out, undecided
+from imubench_pipeline.pooled import pooled_rows
+from imubench_pipeline.requirements import Requirement
+from imubench_pipeline.selection import ranking_rows
+from imubench_pipeline.tables import build
+from tests.test_selection import errors_of
+
+ABOUT = {"sensor": "s", "recording": "a", "status": "ok"}
+KEY = {"sensor": "s", "recording": "a", "channel": "gyro_x"}
+
+
+def finding(name: str, severity: str = "warning", **changes: Any) -> dict[str, Any]:
+    about = {"finding": name, "severity": severity, "detail": f"about {name}", "value": 1.0}
+    return KEY | about | {"start": None, "end": None} | changes
+
+
+def model(verdict: str, chosen: bool = True) -> dict[str, Any]:
+    return KEY | {"chosen": chosen, "verdict": verdict}
+
+
+def parameter(status: str) -> dict[str, Any]:
+    return KEY | {"parameter": "K", "status": status, "reason": "drift"}
+
+
+def test_a_log_of_which_nothing_is_found_is_fit() -> None:
+    found = list(
+        doubts([finding("lines", "note")], [parameter("not_identified")], [model("explained")])
+    )
+    assert found == []
+    assert fitness(found) == "fit"
+    (row,) = judged([ABOUT], found, ())
+    assert (row["fitness"], row["decides"], row["doubts"]) == ("fit", True, "")
+
+
+@pytest.mark.parametrize("name", ["motion", "suspicious_unit", "large_offset", "stuck"])
+def test_what_need_not_be_a_sensor_at_rest_in_its_unit_does_not_decide(name: str) -> None:
+    severity = "fatal" if name == "stuck" else "warning"
+    found = list(doubts([finding("noise_grows"), finding(name, severity)], [], []))
+    (row,) = judged([ABOUT], found, ())
+    assert (row["fitness"], row["decides"]) == ("unfit", False)
+    assert row["doubts"].startswith(f"{name.replace('_', ' ')} (gyro_x); noise grows")
+    assert left_out([row]) == {("s", "a"): f"a does not decide: {row['doubts']}"}
+    (asked_for,) = judged([ABOUT], found, ["s/a"])
+    assert (asked_for["fitness"], asked_for["decides"]) == ("unfit", True)
+    assert left_out([asked_for]) == {}
+
+
+def test_other_doubts_leave_the_figures_and_are_said() -> None:
+    found = list(doubts([finding("bias_step")], [], [model("not explained"), model("x", False)]))
+    (row,) = judged([ABOUT], found, ())
+    assert (row["fitness"], row["decides"]) == ("fit with doubts", True)
+    assert row["doubts"] == "bias step (gyro_x); not explained (gyro_x)"
+    assert found[0].row()["parameters"] == "B, B_curve, K, R, T_B, bias, sigma_min, tau_min"
+    assert found[1].row()["parameters"] is None
+
+
+def test_a_doubtful_parameter_is_no_doubt_of_the_log() -> None:
+    (one,) = doubts([], [parameter("doubtful")], [])
+    assert one.row()["parameters"] == "K"
+    assert one.reason == "drift"
+    assert fitness([one]) == "fit"
+
+
+@pytest.mark.parametrize(("density", "factor"), [(0.08, 1 / 57.29577951), (1e-6, 57.29577951)])
+def test_a_unit_mixed_up_has_its_factor(density: float, factor: float) -> None:
+    (one,) = doubts([finding("suspicious_unit", value=density)], [], [])
+    assert one.factor == pytest.approx(factor)
+
+
+def test_a_recording_that_was_not_analysed_does_not_decide() -> None:
+    for status in ("rejected", "failed"):
+        rows = judged(
+            [ABOUT | {"status": status}], doubts([finding("rejected", "fatal")], [], []), ()
+        )
+        assert (rows[0]["fitness"], rows[0]["decides"], rows[0]["doubts"]) == (None, False, "")
+        assert left_out(rows) == {}  # that is told as rejected
+
+
+def test_pools_are_those_without_the_unfit_recording_and_count_it() -> None:
+    def row(recording: str, value: float) -> dict[str, Any]:
+        about = {"sensor": "s", "recording": recording, "channel": "gyro_x", "recommended": True}
+        limits = {"value": value, "lower": 0.99 * value, "upper": 1.01 * value}
+        return about | limits | {"parameter": "N", "status": "ok", "unit": "x"}
+
+    rows = [row("a", 1.0), row("b", 1.01), row("c", 57.3)]
+    apart = {("s", "c"): "c does not decide"}
+    (pooled,) = pooled_rows(undecided(rows, apart), [], {})
+    (without,) = pooled_rows(rows[:2], [], {})
+    assert pooled["value"] == without["value"]
+    assert (pooled["recordings"], pooled["left_out"]) == (2, 1)
+    assert "does not decide" in pooled["reason"]
+
+
+def asked() -> Requirement:
+    limits = [{"error": "heading", "after": "60 s", "at_most": "1 deg"}]
+    return Requirement.model_validate({"title": "t", "static_window": "1 h", "limits": limits})
+
+
+def test_a_ranking_stands_on_the_recordings_that_decide() -> None:
+    def gyro(N: float) -> dict[str, Estimate]:
+        return {"gyro_x": Estimate("likelihood", {"N": Parameter(N, "ok", None, N, N)})}
+
+    requirement = {"robot": asked()}
+    fine, moved = (list(errors_of({"s": gyro(N)}, requirement)) for N in (1e-4, 1e-2))
+    both = fine + [row | {"recording": "moved"} for row in moved]
+    about = [
+        ABOUT | {"recording": "r", "decides": True, "doubts": "lines (gyro_x)"},
+        ABOUT | {"recording": "moved", "decides": False, "doubts": "motion (gyro_x)"},
+    ]
+    prices = {"s": {"price_class": None}}
+    (alone,) = build("ranking", ranking_rows(fine, requirement, prices, about[:1])).to_pylist()
+    (found,) = build("ranking", ranking_rows(both, requirement, prices, about)).to_pylist()
+    assert found["left_out"] == "moved does not decide: motion (gyro_x)"
+    assert found["doubts"] == "lines (gyro_x)"
+    assert found | {"left_out": None} == alone
+    only = both[len(fine) :]
+    (none,) = build("ranking", ranking_rows(only, requirement, prices, about)).to_pylist()
+    assert none["verdict"] == "not enough data"
+    assert none["reason"] == "moved does not decide: motion (gyro_x)"
+    assert none["rank"] is None
