@@ -92,8 +92,9 @@ def requirement_verdict(
     best = ranked[0]
     decides = next(limit for limit in best["limits"] if limit["decides"])
     said = names[best["sensor"]] + (" (simulated)" if best["simulated"] else "")
+    first = _first(said, best["verdict"], len(ranked), len(groups))
     text = (
-        f"{_first(said, best['verdict'], len(ranked), len(groups))}. The limit that decides is {decides['limit']}: {decides['sigma']} "
+        f"{first}. The limit that decides is {decides['limit']}: {decides['sigma']} "
         f"{decides['unit']} expected ({decides['interval']}), {decides['allowed']} "
         f"{decides['unit']} allowed (1σ)."
     )
