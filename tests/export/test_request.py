@@ -68,6 +68,30 @@ def test_the_file_of_the_worst_axes(tables: dict[str, pa.Table]) -> None:
     assert "gyro_y of recording sim_a by method likelihood, the worst of 2 axes" in text
 
 
+def judged(tables: dict[str, pa.Table], **changes: object) -> dict[str, pa.Table]:
+    """Return the tables with what is thought of the recording."""
+    (about,) = tables["recordings"].to_pylist()
+    return tables | {"recordings": build("recordings", [about | changes])}
+
+
+def test_an_unfit_recording_is_exported_with_a_reason_alone(tables: dict[str, pa.Table]) -> None:
+    moved = judged(tables, decides=False, fitness="unfit", doubts="motion (gyro_x)")
+    with pytest.raises(ExportError, match=r"sim_a does not decide: motion \(gyro_x\); .*--because"):
+        made(moved, REQUEST)
+    text = made(moved, replace(REQUEST, because="the car stood still"))
+    assert isinstance(text, str)
+    said = " ".join(text.replace("#", "").split())
+    assert "CAUTION: sim_a does not decide: motion (gyro_x); used all the same" in said
+    assert "because: the car stood still." in said
+    assert yaml.safe_load(text) == yaml.safe_load(str(made(tables, REQUEST)))
+
+
+def test_doubts_stand_in_the_file(tables: dict[str, pa.Table]) -> None:
+    doubted = judged(tables, decides=True, doubts="lines (gyro_x)")
+    assert "CAUTION: sim_a is in doubt: lines (gyro_x)." in str(made(doubted, REQUEST))
+    assert made(judged(tables, decides=True, doubts=""), REQUEST) == made(tables, REQUEST)
+
+
 def test_the_tables_of_a_run_are_found_in_its_folder(
     tables: dict[str, pa.Table], tmp_path: Path
 ) -> None:
