@@ -5,7 +5,15 @@ from typing import Any
 import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.fitness import doubts, fitness, judged, left_out, undecided
+from imubench_pipeline.fitness import (
+    doubts,
+    fitness,
+    judged,
+    left_out,
+    undecided,
+    with_doubts,
+    with_doubts_of_all,
+)
 from imubench_pipeline.pooled import pooled_rows
 from imubench_pipeline.requirements import Requirement
 from imubench_pipeline.selection import ranking_rows
@@ -96,6 +104,22 @@ def test_pools_are_those_without_the_unfit_recording_and_count_it() -> None:
     assert pooled["value"] == without["value"]
     assert (pooled["recordings"], pooled["left_out"]) == (2, 1)
     assert "does not decide" in pooled["reason"]
+
+
+def test_rows_carry_the_doubts_of_what_they_stand_on() -> None:
+    about = [
+        ABOUT | {"device": "one", "decides": True, "doubts": "lines (gyro_x)"},
+        ABOUT | {"recording": "b", "device": "two", "decides": True, "doubts": ""},
+        ABOUT | {"recording": "c", "device": "two", "decides": False, "doubts": "motion (gyro_x)"},
+    ]
+    rows = [{"sensor": "s", "recording": name} for name in "ab"]
+    assert [row["doubts"] for row in with_doubts(rows, about)] == ["lines (gyro_x)", ""]
+    pair = {"sensor": "s", "recording": "b", "other": "s", "other_recording": "a"}
+    names = ("sensor", "recording"), ("other", "other_recording")
+    assert [row["doubts"] for row in with_doubts([pair], about, names)] == ["lines (gyro_x)"]
+    pools = [{"sensor": "s", "device": device} for device in (None, "one", "two")]
+    said = [row["doubts"] for row in with_doubts_of_all(pools, about)]
+    assert said == ["a: lines (gyro_x)", "a: lines (gyro_x)", ""]
 
 
 def asked() -> Requirement:

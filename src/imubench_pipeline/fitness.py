@@ -255,6 +255,47 @@ def undecided(rows: Iterable[Row], not_deciding: Collection[Key]) -> Iterator[di
         yield {**row, **nothing, **status}
 
 
+def with_doubts(
+    rows: Iterable[Row],
+    recordings: Iterable[Row],
+    names: Sequence[tuple[str, str]] = (("sensor", "recording"),),
+) -> Iterator[dict[str, Any]]:
+    """Yield rows with the doubts of the recordings that they stand on.
+
+    Parameters
+    ----------
+    rows : iterable of mapping
+    recordings : iterable of mapping
+        Rows of the table ``recordings``.
+    names : sequence of (str, str)
+        The columns that name sensor and recording; several pairs, of several recordings.
+    """
+    found: dict[tuple[Any, Any], str] = {_key(row): row["doubts"] or "" for row in recordings}
+    for row in rows:
+        said = [found.get((row.get(of), row.get(name)), "") for of, name in names]
+        yield {**row, "doubts": "; ".join(filter(None, dict.fromkeys(said)))}
+
+
+def with_doubts_of_all(pools: Iterable[Row], recordings: Iterable[Row]) -> Iterator[dict[str, Any]]:
+    """Yield rows of the table ``pooled`` with the doubts of the recordings of sensor or device.
+
+    Parameters
+    ----------
+    pools, recordings : iterable of mapping
+        Rows of the tables.
+    """
+    listed = [row for row in recordings if row["decides"] and row["doubts"]]
+    for row in pools:
+        said = [
+            f"{one['recording']}: {one['doubts']}"
+            for one in listed
+            if one["sensor"] == row["sensor"] and row["device"] in (None, one["device"])
+        ]
+        more = len(said) - _SHOWN
+        text = "; ".join(said[:_SHOWN])
+        yield {**row, "doubts": text + (f"; and {more} more" if more > 0 else "")}
+
+
 def _judged(row: Row, found: Sequence[Doubt], included: Collection[str]) -> dict[str, Any]:
     verdict = fitness(found) if row["status"] == "ok" else None
     named = f"{row['sensor']}/{row['recording']}" in included

@@ -25,7 +25,14 @@ from imubench_pipeline.estimators.estimate import (
 from imubench_pipeline.failures import read_with_failures, with_failures, without
 from imubench_pipeline.faults import Failure
 from imubench_pipeline.findings import Finding
-from imubench_pipeline.fitness import doubts, judged, left_out, undecided
+from imubench_pipeline.fitness import (
+    doubts,
+    judged,
+    left_out,
+    undecided,
+    with_doubts,
+    with_doubts_of_all,
+)
 from imubench_pipeline.pooled import pooled_rows
 from imubench_pipeline.published import published_rows
 from imubench_pipeline.quality.spectral import band_finding, line_findings
@@ -303,9 +310,10 @@ def joined_tables(
     joined["recordings"] = build("recordings", about)
     joined["doubts"] = build("doubts", (one.row() for one in doubted))
     apart = left_out(about)
-    joined["pooled"] = build(
-        "pooled", pooled_rows(undecided(estimated, apart), undecided(biases, apart), devices)
-    )
+    pools = pooled_rows(undecided(estimated, apart), undecided(biases, apart), devices)
+    joined["pooled"] = build("pooled", with_doubts_of_all(pools, about))
+    for name in ("error_budget", "datasheet"):
+        joined[name] = build(name, with_doubts(joined[name].to_pylist(), about))
     truth = list(truth_rows(truths))
     joined["simulated_truth"] = build("simulated_truth", truth)
     joined["published"] = build("published", published_rows(truths, truth, joined))

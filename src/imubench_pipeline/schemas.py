@@ -19,23 +19,11 @@ from imubench_pipeline.faults import FAILURES
 from imubench_pipeline.fitness import DOUBTS, JUDGED
 from imubench_pipeline.fusion.columns import FUSION_TABLES
 
-__all__ = [
-    "BY_RECORDING",
-    "CALIBRATED",
-    "COMPARED",
-    "OF_ONE_RECORDING",
-    "OUTLOOK",
-    "PARTS_OF",
-    "SAMPLES",
-    "TABLES",
-    "TURNED",
-    "Column",
-]
-
 _FITTED = _number("fitted", "as in unit", "what the model has where that is not value; no estimate")
 _SENSOR = _text("sensor", "name of the sensor file")
 _RECORDING = _text("recording", "name of the recording")
 _CHANNEL = _text("channel", "axis and quantity, gyro_x to accel_z")
+_DOUBTED = _text("doubts", "of the recording; empty: none", required=False)
 _METHOD = _text("method", "estimation method")
 _SI = "rad/s or m/s^2"
 _DENSITY = "(rad/s)^2/Hz or (m/s^2)^2/Hz"
@@ -219,6 +207,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _number("p_value", "-", "chance of such differences, if the recordings agree"),
         _text("verdict", "agree or differ, at 1 %", required=False),
         _text("reason", "in words", required=False),
+        _text("doubts", "of the recordings pooled; empty: none", required=False),
     ),
     "reconstruction": (
         *_KEYS,
@@ -258,6 +247,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _number("delta_upper", "-", "largest that both intervals allow"),
         _text("verdict", "better than typ, as printed, worse than typ, not sure, ..."),
         _text("reason", "in words", required=False),
+        _DOUBTED,
     ),
     "datasheet_curve": (
         *_KEYS,
@@ -307,6 +297,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _text("unit", "SI unit"),
         _number("reached_after", "s", "time after which the limit is reached; null: never"),
         _text("reason", "what is not known", required=False),
+        _DOUBTED,
     ),
     "ranking": (
         _text("requirement", "file under config/requirements, without .yaml"),
@@ -332,7 +323,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _number("share", "-", "its part of the variance"),
         _number("reached_after", "s", "time after which the limit is reached"),
         _text("reason", "what is not known", required=False),
-        _text("doubts", "of the recording that answers; empty: none", required=False),
+        _DOUBTED,
         _text("left_out", "recordings that do not decide, and why", required=False),
     ),
     "published": (

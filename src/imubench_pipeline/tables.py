@@ -15,7 +15,8 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 
-from imubench_pipeline.schemas import PARTS_OF, TABLES, Column
+from imubench_pipeline.columns import Column
+from imubench_pipeline.schemas import PARTS_OF, TABLES
 
 _SMALL = 1_000_000  # bytes
 

@@ -30,6 +30,7 @@ FUSION_TABLES: dict[str, tuple[Column, ...]] = {
         number("upper", "-", "upper 95 % limit of n; null: no number may be enough"),
         Column("reachable", pa.bool_(), "-", "some number is enough", required=False),
         text("reason", "why there is no n or no limit", required=False),
+        text("doubts", "of both recordings; empty: none", required=False),
     ),
 }
 """The table ``fusion``, by name; all numbers are SI."""

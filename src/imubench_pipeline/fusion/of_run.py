@@ -13,6 +13,7 @@ import pyarrow.compute as pc
 
 from imubench_pipeline.config import FusionSettings
 from imubench_pipeline.estimators.estimate import JointDraws
+from imubench_pipeline.fitness import left_out, with_doubts
 from imubench_pipeline.fusion.equivalence import (
     Candidate,
     TemperaturePart,
@@ -33,7 +34,7 @@ _OF_LIMIT = 1.96
 def candidates(
     tables: Mapping[str, pa.Table], joint: Mapping[tuple[str, str], Path] | None = None
 ) -> Iterator[Candidate]:
-    """Yield the channels of a run, each with the estimate of the method to use.
+    """Yield the channels of recordings that decide, each with the estimate of the method to use.
 
     Where temperature is taken out of a channel, its estimate is that of what temperature leaves.
 
@@ -53,6 +54,7 @@ def candidates(
     compensated = parameters.filter(pc.equal(parameters["method"], "compensated")).to_pylist()
     recommended = parameters.filter(parameters["recommended"]).to_pylist()
     about = {(row["sensor"], row["recording"]): row for row in recordings.to_pylist()}
+    apart = left_out(about.values())
     groups: dict[tuple[str, str, str, str], list[Row]] = {}
     used = [row for row in compensated if _channel(row) in warm]
     used += [row for row in recommended if _channel(row) not in warm]
@@ -65,6 +67,8 @@ def candidates(
         return read(path).get((channel, method))
 
     for (sensor, recording, channel, method), rows in groups.items():
+        if (sensor, recording) in apart:
+            continue
         path = (joint or {}).get((sensor, recording))
         of = about[sensor, recording]
         yield Candidate(
@@ -120,7 +124,7 @@ def fusion_rows(
     -------
     iterator of mapping
     """
-    return equivalence_rows(
+    rows = equivalence_rows(
         candidates(tables, joint),
         [quantity_to_si(tau, "time") for tau in how.tau],
         how.common.model_dump(),
@@ -128,3 +132,5 @@ def fusion_rows(
         draws=how.draws,
         seed=how.seed,
     )
+    pairs = ("sensor", "recording"), ("other", "other_recording")
+    return with_doubts(rows, tables["recordings"].to_pylist(), pairs)
