@@ -73,7 +73,11 @@ def test_exports_and_pages_say_so(project: Project) -> None:
     said = " ".join(exported.replace("#", "").split())
     assert f"CAUTION: left out: {REASON}" in said
     assert yaml.safe_load(exported)["gyroscope_noise_density"] == pytest.approx(1e-4, rel=0.05)
-    assert REASON in (project.results / "report/index.html").read_text()
+    report = project.results / "report"
+    assert REASON in (report / "index.html").read_text()
+    assert "does not decide (suspicious unit" in (report / "recordings.html").read_text()
+    assert "Does not decide" in (report / "recordings/one/b.html").read_text()
+    assert "Does not decide" not in (report / "recordings/one/a.html").read_text()
 
 
 def test_who_includes_it_has_it_decide(project: Project) -> None:
