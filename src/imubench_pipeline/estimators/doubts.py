@@ -20,15 +20,15 @@ Array = NDArray[np.float64]
 _WORSE = 6.0
 """BIC by which the papers' model must be the worse for the data to be against it."""
 
-_CLEARLY = 2.0
+_CLEARLY = 2.5
 """AIC by which a model without a random walk must be the better for K to be doubted: so it is for
-three quarters of the walks that are processes of a twentieth of the log, and for 2 to 3 % of those
-that are walks."""
+three quarters of the walks that are processes of a twentieth of the log, and for 2 % of those that
+are walks."""
 
-_RATHER = 0.5
-_LEAST_BELOW = 0.16
-"""The same, and the lower limit of K over its value: both together are a doubt, for most of the
-walks that are such processes and are left, and for 2 % of those that are walks."""
+_RATHER = 1.0
+_LEAST_BELOW = 0.1
+"""The same, and the lower limit of K over its value: both together are a doubt, for half of the
+processes that are left, and for hardly any walk."""
 
 _LITTLE = 0.25
 """Part of K that is left beside a ramp below which the ramp may stand for the walk: so it does, and

@@ -13,16 +13,16 @@ import numpy as np
 
 from imubench_pipeline.estimators.whittle import Maximum, Whittle
 
-_OF_DRIFT = 8
-"""Lowest cosines of a log, half a period to four, that a drift is granted."""
+_OF_DRIFT = 5
+"""Lowest cosines of a log, half a period to two and a half, that a drift is granted."""
 
-_NEEDED = 2.0
-"""Gain, twice the log likelihood, from which a walk is needed beyond them: so it is for 98 % of the
-walks that are known to a fifth, and for a third of the drifts that pass for a walk."""
+_NEEDED = 3.0
+"""Gain, twice the log likelihood, from which a walk is needed beyond them: so it is for 97 % of the
+walks that are known to 14 to 20 %, and for one in seven of the smooth drifts that pass for one."""
 
-_STEEPER = 4.0
-"""The same by which a spectrum of f^-4 must be the better: so it is for 1 % of the walks, and for a
-fifth of the drifts that are left."""
+_STEEPER = 8.0
+"""The same by which a spectrum of f^-4 must be the better: so it is for 1 % of the walks, and for
+some of the drifts with sharp bends."""
 
 _WITHOUT = (0, 4)
 """Lowest cosines without which the slope is looked at: chance in a few of them hides it."""
