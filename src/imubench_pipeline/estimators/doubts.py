@@ -121,7 +121,7 @@ def doubted(
     return estimate, papers
 
 
-def _without_a_walk(chosen: Candidate, candidates: Sequence[Candidate], K: Parameter) -> str | None:
+def _without_a_walk(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
     """Say so where AIC clearly prefers a model without the random walk of the chosen one.
 
     A slow process passes for a walk: BIC with what is asked of such a process takes the walk.
