@@ -25,11 +25,6 @@ _CLEARLY = 2.5
 three quarters of the walks that are processes of a twentieth of the log, and for 2 % of those that
 are walks."""
 
-_RATHER = 1.0
-_LEAST_BELOW = 0.1
-"""The same, and the lower limit of K over its value: both together are a doubt, for half of the
-processes that are left, and for hardly any walk."""
-
 _LITTLE = 0.25
 """Part of K that is left beside a ramp below which the ramp may stand for the walk: so it does, and
 AIC clearly prefers it, for 1 % of the walks that are walks."""
@@ -105,11 +100,7 @@ def doubted(
         estimate, papers = (
             _with_doubt_of_the_floor(one, frame.low_pass) for one in (estimate, papers)
         )
-    rival = (
-        drift
-        or _without_a_walk(chosen, candidates, estimate.parameters["K"])
-        or _beside_a_ramp(chosen, candidates)
-    )
+    rival = drift or _without_a_walk(chosen, candidates) or _beside_a_ramp(chosen, candidates)
     if rival is not None:
         estimate, papers = (doubting(one, ("K",), rival) for one in (estimate, papers))
     other = _with_fewer_terms(chosen, candidates) or _with_other_terms(chosen, candidates)
@@ -130,7 +121,7 @@ def doubted(
     return estimate, papers
 
 
-def _without_a_walk(chosen: Candidate, candidates: Sequence[Candidate], K: Parameter) -> str | None:
+def _without_a_walk(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
     """Say so where AIC clearly prefers a model without the random walk of the chosen one.
 
     A slow process passes for a walk: BIC with what is asked of such a process takes the walk.
@@ -141,8 +132,7 @@ def _without_a_walk(chosen: Candidate, candidates: Sequence[Candidate], K: Param
         one for one in candidates if "K" not in one.found.terms.linear and not one.found.terms.ramp
     ]
     best = min(without, key=lambda one: one.aic, default=chosen)
-    hardly_any = K.value and K.lower is not None and K.lower < _LEAST_BELOW * K.value
-    if best.aic > chosen.aic - (_RATHER if hardly_any else _CLEARLY):
+    if best.aic > chosen.aic - _CLEARLY:
         return None
     return (
         f"{best.found.terms.name}, which has no random walk, is better by "
