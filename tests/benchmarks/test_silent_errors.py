@@ -8,7 +8,7 @@ import pytest
 import silent_errors
 from silent_cases import CASES, CLEAN, NOTHING, Log, Truth, exactly
 
-ROW = {"value": 1.0, "lower": 0.9, "upper": 1.1, "status": "ok"}
+ROW = {"value": 1.0, "lower": 0.9, "upper": 1.1, "status": "ok", "reason": None}
 NONE = {"value": None, "lower": None, "upper": None}
 
 
