@@ -312,13 +312,16 @@ def joined_tables(
     apart = left_out(about)
     pools = pooled_rows(undecided(estimated, apart), undecided(biases, apart), devices)
     joined["pooled"] = build("pooled", with_doubts_of_all(pools, about))
-    for name in ("error_budget", "datasheet"):
+    for name in _JUDGED & joined.keys():
         joined[name] = build(name, with_doubts(joined[name].to_pylist(), about))
     truth = list(truth_rows(truths))
     joined["simulated_truth"] = build("simulated_truth", truth)
     joined["published"] = build("published", published_rows(truths, truth, joined))
     return with_failures(joined, failures)
 
+
+_JUDGED = {"error_budget", "datasheet"}
+"""Tables of a recording's own step whose rows say what is doubted of the recording."""
 
 _OF_LOGS = {"step": "bias_step", "warm_up": "warm_up_drift"}
 """What is found of a log as it is read, and found again, with its size, beside its noise."""
