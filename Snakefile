@@ -252,6 +252,7 @@ rule datasheet:
         allan=FOLDER + "/allan.parquet",
         parameters=FOLDER + "/parameters.parquet",
         fixed_bias=FOLDER + "/fixed_bias.parquet",
+        temperature=FOLDER + "/temperature.parquet",
     output:
         datasheet=FOLDER + "/datasheet.parquet",
         datasheet_curve=FOLDER + "/datasheet_curve.parquet",

@@ -4,7 +4,8 @@ Three conventions ruin such a comparison. A printed noise density is mostly one-
 that density over √2; where the datasheet does not say, both readings are given. A printed bias
 instability is the minimum of the curve of Allan deviation, that is 0.664 B where the curve has a
 plateau. A coefficient of temperature, a total over a range of temperature and an rms while it
-changes are three quantities, and no static log shows any of them.
+changes are three quantities. A log at rest whose temperature varies shows the first: it is the
+sensitivity that `imubench_pipeline.thermal` fits. The other two no such log shows.
 """
 
 from __future__ import annotations
@@ -37,10 +38,13 @@ _NO_BANDWIDTH = "an rms without its bandwidth says nothing of the density"
 _NOT_OF_ONE_LOG = {
     "bias_repeatability": "a spread between runs; one recording has one bias",
     "drift": "the document does not say what drift is meant",
-    "temperature_coefficient": "a coefficient of temperature; a static log has one temperature",
-    "temperature_total": "a total over a range of temperature; a static log has one temperature",
-    "temperature_rms": "an rms over temperature; a static log has one temperature",
+    "temperature_total": "a total over the range of the datasheet; a log has its own",
+    "temperature_rms": "an rms over the temperature's course of the datasheet; a log has its own",
 }
+
+
+SENSITIVITY = "sensitivity"
+"""The statistic of a printed coefficient of temperature."""
 
 
 @dataclass(frozen=True)
@@ -210,12 +214,15 @@ def bias_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]
     Yields
     ------
     Comparable
-        In SI; the offset always, the others where they are published, with the obstacle.
+        In SI; the offset always, the others where they are published: the coefficient of
+        temperature to be compared with the sensitivity, the rest with the obstacle.
     """
     axis = _Axis.of(datasheet, channel)
     like = Comparable("offset", "mean", None)
     offsets = axis.read("offset", like, axis.si("offset"))
     yield from offsets or [axis.unpublished(like, "offset")]
+    name = "temperature_coefficient"
+    yield from axis.read(name, Comparable(name, SENSITIVITY, None), axis.si(name))
     for name, obstacle in _NOT_OF_ONE_LOG.items():
         like = Comparable(name, "mean", None, obstacle=obstacle)
         yield from axis.read(name, like, axis.si(name))

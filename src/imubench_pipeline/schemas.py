@@ -228,9 +228,12 @@ TABLES: dict[str, tuple[Column, ...]] = {
     ),
     "datasheet": (
         *_KEYS,
-        _text("method", "estimation method; mean: the mean of the log"),
+        _text("method", "of the estimate; mean: of the log; temperature: the thermal fit"),
         _text("quantity", "N, bias_instability, K, T_B, allan_deviation, offset, ..."),
-        _text("statistic", "what is compared: N, adev_minimum, plateau (0.664 B), K, T_B, mean"),
+        _text(
+            "statistic",
+            "what is compared: N, adev_minimum, plateau (0.664 B), K, T_B, mean, sensitivity",
+        ),
         _number("printed", "as in unit", "figure as printed; null: not published"),
         _text("unit", "unit as printed", required=False),
         _text("kind", "typ, max, min, range, 1sigma or derived", required=False),

@@ -18,7 +18,16 @@ _STATISTIC_NAMES = {
     "K": "K",
     "T_B": "T_B",
 }
-_SYMBOLS = {"N": "N", "K": "K", "T_B": "T_B", "offset": "signal"}
+_SYMBOLS = {
+    "N": "N",
+    "K": "K",
+    "T_B": "T_B",
+    "offset": "signal",
+    "temperature_coefficient": "sensitivity",
+}
+
+_BESIDE = ("mean", "temperature")
+"""What stands in place of a method where no method has a part in a figure."""
 
 _TITLES = {"gyro": "Gyroscope: published figures", "accel": "Accelerometer: published figures"}
 _SIGNS = {"yes": "yes", "no": "no", "other convention": "other", "not looked up": "?"}
@@ -38,7 +47,7 @@ def delta_rows(
         Units of the pages.
     """
     for row in view.datasheet:
-        if row["method"] not in (view.recommended, "mean"):
+        if row["method"] not in (view.recommended, *_BESIDE):
             continue
         unit = page_unit(view.quantity, _SYMBOLS.get(row["quantity"], "B"), system)
         published = row["printed"] is not None
@@ -72,7 +81,9 @@ def deltas_of_sensors(views: Sequence[RecordingView], system: System) -> Iterato
     for view in views:
         recommended = view.recommended()
         for row in view.rows("datasheet"):
-            if row["method"] in (recommended[row["channel"]], "mean") and row["delta"] is not None:
+            if row["method"] not in (recommended[row["channel"]], *_BESIDE):
+                continue
+            if row["delta"] is not None:
                 figure = ("quantity", "statistic", "printed", "unit", "kind", "sidedness")
                 key = (view.sensor, view.simulated, row["channel"], *(row[f] for f in figure))
                 groups.setdefault(key, []).append(row)
