@@ -445,7 +445,7 @@ rule exports:
     input:
         [
             RESULTS + f"/tables/{t}.parquet"
-            for t in ("recordings", "parameters", "allan")
+            for t in ("recordings", "parameters", "allan", "temperature")
         ],
         draws=every("draws.parquet"),
     output:
