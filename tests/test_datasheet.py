@@ -114,10 +114,10 @@ def test_what_is_read_from_the_curve_is_its_minimum() -> None:
     assert row.measured == pytest.approx(minimum)
 
 
-def test_what_is_not_published_is_listed() -> None:
+def test_what_is_not_published_or_not_looked_up_is_listed() -> None:
     found = rows(sheet(), estimate(N=1e-4, B=1e-4, T_B=10.0, K=1e-6))
     assert {key[0] for key in found} == {"N", "adev_minimum", "plateau", "K", "T_B"}
-    assert {row.verdict for row in found.values()} == {"not published"}
+    assert {row.verdict for row in found.values()} == {"not looked up"}
     assert found["K", None].measured == 1e-6
     assert found["K", None].delta is None
     null = {"value": None, "unit": "deg/h"}
@@ -412,7 +412,7 @@ def test_totals_over_temperature_and_runs_are_not_compared_with_one_log() -> Non
         bias_repeatability={"value": 4, "unit": "deg/h"},
     )
     found = bias_rows(sensor, "gyro_x", {"gyro_x": 0.1 * DEG})
-    assert found["offset"].verdict == "not published"
+    assert found["offset"].verdict == "not looked up"
     for name in ("temperature_total", "bias_repeatability"):
         assert found[name].verdict == "not comparable (condition)"
         assert found[name].measured is None and found[name].printed is not None

@@ -56,7 +56,7 @@ class Comparable:
     quantity, statistic : str
         What is printed, and what of an estimate it is compared with.
     figure : PrintedFigure or None
-        None: not published.
+        None: not published, or not looked up.
     sidedness : str or None
         Of a noise density, as this reading takes it.
     value : float or None
@@ -73,6 +73,8 @@ class Comparable:
         Why it cannot be compared with a static log.
     tau : float or None
         Averaging time of a printed Allan deviation, s.
+    looked_up : bool
+        False: the sensor file does not say whether the vendor publishes it.
     """
 
     quantity: str
@@ -87,6 +89,7 @@ class Comparable:
     upper: float | None = None
     obstacle: str | None = None
     tau: float | None = None
+    looked_up: bool = True
 
 
 @dataclass(frozen=True)
@@ -167,8 +170,8 @@ class _Axis:
     def unpublished(self, like: Comparable, *names: str) -> Comparable:
         """Return the row of what has no figure."""
         known = any(self.sheet.looked_up(name) for name in names)
-        said = "the vendor does not publish it" if known else "the sensor file does not give it"
-        return replace(like, reason=said)
+        said = "the vendor does not publish it" if known else "the sensor file does not say"
+        return replace(like, reason=said, looked_up=known)
 
 
 def _with_interval(row: Comparable, rows: Sequence[Comparable]) -> Comparable:
@@ -190,7 +193,7 @@ def comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
     Yields
     ------
     Comparable
-        In SI; without a figure where the vendor does not publish the quantity.
+        In SI; without a figure where none is published, or nobody looked it up.
     """
     axis = _Axis.of(datasheet, channel)
     noise = [*_densities(axis), *_random_walks(axis), *_rms(axis)]

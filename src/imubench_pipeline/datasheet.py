@@ -30,7 +30,8 @@ VERDICTS: dict[str, str] = {
     "worse than typ": "above a typical figure and the tolerance",
     "worse than max": "above a maximum, or above a range",
     "not sure": "the 95 % interval reaches over a border between these",
-    "not published": "there is no printed figure",
+    "not published": "the datasheet was looked up, and prints no figure",
+    "not looked up": "nobody looked up whether a figure is printed",
     "not measured": "the log does not tell the value",
     "not comparable (condition)": "the figure holds for what this log does not have",
 }
@@ -169,7 +170,7 @@ def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
         delta=None,
         delta_lower=None,
         delta_upper=None,
-        verdict="not published",
+        verdict="not published" if entry.looked_up else "not looked up",
         reason=entry.reason,
     )
     if figure is None:

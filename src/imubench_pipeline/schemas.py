@@ -234,7 +234,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
             "statistic",
             "what is compared: N, adev_minimum, plateau (0.664 B), K, T_B, mean, sensitivity",
         ),
-        _number("printed", "as in unit", "figure as printed; null: not published"),
+        _number("printed", "as in unit", "figure as printed; null: the verdict says why"),
         _text("unit", "unit as printed", required=False),
         _text("kind", "typ, max, min, range, 1sigma or derived", required=False),
         _text("condition", "as printed", required=False),

@@ -83,7 +83,7 @@ def test_what_nobody_looked_up_is_not_said_to_be_unpublished(quantity: str, figu
     (row,) = deltas(missing, coverage=known)
     assert row["coverage"] == "not looked up"
     (row,) = deltas(missing, coverage={("b", "gyro", figure): "not looked up"})
-    assert row["coverage"] == "no"
+    assert row["coverage"] == "not looked up"
 
 
 @pytest.mark.parametrize(
@@ -176,7 +176,7 @@ def test_who_publishes_what_is_counted() -> None:
     ]
     gyro, accel = coverage_tables(build("coverage", rows).to_pylist())
     assert gyro["figures"] == ["N", "temperature coefficient"]
-    assert gyro["counts"] == ["2 of 3", "1 of 3"]
+    assert gyro["counts"] == ["2 of 3 looked up", "1 of 2 looked up; 1 not looked up"]
     assert [line["name"] for line in gyro["lines"]] == ["V A", "V B", "V C"]
     assert [[cell["text"] for cell in line["cells"]] for line in gyro["lines"]] == [
         ["yes", "other"],
@@ -186,5 +186,5 @@ def test_who_publishes_what_is_counted() -> None:
     assert [line["document"] for line in gyro["lines"]] == ["–", "D-1", "D-1"]
     assert gyro["lines"][2]["cells"][1]["note"] == "7 ppm/K"
     assert [cell["class"] for cell in gyro["lines"][0]["cells"]] == ["", "none"]
-    assert (accel["figures"], accel["counts"]) == (["N", "offset"], ["0 of 1", "0 of 1"])
+    assert (accel["figures"], accel["counts"]) == (["N", "offset"], ["0 of 1 looked up"] * 2)
     assert list(coverage_tables([])) == []

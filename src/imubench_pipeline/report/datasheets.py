@@ -55,7 +55,7 @@ def delta_rows(
         yield {
             "quantity": _figure_name(row),
             "published": published,
-            "coverage": coverage.get((view.sensor, view.quantity, figure), "no"),
+            "coverage": coverage.get((view.sensor, view.quantity, figure), "not looked up"),
             "printed": f"{row['printed']:g} {row['unit']}" if published else "–",
             "about": ", ".join(filter(None, (row["kind"], _read_as(row), row["condition"]))),
             "comparable": unit.text(row["comparable"]),
@@ -171,10 +171,10 @@ def coverage_tables(rows: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any
             }
         if not lines:
             continue
-        counts = [
-            sum(line["cells"][figure]["text"] == "yes" for line in lines.values())
+        found = {
+            figure: Counter(r["published"] for r in own if r["figure"] == figure)
             for figure in figures
-        ]
+        }
         yield {
             "title": title,
             "figures": [
@@ -184,5 +184,12 @@ def coverage_tables(rows: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any
                 line | {"cells": [line["cells"][figure] for figure in figures]}
                 for line in sorted(lines.values(), key=lambda line: str(line["name"]))
             ],
-            "counts": [f"{count} of {len(lines)}" for count in counts],
+            "counts": [_count(found[figure]) for figure in figures],
         }
+
+
+def _count(published: Counter[str]) -> str:
+    """Return of how many of those looked up a figure is published, and how many were not."""
+    unknown = published["not looked up"]
+    text = f"{published['yes']} of {published.total() - unknown} looked up"
+    return f"{text}; {unknown} not looked up" if unknown else text
