@@ -353,6 +353,7 @@ rule sensor_tables:
         truths=lambda w: plan.truths(w.sensor),
         catalogue=plan.catalogue(),
         decide=plan.settings("decide"),
+        datasheet=plan.settings("datasheet"),
         code=plan.code("sensor_tables"),
         attempt=lambda w: plan.attempt("sensor_tables", w.sensor),
     run:

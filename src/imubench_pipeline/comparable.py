@@ -36,7 +36,7 @@ _READINGS: dict[str, tuple[Sidedness, ...]] = {
 
 _NO_BANDWIDTH = "an rms without its bandwidth says nothing of the density"
 _NOT_OF_ONE_LOG = {
-    "bias_repeatability": "a spread between runs; one recording has one bias",
+    "bias_repeatability": "a spread between runs: the table repeatability",
     "drift": "the document does not say what drift is meant",
     "temperature_total": "a total over the range of the datasheet; a log has its own",
     "temperature_rms": "an rms over the temperature's course of the datasheet; a log has its own",
@@ -229,6 +229,18 @@ def bias_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]
     for name, obstacle in _NOT_OF_ONE_LOG.items():
         like = Comparable(name, "mean", None, obstacle=obstacle)
         yield from axis.read(name, like, axis.si(name))
+
+
+def repeatability_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
+    """Yield what a datasheet says of how a bias differs from one turn-on to the next.
+
+    Yields
+    ------
+    Comparable
+        In SI, to be compared with a standard deviation; nothing where none is published.
+    """
+    axis, name = _Axis.of(datasheet, channel), "bias_repeatability"
+    yield from axis.read(name, Comparable(name, "spread", None), axis.si(name))
 
 
 def _densities(axis: _Axis) -> Iterator[Comparable]:

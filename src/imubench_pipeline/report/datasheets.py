@@ -114,6 +114,38 @@ def deltas_of_sensors(views: Sequence[RecordingView], system: System) -> Iterato
         }
 
 
+def repeatability_lines(
+    rows: Sequence[Row], sensor: str, system: System
+) -> Iterator[dict[str, Any]]:
+    """Yield how the fixed biases of each device of a sensor differ, against what is printed.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        The table ``repeatability``.
+    sensor : str
+    system : str
+        Units of the pages.
+    """
+    for row in rows:
+        if row["sensor"] != sensor:
+            continue
+        unit = page_unit(quantity_of(row["channel"]), "signal", system)
+        yield {
+            "device": row["device"],
+            "channel": row["channel"].replace("_", " "),
+            "recordings": row["recordings"],
+            "printed": f"{row['printed']:g} {row['unit']}",
+            "about": ", ".join(filter(None, (row["kind"], row["condition"]))),
+            "comparable": unit.text(row["comparable"]),
+            "measured": _with_limits(row, unit.text),
+            "unit": unit.sign,
+            "delta": _percent(row["delta"]),
+            "verdict": row["verdict"],
+            "reason": row["reason"] or "",
+        }
+
+
 def _figure_name(row: Row) -> str:
     return _STATISTIC_NAMES.get(row["statistic"], row["quantity"].replace("_", " "))
 
