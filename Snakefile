@@ -252,6 +252,7 @@ rule datasheet:
         allan=FOLDER + "/allan.parquet",
         parameters=FOLDER + "/parameters.parquet",
         fixed_bias=FOLDER + "/fixed_bias.parquet",
+        temperature=FOLDER + "/temperature.parquet",
     output:
         datasheet=FOLDER + "/datasheet.parquet",
         datasheet_curve=FOLDER + "/datasheet_curve.parquet",
@@ -352,6 +353,7 @@ rule sensor_tables:
         truths=lambda w: plan.truths(w.sensor),
         catalogue=plan.catalogue(),
         decide=plan.settings("decide"),
+        datasheet=plan.settings("datasheet"),
         code=plan.code("sensor_tables"),
         attempt=lambda w: plan.attempt("sensor_tables", w.sensor),
     run:
@@ -444,7 +446,7 @@ rule exports:
     input:
         [
             RESULTS + f"/tables/{t}.parquet"
-            for t in ("recordings", "parameters", "allan")
+            for t in ("recordings", "parameters", "allan", "temperature")
         ],
         draws=every("draws.parquet"),
     output:

@@ -194,7 +194,7 @@ def on_the_table(runs: int) -> Iterator[bool]:
                 f"{what} ({sigma:.3g})", float(np.sqrt(np.mean((value - at) ** 2))) / sigma
             )
             yield covered(f"interval of the {what}", (lower < at) & (at < upper))
-        alarms = float(np.mean(found.linearity < 0.05))
+        alarms = float(np.mean(found.linearity.p_value < 0.05))
         yield asked(
             "straight lines that are doubted at 5 %",
             "4 to 6 %",
@@ -207,7 +207,7 @@ def on_the_table(runs: int) -> Iterator[bool]:
             "bends of four sigma that are found: quadratic term (any departure)",
             "at least 95 %",
             f"{100 * np.mean(bent.quadratic.p_value < 0.05):.1f} % "
-            f"({100 * np.mean(bent.linearity < 0.05):.1f} %)",
+            f"({100 * np.mean(bent.linearity.p_value < 0.05):.1f} %)",
             float(np.mean(bent.quadratic.p_value < 0.05)) > 0.95,
         )
 

@@ -99,7 +99,10 @@ def numbers(value: Any) -> list[float]:
 def found_as(sensor: Sensor, quantity: str, fact: dict[str, Any]) -> list[PrintedFigure]:
     """The figures of a sensor file that a fact stands in, by key and unit."""
     sheet = getattr(sensor.datasheet, quantity)
-    listed = sheet.printed(KEYS.get(fact["quantity"], fact["quantity"]))
+    key = KEYS.get(fact["quantity"], fact["quantity"])
+    # A unit by count, or counts by unit, is the sensitivity, though vendors call it a resolution.
+    key = "sensitivity" if key == "resolution" and "LSB" in fact["unit"] else key
+    listed = sheet.printed(key)
     return [each for each in listed if each.unit == fact["unit"]]
 
 

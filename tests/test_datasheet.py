@@ -13,7 +13,7 @@ from imubench_pipeline.datasheet import VERDICTS, Delta, bias_deltas, curve_rms,
 from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators.curve_bias import of_model
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.measured import fixed_bias
+from imubench_pipeline.measured import fixed_bias, sensitivity
 from imubench_pipeline.noise import FLOOR, NoiseModel
 from imubench_pipeline.printed import Datasheet
 from imubench_pipeline.sensor import read_sensors
@@ -114,10 +114,10 @@ def test_what_is_read_from_the_curve_is_its_minimum() -> None:
     assert row.measured == pytest.approx(minimum)
 
 
-def test_what_is_not_published_is_listed() -> None:
+def test_what_is_not_published_or_not_looked_up_is_listed() -> None:
     found = rows(sheet(), estimate(N=1e-4, B=1e-4, T_B=10.0, K=1e-6))
     assert {key[0] for key in found} == {"N", "adev_minimum", "plateau", "K", "T_B"}
-    assert {row.verdict for row in found.values()} == {"not published"}
+    assert {row.verdict for row in found.values()} == {"not looked up"}
     assert found["K", None].measured == 1e-6
     assert found["K", None].delta is None
     null = {"value": None, "unit": "deg/h"}
@@ -406,17 +406,77 @@ def test_a_range_of_offsets_is_a_size() -> None:
         assert (row.printed, row.delta) == (250.0, pytest.approx(abs(mean) / 250 - 1))
 
 
-def test_what_changes_with_temperature_is_not_compared_with_a_static_log() -> None:
+def test_totals_over_temperature_and_runs_are_not_compared_with_one_log() -> None:
     sensor = sheet(
         temperature_total={"value": 30, "unit": "deg/s"},
-        temperature_coefficient={"value": 0.05, "unit": "deg/s/K"},
         bias_repeatability={"value": 4, "unit": "deg/h"},
     )
     found = bias_rows(sensor, "gyro_x", {"gyro_x": 0.1 * DEG})
-    assert found["offset"].verdict == "not published"
-    for name in ("temperature_total", "temperature_coefficient", "bias_repeatability"):
+    assert found["offset"].verdict == "not looked up"
+    for name in ("temperature_total", "bias_repeatability"):
         assert found[name].verdict == "not comparable (condition)"
         assert found[name].measured is None and found[name].printed is not None
+
+
+COEFFICIENT = sheet(temperature_coefficient={"value": 0.05, "unit": "deg/s/K"})
+
+
+def thermal(
+    s: tuple[float | None, float | None, float | None], compensated: bool, q: float | None = None
+) -> list[dict[str, Any]]:
+    """Rows of the table ``temperature``, of a sensitivity with its limits in °/s/K."""
+    figures = [None if one is None else one * DEG for one in s]
+    names = ("value", "lower", "upper")
+    row = dict(zip(names, figures, strict=True)) | {"reason": "BIC favours it by 2.0 only"}
+    return [
+        {"parameter": "T_0", "value": 27.0, "compensated": compensated},
+        {"parameter": "sensitivity", "compensated": compensated} | row,
+        {"parameter": "quadratic", "value": q, "compensated": compensated},
+    ]
+
+
+def coefficient(rows: list[dict[str, Any]]) -> Delta:
+    found = sensitivity(rows, 21.0, 34.0)
+    (row,) = (
+        r
+        for r in bias_deltas(COEFFICIENT, "gyro_x", {"gyro_x": 0.0}, 0.1, found)
+        if r.quantity == "temperature_coefficient"
+    )
+    return row
+
+
+def test_a_fitted_sensitivity_is_compared_with_the_coefficient_by_its_size() -> None:
+    row = coefficient(thermal((-0.06, -0.07, -0.056), True))
+    assert (row.printed, row.unit, row.comparable) == (0.05, "deg/s/K", pytest.approx(0.05 * DEG))
+    found = [x / DEG for x in (row.measured, row.lower, row.upper) if x is not None]
+    assert found == pytest.approx([0.06, 0.056, 0.07])
+    limits = [row.delta, row.delta_lower, row.delta_upper]
+    assert limits == pytest.approx([0.2, 0.12, 0.4])
+    assert row.verdict == "worse than typ"
+    assert "slope at 27 °C, of readings from 21 to 34 °C" in (row.reason or "")
+    bent = coefficient(thermal((0.05, 0.049, 0.051), True, q=1e-6))
+    assert bent.verdict == "as printed" and "bends" in (bent.reason or "")
+
+
+@pytest.mark.parametrize(
+    ("s", "compensated", "verdict"),
+    [
+        ((0.001, -0.003, 0.004), False, "better than typ"),  # at most 0.004 of 0.05
+        ((0.03, -0.01, 0.07), False, "not measured"),
+        ((None, 0.01, 0.02), True, "not measured"),  # temperature and time alike: no limits
+    ],
+)
+def test_a_sensitivity_that_is_not_told_has_limits_at_most(
+    s: tuple[float | None, float, float], compensated: bool, verdict: str
+) -> None:
+    row = coefficient(thermal(s, compensated))
+    assert row.verdict == verdict
+    assert row.measured is None and row.delta is None
+
+
+def test_without_readings_of_the_temperature_there_is_no_sensitivity() -> None:
+    row = coefficient([])
+    assert row.verdict == "not measured" and "no readings" in (row.reason or "")
 
 
 ACCEL = Datasheet.model_validate({"accel": {"offset": {"value": 20, "unit": "mg"}}})

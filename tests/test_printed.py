@@ -142,6 +142,15 @@ def test_an_accelerometer_has_no_g_sensitivity() -> None:
         parse(Sensor, wrong, "s.yaml")
 
 
+def test_counts_by_unit_are_no_resolution() -> None:
+    wrong = with_change("datasheet.gyro.resolution", {"value": 131, "unit": "LSB/(deg/s)"})
+    with pytest.raises(ConfigError, match=r"gyro\.resolution\.unit: .* is the 'sensitivity'"):
+        parse(Sensor, wrong, "s.yaml")
+    both = {"value": 131, "unit": "LSB/(deg/s)"}, {"value": 7.6, "unit": "mdps/LSB"}
+    sheet = parse(Sensor, with_change("datasheet.gyro.sensitivity", list(both)), "s.yaml").datasheet
+    assert sheet.gyro is not None and len(sheet.gyro.printed("sensitivity")) == 2
+
+
 def test_a_file_of_the_old_form_is_read() -> None:
     sheet = parse(Sensor, SENSOR, "s.yaml").datasheet
     assert sheet.gyro is not None

@@ -10,6 +10,7 @@ import pytest
 
 from imubench_pipeline.datasheet import bias_deltas, deltas
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.measured import sensitivity
 from imubench_pipeline.printed import Datasheet
 from imubench_pipeline.published import published_rows
 from imubench_pipeline.results import Key, parameter_rows, truth_rows
@@ -101,9 +102,10 @@ def tables(
         for one in (curve, best)
         for delta in deltas(datasheet, "gyro_x", one, tau, 0.1)
     ]
+    warm = sensitivity(temperature, None, None)
     compared += [
         NAMES | {"method": "mean"} | asdict(delta)
-        for delta in bias_deltas(datasheet, "gyro_x", {"gyro_x": bias}, 0.1)
+        for delta in bias_deltas(datasheet, "gyro_x", {"gyro_x": bias}, 0.1, warm)
     ]
     rows: dict[str, list[Row]] = {
         "parameters": [
@@ -126,6 +128,7 @@ def thermal(name: str, value: float | None, unit: str) -> Row:
 
 
 WARM = [thermal("T_0", 25.0, "degC"), thermal("sensitivity", 0.019 * DEGREE, "rad/s/K"),
+        thermal("quadratic", None, "rad/s/K^2"),
         thermal("bias", -4.05 * DEGREE, "rad/s")]  # fmt: skip
 
 
@@ -178,7 +181,6 @@ def test_the_bias_is_that_without_temperature_beside_the_mean_of_the_log() -> No
 
 
 def test_the_sensitivity_stands_beside_the_coefficient_of_the_datasheet() -> None:
-    # A log of one temperature is not compared with it; here the temperature changed.
     found = by_parameter(rows(tables(estimate("likelihood", (31.0, 90.0)), WARM)))["sensitivity"]
     values = {name: found[name] / DEGREE for name in ("means", "truth", "value", "datasheet")}
     assert values == pytest.approx(
@@ -191,7 +193,7 @@ def test_without_temperature_there_is_no_sensitivity_and_no_bias_but_the_mean() 
     found = by_parameter(rows(tables(estimate("likelihood", (31.0, 90.0)))))
     assert found["sensitivity"]["value"] is found["bias"]["value"] is None
     assert found["bias"]["curve"] == pytest.approx(-4.1 * DEGREE)
-    unknown = [thermal("sensitivity", None, "rad/s/K")]
+    unknown = [WARM[0], thermal("sensitivity", None, "rad/s/K"), WARM[2]]
     found = by_parameter(rows(tables(estimate("likelihood", (31.0, 90.0)), unknown)))
     assert found["sensitivity"]["value"] is None
 

@@ -172,7 +172,7 @@ def allan_variance(
 
     References
     ----------
-    IEEE Std 952-1997, annex C; limits: C. Greenhall and W. Riley, "Uncertainty of stability
+    IEEE Std 952-2020; limits: C. Greenhall and W. Riley, "Uncertainty of stability
     variances based on finite differences", PTTI 2003.
     """
     values = np.asarray(samples, dtype=np.float64)

@@ -4,7 +4,8 @@ Three conventions ruin such a comparison. A printed noise density is mostly one-
 that density over √2; where the datasheet does not say, both readings are given. A printed bias
 instability is the minimum of the curve of Allan deviation, that is 0.664 B where the curve has a
 plateau. A coefficient of temperature, a total over a range of temperature and an rms while it
-changes are three quantities, and no static log shows any of them.
+changes are three quantities. A log at rest whose temperature varies shows the first: it is the
+sensitivity that `imubench_pipeline.thermal` fits. The other two no such log shows.
 """
 
 from __future__ import annotations
@@ -35,12 +36,15 @@ _READINGS: dict[str, tuple[Sidedness, ...]] = {
 
 _NO_BANDWIDTH = "an rms without its bandwidth says nothing of the density"
 _NOT_OF_ONE_LOG = {
-    "bias_repeatability": "a spread between runs; one recording has one bias",
+    "bias_repeatability": "a spread between runs: the table repeatability",
     "drift": "the document does not say what drift is meant",
-    "temperature_coefficient": "a coefficient of temperature; a static log has one temperature",
-    "temperature_total": "a total over a range of temperature; a static log has one temperature",
-    "temperature_rms": "an rms over temperature; a static log has one temperature",
+    "temperature_total": "a total over the range of the datasheet; a log has its own",
+    "temperature_rms": "an rms over the temperature's course of the datasheet; a log has its own",
 }
+
+
+SENSITIVITY = "sensitivity"
+"""The statistic of a printed coefficient of temperature."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +56,7 @@ class Comparable:
     quantity, statistic : str
         What is printed, and what of an estimate it is compared with.
     figure : PrintedFigure or None
-        None: not published.
+        None: not published, or not looked up.
     sidedness : str or None
         Of a noise density, as this reading takes it.
     value : float or None
@@ -69,6 +73,8 @@ class Comparable:
         Why it cannot be compared with a static log.
     tau : float or None
         Averaging time of a printed Allan deviation, s.
+    looked_up : bool
+        False: the sensor file does not say whether the vendor publishes it.
     """
 
     quantity: str
@@ -83,6 +89,7 @@ class Comparable:
     upper: float | None = None
     obstacle: str | None = None
     tau: float | None = None
+    looked_up: bool = True
 
 
 @dataclass(frozen=True)
@@ -163,8 +170,8 @@ class _Axis:
     def unpublished(self, like: Comparable, *names: str) -> Comparable:
         """Return the row of what has no figure."""
         known = any(self.sheet.looked_up(name) for name in names)
-        said = "the vendor does not publish it" if known else "the sensor file does not give it"
-        return replace(like, reason=said)
+        said = "the vendor does not publish it" if known else "the sensor file does not say"
+        return replace(like, reason=said, looked_up=known)
 
 
 def _with_interval(row: Comparable, rows: Sequence[Comparable]) -> Comparable:
@@ -186,7 +193,7 @@ def comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
     Yields
     ------
     Comparable
-        In SI; without a figure where the vendor does not publish the quantity.
+        In SI; without a figure where none is published, or nobody looked it up.
     """
     axis = _Axis.of(datasheet, channel)
     noise = [*_densities(axis), *_random_walks(axis), *_rms(axis)]
@@ -210,15 +217,30 @@ def bias_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]
     Yields
     ------
     Comparable
-        In SI; the offset always, the others where they are published, with the obstacle.
+        In SI; the offset always, the others where they are published: the coefficient of
+        temperature to be compared with the sensitivity, the rest with the obstacle.
     """
     axis = _Axis.of(datasheet, channel)
     like = Comparable("offset", "mean", None)
     offsets = axis.read("offset", like, axis.si("offset"))
     yield from offsets or [axis.unpublished(like, "offset")]
+    name = "temperature_coefficient"
+    yield from axis.read(name, Comparable(name, SENSITIVITY, None), axis.si(name))
     for name, obstacle in _NOT_OF_ONE_LOG.items():
         like = Comparable(name, "mean", None, obstacle=obstacle)
         yield from axis.read(name, like, axis.si(name))
+
+
+def repeatability_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
+    """Yield what a datasheet says of how a bias differs from one turn-on to the next.
+
+    Yields
+    ------
+    Comparable
+        In SI, to be compared with a standard deviation; nothing where none is published.
+    """
+    axis, name = _Axis.of(datasheet, channel), "bias_repeatability"
+    yield from axis.read(name, Comparable(name, "spread", None), axis.si(name))
 
 
 def _densities(axis: _Axis) -> Iterator[Comparable]:

@@ -39,7 +39,8 @@ class Coverage:
         ``N``, ``B``, ``K``, ``T_B``, ``temperature_coefficient`` or ``offset``.
     published : str
         ``yes``; ``other convention``: something akin, such as an rms for N or a total over
-        temperature for the coefficient; ``no``; ``not looked up``: the sensor file does not say.
+        temperature for the coefficient; ``no``: looked up (null), and not published; ``not looked
+        up``: the sensor file does not say, so that it counts neither way.
     as_printed : str or None
         Every figure of it, with its unit and kind.
     document : str or None

@@ -14,9 +14,14 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.comparable import Comparable, bias_comparables, comparables
+from imubench_pipeline.comparable import (
+    SENSITIVITY,
+    Comparable,
+    bias_comparables,
+    comparables,
+)
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.measured import fixed_bias, measured
+from imubench_pipeline.measured import NO_READINGS, fixed_bias, measured
 from imubench_pipeline.printed import Datasheet
 
 VERDICTS: dict[str, str] = {
@@ -25,7 +30,8 @@ VERDICTS: dict[str, str] = {
     "worse than typ": "above a typical figure and the tolerance",
     "worse than max": "above a maximum, or above a range",
     "not sure": "the 95 % interval reaches over a border between these",
-    "not published": "there is no printed figure",
+    "not published": "the datasheet was looked up, and prints no figure",
+    "not looked up": "nobody looked up whether a figure is printed",
     "not measured": "the log does not tell the value",
     "not comparable (condition)": "the figure holds for what this log does not have",
 }
@@ -88,9 +94,13 @@ def deltas(
 
 
 def bias_deltas(
-    datasheet: Datasheet, channel: str, means: Mapping[str, float], tolerance: float
+    datasheet: Datasheet,
+    channel: str,
+    means: Mapping[str, float],
+    tolerance: float,
+    sensitivity: Parameter | None = None,
 ) -> Iterator[Delta]:
-    """Compare the fixed bias of a recording with the offset that a datasheet prints.
+    """Compare the fixed bias of a recording, and how temperature moves it, with what is printed.
 
     Parameters
     ----------
@@ -100,16 +110,21 @@ def bias_deltas(
         Mean of every channel of the recording, rad/s or m/s².
     tolerance : float
         Relative difference that still counts as printed.
+    sensitivity : Parameter, optional
+        Size of the fitted sensitivity to temperature (`imubench_pipeline.measured.sensitivity`);
+        None: the log has no readings of the temperature.
 
     Yields
     ------
     Delta
-        The offset; and what is printed of repeatability and temperature, which one static log
-        cannot be compared with.
+        The offset; the coefficient of temperature, where one is printed; and what is printed of
+        repeatability and temperature that one log cannot be compared with.
     """
     bias = fixed_bias(channel, means)
     for entry in bias_comparables(datasheet, channel):
-        if entry.quantity != "offset":
+        if entry.statistic == SENSITIVITY:
+            yield compare(entry, sensitivity or NO_READINGS, tolerance)
+        elif entry.quantity != "offset":
             yield compare(entry, Parameter(None), tolerance)
         elif bias.value is None and entry.figure:
             hidden = replace(entry, value=None, lower=None, upper=None, obstacle=bias.reason)
@@ -155,7 +170,7 @@ def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
         delta=None,
         delta_lower=None,
         delta_upper=None,
-        verdict="not published",
+        verdict="not published" if entry.looked_up else "not looked up",
         reason=entry.reason,
     )
     if figure is None:

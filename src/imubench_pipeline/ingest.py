@@ -329,7 +329,7 @@ def ingest_as_planned(
     except RecordingError as error:
         remove_kept(folder)
         kept = rejected(error, notes)
-    return kept.quality(names)
+    return kept.quality(names | {"power_cycled": notes.power_cycled})
 
 
 def write_failed(settings: str, failure: Failure, path: Path) -> None:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,9 @@ _EARTH_RATE = 7.292115e-5
 
 _LOCAL_GRAVITY = 0.027
 """m/s²; gravity on the ground differs by less from its standard value."""
+
+NO_READINGS = Parameter(None, "not_shown", "the log has no readings of the temperature")
+"""What a log without them says of the sensitivity."""
 
 _VERTICAL = math.cos(math.radians(15.0))
 _AT_REST = 0.15
@@ -139,3 +143,43 @@ def fixed_bias(channel: str, means: Mapping[str, float]) -> Parameter:
 def _size(value: float, unknown: float, reason: str) -> Parameter:
     size = abs(value)
     return Parameter(size, "ok", reason, max(size - unknown, 0.0), size + unknown)
+
+
+def sensitivity(
+    rows: Iterable[Mapping[str, Any]], lowest: float | None, highest: float | None
+) -> Parameter:
+    """Return the size of the sensitivity of a channel to temperature, as its thermal fit tells it.
+
+    A vendor prints ± so much per kelvin: the sign is left out.
+
+    Parameters
+    ----------
+    rows : iterable of mapping
+        Of the table ``temperature``, of the channel.
+    lowest, highest : float or None
+        Temperatures of the recording, °C.
+
+    Returns
+    -------
+    Parameter
+        rad/s/K or m/s²/K; the reason says at what temperature and over which range it holds.
+        Where temperature is not taken out of the log, the upper limit alone; where it cannot be
+        told from time, nothing.
+    """
+    found = {row["parameter"]: row for row in rows}
+    row = found.get("sensitivity")
+    if row is None:
+        return NO_READINGS
+    at = f"slope at {found['T_0']['value']:.3g} °C"
+    if lowest is not None and highest is not None:
+        at += f", of readings from {lowest:.3g} to {highest:.3g} °C; the vendor has another range"
+    if found["quadratic"]["value"] is not None:
+        at += "; the bias bends with temperature, the slope is another elsewhere"
+    lower, upper = row["lower"], row["upper"]
+    if row["value"] is None or lower is None or upper is None:
+        return Parameter(None, "not_identified", row["reason"] or "no interval")
+    largest = max(abs(lower), abs(upper))
+    if not row["compensated"]:
+        return Parameter(None, "not_identified", f"{row['reason']}; {at}", 0.0, largest)
+    least = 0.0 if lower <= 0.0 <= upper else min(abs(lower), abs(upper))
+    return Parameter(abs(row["value"]), "ok", at, least, largest)

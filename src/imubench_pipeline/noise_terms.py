@@ -1,4 +1,4 @@
-"""The noise terms of an inertial sensor, each with all that follows from it (IEEE Std 952, 647).
+"""The noise terms of an inertial sensor, with all that follows from each (IEEE Std 952-2020, 647).
 
 A term knows its two-sided power spectral density, its Allan variance in continuous time and as
 sampled, the spectrum of its samples, the covariance of their sums, and its discrete state space.

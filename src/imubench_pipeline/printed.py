@@ -178,7 +178,8 @@ class QuantityDatasheet(Strict):
     )
     g_sensitivity: Figures = Field(None, description="of a gyro's offset to acceleration")
     full_scale: Figures = Field(None, description="±, of the sensor or to choose from")
-    resolution: Figures = Field(None, description="unit per LSB, or LSB per unit")
+    sensitivity: Figures = Field(None, description="unit per LSB, or LSB per unit")
+    resolution: Figures = Field(None, description="least change that shows, such as deg/h")
     bandwidth: Figures = Field(None, description="-3 dB, of the sensor")
 
     @model_serializer(mode="wrap")
@@ -212,7 +213,8 @@ def _dimensions(quantity: str, plain: str) -> dict[str, tuple[str, ...]]:
         "temperature_total": (plain,),
         "temperature_rms": (plain,),
         "full_scale": (plain,),
-        "resolution": (f"{quantity}_step", f"{quantity}_sensitivity", plain),
+        "sensitivity": (f"{quantity}_step", f"{quantity}_sensitivity"),
+        "resolution": (plain,),
         "bandwidth": ("frequency",),
     }
 
@@ -257,7 +259,8 @@ class Datasheet(Strict):
             try:
                 dimension = dimension_of(figure.unit, dimensions)
             except UnitError as error:
-                raise ValueError(f"{key}.unit: {error}") from error
+                mend = "; a figure by LSB is the 'sensitivity'" * ("LSB" in figure.unit)
+                raise ValueError(f"{key}.unit: {error}{mend}") from error
             if name in ("noise_density", "bias_instability") and quantity == "accel":
                 for axis in "xyz":
                     printed = figure.on_axis(axis)

@@ -9,11 +9,11 @@ from typing import Any
 
 import pyarrow as pa
 
+from imubench_pipeline.comparable import SENSITIVITY
 from imubench_pipeline.estimators.estimate import SI_UNITS
 from imubench_pipeline.noise import FLOOR
 from imubench_pipeline.sensor import quantity_of
 from imubench_pipeline.simulated_recordings import SimulatedRecording
-from imubench_pipeline.units import to_si
 
 Row = Mapping[str, Any]
 _Place = tuple[str, str, str, str]
@@ -22,6 +22,7 @@ _DATASHEET = {
     "N": ("N", 1.0),
     "adev_minimum": ("B", 1.0 / FLOOR),
     "offset": ("bias", 1.0),
+    SENSITIVITY: (SENSITIVITY, 1.0),
 }
 """Parameter and factor of what is printed in a datasheet, by statistic or quantity."""
 
@@ -128,12 +129,6 @@ def _printed(rows: Iterable[Row]) -> dict[_Place, list[float]]:
     """Return the figures of the datasheet, in the conventions of the parameters."""
     found: dict[_Place, list[float]] = {}
     for row in rows:
-        if row["quantity"] == "temperature_coefficient" and row["printed"] is not None:
-            # Not comparable with a log of one temperature, so that it is as printed alone.
-            dimension = f"{quantity_of(row['channel'])}_temperature_coefficient"
-            value = to_si(row["printed"], row["unit"], dimension)
-            found.setdefault(_place(row, "sensitivity"), []).append(value)
-            continue
         known = _DATASHEET.get(row["statistic"]) or _DATASHEET.get(row["quantity"])
         if known is not None and row["comparable"] is not None:
             parameter, factor = known

@@ -18,6 +18,7 @@ from imubench_pipeline.estimators.columns import DRAWN_TABLES
 from imubench_pipeline.faults import FAILURES
 from imubench_pipeline.fitness import DOUBTS, JUDGED
 from imubench_pipeline.fusion.columns import FUSION_TABLES
+from imubench_pipeline.repeatability import REPEATABILITY
 
 _FITTED = _number("fitted", "as in unit", "what the model has where that is not value; no estimate")
 _SENSOR = _text("sensor", "name of the sensor file")
@@ -37,6 +38,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _RECORDING,
         _text("kind", "static, two_position or rate_table"),
         _text("started", "date and time of the first sample, where known", required=False),
+        Column("power_cycled", pa.bool_(), "-", "without power before it; null: not known", False),
         Column("simulated", pa.bool_(), "-", "made from known parameters, not measured"),
         _text("status", "ok, rejected, or failed: a step of its analysis did"),
         _text("reason", "why a recording is rejected or failed", required=False),
@@ -228,10 +230,13 @@ TABLES: dict[str, tuple[Column, ...]] = {
     ),
     "datasheet": (
         *_KEYS,
-        _text("method", "estimation method; mean: the mean of the log"),
+        _text("method", "of the estimate; mean: of the log; temperature: the thermal fit"),
         _text("quantity", "N, bias_instability, K, T_B, allan_deviation, offset, ..."),
-        _text("statistic", "what is compared: N, adev_minimum, plateau (0.664 B), K, T_B, mean"),
-        _number("printed", "as in unit", "figure as printed; null: not published"),
+        _text(
+            "statistic",
+            "what is compared: N, adev_minimum, plateau (0.664 B), K, T_B, mean, sensitivity",
+        ),
+        _number("printed", "as in unit", "figure as printed; null: the verdict says why"),
         _text("unit", "unit as printed", required=False),
         _text("kind", "typ, max, min, range, 1sigma or derived", required=False),
         _text("condition", "as printed", required=False),
@@ -249,6 +254,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _text("reason", "in words", required=False),
         _DOUBTED,
     ),
+    "repeatability": REPEATABILITY,
     "datasheet_curve": (
         *_KEYS,
         _text("sidedness", "of the noise density, as assumed in this row", required=False),

@@ -239,6 +239,11 @@ class RecordingNotes(Strict):
 
     device: Text | None = Field(None, description="serial number; default: the recording's name")
     started: Text | None = Field(None, description="date and time of the first sample")
+    power_cycled: bool | None = Field(
+        None,
+        description="whether the sensor was without power between this recording and the one "
+        "before it of the same device; null: not known",
+    )
     use: UsedPart = UsedPart()
     two_position: TwoPosition | None = Field(
         None,

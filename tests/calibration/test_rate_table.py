@@ -48,7 +48,7 @@ def test_intervals_cover_what_they_say(name, setting):
         assert (upper - lower)[0] == pytest.approx(2 * 1.96 * sigma, rel=1e-3)
     assert found.bias.std() == pytest.approx(found.bias_sigma, rel=0.05)
     assert found.scale_factor.std() == pytest.approx(found.scale_factor_sigma, rel=0.05)
-    for chance in (found.linearity, found.quadratic.p_value, found.asymmetry.p_value):
+    for chance in (found.linearity.p_value, found.quadratic.p_value, found.asymmetry.p_value):
         assert np.mean(chance < 0.05) == pytest.approx(0.05, abs=0.015)
     assert found.not_observable == ()
 
@@ -60,16 +60,48 @@ def test_what_is_not_a_line_is_found():
     bent = table.fit(noise + 1.02 * rate + 0.004 * rate**2)
     assert bent.quadratic.value.mean() == pytest.approx(0.004, abs=4e-5)
     assert np.mean(bent.quadratic.p_value < 0.05) > 0.95
-    assert np.mean(bent.linearity < 0.05) > 0.9
+    assert np.mean(bent.linearity.p_value < 0.05) > 0.9
     split = table.fit(noise + np.where(rate > 0, 1.002, 0.998) * rate)
     assert split.asymmetry.value.mean() == pytest.approx(0.004, abs=1e-4)
     assert split.scale_factor.mean() == pytest.approx(1.0, abs=1e-4)
-    assert np.mean(split.linearity < 0.05) > 0.9
+    assert np.mean(split.linearity.p_value < 0.05) > 0.9
+
+
+def test_linearity_is_the_largest_deviation_over_full_scale():
+    # Equal noise at rates r: the line of q r^2 is level, and leaves q (r^2 - mean of r^2).
+    rates = (2.0, -2.0, 1.0, -1.0, 0.0)
+    steps = [(30.0 * i + 5.0, 30.0 * i + 30.0, rate) for i, rate in enumerate(rates)]
+    schedule = Schedule.from_steps(steps, 8.0)
+    model, blocks = MODELS["N"], schedule.experiment.blocks(1000)
+    table, rate, square = RateTable(schedule, blocks, model), np.array(rates), np.array(rates) ** 2
+    true = 0.01 * np.abs(square - square.mean()).max() / 2.0
+    found = table.fit(runs_of(model, blocks, 4000) + 1.5 * rate + 0.01 * rate**2).linearity
+    assert found.full_scale == 2.0
+    assert found.value.mean() == pytest.approx(true, rel=0.02)
+    lower, upper = found.interval()
+    assert np.mean((lower <= true) & (true <= upper)) > 0.95
+    # A line: the lower limit is 0 in at least 95 of 100 runs, though the value never is.
+    straight = table.fit(runs_of(model, blocks, 4000) + 1.5 * rate).linearity
+    assert np.mean(straight.interval()[0] == 0.0) > 0.95 and straight.value.min() > 0.0
+
+
+def test_asymmetry_is_a_fraction_of_the_scale_factor():
+    blocks = SCHEDULE.experiment.blocks(1000)
+    rate = SCHEDULE.of_blocks(blocks)[None, :]
+    table = RateTable(SCHEDULE, blocks, MODELS["N"])
+    for gain in (1.0, 2.5):
+        found = table.fit(gain * np.where(rate > 0, 1.01, 0.99) * rate).asymmetry
+        assert found.value[0] == pytest.approx(0.02, rel=1e-9)
+    plain = table.fit(rate).asymmetry.sigma
+    assert found.sigma == pytest.approx(plain / 2.5, rel=1e-9)
+    dead = table.fit(0.0 * rate)
+    assert dead.asymmetry is None and dead.linearity.value[0] == 0.0
+    assert "does not follow the table" in dead.not_observable[-1].reason
 
 
 def test_white_noise_gives_the_straight_line_of_ordinary_least_squares():
     blocks = SCHEDULE.experiment.blocks(1000)
-    means = np.random.default_rng(1).standard_normal((1, len(blocks)))
+    means = np.random.default_rng(1).standard_normal((1, len(blocks))) + 20.0 * np.array(RATES)
     found = RateTable(SCHEDULE, blocks, MODELS["N"]).fit(means)
     slope, offset = np.polyfit(RATES, means[0], 1)
     assert found.scale_factor[0] == pytest.approx(slope, rel=1e-9)
@@ -80,7 +112,16 @@ def test_white_noise_gives_the_straight_line_of_ordinary_least_squares():
     assert found.quadratic.value[0] == pytest.approx(np.polyfit(RATES, means[0], 2)[0], rel=1e-8)
     two = np.column_stack([np.ones(7), np.maximum(RATES, 0), np.minimum(RATES, 0)])
     positive, negative = np.linalg.lstsq(two, means[0], rcond=None)[0][1:]
-    assert found.asymmetry.value[0] == pytest.approx(positive - negative, rel=1e-8)
+    mean = (positive + negative) / 2.0
+    assert found.asymmetry.value[0] == pytest.approx((positive - negative) / mean, rel=1e-7)
+    # Deviations are those from the line, over the largest rate, and so are their standard errors.
+    levels, of, number = np.unique(RATES, return_inverse=True, return_counts=True)
+    left = np.bincount(of, means[0] - slope * np.array(RATES) - offset) / number
+    assert found.linearity.full_scale == 1.0
+    assert found.linearity.deviation[0] == pytest.approx(left, abs=1e-9)
+    taken = 1.0 / 7.0 + (levels - np.mean(RATES)) ** 2 / spread
+    sigma = 1e-3 / 5.0 * np.sqrt(1.0 / number - taken)
+    assert found.linearity.sigma == pytest.approx(sigma, rel=1e-6)
 
 
 def test_logs_of_the_simulator_give_their_scale_factor():
@@ -118,7 +159,7 @@ def test_the_direction_of_the_axis_is_in_the_bias():
     assert unsure.sigma[0] > 10 * sure.sigma[0]
     assert unsure.fit(means).scale_factor_sigma == pytest.approx(sure.sigma[1])
     left_out = RateTable(SCHEDULE, blocks, model).fit(means)
-    assert [one.quantity for one in left_out.not_observable] == ["bias"]
+    assert [one.quantity for one in left_out.not_observable] == ["bias", "asymmetry"]
 
 
 def test_one_rate_tells_no_scale_factor():

@@ -51,6 +51,7 @@ def tables() -> dict[str, pa.Table]:
         "recordings": build("recordings", [recording]),
         "parameters": build("parameters", parameters),
         "allan": build("allan", allan),
+        "temperature": build("temperature", []),
     }
 
 
@@ -90,6 +91,36 @@ def test_doubts_stand_in_the_file(tables: dict[str, pa.Table]) -> None:
     doubted = judged(tables, decides=True, doubts="lines (gyro_x)")
     assert "CAUTION: sim_a is in doubt: lines (gyro_x)." in str(made(doubted, REQUEST))
     assert made(judged(tables, decides=True, doubts=""), REQUEST) == made(tables, REQUEST)
+
+
+def test_axes_and_recordings_that_are_left_out_are_named(tables: dict[str, pa.Table]) -> None:
+    (about,) = tables["recordings"].to_pylist()
+    bad = about | {"recording": "bad", "status": "rejected", "reason": "line 3: found 'x'"}
+    several = tables | {"recordings": build("recordings", [about, bad])}
+    said = " ".join(str(made(several, REQUEST)).replace("#", "").split())
+    assert "gyro: axes left out, less noise at 60 s: gyro_x of sim_a." in said
+    assert "axes left out, no recording has an estimate: gyro_z." in said
+    assert "CAUTION: left out: bad is rejected: line 3: found 'x'." in said
+    gyros = several | {"parameters": tables["parameters"].slice(0, 8)}
+    alone = made(gyros, replace(REQUEST, target="json"))
+    assert "accel left out: there is no estimate of it." in json.loads(alone)["about"]
+
+
+def test_the_temperature_of_the_recording_that_is_exported_is_in_the_file(
+    tables: dict[str, pa.Table],
+) -> None:
+    figures = {"T_0": 30.0, "sensitivity": 2e-4, "quadratic": None, "lag": None}
+    rows = [
+        {"sensor": "mti_7", "recording": "sim_a", "channel": "gyro_x", "parameter": name,
+         "compensated": True, "value": value, "status": "absent" if value is None else "ok",
+         "lower": value and 0.9 * value, "upper": value and 1.1 * value, "unit": "SI"}
+        for name, value in figures.items()
+    ]  # fmt: skip
+    warm = judged(tables, temperature_min=20.0, temperature_max=40.0)
+    warm["temperature"] = build("temperature", rows)
+    text = str(made(warm, replace(REQUEST, target="px4")))
+    assert "TC_G0_X1_0\t0.0002\t9" in text and "TC_G0_TREF\t30\t9" in text
+    assert "TC_G0_X1_1\t0\t9" in text and "TC_A0" not in text
 
 
 def test_the_tables_of_a_run_are_found_in_its_folder(

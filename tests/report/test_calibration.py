@@ -59,7 +59,7 @@ def test_the_page_of_a_rate_table(read: dict[str, Read]) -> None:
     kinds = {one.attributes.get("data-kind") for one in page.elements if one.tag == "figure"}
     assert kinds == {"table_line", "table_residuals"}
     assert page.data["table"]["number"] == [1, 2, 3, 4, 5, 6]
-    for name in ("scale factor", "quadratic term", "asymmetry", "any departure from the line"):
+    for name in ("scale factor", "quadratic term", "asymmetry", "deviation from the line"):
         assert page.naming(name, "tr")
 
 
@@ -110,8 +110,9 @@ def test_sentences() -> None:
     bias = {"parameter": "bias", "value": 1e-3, "lower": 0.9e-3, "upper": 1.1e-3, "reason": None}
     assert answer([bias], "si") == "The bias is 0.001 ± 0.0001 rad/s (95 %)."
     assert answer([], "si") == "Nothing was found of this recording."
-    bent = {"parameter": "linearity", "value": None, "chance": 1e-3}
+    bent = {"parameter": "linearity", "value": 0.0125, "chance": 1e-3}
     assert "A straight line does not fit" in answer([bias, bent], "si")
+    assert "from the line is 1.25 % of the largest rate" in answer([bias, bent], "si")
     assert scatter_words([{"scatter": None}]) == ""
     assert "scatter more than the noise" in scatter_words([{"scatter": 1e-4}])
     assert earth_words([{"earth_rate": None}], "si").endswith("is a part of the bias.")

@@ -7,6 +7,7 @@ from imubench_pipeline.report.datasheets import (
     curve_distances,
     delta_rows,
     deltas_of_sensors,
+    repeatability_lines,
 )
 from imubench_pipeline.report.view import RecordingView, recording_views
 from imubench_pipeline.tables import build
@@ -83,7 +84,7 @@ def test_what_nobody_looked_up_is_not_said_to_be_unpublished(quantity: str, figu
     (row,) = deltas(missing, coverage=known)
     assert row["coverage"] == "not looked up"
     (row,) = deltas(missing, coverage={("b", "gyro", figure): "not looked up"})
-    assert row["coverage"] == "no"
+    assert row["coverage"] == "not looked up"
 
 
 @pytest.mark.parametrize(
@@ -176,7 +177,7 @@ def test_who_publishes_what_is_counted() -> None:
     ]
     gyro, accel = coverage_tables(build("coverage", rows).to_pylist())
     assert gyro["figures"] == ["N", "temperature coefficient"]
-    assert gyro["counts"] == ["2 of 3", "1 of 3"]
+    assert gyro["counts"] == ["2 of 3 looked up", "1 of 2 looked up; 1 not looked up"]
     assert [line["name"] for line in gyro["lines"]] == ["V A", "V B", "V C"]
     assert [[cell["text"] for cell in line["cells"]] for line in gyro["lines"]] == [
         ["yes", "other"],
@@ -186,5 +187,16 @@ def test_who_publishes_what_is_counted() -> None:
     assert [line["document"] for line in gyro["lines"]] == ["–", "D-1", "D-1"]
     assert gyro["lines"][2]["cells"][1]["note"] == "7 ppm/K"
     assert [cell["class"] for cell in gyro["lines"][0]["cells"]] == ["", "none"]
-    assert (accel["figures"], accel["counts"]) == (["N", "offset"], ["0 of 1", "0 of 1"])
+    assert (accel["figures"], accel["counts"]) == (["N", "offset"], ["0 of 1 looked up"] * 2)
     assert list(coverage_tables([])) == []
+
+
+def test_the_spread_of_turn_ons_stands_beside_what_is_printed() -> None:
+    row = {"sensor": "a", "device": "1", "channel": "gyro_x", "recordings": 3, "printed": 4.0,
+           "unit": "deg/h", "kind": "typ", "condition": None, "comparable": 4 * HOUR,
+           "measured": 2 * HOUR, "lower": HOUR, "upper": 12 * HOUR, "delta": -0.5,
+           "verdict": "not sure", "reason": "why"}  # fmt: skip
+    (line,) = repeatability_lines([row, row | {"sensor": "b"}], "a", "practical")
+    assert (line["printed"], line["about"], line["delta"]) == ("4 deg/h", "typ", "−50 %")
+    assert line["measured"] == ["5.556×10⁻⁴", "2.778×10⁻⁴ to 0.003333"]
+    assert (line["unit"], line["channel"], line["recordings"]) == ("°/s", "gyro x", 3)

@@ -5,8 +5,9 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 
-from imubench_pipeline.comparable import comparables
+from imubench_pipeline.comparable import SENSITIVITY, comparables
 from imubench_pipeline.datasheet import bias_deltas, curve_rms, deltas
+from imubench_pipeline.measured import sensitivity
 from imubench_pipeline.printed import Datasheet
 from imubench_pipeline.results import Quality, Row, curves, estimates
 from imubench_pipeline.tables import read, write
@@ -14,7 +15,10 @@ from imubench_pipeline.tables import read, write
 
 def rows(folder: Path, sensor: str, recording: str, settings: str) -> Iterator[Row]:
     """Yield the rows of the table ``datasheet``; none of a rejected recording."""
-    measured = curves(folder / "allan.parquet", Quality.read(folder / "quality.json"))
+    quality = Quality.read(folder / "quality.json")
+    measured = curves(folder / "allan.parquet", quality)
+    temperatures = [quality.recording.get(f"temperature_{end}") for end in ("min", "max")]
+    thermal = read("temperature", [folder / "temperature.parquet"]).to_pylist()
     biases = read("fixed_bias", [folder / "fixed_bias.parquet"]).to_pylist()
     means = {row["channel"]: row["value"] for row in biases}
     given = json.loads(settings)
@@ -25,8 +29,12 @@ def rows(folder: Path, sensor: str, recording: str, settings: str) -> Iterator[R
         for estimate in by_method:
             for delta in deltas(datasheet, channel, estimate, tau, tolerance):
                 yield names | {"method": estimate.method} | asdict(delta)
-        for delta in bias_deltas(datasheet, channel, means, tolerance):
-            yield names | {"method": "mean"} | asdict(delta)
+        own = [row for row in thermal if row["channel"] == channel]
+        for delta in bias_deltas(
+            datasheet, channel, means, tolerance, sensitivity(own, *temperatures)
+        ):
+            method = "temperature" if delta.statistic == SENSITIVITY else "mean"
+            yield names | {"method": method} | asdict(delta)
 
 
 def curve_rows(folder: Path, sensor: str, recording: str, settings: str) -> Iterator[Row]:

@@ -17,12 +17,18 @@ CALIBRATION_TABLES: dict[str, tuple[Column, ...]] = {
         text("run", "rate_table, or at_rest with a direction that is stated"),
         *figure(
             "bias at the first sample used; present_bias: at the end; scale_factor (indicated over "
-            "true rate), quadratic, asymmetry, linearity; earth_rate, heading",
+            "true rate), quadratic, asymmetry (of the scale factors of both senses, over their "
+            "mean), linearity (largest deviation from the line over the largest rate); earth_rate, "
+            "heading",
             "ok; not_observable: the run cannot tell it; no_model, too_short or not_shown",
         ),
         number("sigma", "as in unit", "standard deviation of value: noise and direction"),
         number("sigma_noise", "as in unit", "the part of it that is by the noise model"),
-        number("chance", "-", "of a quadratic, an asymmetry or any departure at least as large"),
+        number(
+            "chance",
+            "-",
+            "of a quadratic, an asymmetry or deviations at least as large",
+        ),
         number("half_width", _RATE, "half of the range of the bias that is left open"),
         number("earth_rate", _RATE, "along the axis, which was taken off; null: it was not"),
         number("earth_rate_sigma", _RATE, "its standard deviation, by the direction's"),

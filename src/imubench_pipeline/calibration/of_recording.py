@@ -272,12 +272,14 @@ def _line(given: Given, found: Calibration) -> Iterator[dict[str, Any]]:
     for name, term in (("quadratic", found.quadratic), ("asymmetry", found.asymmetry)):
         if term is not None:
             yield _term(given, name, term)
-    if found.linearity is not None:
-        yield {
-            "parameter": "linearity",
-            "unit": UNITS["linearity"],
-            "status": "ok",
-            "chance": float(found.linearity[0]),
+    if (straight := found.linearity) is not None:
+        lower, upper = straight.interval()
+        worst = int(np.abs(straight.deviation[0]).argmax())
+        sigma = float(straight.sigma[worst])
+        limits = float(lower[0]), float(upper[0])
+        yield _figure(given, "linearity", straight.value[0], sigma, limits) | {
+            "sigma_noise": sigma,
+            "chance": float(straight.p_value[0]),
         }
 
 

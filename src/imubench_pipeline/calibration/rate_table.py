@@ -3,9 +3,11 @@
     mean of a block = bias + S (table rate + Earth's rate along the axis) + noise
 
 by generalised least squares over all steady rates (`least_squares`): the gyro's drift from one rate
-to the next counts as what the noise model says it is. A line is what IEEE Std 952-1997 fits in its
-scale-factor tests; what it may hide is asked for: a quadratic term, an asymmetry between the two
-senses of rotation, and any departure at all of the rates from the line.
+to the next counts as what the noise model says it is. A line is what IEEE Std 952-2020 fits in its
+scale-factor tests; what it may hide is asked for: a quadratic term; an asymmetry, the scale factor
+of positive less that of negative rates as a fraction of their mean; and the linearity, the largest
+deviation of a rate from the line as a fraction of full scale, for which the largest rate of the
+test stands.
 
 The axis is along that of the table. Then the Earth's rate along it is constant and, not known, it
 is a bias; across it, it averages out over whole turns. An angle a between the two axes lowers the
@@ -38,6 +40,10 @@ Array = NDArray[np.float64]
 _LEVEL = 1e-12
 """rad/s of the Earth's rate that may be open."""
 
+_NO_SCALE = NotObservable(
+    "asymmetry", "the gyro does not follow the table: there is no scale factor to be a fraction of"
+)
+
 _SAME = 1e-9
 """Relative difference of two rates that is rounding."""
 
@@ -49,7 +55,7 @@ class Term:
     Attributes
     ----------
     value : ndarray, shape (runs,)
-        Of the quadratic term, s/rad; of the asymmetry, a ratio.
+        Of the quadratic term, s/rad; of the asymmetry, a fraction of the scale factor.
     sigma : float
         Its standard error by the noise model.
     """
@@ -78,6 +84,51 @@ class Term:
 
 
 @dataclass(frozen=True)
+class Linearity:
+    """The largest deviation of a rate from the line, over full scale, in runs of one design.
+
+    Attributes
+    ----------
+    deviation : ndarray, shape (runs, levels)
+        What each rate is above the line, over full scale.
+    sigma : ndarray, shape (levels,)
+        Its standard error by the noise model.
+    full_scale : float
+        The largest rate of the test, rad/s.
+    p_value : ndarray, shape (runs,)
+        Chance of deviations at least as large, all together, where the line is right.
+    """
+
+    deviation: Array
+    sigma: Array
+    full_scale: float
+    p_value: Array
+
+    @property
+    def value(self) -> Array:
+        """The largest deviation, a fraction of full scale without sign, shape (runs,)."""
+        return np.abs(self.deviation).max(axis=1)
+
+    def interval(self, level: float = 0.95) -> tuple[Array, Array]:
+        """Return confidence limits of the largest true deviation.
+
+        The limits hold of all rates together (Bonferroni): noise alone makes the largest of many
+        deviations large.
+
+        Parameters
+        ----------
+        level : float
+
+        Returns
+        -------
+        (ndarray, ndarray), shapes (runs,)
+        """
+        half = half_width(1.0 - (1.0 - level) / self.sigma.size) * self.sigma
+        size = np.abs(self.deviation)
+        return np.maximum(size - half, 0.0).max(axis=1), (size + half).max(axis=1)
+
+
+@dataclass(frozen=True)
 class Calibration:
     """Bias and scale factor in runs of one design.
 
@@ -90,9 +141,9 @@ class Calibration:
     quadratic : Term or None
         Coefficient of the square of the rate beside the line, s/rad.
     asymmetry : Term or None
-        Scale factor of positive less that of negative rates, beside a bias that both share.
-    linearity : ndarray, shape (runs,), or None
-        Chance of a departure of the levels from the line at least as large, where it is right.
+        Scale factor of positive less that of negative rates over their mean, beside a bias that
+        both share.
+    linearity : Linearity or None
     not_observable : tuple of NotObservable
         Why there is no value of what is None, and what is a part of what.
     """
@@ -101,7 +152,7 @@ class Calibration:
     bias_sigma: float
     quadratic: Term | None
     asymmetry: Term | None
-    linearity: Array | None
+    linearity: Linearity | None
     not_observable: tuple[NotObservable, ...]
 
     @property
@@ -194,6 +245,7 @@ class RateTable:
         rate = schedule.of_blocks(blocks) + earth
         self._levels = _levels(rate)
         number = int(self._levels.max()) + 1
+        self._rates = np.array([rate[self._levels == level][0] for level in range(number)])
         if number < 2:
             raise NotObservableError(
                 f"the table has one rate only, {rate[0]:g} rad/s: a scale factor cannot be told "
@@ -255,19 +307,44 @@ class RateTable:
             If there is not one finite mean a block.
         """
         line = self._line.fit(means)
-        linearity = None
-        if self._each is not None:
-            each = self._each.fit(means)
-            more = np.maximum(line.chi_squared - each.chi_squared, 0.0)
-            linearity = np.asarray(chi2.sf(more, line.freedom - each.freedom))
+        asymmetry = self._fraction(means)
+        still = self._asymmetry is not None and asymmetry is None
         return Calibration(
             line,
             self.sigma[0],
             _term(self._quadratic, means),
-            _term(self._asymmetry, means),
-            linearity,
-            tuple(self._open),
+            asymmetry,
+            self._linearity(line, means),
+            (*self._open, *[_NO_SCALE] * still),
         )
+
+    def _linearity(self, line: Fit, means: Array) -> Linearity | None:
+        if self._each is None:
+            return None
+        each = self._each.fit(means)
+        more = np.maximum(line.chi_squared - each.chi_squared, 0.0)
+        at_rates = np.column_stack([np.ones(len(self._rates)), self._rates])
+        # The line is fitted to the same means: what it takes of their noise is no deviation.
+        variance = np.diag(each.covariance - at_rates @ line.covariance @ at_rates.T)
+        full_scale = float(np.abs(self._rates).max())
+        return Linearity(
+            (each.value - line.value @ at_rates.T) / full_scale,
+            np.sqrt(np.maximum(variance, 0.0)) / full_scale,
+            full_scale,
+            np.asarray(chi2.sf(more, line.freedom - each.freedom)),
+        )
+
+    def _fraction(self, means: Array) -> Term | None:
+        """Return the asymmetry over the mean scale factor of both senses."""
+        if self._asymmetry is None:
+            return None
+        found = self._asymmetry.fit(means)
+        scale = found.value[:, 1]
+        if np.any(np.abs(scale) <= half_width(0.95) * found.sigma[1]):
+            return None
+        # The scale factor's own error is of second order.
+        sigma = float(self._asymmetry.sigma[-1] / np.abs(scale).mean())
+        return Term(found.value[:, -1] / scale, sigma)
 
 
 def calibrate(

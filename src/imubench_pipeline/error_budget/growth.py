@@ -161,7 +161,7 @@ def variance(term: Term, order: int, time: float, start: SensorStart) -> float:
 
     References
     ----------
-    IEEE Std 952-1997, annex C, for the densities. N: P. D. Groves, "Principles of GNSS, Inertial,
+    IEEE Std 952-2020, for the densities. N: P. D. Groves, "Principles of GNSS, Inertial,
     and Multisensor Integrated Navigation Systems", 2nd ed., 2013. The others follow
     from S(f) |H(f)|^2, Parseval's theorem and the state equation of each process.
     """

@@ -11,12 +11,16 @@ import numpy as np
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.export.imu import AxisNoise, ExportError
+from imubench_pipeline.export.temperature import AXES
 from imubench_pipeline.results import estimate_of
 
 Row = Mapping[str, Any]
 Key = tuple[str, str]  # recording, channel
 
 WORST, MEDIAN = "worst", "median"
+
+_NAMED = 40
+"""Recordings of a reason that are named; of more the number."""
 
 
 @dataclass(frozen=True)
@@ -87,6 +91,7 @@ def choose(
             key = (row["recording"], row["channel"], row["method"])
             found.setdefault(key, []).append(row)
     named = devices or {}
+    everywhere = list(found)
     if axis not in (WORST, MEDIAN):
         devices_there = sorted({named.get(recording, recording) for recording, _, _ in found})
         found = {
@@ -117,8 +122,39 @@ def choose(
         f"{channel} of recording {recording} by method {used}, {which}{whose} at {horizon:g} s "
         f"({error:.3g} {unit} there, with a bias averaged as long before)"
     )
-    noise = AxisNoise(estimate.model, origin, parameter_notes(estimate), _least_walk(estimate))
+    others: dict[str, list[Key]] = {}
+    for key in everywhere:
+        if key not in found:
+            others.setdefault("of another device", []).append(key[:2])
+        elif key not in (one[1] for one in ranked):
+            others.setdefault("no white noise in the model", []).append(key[:2])
+        elif key != (recording, channel, used):
+            why = "not the median" if axis == MEDIAN else "less noise"
+            others.setdefault(f"{why} at {horizon:g} s", []).append(key[:2])
+    notes = [*_left_out(others, channel), *parameter_notes(estimate)]
+    noise = AxisNoise(estimate.model, origin, notes, _least_walk(estimate))
     return Choice(recording, channel, used, noise, deviation, len(ranked))
+
+
+def _left_out(others: Mapping[str, Sequence[Key]], chosen: str) -> list[str]:
+    """Say which axes do not stand for the quantity of the chosen one, and why."""
+    quantity, _ = chosen.split("_")
+    said = []
+    for why, keys in others.items():
+        of: dict[str, list[str]] = {}
+        for recording, channel in keys:
+            of.setdefault(recording, []).append(channel)
+        named = [f"{' and '.join(channels)} of {one}" for one, channels in of.items()]
+        more = len(named) - _NAMED
+        said.append(
+            f"axes left out, {why}: {'; '.join(named[:_NAMED])}"
+            + (f"; and those of {more} more recordings" if more > 0 else "")
+        )
+    there = {chosen, *(channel for keys in others.values() for _, channel in keys)}
+    without = [name for axis in AXES if (name := f"{quantity}_{axis}") not in there]
+    if without:
+        said.append(f"axes left out, no recording has an estimate: {' and '.join(without)}")
+    return said
 
 
 def parameter_notes(estimate: Estimate) -> list[str]:

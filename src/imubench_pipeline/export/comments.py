@@ -11,7 +11,7 @@ from imubench_pipeline.export.mapping import Mapped, named
 _WIDTH = 96
 
 
-def heading(imu: Imu, program: str, convention: str) -> list[str]:
+def heading(imu: Imu, program: str, convention: str, *, temperature: bool = False) -> list[str]:
     """Return what is to be said of every file.
 
     Parameters
@@ -21,6 +21,8 @@ def heading(imu: Imu, program: str, convention: str) -> list[str]:
         What loads the file.
     convention : str
         Of its numbers, in words.
+    temperature : bool
+        The file holds how the biases follow the temperature.
 
     Returns
     -------
@@ -34,11 +36,28 @@ def heading(imu: Imu, program: str, convention: str) -> list[str]:
     said.append(convention)
     units = {"gyro": "rad, s", "accel": "m, s"}
     estimated = {"gyro": imu.gyro, "accel": imu.accel}
+    said += [
+        f"{name} left out: there is no estimate of it."
+        for name, one in estimated.items()
+        if one is None
+    ]
     for name, axis in imu.axes.items():
         said.append(f"{name}: {axis.origin}.")
         terms = named((estimated[name] or axis).model.terms)
         said.append(f"{name} model ({units[name]}; N two-sided): {terms}.")
         said += [f"{name}: {note}." for note in axis.notes]
+    if temperature:
+        said += [
+            f"{name} and temperature: {note}."
+            for name, effect in imu.temperature.items()
+            for note in effect.notes
+        ]
+        said.append("Left out: fixed biases, which change from one start to the next.")
+    else:
+        said.append(
+            "Left out: fixed biases, which change from one start to the next, and how they follow "
+            "the temperature: the file holds noise alone."
+        )
     if imu.inflation != 1.0:
         said.append(
             f"INFLATED: from here on all densities and amplitudes are {imu.inflation:g} times "
@@ -53,14 +72,28 @@ def mapping_words(mapped: Mapping[str, Mapped]) -> list[str]:
 
 
 def commented(statements: Sequence[str], mark: str = "#") -> str:
-    """Return statements as comment lines, each beginning with a mark."""
+    """Return statements as comment lines, each beginning with a mark.
+
+    What no comment can hold in every format, such as the name of a recording with a line end of
+    Unicode or a control character in it, is written as its escape.
+    """
     lines = []
     for statement in statements:
         wrapped = textwrap.wrap(
-            statement, _WIDTH - len(mark) - 1, subsequent_indent="  ", break_long_words=False
+            _printable(statement),
+            _WIDTH - len(mark) - 1,
+            subsequent_indent="  ",
+            break_long_words=False,
         )
         lines += [f"{mark} {line}" for line in wrapped]
     return "\n".join(lines) + "\n"
+
+
+def _printable(text: str) -> str:
+    return "".join(
+        one if one.isprintable() or one in " \t\n" else one.encode("unicode_escape").decode("ascii")
+        for one in text
+    )
 
 
 def setting(key: str, value: str, comment: str, indent: str = "") -> str:

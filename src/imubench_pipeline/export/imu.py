@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
+from imubench_pipeline.export.temperature import TemperatureEffect
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
 from imubench_pipeline.units import STANDARD_GRAVITY
 
@@ -64,6 +65,8 @@ class Imu:
         The recordings are simulated.
     cautions : sequence of str
         What speaks against the recordings that were used, and which were left out.
+    temperature : mapping of str to TemperatureEffect
+        How the biases follow the temperature, by quantity.
 
     Raises
     ------
@@ -81,6 +84,7 @@ class Imu:
     because: str | None = None
     simulated: bool = False
     cautions: Sequence[str] = ()
+    temperature: Mapping[str, TemperatureEffect] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in ("rate", "horizon", "gravity", "inflation"):

@@ -13,6 +13,9 @@ B^2 / |1 - e^(-i omega)| is cut off at low frequencies by the number of poles; w
 as samples the Allan deviation is within 7 % at that many samples and 11 % at twice. The default
 of one pole is no flicker noise.
 
+TemperatureBias (T - 25) is added at the temperature T of the sensor, degC; 25 is fixed. A
+ConstantBias of s (25 - T_0) makes it s (T - T_0), and the script sets T to T_0.
+
 Sources: MathWorks, reference pages of imuSensor ("Algorithms"), gyroparams, accelparams and
 fractalcoef (R2023b); the example "Inertial Sensor Noise Analysis Using Allan Variance"; C code
 generated from fusion.simulink.imuSensor (pBandwidth, pStdDevWhiteNoise, pStdDevRandWalk,
@@ -22,11 +25,13 @@ pStdDevBiasInst).
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from imubench_pipeline.export.comments import commented, heading, mapping_words
 from imubench_pipeline.export.imu import AxisNoise, Imu
 from imubench_pipeline.export.mapping import Mapped, as_process_and_walk
+from imubench_pipeline.export.temperature import AXES, TemperatureEffect
 from imubench_pipeline.noise import NoiseModel, driving_density
 
 _CONVENTION = (
@@ -35,6 +40,9 @@ _CONVENTION = (
     "SampleRate = {rate:g} Hz. R2023b or newer."
 )
 _MOST_POLES = 2000
+_PROGRAM_REFERENCE = 25.0
+"""degC; where TemperatureBias adds nothing."""
+
 _REACH = 5.0
 """Samples a pole up to which the Allan deviation of flicker noise is within 11 %."""
 
@@ -58,8 +66,10 @@ def write(imu: Imu) -> str:
     parameters: dict[str, _Parameters] = {}
     for name, axis in imu.axes.items():
         mapped[name], parameters[name] = _parameters(axis, imu)
-    about = heading(imu, "MATLAB imuSensor", _CONVENTION.format(rate=imu.rate))
+    about = heading(imu, "MATLAB imuSensor", _CONVENTION.format(rate=imu.rate), temperature=True)
     about += mapping_words(mapped)
+    biases = {name: _temperature(imu.temperature.get(name)) for name in parameters}
+    about += [f"{name} and temperature: {words}." for name in biases for words in biases[name][1]]
     text = commented(about, "%") + "IMU = imuSensor('accel-gyro');\n"
     text += f"IMU.SampleRate = {imu.rate:.9g};  % Hz\n"
     units = {"gyro": "rad/s", "accel": "m/s^2"}
@@ -72,13 +82,39 @@ def write(imu: Imu) -> str:
             ("'NoiseDensity'", _vector(one.noise_density), f"N, {unit}/sqrt(Hz)"),
             ("'RandomWalk'", _vector(one.random_walk), f"K, {unit} sqrt(Hz)"),
             ("'BiasInstability'", _vector(one.bias_instability), f"of the drive, {unit}"),
+            *biases[name][0],
             ("'BiasInstabilityCoefficients'", one.coefficients, "of the filter"),
         ]
         text += f"IMU.{member} = {maker}( ...\n"
         for i, (key, value, comment) in enumerate(lines):
             end = "); " if i == len(lines) - 1 else ", ..."
             text += f"    {key}, {value}{end} % {comment}\n"
+    told = [imu.temperature[name] for name in biases if biases[name][0]]
+    if told:
+        low, high = max(one.low for one in told), min(one.high for one in told)
+        text += (
+            f"IMU.Temperature = {told[0].reference:.9g};  % degC; between {low:.9g} and "
+            f"{high:.9g} the biases follow it\n"
+        )
     return text
+
+
+def _temperature(effect: TemperatureEffect | None) -> tuple[list[tuple[str, str, str]], list[str]]:
+    """Return the settings with which a bias follows the temperature, and what is left out."""
+    if effect is None:
+        return [], []
+    words = [
+        f"axis {axis} left out: its bias bends with temperature, and the program has a line alone"
+        for axis in effect.square
+    ]
+    slopes = [0.0 if axis in effect.square else effect.slope.get(axis, 0.0) for axis in AXES]
+    if not any(slopes):
+        return [], words
+    at_25 = [slope * (_PROGRAM_REFERENCE - effect.reference) for slope in slopes]
+    return [
+        ("'ConstantBias'", _listed(at_25), "at 25 degC, so that it is 0 at T_0"),
+        ("'TemperatureBias'", _listed(slopes), "a kelvin"),
+    ], words
 
 
 def _parameters(axis: AxisNoise, imu: Imu) -> tuple[Mapped, _Parameters]:
@@ -108,4 +144,8 @@ def _parameters(axis: AxisNoise, imu: Imu) -> tuple[Mapped, _Parameters]:
 
 
 def _vector(value: float) -> str:
-    return f"[{value:.9g}, {value:.9g}, {value:.9g}]"
+    return _listed([value] * 3)
+
+
+def _listed(values: Sequence[float]) -> str:
+    return f"[{', '.join(f'{value:.9g}' for value in values)}]"

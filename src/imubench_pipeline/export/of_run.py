@@ -23,7 +23,7 @@ def exports(
     Parameters
     ----------
     tables : mapping of str to pyarrow.Table
-        ``recordings``, ``parameters`` and ``allan``.
+        Those of `imubench_pipeline.export.request.NEEDED`.
     settings : ExportSettings
     recordings : Path, optional
         As `imubench_pipeline.export.request.made` takes it.

@@ -9,10 +9,17 @@ of dt adds (dt noise)^2 to the variance of the angle or velocity increment, and 
 where dt is EKF2_PREDICT_US, 10 ms by default and whatever the rate of the sensor. The parameters
 have ranges; values outside are set to their end, and said.
 
+Where the log tells how the biases follow the temperature, ``TC_G0_*`` and ``TC_A0_*`` hold it: the
+program takes x0 + x1 dT + x2 dT^2 + x3 dT^3 from a reading, dT = T - TREF, T clipped to TMIN and
+TMAX. They do nothing before the device is named and the correction is switched on. x0 is 0: the
+bias at T_0 is for the calibration of the vehicle, and an accelerometer's holds gravity.
+
 Sources: PX4/PX4-Autopilot, src/modules/ekf2/EKF/covariance.cpp (predictCovariance),
 src/modules/ekf2/EKF/python/ekf_derivation/derivation.py (predict_covariance),
 src/modules/ekf2/module.yaml, params_gyro_bias.yaml and params_accel_bias.yaml (units, ranges,
-EKF2_PREDICT_US); QGroundControl developer guide, "Parameters File Format".
+EKF2_PREDICT_US), src/modules/temperature_compensation/TemperatureCompensation.cpp
+(calc_thermal_offsets_3D, names and clipping); QGroundControl developer guide, "Parameters File
+Format".
 """
 
 from __future__ import annotations
@@ -22,6 +29,7 @@ import math
 from imubench_pipeline.export.comments import commented, heading, mapping_words
 from imubench_pipeline.export.imu import ExportError, Imu
 from imubench_pipeline.export.kalibr import walks
+from imubench_pipeline.export.temperature import AXES
 
 PERIOD = 10_000
 """EKF2_PREDICT_US by default, us."""
@@ -34,6 +42,8 @@ _RANGES = {
     "EKF2_GYR_B_NOISE": (0.0, 0.01),
 }
 _REAL, _INTEGER = 9, 6  # MAV_PARAM_TYPE
+_LETTERS = {"gyro": "G", "accel": "A"}
+_WORDS = {"gyro": "GYRO", "accel": "ACC"}
 
 _CONVENTION = (
     "Noise a step of the filter of {step:g} ms: N / sqrt(dt) and K / sqrt(dt), dt = "
@@ -68,7 +78,7 @@ def write(imu: Imu, period: int = PERIOD) -> str:
         "EKF2_GYR_B_NOISE": (gyro.K / step, "rad/s^2, from K"),
         "EKF2_GYR_NOISE": (gyro.N / step, "rad/s, from N"),
     }
-    about = heading(imu, "PX4 EKF2", _CONVENTION.format(step=period / 1000.0))
+    about = heading(imu, "PX4 EKF2", _CONVENTION.format(step=period / 1000.0), temperature=True)
     about += mapping_words(mapped)
     rows = []
     for name, (value, comment) in values.items():
@@ -81,5 +91,32 @@ def write(imu: Imu, period: int = PERIOD) -> str:
         about.append(f"{name} = {kept:.6g} {comment}.")
         rows.append(f"1\t1\t{name}\t{kept:.9g}\t{_REAL}\n")
     rows.append(f"1\t1\tEKF2_PREDICT_US\t{period}\t{_INTEGER}\n")
+    for quantity in imu.temperature:
+        corrections = _corrections(imu, quantity)
+        rows += [f"1\t1\t{name}\t{value:.9g}\t{_REAL}\n" for name, value in corrections.items()]
+        if corrections:
+            letter = _LETTERS[quantity]
+            about.append(
+                f"TC_{letter}0_*: x, y and z of the log are taken for the axes of the device, and "
+                "its temperature for that of the driver; nothing is corrected before "
+                f"TC_{letter}0_ID names the device, as CAL_{_WORDS[quantity]}0_ID does, and "
+                f"TC_{letter}_ENABLE is 1. The noise above is that of the log as it is, the "
+                "temperature's part included; --method compensated gives what is left."
+            )
     columns = "# Vehicle-Id Component-Id Name Value Type\n"
     return commented(["Onboard parameters for Vehicle 1", *about]) + columns + "".join(rows)
+
+
+def _corrections(imu: Imu, quantity: str) -> dict[str, float]:
+    """Return the parameters of the correction for temperature; none where no axis is told."""
+    effect = imu.temperature[quantity]
+    if not effect.slope:
+        return {}
+    name = f"TC_{_LETTERS[quantity]}0_"
+    found = {"TREF": effect.reference, "TMIN": effect.low, "TMAX": effect.high}
+    for number, axis in enumerate(AXES):
+        # All four: what an earlier calibration left would stay else.
+        found[f"X0_{number}"] = found[f"X3_{number}"] = 0.0
+        found[f"X1_{number}"] = effect.slope.get(axis, 0.0)
+        found[f"X2_{number}"] = effect.square.get(axis, 0.0)
+    return {name + key: value for key, value in found.items()}

@@ -16,6 +16,7 @@ from imubench_pipeline.export.choice import WORST, Choice, choose, devices_of
 from imubench_pipeline.export.imu import AxisNoise, ExportError, Imu, normal_gravity
 from imubench_pipeline.export.mapping import named
 from imubench_pipeline.export.targets import TARGETS
+from imubench_pipeline.export.temperature import TemperatureEffect, temperature_effect
 from imubench_pipeline.fitness import left_out
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.overbound import MOST_EXCESS, overbound
@@ -26,7 +27,7 @@ from imubench_pipeline.units import STANDARD_GRAVITY
 
 Tables = Mapping[str, pa.Table]
 
-NEEDED = ("recordings", "parameters", "allan")
+NEEDED = ("recordings", "parameters", "allan", "temperature")
 """The tables that a request reads."""
 
 
@@ -107,7 +108,7 @@ def made(tables: Tables, request: Request, recordings: Path | None = None) -> st
     Parameters
     ----------
     tables : mapping of str to pyarrow.Table
-        ``recordings``, ``parameters`` and ``allan`` of a run.
+        ``recordings``, ``parameters``, ``allan`` and ``temperature`` of a run.
     request : Request
     recordings : Path, optional
         Folder of the recordings of the run: their tables ``draws`` say how sure a fit is that is to
@@ -135,6 +136,7 @@ def imu_of(tables: Tables, request: Request, folder: Path | None = None) -> Imu:
     rows, cautions = _deciding(tables, request, recordings)
     axes: dict[str, AxisNoise] = {}
     rates: list[float] = []
+    effects: dict[str, TemperatureEffect] = {}
     simulated = False
     for quantity in ("gyro", "accel"):
         if not any(row["channel"].startswith(f"{quantity}_") for row in rows):
@@ -153,6 +155,8 @@ def imu_of(tables: Tables, request: Request, folder: Path | None = None) -> Imu:
         simulated = simulated or bool(about["simulated"])
         rates.append(float(f"{about['rate']:.9g}"))  # stamps are not sure of more
         axes[quantity] = choice.axis
+        warmed = _rows(tables["temperature"], sensor=request.sensor, recording=choice.recording)
+        effects[quantity] = temperature_effect(warmed, about, quantity, request.horizon)
         if request.overbound:
             family = TARGETS[request.target].family
             drawn = _drawn(folder, request.sensor, choice)
@@ -174,6 +178,7 @@ def imu_of(tables: Tables, request: Request, folder: Path | None = None) -> Imu:
         because=request.because,
         simulated=simulated,
         cautions=tuple(dict.fromkeys(cautions)),
+        temperature=effects,
     )
 
 
@@ -183,18 +188,23 @@ def _deciding(
     """Return the estimates that an export may stand on, and what is to be said of the others."""
     rows = _rows(tables["parameters"], sensor=request.sensor)
     apart = left_out(recordings)
+    without = [
+        f"left out: {row['recording']} is {row['status']}: {row['reason']}"
+        for row in recordings
+        if row["status"] != "ok"
+    ]
     if not apart:
-        return rows, []
+        return rows, without
     reasons = "; ".join(apart.values())
     if (request.because or "").strip():
-        return rows, [f"{reasons}; used all the same, because: {request.because}"]
+        return rows, [f"{reasons}; used all the same, because: {request.because}", *without]
     kept = [row for row in rows if (row["sensor"], row["recording"]) not in apart]
     if rows and not kept:
         raise ExportError(
             f"{request.sensor}: {reasons}; look at the findings, or say why it may be used all the "
             "same (--because; exports: because; decide: include)"
         )
-    return kept, [f"left out: {reasons}"]
+    return kept, [f"left out: {reasons}", *without]
 
 
 def _drawn(folder: Path | None, sensor: str, choice: Choice) -> Sequence[NoiseModel]:

@@ -22,14 +22,22 @@ WORDS = {
     "scale_factor": "scale factor",
     "quadratic": "quadratic term",
     "asymmetry": "asymmetry",
-    "linearity": "any departure from the line",
+    "linearity": "deviation from the line, of the largest rate",
     "earth_rate": "the Earth's rate",
     "heading": "heading",
 }
 """Name of each figure on a page."""
 
 _PPM = 1e6
-_OF_RATIO = {"scale_factor": "", "asymmetry": " ppm", "quadratic": " ppm per °/s"}
+_PERCENT = 1e2
+_OF_RATIO = {
+    "scale_factor": ("", 1.0),
+    "asymmetry": (" ppm", _PPM),
+    "quadratic": (" ppm per °/s", _PPM * math.radians(1.0)),
+    "linearity": (" %", _PERCENT),
+}
+"""Unit on a page of what is no rate, and the factor to it."""
+
 _DOUBTED = 0.05
 """Chance below which a straight line is doubted."""
 
@@ -59,6 +67,8 @@ def answer(rows: Sequence[Row], system: System) -> str:
     straight = found.get("linearity")
     if straight is not None and straight["chance"] is not None:
         doubted = straight["chance"] < _DOUBTED
+        largest = number_text(_PERCENT * straight["value"], 3)
+        text += f"The largest deviation from the line is {largest} % of the largest rate. "
         text += (
             "A straight line does not fit: noise alone departs"
             if doubted
@@ -111,13 +121,13 @@ def _texts(row: Row) -> dict[str, str]:
         )
         sigma = f"{number_text(_PPM * row['sigma'], 3)} ppm"
     else:
-        per = _PPM * (math.radians(1.0) if name == "quadratic" else 1.0)
+        _, per = _OF_RATIO[name]
         value, low, high, true, sigma = (
             "–" if row[key] is None else number_text(per * row[key], 3)
             for key in ("value", "lower", "upper", "truth", "sigma")
         )
     return {
-        "text": value + _OF_RATIO[name],
+        "text": value + _OF_RATIO[name][0],
         "limits": f"{low} to {high}",
         "sigma_text": sigma,
         "truth_text": true,

@@ -18,7 +18,16 @@ _STATISTIC_NAMES = {
     "K": "K",
     "T_B": "T_B",
 }
-_SYMBOLS = {"N": "N", "K": "K", "T_B": "T_B", "offset": "signal"}
+_SYMBOLS = {
+    "N": "N",
+    "K": "K",
+    "T_B": "T_B",
+    "offset": "signal",
+    "temperature_coefficient": "sensitivity",
+}
+
+_BESIDE = ("mean", "temperature")
+"""What stands in place of a method where no method has a part in a figure."""
 
 _TITLES = {"gyro": "Gyroscope: published figures", "accel": "Accelerometer: published figures"}
 _SIGNS = {"yes": "yes", "no": "no", "other convention": "other", "not looked up": "?"}
@@ -38,7 +47,7 @@ def delta_rows(
         Units of the pages.
     """
     for row in view.datasheet:
-        if row["method"] not in (view.recommended, "mean"):
+        if row["method"] not in (view.recommended, *_BESIDE):
             continue
         unit = page_unit(view.quantity, _SYMBOLS.get(row["quantity"], "B"), system)
         published = row["printed"] is not None
@@ -46,7 +55,7 @@ def delta_rows(
         yield {
             "quantity": _figure_name(row),
             "published": published,
-            "coverage": coverage.get((view.sensor, view.quantity, figure), "no"),
+            "coverage": coverage.get((view.sensor, view.quantity, figure), "not looked up"),
             "printed": f"{row['printed']:g} {row['unit']}" if published else "–",
             "about": ", ".join(filter(None, (row["kind"], _read_as(row), row["condition"]))),
             "comparable": unit.text(row["comparable"]),
@@ -72,7 +81,9 @@ def deltas_of_sensors(views: Sequence[RecordingView], system: System) -> Iterato
     for view in views:
         recommended = view.recommended()
         for row in view.rows("datasheet"):
-            if row["method"] in (recommended[row["channel"]], "mean") and row["delta"] is not None:
+            if row["method"] not in (recommended[row["channel"]], *_BESIDE):
+                continue
+            if row["delta"] is not None:
                 figure = ("quantity", "statistic", "printed", "unit", "kind", "sidedness")
                 key = (view.sensor, view.simulated, row["channel"], *(row[f] for f in figure))
                 groups.setdefault(key, []).append(row)
@@ -100,6 +111,38 @@ def deltas_of_sensors(views: Sequence[RecordingView], system: System) -> Iterato
                 verdict if len(found) == 1 else f"{verdict} ({count})"
                 for verdict, count in verdicts.items()
             ),
+        }
+
+
+def repeatability_lines(
+    rows: Sequence[Row], sensor: str, system: System
+) -> Iterator[dict[str, Any]]:
+    """Yield how the fixed biases of each device of a sensor differ, against what is printed.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        The table ``repeatability``.
+    sensor : str
+    system : str
+        Units of the pages.
+    """
+    for row in rows:
+        if row["sensor"] != sensor:
+            continue
+        unit = page_unit(quantity_of(row["channel"]), "signal", system)
+        yield {
+            "device": row["device"],
+            "channel": row["channel"].replace("_", " "),
+            "recordings": row["recordings"],
+            "printed": f"{row['printed']:g} {row['unit']}",
+            "about": ", ".join(filter(None, (row["kind"], row["condition"]))),
+            "comparable": unit.text(row["comparable"]),
+            "measured": _with_limits(row, unit.text),
+            "unit": unit.sign,
+            "delta": _percent(row["delta"]),
+            "verdict": row["verdict"],
+            "reason": row["reason"] or "",
         }
 
 
@@ -160,10 +203,10 @@ def coverage_tables(rows: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any
             }
         if not lines:
             continue
-        counts = [
-            sum(line["cells"][figure]["text"] == "yes" for line in lines.values())
+        found = {
+            figure: Counter(r["published"] for r in own if r["figure"] == figure)
             for figure in figures
-        ]
+        }
         yield {
             "title": title,
             "figures": [
@@ -173,5 +216,12 @@ def coverage_tables(rows: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any
                 line | {"cells": [line["cells"][figure] for figure in figures]}
                 for line in sorted(lines.values(), key=lambda line: str(line["name"]))
             ],
-            "counts": [f"{count} of {len(lines)}" for count in counts],
+            "counts": [_count(found[figure]) for figure in figures],
         }
+
+
+def _count(published: Counter[str]) -> str:
+    """Return of how many of those looked up a figure is published, and how many were not."""
+    unknown = published["not looked up"]
+    text = f"{published['yes']} of {published.total() - unknown} looked up"
+    return f"{text}; {unknown} not looked up" if unknown else text

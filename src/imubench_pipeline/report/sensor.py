@@ -8,7 +8,7 @@ from typing import Any
 
 from imubench_pipeline.drift import LEVEL
 from imubench_pipeline.report.comparison import Comparison
-from imubench_pipeline.report.datasheets import delta_rows
+from imubench_pipeline.report.datasheets import delta_rows, repeatability_lines
 from imubench_pipeline.report.meaning import budget_tables, budget_words
 from imubench_pipeline.report.palette import places
 from imubench_pipeline.report.payload import FOREST, looks
@@ -29,6 +29,7 @@ def sensor_page(site: Site, sensor: str) -> Page:
         *(view.key for view in own),
         *(view.device_page for view in own),
         [row for row in site.rows("pooled") if row["sensor"] == sensor],
+        [row for row in site.rows("repeatability") if row["sensor"] == sensor],
         [row for row in site.rows("ranking") if row["sensor"] == sensor],
         [row for row in site.rows("coverage") if row["sensor"] == sensor],
         site.looks[sensor],
@@ -61,6 +62,7 @@ def _sensor(site: Site, sensor: str, own: Sequence[RecordingView]) -> dict[str, 
         "budget_words": budget_words(site.settings["settings"]["error_budget"]),
         "too_many": len(own) > _MANY,
         "deltas": list(_deltas(site, shown)),
+        "repeated": list(repeatability_lines(site.rows("repeatability"), sensor, site.system)),
         "page": {
             "grouped": "recording",
             "recordings": [view.name for view in own],

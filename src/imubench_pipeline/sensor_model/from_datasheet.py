@@ -146,17 +146,17 @@ class _Printed:
         return LowPass(printed)
 
     def _step(self) -> float | None:
-        for figure in self._typical("resolution"):
-            value = figure.on_axis(self._axis)
-            if not isinstance(value, float) or figure.unit is None:
-                continue
-            dimensions = FIGURE_DIMENSIONS[self._quantity]["resolution"]
-            dimension = dimension_of(figure.unit, dimensions)
-            found = to_si(value, figure.unit, dimension)
-            text = f"resolution {value:g} {figure.unit}: {figure.kind}, datasheet"
-            self._said.append(Remark("register", text))
-            return 1.0 / found if dimension.endswith("sensitivity") else found
-        self._assume("register", f"{self._quantity}: not rounded, no resolution is printed")
+        for name in ("sensitivity", "resolution"):
+            for figure in self._typical(name):
+                value = figure.on_axis(self._axis)
+                if not isinstance(value, float) or figure.unit is None:
+                    continue
+                dimension = dimension_of(figure.unit, FIGURE_DIMENSIONS[self._quantity][name])
+                found = to_si(value, figure.unit, dimension)
+                text = f"{name} {value:g} {figure.unit}: {figure.kind}, datasheet"
+                self._said.append(Remark("register", text))
+                return 1.0 / found if dimension.endswith("sensitivity") else found
+        self._assume("register", f"{self._quantity}: not rounded, no sensitivity is printed")
         return None
 
     def _full_scale(self, step: float | None) -> float | None:
@@ -169,7 +169,7 @@ class _Printed:
             ranges = [to_si(each, figure.unit, dimension) for each in values]
             chosen = len(ranges) - 1
             if step is not None and len(ranges) > 1:
-                # The resolution is printed for the range that a register of 16 bits then has.
+                # The sensitivity is printed for the range that a register of 16 bits then has.
                 chosen = int(np.argmin(np.abs(np.log(np.array(ranges) / (step * _REGISTER)))))
             text = f"full scale {values[chosen]:g} {figure.unit}: datasheet"
             self._said.append(Remark("register", text))

@@ -1,0 +1,144 @@
+"""How the bias follows the temperature, for programs that correct it or simulate it.
+
+    bias(T) - bias(T_0) = s (T - T_0) + q (T - T_0)^2,
+
+as `imubench_pipeline.thermal` fits it to one recording of one device. A correction that is wrong is
+worse than none, and no program here has a lag: an axis is left out, with the reason, unless the log
+tells s well enough for these uses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+Row = Mapping[str, Any]
+
+AXES = "xyz"
+
+_LEAST_KNOWN = 0.5
+"""Half of the 95 % interval over s, at most: a correction then leaves half of the effect.
+"""
+
+_LEAST_RANGE = 2.0
+"""K; PX4 changes a correction after a change of 1 K only (update_offsets_gyro): in a smaller range
+about T_0 it would correct nothing."""
+
+
+@dataclass(frozen=True)
+class TemperatureEffect:
+    """What temperature adds to the axes of a quantity.
+
+    Attributes
+    ----------
+    reference : float
+        T_0, where it adds nothing, °C.
+    low, high : float
+        Temperatures of the recording, between which it holds, °C.
+    slope, square : dict of str to float
+        s and q of each axis that is told, rad/s or m/s² per K and K²; the square only of those that
+        have one.
+    notes : list of str
+        What each axis is from, and why others are left out.
+    """
+
+    reference: float = 0.0
+    low: float = 0.0
+    high: float = 0.0
+    slope: Mapping[str, float] = field(default_factory=dict)
+    square: Mapping[str, float] = field(default_factory=dict)
+    notes: Sequence[str] = ()
+
+
+def temperature_effect(
+    rows: Iterable[Row], recording: Row, quantity: str, horizon: float
+) -> TemperatureEffect:
+    """Return what temperature adds to the axes of a quantity in one recording.
+
+    Parameters
+    ----------
+    rows : iterable of mapping
+        Of the table ``temperature``, of the recording.
+    recording : mapping
+        Its row of the table ``recordings``.
+    quantity : {"gyro", "accel"}
+    horizon : float
+        How long the program goes without a measurement, s: a sensor that may follow the
+        temperature later than that is left out.
+
+    Returns
+    -------
+    TemperatureEffect
+    """
+    low, high = recording["temperature_min"], recording["temperature_max"]
+    by_axis: dict[str, dict[str, Row]] = {}
+    for row in rows:
+        of, axis = row["channel"].split("_")
+        if of == quantity:
+            by_axis.setdefault(axis, {})[row["parameter"]] = row
+    if not by_axis or low is None or high is None:
+        why = f"{recording['recording']} has no readings of the temperature"
+        return TemperatureEffect(notes=[f"left out: {why}"])
+    reference = float(min(by_axis.items())[1]["T_0"]["value"])
+    unit = {"gyro": "rad/s", "accel": "m/s^2"}[quantity]
+    slope: dict[str, float] = {}
+    square: dict[str, float] = {}
+    notes = [
+        f"T_0 = {reference:.2f} degC, of recording {recording['recording']}, device "
+        f"{recording['device']}: it holds for that device, from {low:.2f} to {high:.2f} degC"
+    ]
+    for axis in AXES:
+        if axis not in by_axis:
+            notes.append(f"axis {axis} left out: no fit of the temperature")
+            continue
+        found = by_axis[axis]
+        reason = _reason_against(found, high - low, horizon)
+        if reason is not None:
+            notes.append(f"axis {axis} left out: {reason}")
+            continue
+        q = found["quadratic"]["value"] or 0.0
+        # The axes of one quantity may come from files whose mean temperatures differ.
+        slope[axis] = found["sensitivity"]["value"] + 2.0 * q * (reference - found["T_0"]["value"])
+        if q:
+            square[axis] = q
+        s = found["sensitivity"]
+        bends = f", square {q:.3e} {unit}/K^2" if q else ""
+        notes.append(
+            f"axis {axis}: {s['value']:.4e} {unit}/K, 95 % limits {s['lower']:.3e} to "
+            f"{s['upper']:.3e}{bends}; {_lag_words(found['lag'])}"
+        )
+    return TemperatureEffect(reference, float(low), float(high), slope, square, notes)
+
+
+def _reason_against(found: Mapping[str, Row], span: float, horizon: float) -> str | None:
+    """Return why a fit is not safe to correct with; None where it is."""
+    s, lag = found["sensitivity"], found["lag"]
+    if s["value"] is None or s["lower"] is None or s["upper"] is None:
+        return f"the sensitivity is {s['status'].replace('_', ' ')}: {s['reason']}"
+    if not s["compensated"]:
+        return f"the log does not show it: {s['reason']}"
+    known = 0.5 * (s["upper"] - s["lower"]) / abs(s["value"])
+    if known > _LEAST_KNOWN:
+        return (
+            f"it is known to {100 * known:.0f} % only, by the noise and by what the register of "
+            f"the temperature leaves open; {100 * _LEAST_KNOWN:.0f} % is needed"
+        )
+    if span < _LEAST_RANGE:
+        return f"the temperature varies by {span:.2g} K only; {_LEAST_RANGE:g} K is needed"
+    if lag["status"] != "absent":
+        longest = lag["upper"]
+        if longest is None:
+            return f"its lag is {lag['status'].replace('_', ' ')}: {lag['reason']}"
+        if longest > horizon:
+            return (
+                f"it may lag the temperature by {longest:.3g} s, longer than the horizon of "
+                f"{horizon:g} s, and the program has no lag"
+            )
+    return None
+
+
+def _lag_words(lag: Row) -> str:
+    if lag["upper"] is None:
+        return "no lag"
+    return f"a lag of up to {lag['upper']:.3g} s is not corrected"

@@ -1,0 +1,130 @@
+"""Every file is read by the parser of its program, whatever names and reasons stand in it."""
+
+import ast
+import io
+import json
+import re
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from imubench_pipeline.export.imu import AxisNoise, Imu
+from imubench_pipeline.export.targets import TARGETS
+from imubench_pipeline.export.temperature import TemperatureEffect
+from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
+from tests.export.test_filters import ekf2, opencv
+
+Content = str | bytes
+
+
+def without_words(text: Content) -> Any:
+    found = json.loads(text)
+    return {key: value for key, value in found.items() if key not in ("about", "sensor")}
+
+
+def script(text: Content) -> list[str]:
+    """Return the statements of MATLAB: three points go on, and a per cent sign ends a line."""
+    assert isinstance(text, str)
+    code = [line.split("%")[0].rstrip() for line in text.split("\n") if line.strip()]
+    joined = "\n".join(line for line in code if line).replace("...\n", "")
+    statements = joined.split("\n")
+    for statement in statements:
+        assert re.fullmatch(r"IMU(\.\w+)? = .*;\s*", statement), statement
+        for opened, closed in ("()", "[]"):
+            assert statement.count(opened) == statement.count(closed)
+    return statements
+
+
+def arrays(content: Content) -> dict[str, Any]:
+    assert isinstance(content, bytes)
+    with np.load(io.BytesIO(content), allow_pickle=False) as found:
+        return {name: found[name].tolist() for name in found.files if name != "about"}
+
+
+def about(content: Content) -> str:
+    """Return all that a file says in words, on one line."""
+    if isinstance(content, bytes):
+        with np.load(io.BytesIO(content), allow_pickle=False) as found:
+            return " ".join(found["about"].tolist())
+    if content.startswith("{"):
+        return " ".join(json.loads(content)["about"])
+    words = [line[1:] for line in content.split("\n") if line[:1] in "#%"]
+    return re.sub(r"\s+", " ", " ".join(words))
+
+
+PARSERS: dict[str, Callable[[Any], Any]] = {
+    "kalibr": yaml.safe_load,
+    "openvins": opencv,
+    "vins-fusion": opencv,
+    "basalt": without_words,
+    "orb-slam3": opencv,
+    "px4": ekf2,
+    "gnss-ins-sim": lambda text: ast.dump(ast.parse(text)),
+    "matlab": script,
+    "json": without_words,
+    "npz": arrays,
+    "python": lambda text: ast.dump(ast.parse(text)),
+}
+
+positive = st.floats(1e-6, 1e-2)
+models = st.builds(
+    NoiseModel,
+    N=positive,
+    B=positive,
+    T_B=st.none() | st.floats(1.0, 1e3),
+    K=st.floats(1e-8, 1e-4),
+    Q=st.just(0.0) | positive,
+    R=st.just(0.0) | st.floats(1e-9, 1e-7),
+    further=st.lists(st.builds(GaussMarkov, positive, st.floats(1.0, 1e3)), max_size=1),
+    sinusoids=st.lists(st.builds(Sinusoid, positive, st.floats(0.1, 5.0)), max_size=1),
+)
+HOSTILE = "a\u2028gyro_x: 1\x85b\x00c\x1f: [\"'{}%#\\\r\n\t...\n\ufeff*/ é"
+names = st.text(min_size=1, max_size=20) | st.just(HOSTILE)
+
+
+def sensor(model: NoiseModel, said: str) -> Imu:
+    axis = AxisNoise(model, f"gyro_x of recording {said}", [f"axes left out: {said}"])
+    warm = TemperatureEffect(30.0, 20.0, 40.0, {"x": 1e-4}, {}, [f"axis y left out: {said}"])
+    return Imu(
+        sensor=said,
+        rate=50.0,
+        gyro=axis,
+        accel=axis,
+        inflation=1.5,
+        because=f"it flies {said}",
+        horizon=10.0,
+        cautions=[f"left out: {said}"],
+        temperature={"gyro": warm},
+    )
+
+
+@pytest.mark.parametrize("name", TARGETS)
+@settings(max_examples=12, deadline=None)
+@given(model=models, said=names)
+def test_words_never_reach_the_numbers(name: str, model: NoiseModel, said: str) -> None:
+    write, parse = TARGETS[name].write, PARSERS[name]
+    assert parse(write(sensor(model, said))) == parse(write(sensor(model, "a")))
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_every_file_says_what_is_left_out(name: str) -> None:
+    rest = NoiseModel(N=1e-4, B=1e-4, K=1e-6, Q=1e-5, R=1e-8, sinusoids=[Sinusoid(1e-4, 2.0)])
+    said = about(TARGETS[name].write(sensor(rest, "run 3")))
+    for words in (
+        "CAUTION: left out: run 3.",
+        "gyro: axes left out: run 3.",
+        "Left out: fixed biases",
+        "gyro model (rad, s; N two-sided): Q = 1.000e-05, N = 1.000e-04",
+        "because: it flies run 3.",
+    ):
+        assert words in said
+    if name not in ("json", "npz"):  # they hold every term
+        assert "line of amplitude 1.500e-04 at 2 Hz" in said
+        assert re.search(r"Q = 1\.500e-05.{0,40} is left out|not held: Q = 1\.500e-05", said)
+    if name == "python":
+        assert "not held: " in said and "R = 1.500e-08" in said
