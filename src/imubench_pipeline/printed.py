@@ -167,7 +167,9 @@ class QuantityDatasheet(Strict):
     drift: Figures = Field(None, description="a drift that the document does not define further")
     rate_random_walk: Figures = Field(None, description="K")
     correlation_time: Figures = Field(None, description="T_B")
-    offset: Figures = Field(None, description="zero-rate or zero-g offset, ±")
+    offset: Figures = Field(
+        None, description="zero-rate or zero-g offset, ±: the turn-on bias as it is delivered"
+    )
     bias_repeatability: Figures = Field(None, description="offset from one run to another")
     temperature_coefficient: Figures = Field(None, description="offset per kelvin")
     temperature_total: Figures = Field(
@@ -176,7 +178,16 @@ class QuantityDatasheet(Strict):
     temperature_rms: Figures = Field(
         None, description="rms of the offset while the temperature changes slowly"
     )
+    scale_factor_error: Figures = Field(
+        None, description="± of the scale factor or sensitivity, as % or ppm of itself"
+    )
+    nonlinearity: Figures = Field(
+        None, description="departure from the straight line, as % or ppm of full scale"
+    )
     g_sensitivity: Figures = Field(None, description="of a gyro's offset to acceleration")
+    vibration_rectification: Figures = Field(
+        None, description="change of the mean in vibration, per square of its rms acceleration"
+    )
     full_scale: Figures = Field(None, description="±, of the sensor or to choose from")
     resolution: Figures = Field(None, description="unit per LSB, or LSB per unit")
     bandwidth: Figures = Field(None, description="-3 dB, of the sensor")
@@ -211,6 +222,9 @@ def _dimensions(quantity: str, plain: str) -> dict[str, tuple[str, ...]]:
         "temperature_coefficient": (f"{quantity}_temperature_coefficient",),
         "temperature_total": (plain,),
         "temperature_rms": (plain,),
+        "scale_factor_error": ("ratio",),
+        "nonlinearity": ("ratio",),
+        "vibration_rectification": (f"{quantity}_vibration_coefficient",),
         "full_scale": (plain,),
         "resolution": (f"{quantity}_step", f"{quantity}_sensitivity", plain),
         "bandwidth": ("frequency",),
