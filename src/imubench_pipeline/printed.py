@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import (
@@ -238,6 +238,17 @@ FIGURE_DIMENSIONS: dict[str, dict[str, tuple[str, ...]]] = {
 }
 """Dimensions that each datasheet figure may have, the usual one first, by quantity."""
 
+IN_USE = (
+    "offset",
+    "bias_repeatability",
+    "temperature_coefficient",
+    "scale_factor_error",
+    "nonlinearity",
+    "g_sensitivity",
+    "vibration_rectification",
+)
+"""Figures of errors that come in use and are in no static log."""
+
 _LARGEST_ACCELERATION_NOISE = 1.0
 
 
@@ -278,6 +289,21 @@ class Datasheet(Strict):
                     if isinstance(printed, float):
                         _check_micro(printed, figure.unit, dimension, key)
         return self
+
+    def only(self, names: Collection[str]) -> dict[str, Any]:
+        """Return what the file says of some figures, and of the options that they hold for.
+
+        Parameters
+        ----------
+        names : collection of str
+            Such as `IN_USE`.
+        """
+        written = self.model_dump(mode="json", include={"options", *FIGURE_DIMENSIONS})
+        for quantity in FIGURE_DIMENSIONS:
+            sheet = written[quantity] or {}
+            kept = {name: figures for name, figures in sheet.items() if name in names}
+            written[quantity] = kept if written[quantity] is not None else None
+        return written
 
     def _figures(self) -> Iterator[tuple[str, str, str, PrintedFigure]]:
         """Yield key, quantity, name and figure of everything that is printed."""
