@@ -1,9 +1,9 @@
 """On what a verdict rests beside the errors that are known: figures that are not, and musts.
 
 A sensor that is known not to have what a requirement says it must is excluded. One whose known
-errors pass, but of which a figure is not known that the use brings into play, passes if that figure is
-below the largest that leaves the limit kept; several that are not known share what room there is,
-so that with all of them at their largest the limit is just reached.
+errors pass, but of which a figure is not known that the use brings into play, passes if that
+figure is below the largest that leaves the limit kept; several that are not known share what room
+there is, so that with all of them at their largest the limit is just reached.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Row = Mapping[str, Any]
 
 EXCLUDED = "excluded"
 
-_CONDITIONAL = {"passes": "passes if", "probably passes": "probably passes if"}
+CONDITIONAL = {"passes": "passes if", "probably passes": "probably passes if"}
 """The verdicts that a condition changes: what fails without it fails with it, too."""
 
 _SENSORS = {"gyro": "gyro", "accel": "accelerometer"}
@@ -104,9 +104,9 @@ class Rests:
         if self.lacking:
             return EXCLUDED, "; ".join(self.lacking)
         said = list(self._conditions())
-        if words not in _CONDITIONAL or not said:
+        if words not in CONDITIONAL or not said:
             return words, None
-        return _CONDITIONAL[words], "; ".join(said)
+        return CONDITIONAL[words], "; ".join(said)
 
     def _conditions(self) -> Iterator[str]:
         for (measured, cause), largest in self.figures.items():
@@ -116,6 +116,19 @@ class Rests:
             yield text.format(sensor=_SENSORS[measured], largest=size)
         if self.unknown:
             yield f"it has what it must (not known: {', '.join(self.unknown)})"
+
+
+def in_words(row: Row) -> str:
+    """Return a verdict with what it rests on: ``passes if its gyros are calibrated to ...``.
+
+    Parameters
+    ----------
+    row : mapping
+        Has ``verdict`` and ``conditions``, as the table ``ranking``.
+    """
+    if not row["conditions"]:
+        return str(row["verdict"])
+    return f"{row['verdict']}{':' * (row['verdict'] == EXCLUDED)} {row['conditions']}"
 
 
 def _measured(row: Row) -> str:
