@@ -272,6 +272,7 @@ rule error_budget:
     input:
         parameters=FOLDER + "/parameters.parquet",
         draws=FOLDER + "/draws.parquet",
+        temperature=FOLDER + "/temperature.parquet",
     output:
         FOLDER + "/error_budget.parquet",
     group:
@@ -279,7 +280,7 @@ rule error_budget:
     resources:
         **ASKED,
     params:
-        settings=plan.error_budget_settings(),
+        settings=lambda w: plan.error_budget_settings(w.sensor),
         code=plan.code("error_budget"),
         attempt=lambda w: plan.attempt("error_budget", w.sensor, w.recording),
     run:

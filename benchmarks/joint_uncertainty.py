@@ -42,7 +42,7 @@ from imubench_pipeline.estimators.draws import joint_draws
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.posterior import sample
 from imubench_pipeline.estimators.whittle import Terms, model_of, whittle_of
-from imubench_pipeline.expected_errors import Question, error_rows, standard
+from imubench_pipeline.expected_errors import AxisErrors, Question, error_rows, standard
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recording import LogWriter, channel_logs
 from imubench_pipeline.results import Key, recommended_estimates
@@ -54,7 +54,6 @@ Array = NDArray[np.float64]
 
 CHANNEL = "gyro_x"
 _DRAWN = 4_000
-NOTHING = NoiseModel()
 Place = tuple[str, float]
 """An error, and after how many seconds."""
 
@@ -222,7 +221,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         )
         for question in questions(how):
             place = (question.error, question.time)
-            truth = question.answer(case.model, NOTHING).total
+            truth = question.answer(AxisErrors(case.model), AxisErrors()).total
             claimed, actual, inside = claimed_and_actual(np.array(together[place]), truth)
             ci = binomtest(inside, options.logs).proportion_ci(0.95, "exact")
             told, missed, kept = claimed_and_actual(np.array(known[place]), truth)

@@ -155,7 +155,7 @@ def _given(plan: Plan, step: str, sensor: str, name: str, recordings: Path) -> S
         "estimate": ("quality", "allan"),
         "reconstruct": ("quality", "allan", "parameters"),
         "datasheet": ("quality", "allan", "parameters", "fixed_bias"),
-        "error_budget": ("parameters",),
+        "error_budget": ("parameters", "draws", "temperature"),
     }
     outputs = {
         "ingest": ("quality", "envelope", "histogram"),
@@ -171,7 +171,7 @@ def _given(plan: Plan, step: str, sensor: str, name: str, recordings: Path) -> S
         "estimate": lambda: plan.estimate_settings(sensor, name),
         "reconstruct": lambda: plan.settings("reconstruction"),
         "datasheet": lambda: plan.datasheet_settings(sensor),
-        "error_budget": plan.error_budget_settings,
+        "error_budget": lambda: plan.error_budget_settings(sensor),
     }
     params = {"settings": settings[step](), "source": str(plan.recordings[sensor, name].path)}
     return SimpleNamespace(

@@ -42,6 +42,13 @@ def test_limits_are_in_si(tmp_path: Path) -> None:
         ({"static_window": None}, "either 'static_window' or 'turn_on'"),
         ({"turn_on": {"gyro": "1 deg/s", "accel": "1 mg"}}, "either 'static_window' or 'turn_on'"),
         ({"latitude": "91 deg"}, "between the poles: there cos φ is 0, and a gyro"),
+        ({"environment": {"temperature_change": "-20 K"}}, "a difference above zero"),
+        ({"environment": {"turns": "10 m"}}, "environment.turns"),
+        ({"environment": {"speed_chang": "10 m/s"}}, "did you mean 'speed_change'?"),
+        ({"must": {"axes": ["gyro_xyw"]}}, "such as gyro_xyz or accel_z"),
+        ({"must": {"mass": "30 m"}}, "no unit of mass"),
+        ({"must": {"temperature": ["60 degC", "-20 degC"]}}, "the lower temperature first"),
+        ({"must": {"full_scale": {"gyro": "8 g"}}}, "must.full_scale.gyro"),
         ({"axes": "worst"}, "did you mean 'axis'?"),
     ],
 )

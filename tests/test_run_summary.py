@@ -23,7 +23,8 @@ def finding(sensor: str, name: str, severity: str = "warning") -> dict[str, Any]
 def standing(sensor: str, **values: object) -> dict[str, Any]:
     row = {"requirement": "robot", "sensor": sensor, "recording": "run", "verdict": "passes",
            "rank": 1, "decides": True, "error": "heading", "unit": "rad", "margin": 2.0,
-           "time": 1.0, "tied_with": None, "limit_verdict": "passes"}  # fmt: skip
+           "time": 1.0, "tied_with": None, "conditions": None,
+           "limit_verdict": "passes"}  # fmt: skip
     return row | values
 
 

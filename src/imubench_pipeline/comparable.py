@@ -93,8 +93,17 @@ class Comparable:
 
 
 @dataclass(frozen=True)
-class _Axis:
-    """What a datasheet says of one axis of a quantity."""
+class PrintedAxis:
+    """What a datasheet says of one axis of a quantity.
+
+    Attributes
+    ----------
+    sheet : QuantityDatasheet
+    options : sequence of str
+        Grades, ranges and modes that the logged sensors have.
+    quantity, axis : str
+        ``gyro`` or ``accel``; ``x``, ``y`` or ``z``.
+    """
 
     sheet: QuantityDatasheet
     options: Sequence[str]
@@ -102,7 +111,8 @@ class _Axis:
     axis: str
 
     @classmethod
-    def of(cls, datasheet: Datasheet, channel: str) -> _Axis:
+    def of(cls, datasheet: Datasheet, channel: str) -> PrintedAxis:
+        """Return what a datasheet says of a channel, such as ``gyro_x``."""
         quantity, axis = channel.split("_")
         sheet = getattr(datasheet, quantity) or QuantityDatasheet()
         return cls(sheet, datasheet.options, quantity, axis)
@@ -195,7 +205,7 @@ def comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
     Comparable
         In SI; without a figure where none is published, or nobody looked it up.
     """
-    axis = _Axis.of(datasheet, channel)
+    axis = PrintedAxis.of(datasheet, channel)
     noise = [*_densities(axis), *_random_walks(axis), *_rms(axis)]
     names = ("noise_density", "random_walk", "rms_noise")
     yield from noise or [axis.unpublished(Comparable("N", "N", None), *names)]
@@ -220,7 +230,7 @@ def bias_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]
         In SI; the offset always, the others where they are published: the coefficient of
         temperature to be compared with the sensitivity, the rest with the obstacle.
     """
-    axis = _Axis.of(datasheet, channel)
+    axis = PrintedAxis.of(datasheet, channel)
     like = Comparable("offset", "mean", None)
     offsets = axis.read("offset", like, axis.si("offset"))
     yield from offsets or [axis.unpublished(like, "offset")]
@@ -239,11 +249,11 @@ def repeatability_comparables(datasheet: Datasheet, channel: str) -> Iterator[Co
     Comparable
         In SI, to be compared with a standard deviation; nothing where none is published.
     """
-    axis, name = _Axis.of(datasheet, channel), "bias_repeatability"
+    axis, name = PrintedAxis.of(datasheet, channel), "bias_repeatability"
     yield from axis.read(name, Comparable(name, "spread", None), axis.si(name))
 
 
-def _densities(axis: _Axis) -> Iterator[Comparable]:
+def _densities(axis: PrintedAxis) -> Iterator[Comparable]:
     dimensions = FIGURE_DIMENSIONS[axis.quantity]["noise_density"]
     figures = axis.sheet.printed("noise_density")
     for stated in dict.fromkeys(figure.sidedness for figure in figures):
@@ -268,12 +278,12 @@ def _densities(axis: _Axis) -> Iterator[Comparable]:
             )
 
 
-def _random_walks(axis: _Axis) -> list[Comparable]:
+def _random_walks(axis: PrintedAxis) -> list[Comparable]:
     like = Comparable("N", "N", None, reason="random walk as printed is N")
     return axis.read("random_walk", like, axis.si("random_walk"))
 
 
-def _rms(axis: _Axis) -> list[Comparable]:
+def _rms(axis: PrintedAxis) -> list[Comparable]:
     si = axis.si("rms_noise")
 
     def convert(value: float, figure: PrintedFigure) -> float:

@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 from imubench_pipeline.error_budget import (
+    NO_FIGURES,
+    NO_USE,
     Budget,
+    Figures,
     Gyrocompass,
+    Missing,
     Quantity,
     Start,
+    Uncalibrated,
+    Use,
     budget,
     chance_within,
     draw_models,
@@ -18,16 +28,29 @@ from imubench_pipeline.error_budget import (
     interval,
     time_until,
 )
+from imubench_pipeline.error_budget.printed_errors import PRINTED
 from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.requirements import DIMENSIONS, Axis, Error, Requirement
+from imubench_pipeline.printed import FIGURE_DIMENSIONS
+from imubench_pipeline.requirements import DIMENSIONS, Axis, Environment, Error, Requirement
 from imubench_pipeline.sensor import quantity_of
 from imubench_pipeline.simulate import channel_rng
-from imubench_pipeline.units import SI_UNITS, quantity_to_si
+from imubench_pipeline.units import SI_UNITS, difference_to_si, quantity_to_si
 
 Row = Mapping[str, Any]
 
-_NOTHING = NoiseModel()
+_NAMELESS: Mapping[str, Figures] = MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class AxisErrors:
+    """What is known of the errors of one axis: its noise, and figures of what comes in use."""
+
+    model: NoiseModel = field(default_factory=NoiseModel)
+    figures: Figures = field(default_factory=dict)
+
+
+_NOTHING = AxisErrors()
 _NAMES = {"gyro": "gyro", "accel": "accelerometer"}
 
 
@@ -49,6 +72,8 @@ class Question:
         rad; for ``north``.
     limit : float or None
         Largest standard deviation that fulfils the requirement, SI.
+    use : Use
+        What happens besides.
     """
 
     requirement: str | None
@@ -58,29 +83,51 @@ class Question:
     axis: Axis
     latitude: float | None = None
     limit: float | None = None
+    use: Use = NO_USE
 
     @property
     def needs(self) -> tuple[str, ...]:
         """The quantities that it takes to answer."""
         return ("gyro",) if self.error in ("heading", "north") else ("gyro", "accel")
 
-    def answer(self, gyro: NoiseModel, accel: NoiseModel) -> Budget:
+    def answer(self, gyro: AxisErrors, accel: AxisErrors) -> Budget:
         """Return the budget with these axes."""
         if self.error == "north":
             return self._compass(gyro).heading(self.time)
-        return budget(self.error, self.time, gyro=gyro, accel=accel, start=self.start)
+        return budget(
+            self.error,
+            self.time,
+            gyro=gyro.model,
+            accel=accel.model,
+            start=self.start,
+            use=self.use,
+            gyro_figures=gyro.figures,
+            accel_figures=accel.figures,
+        )
 
-    def reached(self, gyro: NoiseModel, accel: NoiseModel) -> float | None:
+    def reached(self, gyro: AxisErrors, accel: AxisErrors) -> float | None:
         """Return after which time the limit is reached, s; for north, the rest that it takes."""
         if self.limit is None:
             return None
         if self.error == "north":
             return self._compass(gyro).time_needed(self.limit)
-        return time_until(self.limit, self.error, gyro=gyro, accel=accel, start=self.start)
+        return time_until(
+            self.limit,
+            self.error,
+            gyro=gyro.model,
+            accel=accel.model,
+            start=self.start,
+            use=self.use,
+            gyro_figures=gyro.figures,
+            accel_figures=accel.figures,
+        )
 
-    def _compass(self, gyro: NoiseModel) -> Gyrocompass:
+    def _compass(self, gyro: AxisErrors) -> Gyrocompass:
         assert self.latitude is not None  # checked with the requirement
-        return Gyrocompass(gyro=gyro, latitude=self.latitude)
+        stated = self.start.gyro.bias if isinstance(self.start.gyro, Uncalibrated) else None
+        # Whoever looks for north at any time takes a bias off by turning the gyro.
+        figures = gyro.figures if self.requirement is not None else NO_FIGURES
+        return Gyrocompass(gyro=gyro.model, latitude=self.latitude, bias=stated, figures=figures)
 
 
 def standard(
@@ -119,6 +166,7 @@ def of_requirement(name: str, requirement: Requirement) -> Iterator[Question]:
             requirement.axis,
             latitude if isinstance(latitude, float) else None,
             limit.size / requirement.sigmas,
+            use_of(requirement.environment, limit.seconds),
         )
 
 
@@ -127,10 +175,26 @@ def start_of(requirement: Requirement) -> Start:
     if requirement.static_window is not None:
         return Start.calibrated(quantity_to_si(requirement.static_window, "time"))
     assert requirement.turn_on is not None  # checked with the requirement
+    gyro, accel = requirement.turn_on.gyro, requirement.turn_on.accel
     return Start.uncalibrated(
-        gyro_bias=quantity_to_si(requirement.turn_on.gyro, "angular_rate"),
-        accel_bias=quantity_to_si(requirement.turn_on.accel, "acceleration"),
+        gyro_bias=None if gyro is None else quantity_to_si(gyro, "angular_rate"),
+        accel_bias=None if accel is None else quantity_to_si(accel, "acceleration"),
         on_time=quantity_to_si(requirement.turn_on.on_time, "time"),
+    )
+
+
+def use_of(environment: Environment, time: float) -> Use:
+    """Return what happens in an application, all of it within the time of a limit, s."""
+    stated = {
+        "turns": (environment.turns, "angle"),
+        "speed_change": (environment.speed_change, "velocity"),
+        "vibration": (environment.vibration, "acceleration"),
+    }
+    change = environment.temperature_change
+    return Use(
+        temperature_change=difference_to_si(change, "temperature") if change else 0.0,
+        over=time,
+        **{name: quantity_to_si(text, of) for name, (text, of) in stated.items() if text},
     )
 
 
@@ -141,6 +205,7 @@ def error_rows(
     *,
     draws: int,
     seed: int,
+    figures: Mapping[str, Figures] = _NAMELESS,
 ) -> Iterator[Row]:
     """Yield the rows of the table ``error_budget`` of a recording.
 
@@ -155,11 +220,28 @@ def error_rows(
         Noise models drawn from what each log leaves open; they give the interval of a total.
     seed : int
         Of the run; each channel has a stream of its own.
+    figures : mapping of str to mapping
+        Of each channel, what is known of the errors that come in use (`printed_errors.in_use`).
     """
     # Of a log too short for any estimate nothing is known: that is not a sensor without noise.
     known = {channel: estimate for channel, estimate in estimates.items() if estimate.model.terms}
+    axes = {
+        channel: AxisErrors(estimate.model, figures.get(channel, NO_FIGURES))
+        for channel, estimate in known.items()
+    }
     drawn = {
-        channel: draw_models(estimate, draws, channel_rng(seed, *names.values(), channel, "budget"))
+        channel: [
+            AxisErrors(model, one)
+            for model, one in zip(
+                draw_models(estimate, draws, channel_rng(seed, *names.values(), channel, "budget")),
+                _drawn(
+                    axes[channel].figures,
+                    draws,
+                    channel_rng(seed, *names.values(), channel, "temperature of the budget"),
+                ),
+                strict=True,
+            )
+        ]
         for channel, estimate in known.items()
     }
     for question in questions:
@@ -181,14 +263,16 @@ def error_rows(
             yield asked | {"source": "total", "reason": "; ".join(missing)}
             continue
         chosen = {
-            quantity: _axis(question, quantity, known) if quantity in question.needs else None
+            quantity: _axis(question, quantity, axes) if quantity in question.needs else None
             for quantity in ("gyro", "accel")
         }
-        models = [estimates[c].model if c else _NOTHING for c in chosen.values()]
+        pair = [axes[c] if c else _NOTHING for c in chosen.values()]
         many = [drawn[c] if c else [_NOTHING] * draws for c in chosen.values()]
-        found = question.answer(*models)
-        budgets = [question.answer(*pair) for pair in zip(*many, strict=True)]
+        found = question.answer(*pair)
+        budgets = [question.answer(*one) for one in zip(*many, strict=True)]
         lower, upper = interval(budgets)
+        # The draws of what is absent lie above it: the value itself is inside.
+        lower, upper = min(lower, found.total), max(upper, found.total)
         apart = [c for c in chosen.values() if c and not drawn_jointly(estimates[c])]
         yield (
             asked
@@ -196,12 +280,11 @@ def error_rows(
             | {
                 "source": "total",
                 "sigma": found.total,
-                # The draws of what is absent lie above it: the value itself is inside.
-                "lower": min(lower, found.total),
-                "upper": max(upper, found.total),
+                "lower": lower,
+                "upper": upper,
                 "drawn": "one by one" if apart else "jointly",
                 "within": question.limit and chance_within(question.limit, budgets),
-                "reached_after": question.reached(*models),
+                "reached_after": question.reached(*pair),
                 "reason": "; ".join(
                     [
                         *found.assumptions,
@@ -214,7 +297,60 @@ def error_rows(
             }
         )
         for contribution in sorted(found.contributions, key=lambda one: -one.sigma):
-            yield asked | chosen | {"source": contribution.source, "sigma": contribution.sigma}
+            figure = contribution.figure
+            yield (
+                asked
+                | chosen
+                | {
+                    "source": contribution.source,
+                    "sigma": contribution.sigma,
+                    "cause": contribution.cause,
+                    "origin": figure.origin if figure else "measured",
+                    "kind": figure.kind if figure else None,
+                    "convention": figure.convention if figure else None,
+                }
+            )
+        for one in found.missing if question.limit is not None else ():
+            room = _room(question.limit, found.total, upper) / math.sqrt(len(found.missing))
+            yield asked | chosen | _missing_row(one, room)
+
+
+def _room(limit: float | None, total: float, upper: float) -> float:
+    """Return what may come to a total within a limit: to its upper limit, where that fits."""
+    assert limit is not None  # there is none to keep otherwise
+    taken = upper if upper < limit else total
+    return math.sqrt(max(limit**2 - taken**2, 0.0))
+
+
+def _missing_row(missing: Missing, room: float) -> dict[str, Any]:
+    """Return the row of a source that is not known, with the largest figure that has room."""
+    dimension = FIGURE_DIMENSIONS[missing.quantity][PRINTED[missing.cause]][0]
+    return {
+        "source": missing.source,
+        "cause": missing.cause,
+        "origin": "not known",
+        "largest": room / missing.lever if room else None,
+        "largest_unit": SI_UNITS[dimension],
+        "reason": missing.reason,
+    }
+
+
+def _drawn(figures: Figures, draws: int, rng: np.random.Generator) -> list[Figures]:
+    """Return draws of what is known of an axis, as sure as its measured figures are."""
+    spread = {cause: one for cause, one in figures.items() if one.spread and one.sigma is not None}
+    if not spread:
+        return [figures] * draws
+    normal = rng.standard_normal((draws, len(spread)))
+    return [
+        {
+            **figures,
+            **{
+                cause: replace(one, sigma=abs((one.sigma or 0.0) + one.spread * float(number)))
+                for (cause, one), number in zip(spread.items(), numbers, strict=True)
+            },
+        }
+        for numbers in normal
+    ]
 
 
 def _missing(quantity: str, estimates: Mapping[str, Estimate]) -> str:
@@ -237,15 +373,15 @@ def _why(estimate: Estimate) -> str:
     return next((reason for reason in reasons if reason), "its log does not show it")
 
 
-def _axis(question: Question, quantity: str, estimates: Mapping[str, Estimate]) -> str:
+def _axis(question: Question, quantity: str, axes: Mapping[str, AxisErrors]) -> str:
     """Return the channel of a quantity whose own part of the error is the worst, or the median."""
 
     def part(channel: str) -> float:
-        model = estimates[channel].model
-        pair = (model, _NOTHING) if quantity == "gyro" else (_NOTHING, model)
+        own = axes[channel]
+        pair = (own, _NOTHING) if quantity == "gyro" else (_NOTHING, own)
         return question.answer(*pair).total
 
-    ranked = sorted((c for c in estimates if quantity_of(c) == quantity), key=part)
+    ranked = sorted((c for c in axes if quantity_of(c) == quantity), key=part)
     # Of two axes the median is the worse one.
     return ranked[-1] if question.axis == "worst" else ranked[len(ranked) // 2]
 

@@ -17,6 +17,7 @@ from pydantic import BaseModel
 from imubench_pipeline.config import Run, given_beside, read_run
 from imubench_pipeline.drop_zone import Recording, fingerprint, fingerprints, found_logs
 from imubench_pipeline.faults import Faults
+from imubench_pipeline.printed import IN_USE
 from imubench_pipeline.provenance import source_digest
 from imubench_pipeline.requirements import Requirement, read_requirements
 from imubench_pipeline.sensor import (
@@ -36,12 +37,16 @@ from imubench_pipeline.simulated_recordings import (
     read_simulated,
 )
 from imubench_pipeline.step_modules import STEPS
+from imubench_pipeline.suitability.abilities import abilities
 from imubench_pipeline.units import quantity_to_si
 from imubench_pipeline.validation import ConfigError, parse, read_yaml
 
 _OF_INGEST = ("quality.json", "envelope.parquet", "histogram.parquet")
 _EXPERIMENTS = ("two_position", "rate_table", "pointing")
 """Keys of the notes that the ingest does not depend on."""
+
+_OF_RANKING = ("price_class", "must")
+"""Keys of a requirement that no error follows from."""
 
 _ANY_LOG = {"rate": "1 Hz", "channels": {"gyro_x": {"column": 1, "unit": "rad/s"}}}
 """Stands for the layout of a sensor's logs where that does not matter."""
@@ -311,23 +316,24 @@ class Plan:
             }
         )
 
-    def error_budget_settings(self) -> str:
-        """Return the errors that are asked of every recording."""
+    def error_budget_settings(self, sensor: str) -> str:
+        """Return the errors that are asked of a sensor's recordings, and what is printed of it."""
+        known = self.sensors.get(sensor)
         return _text(
             {
                 "error_budget": self.run.error_budget.model_dump(mode="json"),
-                "requirements": self._requirements("title", "note", "example", "price_class"),
+                "requirements": self._requirements(*_OF_RANKING, "title", "note", "example"),
+                "datasheet": known.datasheet.only(IN_USE) if known else {},
             }
         )
 
     def ranking_settings(self) -> str:
-        """Return what the ranking depends on: requirements, and prices of the sensors."""
-        return _text(
-            {
-                "requirements": self._requirements("title", "note", "example"),
-                "sensors": self._described("price_class"),
-            }
-        )
+        """Return what the ranking depends on: requirements, and what the sensors have."""
+        sensors = self._described("price_class")
+        for name, about in sensors.items():
+            about["abilities"] = abilities(self.sensors[name]).model_dump(mode="json")
+        requirements = self._requirements("title", "note", "example", "environment")
+        return _text({"requirements": requirements, "sensors": sensors})
 
     def _requirements(self, *unused: str) -> dict[str, object]:
         """Return what applications need, without what a step does not use of it."""
@@ -336,7 +342,7 @@ class Plan:
             for name, one in self.requirements.items()
         }
 
-    def _described(self, *keys: str) -> dict[str, object]:
+    def _described(self, *keys: str) -> dict[str, dict[str, object]]:
         """Return what the files of the sensors that have recordings say."""
         used = {sensor for sensor, _ in self.recordings}
         return {

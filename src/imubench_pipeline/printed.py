@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import (
@@ -167,7 +167,9 @@ class QuantityDatasheet(Strict):
     drift: Figures = Field(None, description="a drift that the document does not define further")
     rate_random_walk: Figures = Field(None, description="K")
     correlation_time: Figures = Field(None, description="T_B")
-    offset: Figures = Field(None, description="zero-rate or zero-g offset, ±")
+    offset: Figures = Field(
+        None, description="zero-rate or zero-g offset, ±: the turn-on bias as it is delivered"
+    )
     bias_repeatability: Figures = Field(None, description="offset from one run to another")
     temperature_coefficient: Figures = Field(None, description="offset per kelvin")
     temperature_total: Figures = Field(
@@ -176,7 +178,16 @@ class QuantityDatasheet(Strict):
     temperature_rms: Figures = Field(
         None, description="rms of the offset while the temperature changes slowly"
     )
+    scale_factor_error: Figures = Field(
+        None, description="± of the scale factor or sensitivity, as % or ppm of itself"
+    )
+    nonlinearity: Figures = Field(
+        None, description="departure from the straight line, as % or ppm of full scale"
+    )
     g_sensitivity: Figures = Field(None, description="of a gyro's offset to acceleration")
+    vibration_rectification: Figures = Field(
+        None, description="change of the mean in vibration, per square of its rms acceleration"
+    )
     full_scale: Figures = Field(None, description="±, of the sensor or to choose from")
     sensitivity: Figures = Field(None, description="unit per LSB, or LSB per unit")
     resolution: Figures = Field(None, description="least change that shows, such as deg/h")
@@ -212,6 +223,9 @@ def _dimensions(quantity: str, plain: str) -> dict[str, tuple[str, ...]]:
         "temperature_coefficient": (f"{quantity}_temperature_coefficient",),
         "temperature_total": (plain,),
         "temperature_rms": (plain,),
+        "scale_factor_error": ("ratio",),
+        "nonlinearity": ("ratio",),
+        "vibration_rectification": (f"{quantity}_vibration_coefficient",),
         "full_scale": (plain,),
         "sensitivity": (f"{quantity}_step", f"{quantity}_sensitivity"),
         "resolution": (plain,),
@@ -225,6 +239,17 @@ FIGURE_DIMENSIONS: dict[str, dict[str, tuple[str, ...]]] = {
     "accel": _dimensions("accel", "acceleration"),
 }
 """Dimensions that each datasheet figure may have, the usual one first, by quantity."""
+
+IN_USE = (
+    "offset",
+    "bias_repeatability",
+    "temperature_coefficient",
+    "scale_factor_error",
+    "nonlinearity",
+    "g_sensitivity",
+    "vibration_rectification",
+)
+"""Figures of errors that come in use and are in no static log."""
 
 _LARGEST_ACCELERATION_NOISE = 1.0
 
@@ -267,6 +292,21 @@ class Datasheet(Strict):
                     if isinstance(printed, float):
                         _check_micro(printed, figure.unit, dimension, key)
         return self
+
+    def only(self, names: Collection[str]) -> dict[str, Any]:
+        """Return what the file says of some figures, and of the options that they hold for.
+
+        Parameters
+        ----------
+        names : collection of str
+            Such as `IN_USE`.
+        """
+        written = self.model_dump(mode="json", include={"options", *FIGURE_DIMENSIONS})
+        for quantity in FIGURE_DIMENSIONS:
+            sheet = written[quantity] or {}
+            kept = {name: figures for name, figures in sheet.items() if name in names}
+            written[quantity] = kept if written[quantity] is not None else None
+        return written
 
     def _figures(self) -> Iterator[tuple[str, str, str, PrintedFigure]]:
         """Yield key, quantity, name and figure of everything that is printed."""

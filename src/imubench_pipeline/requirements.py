@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from statistics import NormalDist
@@ -9,8 +10,17 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from imubench_pipeline.units import quantity_to_si
-from imubench_pipeline.validation import ConfigError, Strict, Text, parse, read_yaml
+from imubench_pipeline.units import difference_to_si, quantity_to_si
+from imubench_pipeline.validation import (
+    Between,
+    ConfigError,
+    Frequency,
+    Strict,
+    Text,
+    of_size,
+    parse,
+    read_yaml,
+)
 
 Error = Literal["attitude", "heading", "velocity", "position", "north"]
 """What is limited; ``north`` is the heading that a gyro at rest finds from the Earth's rate."""
@@ -76,18 +86,83 @@ class Limit(Strict):
         return f"{self.error} within {self.at_most} after {self.after}"
 
 
+def _change(text: str) -> str:
+    if not difference_to_si(text, "temperature") > 0:
+        raise ValueError("expected a difference above zero, such as 20 K")
+    return text
+
+
+def _axes(text: str) -> str:
+    _, _, axes = text.partition("_")
+    if not re.fullmatch("(gyro|accel)_[xyz]+", text) or len(set(axes)) < len(axes):
+        raise ValueError("expected a quantity with its axes, such as gyro_xyz or accel_z")
+    return text
+
+
+Rate = Annotated[Text, AfterValidator(of_size("angular_rate")), Field(examples=["300 deg/s"])]
+Acceleration = Annotated[Text, AfterValidator(of_size("acceleration")), Field(examples=["8 g"])]
+
+
 class TurnOn(Strict):
     """Standard deviations of the biases with which dead reckoning begins."""
 
-    gyro: Text = Field(description="with its unit, such as 0.2 deg/s")
-    accel: Text = Field(description="with its unit, such as 20 mg")
+    gyro: Text | None = Field(
+        None, description="with its unit, such as 0.2 deg/s; null: that of the datasheet"
+    )
+    accel: Text | None = Field(
+        None, description="with its unit, such as 20 mg; null: that of the datasheet"
+    )
     on_time: Time = Field("60 s", description="since the sensor was switched on")
 
     @model_validator(mode="after")
     def _units(self) -> TurnOn:
-        quantity_to_si(self.gyro, "angular_rate")
-        quantity_to_si(self.accel, "acceleration")
+        if self.gyro is not None:
+            quantity_to_si(self.gyro, "angular_rate")
+        if self.accel is not None:
+            quantity_to_si(self.accel, "acceleration")
         return self
+
+
+class Environment(Strict):
+    """What a sensor meets in use that a static log does not show; what is left out is not there."""
+
+    temperature_change: Annotated[Text, AfterValidator(_change)] | None = Field(
+        None,
+        examples=["20 K"],
+        description="±, from the static window to the end; with turn_on, from where its bias holds",
+    )
+    turns: Annotated[Text, AfterValidator(of_size("angle"))] | None = Field(
+        None, examples=["360 deg"], description="± about the axis of the gyro, by the end"
+    )
+    speed_change: Annotated[Text, AfterValidator(of_size("velocity"))] | None = Field(
+        None, examples=["10 m/s"], description="± along the axis of the accelerometer, by the end"
+    )
+    vibration: Acceleration | None = Field(None, description="rms of one axis")
+
+
+class FullScale(Strict):
+    """What must not be beyond the range of a sensor."""
+
+    gyro: Rate | None = Field(None, description="±")
+    accel: Acceleration | None = Field(None, description="±, gravity included")
+
+
+class Must(Strict):
+    """What a sensor must have, as far as its file tells; what is left out is not asked for."""
+
+    full_scale: FullScale = FullScale()
+    bandwidth: Frequency | None = Field(None, description="-3 dB, of each quantity, at least")
+    rate: Frequency | None = Field(None, description="of samples, at least")
+    temperature: Between | None = Field(None, description="of operation, at least")
+    axes: tuple[Annotated[str, AfterValidator(_axes)], ...] = Field(
+        (), description="such as [gyro_xyz, accel_xyz]"
+    )
+    mass: Annotated[Text, AfterValidator(of_size("mass"))] | None = Field(
+        None, examples=["30 g"], description="at most"
+    )
+    power: Annotated[Text, AfterValidator(of_size("power"))] | None = Field(
+        None, examples=["1 W"], description="at most"
+    )
 
 
 class Requirement(Strict):
@@ -102,6 +177,10 @@ class Requirement(Strict):
     )
     turn_on: TurnOn | None = Field(None, description="instead: biases that nothing has taken off")
     latitude: Latitude | None = Field(None, description="for limits of north")
+    environment: Environment = Field(
+        Environment(), description="what happens in use; datasheets say what errors it causes"
+    )
+    must: Must = Field(Must(), description="without it a sensor is excluded")
     confidence: float = Field(
         0.95, gt=0, lt=1, description="chance of an error within its limit, on one axis"
     )

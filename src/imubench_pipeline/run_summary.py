@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from imubench_pipeline.findings import LEFT_OUT
+from imubench_pipeline.suitability.conditions import in_words
 from imubench_pipeline.tables import read
 
 Row = Mapping[str, Any]
@@ -194,7 +195,7 @@ def leaders(ranking: Iterable[Row], recordings: Iterable[Row]) -> Iterator[str]:
         if best["verdict"].endswith("fails"):
             shown = f"no sensor fulfils it; best is {shown}"
         tied = f", tied with {best['tied_with']}" if best["tied_with"] else ""
-        yield one_line(f"{name}: {shown}: {best['verdict']}{tied}")
+        yield one_line(f"{name}: {shown}: {in_words(best)}{tied}")
 
 
 def one_line(text: str, longest: int = _MOST_LETTERS) -> str:

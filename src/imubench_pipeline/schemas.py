@@ -19,6 +19,7 @@ from imubench_pipeline.faults import FAILURES
 from imubench_pipeline.fitness import DOUBTS, JUDGED
 from imubench_pipeline.fusion.columns import FUSION_TABLES
 from imubench_pipeline.repeatability import REPEATABILITY
+from imubench_pipeline.suitability.columns import CONDITIONS, IN_USE
 
 _FITTED = _number("fitted", "as in unit", "what the model has where that is not value; no estimate")
 _SENSOR = _text("sensor", "name of the sensor file")
@@ -302,6 +303,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _number("limit", "as in unit", "largest standard deviation that is allowed"),
         _text("unit", "SI unit"),
         _number("reached_after", "s", "time after which the limit is reached; null: never"),
+        *IN_USE,
         _text("reason", "what is not known", required=False),
         _DOUBTED,
     ),
@@ -328,6 +330,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _text("source", "the largest contribution", required=False),
         _number("share", "-", "its part of the variance"),
         _number("reached_after", "s", "time after which the limit is reached"),
+        *CONDITIONS,
         _text("reason", "what is not known", required=False),
         _DOUBTED,
         _text("left_out", "recordings that do not decide, and why", required=False),

@@ -10,6 +10,8 @@ from typing import Any
 
 from imubench_pipeline.fitness import left_out
 from imubench_pipeline.requirements import Requirement
+from imubench_pipeline.suitability.abilities import Abilities
+from imubench_pipeline.suitability.conditions import Rests, is_missing, named, parts_of
 
 Row = Mapping[str, Any]
 
@@ -35,11 +37,17 @@ class Standing:
         The largest contribution.
     share : float or None
         Its part of the variance.
+    parts : str or None
+        All sources that count.
+    missing : tuple of mapping
+        Rows of sources whose figure is not known.
     """
 
     total: Row
     source: str | None = None
     share: float | None = None
+    parts: str | None = None
+    missing: tuple[Row, ...] = ()
 
     @property
     def known(self) -> bool:
@@ -87,7 +95,8 @@ def ranking_rows(
 
     A sensor stands where its limit with the least margin stands. Its rank is one more than the
     number of sensors that are surely better, whose interval lies wholly above its own: sensors
-    with overlapping intervals are tied.
+    with overlapping intervals are tied. One with a figure that is not known is surely better than
+    another only where that of the other is not known, too.
 
     Parameters
     ----------
@@ -95,7 +104,7 @@ def ranking_rows(
         Rows of the table ``error_budget``.
     requirements : mapping of str to Requirement
     sensors : mapping of str to mapping
-        ``price_class`` of each sensor.
+        ``price_class`` of each sensor, and its ``abilities``, where known.
     recordings : iterable of mapping
         Rows of the table ``recordings``: those that do not decide are left out.
 
@@ -115,25 +124,37 @@ def ranking_rows(
     for name, requirement in requirements.items():
         standings = _standings(by_requirement[name], requirement)
         deciding = {sensor: _deciding(found) for sensor, found in standings.items()}
+        rests = {
+            sensor: Rests.of(
+                requirement.must,
+                Abilities.model_validate(sensors[sensor].get("abilities", {})),
+                [row for standing in found for row in standing.missing],
+            )
+            for sensor, found in standings.items()
+        }
         ranked = {
             sensor: one
             for sensor, one in deciding.items()
-            if one.known and requirement.admits(sensors[sensor]["price_class"])
+            if one.known
+            and requirement.admits(sensors[sensor]["price_class"])
+            and not rests[sensor].lacking
         }
         for sensor, found in standings.items():
             one = deciding[sensor]
-            rank, tied = _rank(sensor, ranked) if sensor in ranked else (None, [])
+            rank, tied = _rank(sensor, ranked, rests) if sensor in ranked else (None, [])
             price_class = sensors[sensor]["price_class"]
             outside = None if requirement.admits(price_class) else "outside the price class"
             if outside and price_class is None:
                 outside = "price class not stated"
+            verdict, conditions = rests[sensor].verdict(one.verdict)
             for standing in found:
                 yield {
                     "requirement": name,
                     "sensor": sensor,
                     "rank": rank,
                     "tied_with": ", ".join(tied) or None,
-                    "verdict": outside or one.verdict,
+                    "verdict": outside or verdict,
+                    "conditions": None if outside else conditions,
                     "confidence": requirement.confidence,
                     "at_most": standing.total["limit"] * requirement.sigmas,
                     "decides": standing is one,
@@ -161,6 +182,7 @@ def _limit_row(standing: Standing) -> Row:
         "limit_verdict": standing.verdict,
         "source": standing.source,
         "share": standing.share,
+        "parts": standing.parts,
         "reached_after": total["reached_after"],
         "reason": total["reason"],
     }
@@ -182,17 +204,20 @@ def _standings(rows: list[Row], requirement: Requirement) -> dict[str, list[Stan
                 standings.append(Standing(totals[0]))
                 continue
             total = known[-1] if requirement.axis == "worst" else known[len(known) // 2]
-            sources = [
+            own_parts = [
                 row
                 for row in parts
                 if row["source"] != "total" and row["recording"] == total["recording"]
             ]
+            missing = tuple(row for row in own_parts if is_missing(row))
+            sources = [row for row in own_parts if not is_missing(row)]
             largest = max(sources, key=lambda row: row["sigma"], default=None)
             if largest is None or total["sigma"] == 0.0:
-                standings.append(Standing(total))
+                standings.append(Standing(total, missing=missing))
             else:
                 share = (largest["sigma"] / total["sigma"]) ** 2
-                standings.append(Standing(total, largest["source"], share))
+                shares = parts_of(total["sigma"], sources)
+                standings.append(Standing(total, named(largest), share, shares, missing))
         found[sensor] = standings
     return found
 
@@ -205,17 +230,20 @@ def _deciding(standings: list[Standing]) -> Standing:
     return worst if not unknown or worst.verdict == "surely fails" else unknown[0]
 
 
-def _rank(sensor: str, ranked: Mapping[str, Standing]) -> tuple[int, list[str]]:
+def _rank(
+    sensor: str, ranked: Mapping[str, Standing], rests: Mapping[str, Rests]
+) -> tuple[int, list[str]]:
     """Return the rank of a sensor, and the sensors that it is tied with."""
-    low, high = ranked[sensor].margins
-    better, tied = 0, []
-    for other, standing in ranked.items():
-        other_low, other_high = standing.margins
-        if other_low > high:
-            better += 1
-        elif other != sensor and other_high >= low:
-            tied.append(other)
-    return 1 + better, tied
+
+    def better(one: str, other: str) -> bool:
+        known = rests[one].figures.keys() <= rests[other].figures.keys()
+        return known and ranked[one].margins[0] > ranked[other].margins[1]
+
+    above = [other for other in ranked if better(other, sensor)]
+    tied = [
+        other for other in ranked if other not in (sensor, *above) and not better(sensor, other)
+    ]
+    return 1 + len(above), tied
 
 
 def _over(limit: float, error: float) -> float:

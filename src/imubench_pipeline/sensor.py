@@ -5,15 +5,24 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from imubench_pipeline.calibration.declaration import AtRest, OnRateTable
 from imubench_pipeline.earth_rate.declaration import TwoPosition
 from imubench_pipeline.printed import Datasheet
 from imubench_pipeline.units import UnitError, conversion, quantity_to_si
-from imubench_pipeline.validation import ConfigError, Frequency, Strict, Text, parse, read_yaml
+from imubench_pipeline.validation import (
+    Between,
+    ConfigError,
+    Frequency,
+    Strict,
+    Text,
+    of_size,
+    parse,
+    read_yaml,
+)
 
 QUANTITIES: dict[str, str] = {"gyro": "angular_rate", "accel": "acceleration"}
 """The measured quantities and the dimension of each."""
@@ -212,11 +221,25 @@ def _check_unit(unit: str, dimension: str, key: str) -> None:
 
 
 class Sensor(Strict):
-    """One IMU model: its logs and its datasheet."""
+    """One IMU model: its logs, what it needs of a vehicle, and its datasheet."""
 
     vendor: str
     model: str
     price_class: str | None = None
+    price: Text | None = Field(None, description="with its currency and number, such as 12 EUR")
+    mass: Annotated[Text, AfterValidator(of_size("mass"))] | None = Field(
+        None, examples=["15 g"], description="null: not known"
+    )
+    power: Annotated[Text, AfterValidator(of_size("power"))] | None = Field(
+        None, examples=["0.2 W"], description="that it takes; null: not known"
+    )
+    temperature_range: Between | None = Field(
+        None, description="of operation, such as [-40 degC, 85 degC]; null: not known"
+    )
+    rate: Frequency | None = Field(
+        None, description="the highest that it gives samples at; null: not known"
+    )
+    interface: Text | None = Field(None, description="such as SPI, I2C, UART or CAN")
     log: LogFormat
     datasheet: Datasheet = Datasheet()
 

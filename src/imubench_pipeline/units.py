@@ -1,7 +1,8 @@
 """Every unit that a log, a setting or a datasheet writes, converted to SI and back.
 
 The registry is ours: angles have a dimension of their own, so that °/s and Hz, or rad/s and
-1/s, cannot be mixed up, ``g`` is standard gravity, not gram, and ``LSB`` is a count.
+1/s, cannot be mixed up, ``g`` is standard gravity, and gram where a mass is asked for alone, and
+``LSB`` is a count.
 """
 
 from __future__ import annotations
@@ -42,10 +43,15 @@ SI_UNITS: dict[str, str] = {
     "gyro_temperature_curvature": "rad/s/K^2",
     "accel_temperature_curvature": "m/s^2/K^2",
     "gyro_acceleration_coefficient": "rad/s/(m/s^2)",
+    "gyro_vibration_coefficient": "rad/s/(m/s^2)^2",
+    "accel_vibration_coefficient": "m/s^2/(m/s^2)^2",
     "gyro_step": "rad/s/LSB",
     "accel_step": "m/s^2/LSB",
     "gyro_sensitivity": "LSB/(rad/s)",
     "accel_sensitivity": "LSB/(m/s^2)",
+    "ratio": "1",
+    "mass": "kg",
+    "power": "W",
 }
 """The dimensions that the project knows, each with the SI unit that it is kept in."""
 
@@ -73,10 +79,15 @@ _EXAMPLES: dict[str, str] = {
     "gyro_temperature_curvature": "deg/s/K^2",
     "accel_temperature_curvature": "mg/K^2",
     "gyro_acceleration_coefficient": "deg/s/g or deg/h/g",
+    "gyro_vibration_coefficient": "deg/s/g^2 or deg/h/g^2",
+    "accel_vibration_coefficient": "mg/g^2 or ug/g^2",
     "gyro_step": "mdps/LSB or deg/s/LSB",
     "accel_step": "mg/LSB or m/s^2/LSB",
     "gyro_sensitivity": "LSB/(deg/s)",
     "accel_sensitivity": "LSB/g or LSB/mg",
+    "ratio": "% or ppm",
+    "mass": "g or kg",
+    "power": "W or mW",
 }
 
 _WRITTEN: dict[str, str] = {
@@ -84,6 +95,7 @@ _WRITTEN: dict[str, str] = {
     "frequency": "100 Hz",
     "time": "10 s",
     "angle": "48 deg",
+    "mass": "30 g",
 }
 """How a quantity is written, where 1 of its first unit is an odd example."""
 
@@ -110,6 +122,11 @@ standard_gravity = 9.80665 * meter / second ** 2 = g = g0
 gal = 0.01 * meter / second ** 2 = Gal
 foot = 0.3048 * meter = ft
 foot_per_second = foot / second = fps
+percent = 0.01
+ppm = 1e-6
+kilogram = [mass] = kg
+gram = 0.001 * kilogram
+watt = [power] = W
 """
 
 
@@ -142,6 +159,8 @@ _MEANT: tuple[tuple[str, str], ...] = (
     (r"\s*\((?:OCR|total|typ|max|min)\.?\)\s*$", ""),
     (r"[\s-]*(?:\(?\brms\b\)?|1\s*[σs]igma|1\s*σ)\s*$", ""),
     # signs
+    (r"%", "percent"),
+    (r"\b(percent|ppm)\s*(?:of\s+)?(?:FSR?|full[\s-]scale)\s*$", r"\1"),
     (r"²", "^2"),
     (r"³", "^3"),
     (r"−", "-"),
@@ -232,8 +251,9 @@ def _converter(unit: str, dimension: str) -> tuple[float, float]:
     if unit.strip() == "?":
         raise UnitError(f"the unit '?' is left to fill in; {_expected(dimension)}")
     target = _targets()[dimension]
+    gram = dimension == "mass" and unit.strip() == "g"
     try:
-        power, source = _parsed(unit)
+        power, source = _parsed("gram" if gram else unit)
     except UnitError as error:
         raise UnitError(f"{error}; {_expected(dimension)}") from error
     if source.dimensionality != target.dimensionality:

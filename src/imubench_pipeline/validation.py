@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from datetime import date
 from fractions import Fraction
 from pathlib import Path
@@ -55,9 +55,35 @@ def _duration(text: str) -> str:
     return text
 
 
+def of_size(dimension: str) -> Callable[[str], str]:
+    """Return a check that a text is a number above zero with a unit of a dimension.
+
+    Parameters
+    ----------
+    dimension : str
+        A key of `imubench_pipeline.units.SI_UNITS`.
+    """
+
+    def check(text: str) -> str:
+        if not quantity_to_si(text, dimension) > 0:
+            raise ValueError(f"expected more than zero, with its unit of {dimension}")
+        return text
+
+    return check
+
+
+def _between(ends: tuple[str, str]) -> tuple[str, str]:
+    low, high = (quantity_to_si(end, "temperature") for end in ends)
+    if not low < high:
+        raise ValueError(f"found {ends[0]} to {ends[1]}; expected the lower temperature first")
+    return ends
+
+
 FractionOfLog = Annotated[float, BeforeValidator(_fraction, json_schema_input_type=float | str)]
 Text = Annotated[str, BeforeValidator(as_text)]
 Frequency = Annotated[Text, AfterValidator(_frequency), Field(examples=["100 Hz"])]
+Between = Annotated[tuple[Text, Text], AfterValidator(_between)]
+"""A lower and an upper temperature, with their units."""
 Duration = Annotated[Text, AfterValidator(_duration), Field(examples=["10 h"])]
 
 

@@ -23,6 +23,7 @@ from imubench_pipeline.estimators.identifiability import bounds_of
 from imubench_pipeline.noise import FLOOR, GaussMarkov, NoiseModel
 from imubench_pipeline.report import glossary as module
 from imubench_pipeline.report.glossary import UnknownTermError, glossary, term
+from imubench_pipeline.suitability import conditions
 from imubench_pipeline.units import from_si, to_si
 from imubench_pipeline.validation import ConfigError
 from tests.conftest import PROJECT
@@ -255,6 +256,8 @@ def values_in_tables() -> Iterator[tuple[str, str]]:
     for verdict in strings_in("selection.py", "ranking_rows"):
         if "price class" in verdict:
             yield verdict, "verdict"
+    for verdict in (conditions.EXCLUDED, *conditions.CONDITIONAL.values()):
+        yield verdict, "verdict"
     for verdict in strings_in("estimators/goodness.py", "goodness", ast.IfExp):
         yield verdict, "verdict"
     for verdict in ("changed", "as before"):  # of the table drift

@@ -114,7 +114,7 @@ def group(sensor: str, verdict: str, rank: int | str = "–", **values: Any) -> 
          "allowed": "5", "decides": True, "reason": reason},
     ]  # fmt: skip
     made = {"sensor": sensor, "verdict": verdict, "rank": rank, "limits": limits}
-    return made | {"tied_with": None, "simulated": False} | values
+    return made | {"tied_with": None, "simulated": False, "conditions": None} | values
 
 
 NAMES = {name: name.upper() for name in "abcdefgh"}

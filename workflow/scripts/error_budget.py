@@ -5,15 +5,17 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from imubench_pipeline.config import ErrorBudgetSettings
+from imubench_pipeline.error_budget.printed_errors import in_use
 from imubench_pipeline.expected_errors import error_rows, of_requirement, standard
+from imubench_pipeline.printed import Datasheet
 from imubench_pipeline.requirements import Requirement
 from imubench_pipeline.results import Row, recommended_estimates
-from imubench_pipeline.tables import write
+from imubench_pipeline.tables import read, write
 from imubench_pipeline.units import quantity_to_si
 
 
 def rows(
-    parameters: Path, draws: Path, sensor: str, recording: str, settings: str
+    parameters: Path, draws: Path, temperature: Path, sensor: str, recording: str, settings: str
 ) -> Iterator[Row]:
     """Yield the rows of the table ``error_budget``; none of a rejected recording."""
     given = json.loads(settings)
@@ -30,7 +32,11 @@ def rows(
     if not estimates:
         return
     names = {"sensor": sensor, "recording": recording}
-    yield from error_rows(names, estimates, questions, draws=how.draws, seed=how.seed)
+    datasheet = Datasheet.model_validate(given["datasheet"])
+    figures = in_use(datasheet, estimates, read("temperature", [temperature]).to_pylist())
+    yield from error_rows(
+        names, estimates, questions, draws=how.draws, seed=how.seed, figures=figures
+    )
 
 
 if __name__ == "__main__":
@@ -38,6 +44,7 @@ if __name__ == "__main__":
     found = rows(
         Path(snakemake.input.parameters),
         Path(snakemake.input.draws),
+        Path(snakemake.input.temperature),
         names.sensor,
         names.recording,
         snakemake.params.settings,

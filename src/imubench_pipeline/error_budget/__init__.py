@@ -1,15 +1,10 @@
 """What a noise model means for navigation: errors of dead reckoning, by what they come of."""
 
-from imubench_pipeline.error_budget.budget import (
-    Budget,
-    Contribution,
-    Levelled,
-    Quantity,
-    Start,
-    budget,
-)
+from imubench_pipeline.error_budget.budget import Levelled, Start, budget
 from imubench_pipeline.error_budget.growth import Calibrated, Uncalibrated
 from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE, Gyrocompass
+from imubench_pipeline.error_budget.in_use import NO_FIGURES, NO_USE, Figure, Figures, Use
+from imubench_pipeline.error_budget.parts import Budget, Contribution, Missing, Quantity
 from imubench_pipeline.error_budget.uncertainty import (
     chance_within,
     draw_models,
@@ -20,14 +15,20 @@ from imubench_pipeline.error_budget.until import time_until
 
 __all__ = [
     "EARTH_RATE",
+    "NO_FIGURES",
+    "NO_USE",
     "Budget",
     "Calibrated",
     "Contribution",
+    "Figure",
+    "Figures",
     "Gyrocompass",
     "Levelled",
+    "Missing",
     "Quantity",
     "Start",
     "Uncalibrated",
+    "Use",
     "budget",
     "chance_within",
     "draw_models",

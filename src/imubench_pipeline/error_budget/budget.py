@@ -4,8 +4,9 @@ The assumptions, of all budgets here:
 
 - one horizontal axis: the accelerometer along it and the gyro across it, whose tilt turns gravity
   into that accelerometer. The error in the plane is sqrt(2) times that of one axis where both
-  are alike. Velocity and position errors need no motion; what grows with motion (scale factors,
-  misalignment, heading times way) is left out;
+  are alike. Velocity and position errors need no motion. Of what grows with motion and in the
+  field, scale factors, temperature and vibration count as far as a use is stated (`in_use`);
+  misalignment and heading times way are left out;
 - small angles: up to about 0.2 rad;
 - a flat Earth that does not turn, g = 9.80665 m/s^2: no Schuler feedback (a period of 84.4 min),
   whose absence overstates errors. After 60 s that is 0.3 % at most. After 600 s it is 10 % of the
@@ -20,9 +21,9 @@ The assumptions, of all budgets here:
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import get_args
 
 from imubench_pipeline.error_budget.growth import (
     Calibrated,
@@ -32,6 +33,25 @@ from imubench_pipeline.error_budget.growth import (
     of_constant,
     of_white_mean,
     variance,
+)
+from imubench_pipeline.error_budget.in_use import (
+    BIASES,
+    NAMES,
+    NO_FIGURES,
+    NO_USE,
+    STATED,
+    Cause,
+    Figures,
+    Measured,
+    Use,
+    levers,
+)
+from imubench_pipeline.error_budget.parts import (
+    Budget,
+    Contribution,
+    Missing,
+    Quantity,
+    of_figure,
 )
 from imubench_pipeline.noise import (
     Flicker,
@@ -43,11 +63,11 @@ from imubench_pipeline.noise import (
 )
 from imubench_pipeline.units import STANDARD_GRAVITY
 
-Quantity = Literal["attitude", "heading", "velocity", "position"]
-
 _GYRO_ORDER: dict[Quantity, int] = {"attitude": 0, "heading": 0, "velocity": 1, "position": 2}
 _ACCEL_ORDER: dict[Quantity, int] = {"velocity": 0, "position": 1}
 """Integrations but one, m of `growth`."""
+
+_WORDS: dict[Measured, str] = {"gyro": "gyro", "accel": "accelerometer"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,8 +81,8 @@ class Levelled:
     Parameters
     ----------
     bias : float, optional
-        Turn-on bias of the accelerometer, 1 sigma, m/s^2; None: not known, it is left out of the
-        attitude and the budget says so.
+        Turn-on bias of the accelerometer, 1 sigma, m/s^2; None: it is a figure of the sensor, and
+        where that is not known, it is left out of the attitude and the budget says so.
     on_time : float
         Time from switch-on to the beginning of the window, s; walks, ramps and flicker noise
         count from switch-on.
@@ -131,13 +151,15 @@ class Start:
     def uncalibrated(
         cls,
         *,
-        gyro_bias: float,
-        accel_bias: float,
+        gyro_bias: float | None,
+        accel_bias: float | None,
         on_time: float,
         tilt: float = 0.0,
         heading: float = 0.0,
     ) -> Start:
         """Return a start with turn-on biases of a given sigma, rad/s and m/s^2, and no window.
+
+        None: a bias is a figure of the sensor.
 
         Raises
         ------
@@ -152,51 +174,16 @@ class Start:
         )
 
 
-@dataclass(frozen=True)
-class Contribution:
-    """What one source adds to an error.
-
-    Attributes
-    ----------
-    source : str
-        Such as ``gyro N``, ``accel GM 89.5 s``, ``gyro turn-on bias``.
-    sigma : float
-        1 sigma, rad, m/s or m.
-    """
-
-    source: str
-    sigma: float
-
-
-@dataclass(frozen=True)
-class Budget:
-    """An error and what it is made of.
-
-    Attributes
-    ----------
-    time : float
-        s.
-    quantity : str
-        ``attitude`` (a tilt) and ``heading`` in rad, ``velocity`` in m/s, ``position`` in m.
-    contributions : sequence of Contribution
-        Independent of each other.
-    assumptions : sequence of str
-        What was not known, and what stands for it.
-    """
-
-    time: float
-    quantity: Quantity
-    contributions: Sequence[Contribution]
-    assumptions: Sequence[str] = ()
-
-    @property
-    def total(self) -> float:
-        """1 sigma: the root of the sum of the squares of the contributions."""
-        return math.hypot(*(contribution.sigma for contribution in self.contributions))
-
-
 def budget(
-    quantity: Quantity, time: float, *, gyro: NoiseModel, accel: NoiseModel, start: Start
+    quantity: Quantity,
+    time: float,
+    *,
+    gyro: NoiseModel,
+    accel: NoiseModel,
+    start: Start,
+    use: Use = NO_USE,
+    gyro_figures: Figures = NO_FIGURES,
+    accel_figures: Figures = NO_FIGURES,
 ) -> Budget:
     """Return the error after a time of dead reckoning, by source.
 
@@ -219,6 +206,10 @@ def budget(
     accel : NoiseModel
         The accelerometer along the axis; the heading does not need it.
     start : Start
+    use : Use
+        What happens besides.
+    gyro_figures, accel_figures : mapping of str to Figure
+        What is known of these axes beside the noise.
 
     Returns
     -------
@@ -240,29 +231,56 @@ def budget(
         raise ValueError(f"quantity is {quantity!r}, expected one of {get_args(Quantity)}")
     if not (math.isfinite(time) and time > 0):
         raise ValueError(f"time is {time}, expected a time above 0")
-    return Budget(time, quantity, *_sources(quantity, time, gyro, accel, start))
+    found = _sources(quantity, time, gyro, accel, start)
+    missing: list[Missing] = []
+    assumptions: list[str] = []
+    for measured, cause, source, lever in _levers(quantity, time, start, use):
+        figures = gyro_figures if measured == "gyro" else accel_figures
+        part = of_figure(measured, cause, source, lever, figures)
+        if isinstance(part, Contribution):
+            found.append(part)
+        elif part is not None:
+            missing.append(part)
+            if cause == "turn_on_bias":
+                assumptions.append(f"turn-on bias of the {_WORDS[measured]}: not known, left out")
+    return Budget(time, quantity, found, assumptions, missing)
 
 
 def _sources(
     quantity: Quantity, time: float, gyro: NoiseModel, accel: NoiseModel, start: Start
-) -> tuple[list[Contribution], list[str]]:
+) -> list[Contribution]:
     order = _GYRO_ORDER[quantity]
     gravity = STANDARD_GRAVITY if order > 0 else 1.0
     found = list(of_sensor("gyro", gyro, order, time, start.gyro, gravity))
-    assumptions: list[str] = []
     if quantity in _ACCEL_ORDER:
         found.extend(of_sensor("accel", accel, _ACCEL_ORDER[quantity], time, start.accel))
     if quantity == "heading":
-        found.append(Contribution("initial heading", start.heading))
+        found.append(Contribution("initial heading", start.heading, "start", STATED))
     elif isinstance(start.tilt, Levelled):
         if quantity == "attitude" and isinstance(start.accel, Calibrated):
             found.extend(_of_levelling(accel, start.accel.window, start.tilt))
-            if start.tilt.bias is None:
-                assumptions.append("turn-on bias of the accelerometer: not known, left out")
     else:
         lever = gravity * of_constant(order - 1, time)
-        found.append(Contribution("initial tilt", start.tilt * lever))
-    return found, assumptions
+        found.append(Contribution("initial tilt", start.tilt * lever, "start", STATED))
+    return found
+
+
+def _levers(
+    quantity: Quantity, time: float, start: Start, use: Use
+) -> Iterator[tuple[Measured, Cause, str, float]]:
+    """Yield sensor, cause, source and lever of what figures of the sensors add."""
+    order = _GYRO_ORDER[quantity]
+    gravity = STANDARD_GRAVITY if order > 0 else 1.0
+    for cause, lever in levers("gyro", order, time, start.gyro, use, seen=order == 0):
+        yield "gyro", cause, f"gyro {NAMES[cause]}", gravity * lever
+    if quantity in _ACCEL_ORDER:
+        of_accel = levers("accel", _ACCEL_ORDER[quantity], time, start.accel, use, seen=True)
+        for cause, lever in of_accel:
+            yield "accel", cause, f"accel {NAMES[cause]}", lever
+    if quantity == "attitude" and isinstance(start.tilt, Levelled) and start.tilt.bias is None:
+        for cause in BIASES:
+            source = f"initial tilt by accel {NAMES[cause]}"
+            yield "accel", cause, source, 1.0 / STANDARD_GRAVITY
 
 
 def of_sensor(
@@ -293,9 +311,9 @@ def of_sensor(
         else:
             sigma = math.sqrt(variance(term, order, time, start))
             yield Contribution(f"{sensor} {label(term)}", factor * sigma)
-    if isinstance(start, Uncalibrated):
+    if isinstance(start, Uncalibrated) and start.bias is not None:
         grown = factor * start.bias * of_constant(order, time)
-        yield Contribution(f"{sensor} turn-on bias", grown)
+        yield Contribution(f"{sensor} turn-on bias", grown, "turn_on_bias", STATED)
 
 
 def label(term: Term) -> str:
@@ -316,7 +334,8 @@ def _of_levelling(accel: NoiseModel, window: float, levelled: Levelled) -> Itera
         yield Contribution(f"initial tilt by accel {label(term)}", sigma)
     if levelled.bias is not None:
         sigma = levelled.bias / STANDARD_GRAVITY
-        yield Contribution("initial tilt by accel turn-on bias", sigma)
+        source = "initial tilt by accel turn-on bias"
+        yield Contribution(source, sigma, "turn_on_bias", STATED)
 
 
 def _check_not_negative(**values: float) -> None:

@@ -74,8 +74,8 @@ class Uncalibrated:
 
     Parameters
     ----------
-    bias : float
-        Turn-on bias, 1 sigma, rad/s or m/s^2.
+    bias : float or None
+        Turn-on bias, 1 sigma, rad/s or m/s^2; None: it is a figure of the sensor (`in_use`).
     on_time : float
         Time from switch-on to the start, s.
 
@@ -85,13 +85,13 @@ class Uncalibrated:
         If one is negative or not finite.
     """
 
-    bias: float
+    bias: float | None
     on_time: float
 
     def __post_init__(self) -> None:
         for name in ("bias", "on_time"):
             value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0):
+            if value is not None and not (math.isfinite(value) and value >= 0):
                 raise ValueError(f"{name} is {value}, expected a number from 0")
 
 

@@ -10,21 +10,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
-from imubench_pipeline.error_budget.budget import Budget, Contribution, label
+from imubench_pipeline.error_budget.budget import label
 from imubench_pipeline.error_budget.growth import mean_variance
+from imubench_pipeline.error_budget.in_use import BIASES, NAMES, STATED, Figures
+from imubench_pipeline.error_budget.parts import Budget, Contribution, Missing, of_figure
 from imubench_pipeline.noise import NoiseModel, Sinusoid, Term
 
 EARTH_RATE = 7.292115e-5
 """w_ie, rad/s (WGS 84)."""
 
-_BIAS_LEFT_OUT = "turn-on bias of the gyro: not known, left out; the heading is no better than this"
+_BIAS_LEFT_OUT = "turn-on bias of the gyro: left out; the heading is no better than this"
 
 _TIMES: NDArray[np.float64] = np.geomspace(1e-3, 1e9, 601)
 
@@ -41,13 +43,16 @@ class Gyrocompass:
         rad.
     bias : float, optional
         Turn-on bias of the gyro, 1 sigma, rad/s: at one position it cannot be told from the
-        Earth's rate. None: not known; it is left out and the budget says so.
+        Earth's rate. None: it is a figure of the gyro; where that is not known, it is left out and
+        the budget says so.
     on_time : float
         Time from switch-on to the beginning, s; a walk, a ramp and flicker noise count from
         switch-on (see `growth.Uncalibrated`). At two positions it does not matter.
     positions : {1, 2}
         2: the gyro is turned end for end after half the time, in no time, and half the difference
         of the two means is taken. That takes off the turn-on bias.
+    figures : mapping of str to Figure
+        What is known of the gyro beside its noise.
 
     Raises
     ------
@@ -60,6 +65,7 @@ class Gyrocompass:
     bias: float | None = None
     on_time: float = 0.0
     positions: Literal[1, 2] = 1
+    figures: Figures = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not abs(self.latitude) < math.pi / 2.0:
@@ -99,12 +105,17 @@ class Gyrocompass:
         """
         if not (math.isfinite(time) and time > 0):
             raise ValueError(f"time is {time}, expected a time above 0")
-        unknown = self.positions == 1 and self.bias is None
+        biases = self._biases()
+        missing = [part for part in biases if isinstance(part, Missing)]
         return Budget(
             time,
             "heading",
-            list(self._contributions(time, swings=True)),
-            [_BIAS_LEFT_OUT] if unknown else [],
+            [
+                *self._of_noise(time, swings=True),
+                *(part for part in biases if isinstance(part, Contribution)),
+            ],
+            [_BIAS_LEFT_OUT] if missing else [],
+            missing,
         )
 
     def time_needed(self, accuracy: float) -> float | None:
@@ -132,10 +143,12 @@ class Gyrocompass:
         if not (math.isfinite(accuracy) and accuracy > 0):
             raise ValueError(f"accuracy is {accuracy}, expected an angle above 0")
 
+        biases = [part.sigma for part in self._biases() if isinstance(part, Contribution)]
+
         def excess(logarithm: float) -> float:
             time = math.exp(logarithm)
-            sigmas = (part.sigma for part in self._contributions(time, swings=False))
-            return math.hypot(*sigmas) / accuracy - 1.0
+            sigmas = (part.sigma for part in self._of_noise(time, swings=False))
+            return math.hypot(*sigmas, *biases) / accuracy - 1.0
 
         at = np.log(_TIMES)
         values = np.array([excess(float(x)) for x in at])
@@ -159,16 +172,31 @@ class Gyrocompass:
             return float(_TIMES[0])
         return math.exp(brentq(excess, float(at[first - 1]), after, xtol=1e-12))
 
-    def _contributions(self, time: float, *, swings: bool) -> Iterator[Contribution]:
-        north = EARTH_RATE * math.cos(self.latitude)
+    @property
+    def _north(self) -> float:
+        """The part of the Earth's rate that points north, rad/s."""
+        return EARTH_RATE * math.cos(self.latitude)
+
+    def _biases(self) -> list[Contribution | Missing]:
+        """Return what the bias of the gyro adds, which no time takes off."""
+        if self.positions == 2:
+            return []
+        if self.bias is not None:
+            sigma = self.bias / self._north
+            return [Contribution("gyro turn-on bias", sigma, "turn_on_bias", STATED)]
+        parts = (
+            of_figure("gyro", cause, f"gyro {NAMES[cause]}", 1.0 / self._north, self.figures)
+            for cause in BIASES
+        )
+        return [part for part in parts if part is not None]
+
+    def _of_noise(self, time: float, *, swings: bool) -> Iterator[Contribution]:
         for term in self.gyro.terms:
             if isinstance(term, Sinusoid) and not swings:
                 sigma = self._envelope(term, time)
             else:
                 sigma = math.sqrt(self._variance(term, time))
-            yield Contribution(f"gyro {label(term)}", sigma / north)
-        if self.positions == 1 and self.bias is not None:
-            yield Contribution("gyro turn-on bias", self.bias / north)
+            yield Contribution(f"gyro {label(term)}", sigma / self._north)
 
     def _variance(self, term: Term, time: float) -> float:
         if self.positions == 1:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.special import ndtr
 
-from imubench_pipeline.error_budget.budget import Budget
+from imubench_pipeline.error_budget.parts import Budget
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
 

@@ -7,7 +7,9 @@ import math
 import numpy as np
 from scipy.optimize import brentq
 
-from imubench_pipeline.error_budget.budget import Quantity, Start, budget
+from imubench_pipeline.error_budget.budget import Start, budget
+from imubench_pipeline.error_budget.in_use import NO_FIGURES, NO_USE, Figures, Use
+from imubench_pipeline.error_budget.parts import Quantity
 from imubench_pipeline.noise import NoiseModel
 
 _SHORTEST = 1e-6
@@ -17,7 +19,15 @@ _POINTS = 4096
 
 
 def time_until(
-    limit: float, quantity: Quantity, *, gyro: NoiseModel, accel: NoiseModel, start: Start
+    limit: float,
+    quantity: Quantity,
+    *,
+    gyro: NoiseModel,
+    accel: NoiseModel,
+    start: Start,
+    use: Use = NO_USE,
+    gyro_figures: Figures = NO_FIGURES,
+    accel_figures: Figures = NO_FIGURES,
 ) -> float | None:
     """Return the time after which an error reaches a limit.
 
@@ -32,6 +42,8 @@ def time_until(
     quantity : {"attitude", "heading", "velocity", "position"}
     gyro, accel : NoiseModel
     start : Start
+    use : Use
+    gyro_figures, accel_figures : mapping of str to Figure
         All as in `budget`.
 
     Returns
@@ -49,7 +61,17 @@ def time_until(
         raise ValueError(f"limit is {limit}, expected a number above 0")
 
     def excess(time: float) -> float:
-        return budget(quantity, time, gyro=gyro, accel=accel, start=start).total - limit
+        found = budget(
+            quantity,
+            time,
+            gyro=gyro,
+            accel=accel,
+            start=start,
+            use=use,
+            gyro_figures=gyro_figures,
+            accel_figures=accel_figures,
+        )
+        return found.total - limit
 
     if excess(_SHORTEST) >= 0:
         return 0.0

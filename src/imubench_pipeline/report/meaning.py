@@ -14,6 +14,7 @@ from imubench_pipeline.report.practical import (
     unit_of,
 )
 from imubench_pipeline.requirements import DIMENSIONS, Requirement
+from imubench_pipeline.suitability.conditions import is_missing, parts_of
 
 Row = Mapping[str, Any]
 Simulated = Mapping[tuple[str, str], bool]
@@ -26,7 +27,6 @@ _NAMES = {
     "north": "north, found at rest",
 }
 _HALF_TURN = 3.141592653589793
-_SHOWN_SOURCES = 3
 
 
 def rankings(
@@ -59,6 +59,7 @@ def rankings(
                     "rank": limits[0]["rank"] or "–",
                     "tied_with": limits[0]["tied_with"],
                     "verdict": limits[0]["verdict"],
+                    "conditions": limits[0]["conditions"],
                     "limits": [_limit(row, system) for row in limits],
                 }
             )
@@ -88,6 +89,7 @@ def _limit(row: Row, system: System) -> dict[str, Any]:
         "margin": number_text(row["margin"], 3) if known else "–",
         "chance": _percent(row["chance"]) if known else "–",
         "source": f"{row['source']} ({_percent(row['share'])})" if row["source"] else "–",
+        "parts": (row["parts"] or "–").split("; "),
         "reached": duration_text(reached) if reached is not None else "–",
         "decides": row["decides"],
         "reason": row["reason"] or "",
@@ -156,10 +158,9 @@ def _cell(rows: Sequence[Row], unit: PageUnit) -> dict[str, Any]:
     lines = [shown]
     if _sensible(total, total["sigma"]):
         lines.append(interval_text(total, unit))
+    sources = [row for row in rows if row["source"] != "total" and not is_missing(row)]
     if total["sigma"] > 0.0:
-        parts = [row for row in rows if row["source"] != "total"][:_SHOWN_SOURCES]
-        shares = ((row["source"], (row["sigma"] / total["sigma"]) ** 2) for row in parts)
-        lines += [f"{source} {_percent(share)}" for source, share in shares if share >= 0.01]
+        lines += (parts_of(total["sigma"], sources) or "").split("; ")
     return {"lines": lines, "note": total["reason"] or "", "class": "number"}
 
 
@@ -187,7 +188,9 @@ def budget_words(settings: Mapping[str, Any]) -> str:
         The section ``error_budget`` of the run's settings.
     """
     return (
-        "Errors that the noise alone causes in dead reckoning, with 95 % intervals and the largest "
-        f"parts of the variance. Biases and tilt are taken over {settings['static_window']} at "
-        f"rest right before; north is found at rest at a latitude of {settings['latitude']}."
+        "Errors that the noise causes in dead reckoning, with 95 % intervals and the parts of the "
+        f"variance of 1 % or more. Biases and tilt are taken over {settings['static_window']} at "
+        "rest right before; a tilt keeps the turn-on bias of the accelerometers, which is marked "
+        "as it is from the datasheet. North is found at rest at a latitude of "
+        f"{settings['latitude']}, by a gyro whose bias is known."
     )

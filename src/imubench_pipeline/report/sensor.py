@@ -17,6 +17,7 @@ from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.start import summary
 from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView, Row
 from imubench_pipeline.report.words import counted
+from imubench_pipeline.suitability.conditions import in_words
 
 _MANY = 12
 """Recordings of a sensor beyond which its page leaves budgets and deltas to those of recordings."""
@@ -94,7 +95,7 @@ def _standings(site: Site, sensor: str) -> Iterator[dict[str, str]]:
         if row["sensor"] == sensor and row["decides"]:
             title = site.settings["requirements"][row["requirement"]]["title"]
             place = f", rank {row['rank']}" if row["rank"] else ""
-            yield {"title": title, "text": row["verdict"] + place}
+            yield {"title": title, "text": in_words(row) + place}
 
 
 def _devices(own: Sequence[RecordingView]) -> Iterator[dict[str, Any]]:

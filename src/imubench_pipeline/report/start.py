@@ -20,6 +20,7 @@ from imubench_pipeline.report.words import (
     requirement_words,
     sentence,
 )
+from imubench_pipeline.suitability.conditions import in_words
 
 _LONGEST_PART = 1 / 9
 """Part of a log that tells an error of that length."""
@@ -151,7 +152,7 @@ def _rankings(site: Site) -> Iterator[dict[str, Any]]:
                 if group["tied_with"]
             },
             "undrawn": ", ".join(
-                f"{site.names[group['sensor']]} ({group['verdict']})"
+                f"{site.names[group['sensor']]} ({in_words(group)})"
                 for group in one["groups"]
                 if group["rank"] == "–"
             ),

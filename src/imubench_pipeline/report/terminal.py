@@ -21,6 +21,7 @@ from imubench_pipeline.report.terminal_table import fitting
 from imubench_pipeline.requirements import Requirement
 from imubench_pipeline.run_summary import left_out, one_line, rejections, serious
 from imubench_pipeline.sensor import quantity_of
+from imubench_pipeline.suitability.conditions import in_words
 
 Row = Mapping[str, Any]
 About = Mapping[tuple[str, str], Row]
@@ -30,6 +31,8 @@ _TITLES = {"gyro": "Gyroscopes", "accel": "Accelerometers"}
 _STYLES = {
     "passes": "green",
     "probably passes": "green",
+    "passes if": "yellow",
+    "probably passes if": "yellow",
     "probably fails": "yellow",
     "surely fails": "red",
 }
@@ -144,7 +147,7 @@ def _ranking_lines(group: Mapping[str, Any], *, every: bool) -> Iterator[list[st
     first: list[str | Text] = [
         str(group["rank"]),
         sensor,
-        Text(group["verdict"], style=_STYLES.get(group["verdict"], "dim")),
+        Text(one_line(in_words(group)), style=_STYLES.get(group["verdict"], "dim")),
     ]
     for limit in group["limits"]:
         if every or limit["decides"]:

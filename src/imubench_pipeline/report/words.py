@@ -14,13 +14,24 @@ from imubench_pipeline.report.practical import (
     symbol_text,
 )
 from imubench_pipeline.requirements import Requirement
+from imubench_pipeline.suitability.conditions import EXCLUDED, in_words
+from imubench_pipeline.validation import Strict
 
 Row = Mapping[str, Any]
 
 _ROUGH = 0.3
 """Half of an interval over its value from which a percentage would hide its asymmetry."""
 
-_VERDICTS = ("passes", "probably passes", "probably fails", "surely fails", "not enough data")
+_VERDICTS = (
+    "passes",
+    "probably passes",
+    "passes if",
+    "probably passes if",
+    "probably fails",
+    "surely fails",
+    "not enough data",
+    EXCLUDED,
+)
 
 
 def untold(row: Row, unit: PageUnit, duration: float | None) -> str:
@@ -92,7 +103,7 @@ def requirement_verdict(
     best = ranked[0]
     decides = next(limit for limit in best["limits"] if limit["decides"])
     said = names[best["sensor"]] + (" (simulated)" if best["simulated"] else "")
-    first = _first(said, best["verdict"], len(ranked), len(groups))
+    first = _first(said, in_words(best), len(ranked), len(groups))
     text = (
         f"{first}. The limit that decides is {decides['limit']}: {decides['sigma']} "
         f"{decides['unit']} expected ({decides['interval']}), {decides['allowed']} "
@@ -118,6 +129,8 @@ def _first(sensor: str, verdict: str, judged: int, asked: int) -> str:
         return f"{sensor} is the best of {of} and passes"
     if verdict == "probably passes":
         return f"No sensor surely passes. The best of {of}, {sensor}, probably passes"
+    if " if " in verdict:
+        return f"No sensor passes without a condition. The best of {of}, {sensor}, {verdict}"
     return f"No sensor passes. Of {of} the nearest is {sensor}, which {verdict}"
 
 
@@ -142,7 +155,8 @@ def _others(groups: Sequence[Mapping[str, Any]], names: Mapping[str, str]) -> st
         reason = next((limit["reason"] for limit in group["limits"] if limit["decides"]), "")
         if group["verdict"] == "not enough data" and reason:
             said = f"{said} ({reason})"
-        found.setdefault(said, []).append(names[group["sensor"]])
+        why = f" ({group['conditions']})" * (group["verdict"] == EXCLUDED)
+        found.setdefault(said, []).append(names[group["sensor"]] + why)
     for said, own in found.items():
         if own:
             listed = ", ".join(own) if len(own) <= _FEW else f"{len(own)} sensors"
@@ -154,9 +168,12 @@ _FEW = 4
 _CAPITALS = {
     "passes": "Pass too",
     "probably passes": "Probably pass",
+    "passes if": "Pass on conditions",
+    "probably passes if": "Probably pass on conditions",
     "probably fails": "Probably fail",
     "surely fails": "Surely fail",
     "not enough data": "Cannot be judged",
+    EXCLUDED: "Excluded",
 }
 
 
@@ -166,7 +183,8 @@ def requirement_words(requirement: Requirement) -> str:
     if requirement.static_window:
         begin = f"biases and tilt from {requirement.static_window} at rest right before"
     elif requirement.turn_on:
-        biases = f"{requirement.turn_on.gyro} and {requirement.turn_on.accel}"
+        stated = (requirement.turn_on.gyro, requirement.turn_on.accel)
+        biases = " and ".join(bias or "the datasheet" for bias in stated)
         begin = f"turn-on biases of {biases} that nothing has taken off"
     else:
         begin = ""
@@ -174,9 +192,25 @@ def requirement_words(requirement: Requirement) -> str:
         "An example, made up." if requirement.example else "",
         f"Asked: {limits}, in {100 * requirement.confidence:g} % of runs, by the "
         f"{requirement.axis} axis; {begin}.",
+        _stated("In use", requirement.environment),
+        _stated("A sensor must have", requirement.must),
         f"{requirement.note.rstrip('.')}." if requirement.note else "",
     ]
     return " ".join(part for part in parts if part)
+
+
+def _stated(lead: str, group: Strict) -> str:
+    """Return what a group of a requirement states, in a sentence; empty if it states nothing."""
+    stated: list[str] = []
+    for name, value in group:
+        if isinstance(value, Strict):
+            inner = ", ".join(f"{key} {one}" for key, one in value if one is not None)
+            value = inner or None
+        elif isinstance(value, tuple):
+            value = (" to " if name == "temperature" else ", ").join(value) or None
+        if value is not None:
+            stated.append(f"{name.replace('_', ' ')} {value}")
+    return f"{lead}: {'; '.join(stated)}." if stated else ""
 
 
 def model_text(name: str) -> str:

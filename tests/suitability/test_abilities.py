@@ -1,0 +1,105 @@
+"""What a sensor must have, against what its file tells."""
+
+from typing import Any
+
+import pytest
+
+from imubench_pipeline.requirements import Must
+from imubench_pipeline.sensor import CHANNELS, Sensor
+from imubench_pipeline.suitability.abilities import abilities, judge
+
+FIGURES = {
+    "full_scale": {"value": [125, 250], "unit": "deg/s", "kind": "choices"},
+    "bandwidth": {"value": {"xy": 80, "z": 60}, "unit": "Hz"},
+}
+WHOLE: dict[str, Any] = {
+    "vendor": "V",
+    "model": "M",
+    "mass": "20 g",
+    "power": "300 mW",
+    "temperature_range": ["-40 degC", "85 degC"],
+    "log": {
+        "rate": "100 Hz",
+        "channels": {c: {"column": c, "unit": "deg/s"} for c in CHANNELS[:3]},
+    },
+    "datasheet": {"gyro": FIGURES},
+}
+
+
+def judged(must: dict[str, Any], **changes: Any) -> tuple[list[str], list[str]]:
+    sensor = Sensor.model_validate(WHOLE | changes)
+    return judge(Must.model_validate(must), abilities(sensor))
+
+
+@pytest.mark.parametrize(
+    ("must", "lacking"),
+    [
+        ({"full_scale": {"gyro": "250 deg/s"}}, None),
+        (
+            {"full_scale": {"gyro": "300 deg/s"}},
+            "full scale of the gyro 250 deg/s, 300 deg/s asked",
+        ),
+        ({"bandwidth": "60 Hz", "axes": ["gyro_xyz"]}, None),
+        (
+            {"bandwidth": "70 Hz", "axes": ["gyro_xyz"]},
+            "bandwidth of the gyro 60 Hz, 70 Hz asked",
+        ),
+        ({"rate": "100 Hz"}, None),
+        ({"temperature": ["-20 degC", "60 degC"]}, None),
+        (
+            {"temperature": ["-55 degC", "60 degC"]},
+            "temperature range -40 to 85 degC, -55 degC to 60 degC asked",
+        ),
+        ({"axes": ["gyro_xyz"]}, None),
+        ({"mass": "0.02 kg"}, None),
+        ({"mass": "15 g"}, "mass 20 g, 15 g asked"),
+        ({"power": "0.3 W"}, None),
+        ({"power": "0.2 W"}, "power 0.3 W, 0.2 W asked"),
+    ],
+)
+def test_what_a_sensor_is_known_to_have(must: dict[str, Any], lacking: str | None) -> None:
+    assert judged(must) == ([lacking] if lacking else [], [])
+
+
+@pytest.mark.parametrize(
+    ("must", "unknown"),
+    [
+        ({"full_scale": {"accel": "8 g"}}, "full scale of the accelerometer"),
+        ({"bandwidth": "10 Hz"}, "bandwidth of the accelerometer"),
+        ({"rate": "200 Hz"}, "rate"),  # The logs are slower, which the sensor need not be.
+        ({"axes": ["accel_z"]}, "axis accel_z"),
+    ],
+)
+def test_what_nobody_knows(must: dict[str, Any], unknown: str) -> None:
+    assert judged(must) == ([], [unknown])
+
+
+@pytest.mark.parametrize("key", ["mass", "power", "temperature_range"])
+def test_what_a_sensor_file_leaves_out_is_not_known(key: str) -> None:
+    asked = {"mass": "30 g", "power": "1 W", "temperature": ["0 degC", "40 degC"]}
+    assert judged(asked, **{key: None}) == ([], [key.replace("_", " ")])
+
+
+def test_a_sensor_without_a_quantity_lacks_its_axes() -> None:
+    lacking, unknown = judged(
+        {"axes": ["accel_xyz"], "full_scale": {"accel": "2 g"}},
+        datasheet={"gyro": FIGURES, "accel": None},
+    )
+    assert (lacking, unknown) == (["no accelerometer"], [])
+
+
+def test_the_highest_rate_is_that_of_the_sensor() -> None:
+    assert judged({"rate": "400 Hz"}, rate="1 kHz") == ([], [])
+    assert judged({"rate": "2 kHz"}, rate="1 kHz") == (["rate 1000 Hz, 2 kHz asked"], [])
+
+
+def test_figures_of_other_options_do_not_count() -> None:
+    figures = [
+        {"value": 250, "unit": "deg/s", "option": "mode A"},
+        {"value": 2000, "unit": "deg/s", "option": "mode B"},
+    ]
+    asked = {"full_scale": {"gyro": "1000 deg/s"}}
+    sheet = {"gyro": {"full_scale": figures}}
+    assert judged(asked, datasheet=sheet) == ([], ["full scale of the gyro"])
+    lacking, _ = judged(asked, datasheet=sheet | {"options": ["mode A"]})
+    assert lacking == ["full scale of the gyro 250 deg/s, 1000 deg/s asked"]

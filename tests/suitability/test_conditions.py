@@ -1,0 +1,113 @@
+"""Verdicts that rest on what is not known, and sensors that are excluded."""
+
+from typing import Any
+
+import pytest
+
+from imubench_pipeline.error_budget.printed_errors import in_use
+from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.expected_errors import error_rows, of_requirement
+from imubench_pipeline.printed import Datasheet
+from imubench_pipeline.requirements import Requirement
+from imubench_pipeline.selection import ranking_rows
+from imubench_pipeline.suitability.conditions import in_words
+from imubench_pipeline.tables import build
+
+CHANNELS = ("gyro_x", "accel_x")
+GYRO = {
+    "scale_factor_error": {"value": 500, "unit": "ppm"},
+    "temperature_coefficient": {"value": 1e-4, "unit": "deg/s/K"},
+}
+ACCEL = {"offset": {"value": 50, "unit": "mg", "kind": "typ"}}
+TURNS = {"turns": "360 deg", "temperature_change": "20 K"}
+
+
+def requirement(error: str = "heading", at_most: str = "2 deg", **keys: Any) -> Requirement:
+    limit = {"error": error, "after": "60 s", "at_most": at_most}
+    return Requirement.model_validate(
+        {"title": "t", "static_window": "1 h", "limits": [limit], "environment": TURNS} | keys
+    )
+
+
+def ranking(asked: Requirement, **sensors: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    rows: list[Any] = []
+    for name, printed in sensors.items():
+        estimates = {
+            channel: Estimate("likelihood", {"N": Parameter(N, lower=0.9 * N, upper=1.1 * N)})
+            for channel, N in zip(CHANNELS, (5e-5, 1e-3), strict=True)
+        }
+        figures = in_use(Datasheet.model_validate(printed), CHANNELS, ())
+        names = {"sensor": name, "recording": "r"}
+        questions = list(of_requirement("robot", asked))
+        rows += error_rows(names, estimates, questions, draws=100, seed=1, figures=figures)
+    about = {name: {"price_class": None} for name in sensors}
+    errors = build("error_budget", rows).to_pylist()
+    found = build("ranking", ranking_rows(errors, {"robot": asked}, about)).to_pylist()
+    return {row["sensor"]: row for row in found}
+
+
+def largest_of(words: str) -> float:
+    """The number of a condition: 'its ... is below 1200 ppm (1 sigma)'."""
+    return float(words.partition("below ")[2].split()[0])
+
+
+def test_a_sensor_whose_figures_are_known_passes_without_a_condition() -> None:
+    row = ranking(requirement(), known={"gyro": GYRO})["known"]
+    assert (row["verdict"], row["conditions"]) == ("passes", None)
+    assert "gyro scale factor (datasheet, typ)" in row["parts"]
+
+
+@pytest.mark.parametrize("missing", [("scale_factor_error",), tuple(GYRO)])
+def test_the_largest_figure_is_that_with_which_the_limit_is_just_kept(
+    missing: tuple[str, ...],
+) -> None:
+    """With the figures of the conditions printed a sensor passes; with 5 % more it fails."""
+    left = {name: one for name, one in GYRO.items() if name not in missing}
+    asked = requirement()
+    row = ranking(asked, unknown={"gyro": left})["unknown"]
+    assert row["verdict"] == "passes if"
+    said = row["conditions"].split("; ")
+    assert len(said) == len(missing)
+    for share, ending in ((0.97, "passes"), (1.05, "fails")):
+        printed = dict(left)
+        for words in said:
+            size = share * largest_of(words)
+            name, unit = ("scale_factor_error", "ppm") if "scale" in words else (
+                "temperature_coefficient", "deg/s/K",
+            )  # fmt: skip
+            printed[name] = {"value": size, "unit": unit}
+        found = ranking(asked, s={"gyro": printed})["s"]
+        assert found["conditions"] is None
+        assert found["verdict"].endswith(ending)
+
+
+def test_a_tilt_has_the_turn_on_bias_of_the_datasheet() -> None:
+    asked = requirement("attitude", "5 deg", environment={})
+    found = ranking(asked, known={"accel": ACCEL}, unknown={})
+    # 50 mg are 2.86 deg, 5.6 deg at 95 %.
+    assert found["known"]["verdict"] == "surely fails"
+    assert found["known"]["source"] == "initial tilt by accel turn-on bias (datasheet, typ)"
+    assert found["unknown"]["verdict"] == "passes if"
+    assert "its accelerometers are calibrated to 4" in found["unknown"]["conditions"]
+    assert "mg (1 sigma)" in found["unknown"]["conditions"]
+
+
+def test_what_fails_already_has_no_condition() -> None:
+    row = ranking(requirement(at_most="0.01 deg"), unknown={})["unknown"]
+    assert (row["verdict"], row["conditions"]) == ("surely fails", None)
+
+
+def test_an_unknown_figure_does_not_make_a_sensor_better() -> None:
+    found = ranking(requirement(at_most="9 deg"), known={"gyro": GYRO}, unknown={})
+    assert found["unknown"]["margin"] > found["known"]["margin"]
+    assert (found["unknown"]["rank"], found["known"]["rank"]) == (1, 1)
+    assert found["known"]["tied_with"] == "unknown"
+
+
+def test_a_sensor_without_what_it_must_have_is_excluded() -> None:
+    asked = requirement(must={"mass": "30 g", "axes": ["gyro_x"]})
+    rows = ranking(asked, unknown={"gyro": GYRO})
+    assert rows["unknown"]["verdict"] == "passes if"
+    assert "not known: axis gyro_x, mass" in rows["unknown"]["conditions"]
+    assert in_words({"verdict": "excluded", "conditions": "no gyro"}) == "excluded: no gyro"
+    assert in_words({"verdict": "passes", "conditions": None}) == "passes"
