@@ -7,6 +7,7 @@ makes most of the error (`imubench_pipeline.fitness` says what is doubted of a l
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator
 from typing import Literal, get_args
@@ -17,7 +18,7 @@ from imubench_pipeline.verdicts.basis import Basis, Row
 from imubench_pipeline.verdicts.sources import parameters_behind, quantity_behind
 from imubench_pipeline.verdicts.standing import Standing
 
-Reason = Literal["short_log", "one_specimen", "wide_interval", "few_axes"]
+Reason = Literal["one_specimen", "short_log", "wide_interval", "few_axes"]
 """What makes evidence weak; beside these, the codes of doubts."""
 
 REASONS: tuple[str, ...] = get_args(Reason)
@@ -42,12 +43,16 @@ def weaknesses(standing: Standing, requirement: Requirement, basis: Basis) -> li
     Returns
     -------
     list of str
-        `REASONS` and codes of the table ``doubts``. What is said of a log counts where it is of
-        half the recordings or more.
+        `REASONS` and codes of the table ``doubts``. Axes and doubts count where they are those of
+        half the recordings or more, the length is that of the longest.
     """
     found = []
     if standing.expected.specimens == 1:
         found.append("one_specimen")
+    durations = [basis.duration((row["sensor"], row["recording"])) for row in standing.totals]
+    longest = max((one for one in durations if one is not None), default=math.inf)
+    if longest_asked(standing.total, requirement) > LONGEST_PART * longest:
+        found.append("short_log")
     if standing.wide:
         found.append("wide_interval")
     of_logs = Counter(
@@ -65,9 +70,6 @@ def _of_log(
     total: Row, standing: Standing, requirement: Requirement, basis: Basis
 ) -> Iterator[str]:
     key = total["sensor"], total["recording"]
-    duration = basis.duration(key)
-    if duration is not None and longest_asked(total, requirement) > LONGEST_PART * duration:
-        yield "short_log"
     for quantity in ("gyro", "accel"):
         axes = basis.axes(key, quantity) if total[quantity] else None
         if requirement.axis == "worst" and axes is not None and axes < _AXES:

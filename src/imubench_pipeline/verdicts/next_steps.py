@@ -74,8 +74,9 @@ def _steps(one: Judgement, basis: Basis) -> Iterator[_Step]:
     """Yield what would help one verdict: to turn it, and to make its evidence stronger."""
     if one.unless is not None:
         action: Action = "check_unit" if one.unless.factors else "record_again"
+        quantities = " and ".join(f"the {_NAMES[name]}" for name in one.unless.factors)
         for key, doubts in one.unless.doubts.items():
-            yield _Step(action, key, one.name, turns=True, what=doubts)
+            yield _Step(action, key, one.name, turns=True, what=quantities or doubts)
     decides = one.decides
     if not decides.known:
         yield from _for_channels(one, basis)
@@ -94,7 +95,7 @@ def _for_channels(one: Judgement, basis: Basis) -> Iterator[_Step]:
     if key in basis.apart:
         return
     needs = ("gyro",) if total["error"] in ("heading", "north") else ("gyro", "accel")
-    missing = [_NAMES[quantity] for quantity in needs if basis.axes(key, quantity) == 0]
+    missing = [f"the {_NAMES[name]}" for name in needs if basis.axes(key, name) == 0]
     if missing:
         yield _Step("add_channels", key, one.name, turns=True, what=" and ".join(missing))
 
@@ -159,7 +160,7 @@ def _to_strengthen(one: Judgement, reason: str, basis: Basis) -> Iterator[_Step]
     elif reason == "short_log" and duration is not None:
         yield _Step("log_longer", key, one.name, False, duration=_told_by(one))
     elif reason == "few_axes":
-        yield _Step("add_channels", key, one.name, False, what="three axes")
+        yield _Step("add_channels", key, one.name, False, what="all three axes")
     elif reason not in REASONS:
         for total in one.decides.totals:
             own = one.sensor, total["recording"]
@@ -189,7 +190,7 @@ def _row(steps: Sequence[_Step], basis: Basis) -> dict[str, Any]:
     specimens = max((step.specimens for step in steps if step.specimens), default=None)
     whats = ", ".join(dict.fromkeys(step.what for step in steps if step.what))
     sensor, recording = first.key
-    effect = _effect(len(turned), len(strengthened))
+    effect = _effect(first.action, len(turned), len(strengthened))
     logged = basis.duration((sensor, recording)) if recording else None
     what = _what_to_do(first.action, recording, whats, duration, logged, specimens)
     return {
@@ -215,26 +216,33 @@ def _what_to_do(
 ) -> str:
     match action:
         case "check_unit":
-            return f"check the unit of {recording} ({what})"
+            return f"check the unit of {what} in {recording}"
         case "record_again":
             return f"record {recording} again ({what})"
         case "add_channels":
-            return f"log with {what} ({recording} lacks it)"
+            return f"log {what}, which {recording} does not have"
         case "log_longer":
-            assert duration is not None
+            assert duration is not None  # of every such step
             more = duration - (logged or 0.0)
             return f"log {recording} for {_time(more)} more, {_time(duration)} in all"
     return f"log {specimens} more {'specimen' if specimens == 1 else 'specimens'}"
 
 
-def _effect(turned: int, strengthened: int) -> str:
+_WOULD = {"check_unit": "turn", "record_again": "allow", "add_channels": "allow"}
+"""What a step does with verdicts; else it settles them, if the figures stay what they are."""
+
+
+def _effect(action: Action, turned: int, strengthened: int) -> str:
     parts = []
     if turned:
-        parts.append(f"it may turn or settle {turned} {'verdict' if turned == 1 else 'verdicts'}")
+        parts.append(f"would {_WOULD.get(action, 'settle')} {_verdicts(turned)}")
     if strengthened:
-        noun = "verdict" if strengthened == 1 else "verdicts"
-        parts.append(f"it makes {strengthened} {noun} stronger")
-    return " and ".join(parts)
+        parts.append(f"would give {_verdicts(strengthened)} stronger evidence")
+    return "it " + " and ".join(parts)
+
+
+def _verdicts(number: int) -> str:
+    return f"{number} {'verdict' if number == 1 else 'verdicts'}"
 
 
 def _time(seconds: float) -> str:

@@ -72,13 +72,17 @@ class Standing:
         return low <= 0.0 or high / low > VAGUE
 
     @property
+    def _vague(self) -> bool:
+        """Whether the log that answers says too little: two specimens do not know their spread."""
+        lower, upper = self.total["lower"], self.total["upper"]
+        return bool(lower <= 0.0 or upper / lower > VAGUE)
+
+    @property
     def verdict(self) -> str:
         """The chance in words."""
         if not self.known:
             return "not enough data"
-        # Two specimens do not know their spread: only what each log leaves open is too little.
-        vague = self.total["lower"] <= 0.0 or self.total["upper"] / self.total["lower"] > VAGUE
-        if vague and 1.0 - _SURE < self.chance < _SURE:
+        if self._vague and 1.0 - _SURE < self.chance < _SURE:
             return "not enough data"
         for least, words in ((_SURE, "passes"), (0.5, "probably passes")):
             if self.chance >= least:

@@ -34,7 +34,7 @@ class Unless:
     logged : Standing or None
         The limit that would decide with the figures as they were logged; None: as it does.
     mended : Standing or None
-        With the factors of the doubts; None where they turn nothing.
+        With the factors of the doubts; None where there are none.
     factors : mapping of str to float
         By quantity.
     doubts : mapping of (str, str) to str
@@ -45,11 +45,6 @@ class Unless:
     mended: Standing | None
     factors: Factors
     doubts: Mapping[tuple[str, str], str]
-
-    @property
-    def turns(self) -> bool:
-        """Whether a mended unit changes what is said."""
-        return self.mended is not None
 
 
 def unless(sensor: str, rows: Sequence[Row], found: Standing, basis: Basis) -> Unless | None:
@@ -81,7 +76,7 @@ def unless(sensor: str, rows: Sequence[Row], found: Standing, basis: Basis) -> U
     logged = deciding(standings(own, devices))
     factors = {key: basis.factors(key) for key in doubted}
     mended = deciding(standings(list(_mended(own, factors)), devices)) if factors else None
-    if mended is not None and mended.verdict in (logged.verdict, "not enough data"):
+    if mended is not None and not unjudged and mended.verdict == logged.verdict:
         mended = None
     if not logged.known or (mended is None and not unjudged):
         return None
