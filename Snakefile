@@ -43,6 +43,7 @@ FOLDER = RESULTS + "/recordings/{sensor}/{recording}"
 JOINED = sorted(set(TABLES) - set(OF_ONE_RECORDING))
 RANKED = {
     "ranking",
+    "next_steps",
     "fusion",
     "coverage",
     "coverage_by_vendor",
@@ -389,10 +390,12 @@ rule tables:
 
 rule ranking:
     input:
-        errors=RESULTS + "/tables/error_budget.parquet",
-        recordings=RESULTS + "/tables/recordings.parquet",
+        **{
+            table: f"{RESULTS}/tables/{table}.parquet"
+            for table in ("error_budget", "recordings", "doubts", "parameters")
+        },
     output:
-        as_files("ranking"),
+        as_files("ranking", "next_steps"),
     group:
         "comparison"
     resources:

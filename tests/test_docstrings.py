@@ -35,7 +35,10 @@ PUBLIC = ["allan", "confidence", "noise", "simulate", "score", "datasheet", "uni
           "sensor_model/profile_files", "sensor_model/profiles", "sensor_model/settings",
           "sensor_model/simulation", "sensor_model/sources",
           "sensor_model/from_datasheet", "sensor_model/from_estimates",
-          "sensor_model/spectra", "sensor_model/writing"]  # fmt: skip
+          "sensor_model/spectra", "sensor_model/writing",
+          "verdicts/basis", "verdicts/evidence", "verdicts/judgement", "verdicts/next_steps",
+          "verdicts/sources", "verdicts/specimens", "verdicts/standing",
+          "verdicts/unless"]  # fmt: skip
 
 
 def functions(path: Path) -> list[ast.FunctionDef]:

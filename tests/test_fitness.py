@@ -134,9 +134,10 @@ def test_a_ranking_stands_on_the_recordings_that_decide() -> None:
     requirement = {"robot": asked()}
     fine, moved = (list(errors_of({"s": gyro(N)}, requirement)) for N in (1e-4, 1e-2))
     both = fine + [row | {"recording": "moved"} for row in moved]
+    told = ABOUT | {"device": "d", "simulated": False, "duration": 7200.0}
     about = [
-        ABOUT | {"recording": "r", "decides": True, "doubts": "lines (gyro_x)"},
-        ABOUT | {"recording": "moved", "decides": False, "doubts": "motion (gyro_x)"},
+        told | {"recording": "r", "decides": True, "doubts": "lines (gyro_x)"},
+        told | {"recording": "moved", "decides": False, "doubts": "motion (gyro_x)"},
     ]
     prices = {"s": {"price_class": None}}
     (alone,) = build("ranking", ranking_rows(fine, requirement, prices, about[:1])).to_pylist()
@@ -149,3 +150,4 @@ def test_a_ranking_stands_on_the_recordings_that_decide() -> None:
     assert none["verdict"] == "not enough data"
     assert none["reason"] == "moved does not decide: motion (gyro_x)"
     assert none["rank"] is None
+    assert none["unless"].startswith("as logged it ") and none["unless_verdict"] is None

@@ -424,7 +424,7 @@ def drift(name: str, verdict: str | None) -> dict[str, Any]:
 def standing(sensor: str, verdict: str = "passes", margin: float = 2.0) -> dict[str, Any]:
     return {"requirement": "robot", "sensor": sensor, "recording": "a", "verdict": verdict,
             "rank": 1, "decides": True, "error": "heading", "unit": "rad", "margin": margin,
-            "time": 1.0, "tied_with": None, "limit_verdict": verdict}  # fmt: skip
+            "time": 1.0, "tied_with": None, "limit_verdict": verdict, "evidence": None}  # fmt: skip
 
 
 def state(
@@ -510,7 +510,7 @@ def test_what_changed_is_told_with_its_reason(tmp_path: Path) -> None:
     assert (found.new, found.removed, STATUS[found.outcome]) == (["s/new"], ["s/gone"], 0)
     text = in_words(found)
     assert "1 new, 2 analysed again, 1 removed, 0 skipped; 4 in all" in text
-    assert "robot: no sensor fulfils it; best is u: surely fails (before: s)\n" in text
+    assert "robot: no sensor fulfils it; nearest is u: surely fails (before: s)\n" in text
 
 
 @pytest.mark.parametrize(

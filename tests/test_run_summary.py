@@ -23,8 +23,8 @@ def finding(sensor: str, name: str, severity: str = "warning") -> dict[str, Any]
 def standing(sensor: str, **values: object) -> dict[str, Any]:
     row = {"requirement": "robot", "sensor": sensor, "recording": "run", "verdict": "passes",
            "rank": 1, "decides": True, "error": "heading", "unit": "rad", "margin": 2.0,
-           "time": 1.0, "tied_with": None, "conditions": None,
-           "limit_verdict": "passes"}  # fmt: skip
+           "time": 1.0, "tied_with": None, "conditions": None, "limit_verdict": "passes",
+           "evidence": "strong"}  # fmt: skip
     return row | values
 
 
@@ -81,15 +81,15 @@ def test_the_recording_with_the_worst_warnings_comes_first() -> None:
 def test_a_line_says_which_sensor_leads_a_requirement() -> None:
     rows = [
         standing("second", rank=2),
-        standing("best", tied_with="other"),
+        standing("best", tied_with="other", evidence="weak"),
         standing("best", decides=False, verdict="surely fails"),
         standing("made", requirement="hard", verdict="surely fails"),
         standing("short", requirement="vague", verdict="not enough data"),
         standing("c", requirement="dear", rank=None, verdict="outside the price class"),
     ]
     assert list(leaders(rows, [recording("best"), recording("made", simulated=True)])) == [
-        "robot: best: passes, tied with other",
-        "hard: no sensor fulfils it; best is made (simulated): surely fails",
+        "robot: best: passes, on weak evidence, tied with other",
+        "hard: no sensor fulfils it; nearest is made (simulated): surely fails",
         "vague: short: not enough data",
         "dear: no sensor can be ranked",
     ]

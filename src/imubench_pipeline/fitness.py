@@ -17,6 +17,8 @@ import pyarrow as pa
 
 from imubench_pipeline.columns import Column, number, text
 from imubench_pipeline.findings import LEFT_OUT
+from imubench_pipeline.quality.plausibility import factor_of_gravity
+from imubench_pipeline.sensor import quantity_of
 
 Row = Mapping[str, Any]
 Key = tuple[str, str]  # sensor, recording
@@ -67,7 +69,8 @@ DOUBTS = (
 
 _DEGREES = math.degrees(1.0)
 _LARGEST_SMALL = 1e-5
-"""rad/s/sqrt(Hz): a gyro's noise is suspicious for being above it, or for being below."""
+"""rad/s/sqrt(Hz), and of the minimum of the Allan deviation rad/s: a gyro's noise is suspicious for
+being above it, or for being below."""
 
 _SHOWN = 3
 """Doubts of a recording that are named; of more the number."""
@@ -329,9 +332,12 @@ def _of_finding(row: Row) -> Doubt:
 
 def _factor(row: Row) -> float | None:
     """Return by what a unit that was mixed up multiplies a value that is mended."""
-    if row["finding"] != "suspicious_unit":
-        return None
-    return 1.0 / _DEGREES if row["value"] > _LARGEST_SMALL else _DEGREES
+    if row["finding"] == "gravity_norm":
+        return factor_of_gravity(row["value"])
+    of_gyro = row["channel"] is not None and quantity_of(row["channel"]) == "gyro"
+    if of_gyro and row["finding"] in ("suspicious_unit", "unusual_figure"):
+        return 1.0 / _DEGREES if row["value"] > _LARGEST_SMALL else _DEGREES
+    return None
 
 
 def _place(row: Row) -> tuple[str, str, str | None]:

@@ -3,22 +3,20 @@
 A noise parameter is pooled on the logarithm, y_k = ln p_k = mu + u_k + e_k, with variances tau^2
 between recordings and v_k from the 95 % limits of each. Of asymmetric limits the half towards mu
 counts, v = (ln upper - y)^2 / z^2 where mu > y (the likelihood of a split normal, whose sum is
-convex in mu), no narrower than a quarter of the mean half: a value beside its own limit would be a
-wall.
+convex in mu), no narrower than a quarter of the mean half: a narrower one would be a wall.
 
 A recording without a value inside positive limits is left out and counted. The limits of what is
-not identified are made by the prior as much as by the log, and the middle of their logarithms is
-no estimate: twenty of them would make a confident wrong value. They serve against the selection
-that leaving out makes (small values are identified less often): `Pool.contradicting`.
+not identified are made by the prior as much as by the log: twenty of their middles would make a
+confident wrong value. They serve against the selection that leaving out makes, of small values
+less often identified: `Pool.contradicting`.
 
 The interval of the pool is Hartung and Knapp's, t with K - 1 degrees of freedom, but never narrower
 than the errors of the recordings allow (Jackson et al.). It covers, in 8,000 simulated pools a case
 (errors equal-within a factor 3), for K = 2; 3; 5; 20: without spread 99; 99; 98; 96-97 %, with a
-spread of one error 98-96; 97-94; 96-94; 95, of three 96-93; 96-93; 95; 95. Where errors differ
-tenfold and the spread lies between them, the most precise recording rules, and it covers down to
-79; 86; 89; 93. With K = 2 it is wide (t = 12.7): two values do not know their spread. What is
-shorter fails: the normal interval covers 70-76 % at a large spread, and Hartung and Knapp's alone
-(95 %) has no width where two values happen to meet.
+spread of one error 98-96; 97-94; 96-94; 95, of three 96-93; 96-93; 95; 95; where errors differ
+tenfold about the spread, down to 79; 86; 89; 93. With K = 2 it is wide (t = 12.7): two values do
+not know their spread. What is shorter fails: the normal interval covers 70-76 % at a large spread,
+and Hartung and Knapp's alone (95 %) has no width where two values happen to meet.
 
 References
 ----------
@@ -70,9 +68,9 @@ class Pool:
         a value with limits. Of one recording its own.
     recordings, left_out, contradicting : int
         Used; left out; of those, the ones whose limits lie outside what the others predict.
-    spread, spread_lower, spread_upper : float or None
-        tau, the standard deviation of the logarithm between recordings (relative, where small),
-        and its 95 % limits. Both limits 0: the values agree better than their errors allow.
+    error, spread, spread_lower, spread_upper : float or None
+        Standard error of ln value; tau, the standard deviation of the logarithm between recordings
+        (relative, where small), with 95 % limits: both 0 where values agree better than errors do.
     p_value, verdict : float or None, str or None
         Of Cochran's Q, chi-squared with K - 1 degrees of freedom where recordings agree;
         ``differ`` where it is below `LEVEL`, else ``agree``: no difference is shown.
@@ -84,6 +82,7 @@ class Pool:
     recordings: int
     left_out: int
     contradicting: int = 0
+    error: float | None = None
     spread: float | None = None
     spread_lower: float | None = None
     spread_upper: float | None = None
@@ -152,8 +151,10 @@ def pool(
     spread_squared = _spread_squared(points, float(freedom))
     mean, q, _, weight = _minimum(points, spread_squared)
     centre = middle + mean
-    half = max(t * math.sqrt(q / freedom), _NORMAL) / math.sqrt(weight)
-    predicted = t * math.sqrt(spread_squared + 1.0 / weight)
+    error = 1.0 / math.sqrt(weight)
+    half = max(t * math.sqrt(q / freedom), _NORMAL) * error
+    predicted = t * math.hypot(math.sqrt(spread_squared), error)
+    outside = _outside(others, bounded_exp(centre - predicted), bounded_exp(centre + predicted))
     p_value = float(chdtrc(freedom, _minimum(points, 0.0)[1]))
     return Pool(
         value=math.exp(centre),
@@ -161,9 +162,8 @@ def pool(
         upper=bounded_exp(centre + half),
         recordings=len(used),
         left_out=len(others),
-        contradicting=_outside(
-            others, bounded_exp(centre - predicted), bounded_exp(centre + predicted)
-        ),
+        contradicting=outside,
+        error=error,
         spread=math.sqrt(spread_squared),
         spread_lower=math.sqrt(_spread_squared(points, high_q)),
         spread_upper=math.sqrt(_spread_squared(points, low_q)),

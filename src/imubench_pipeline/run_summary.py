@@ -193,9 +193,10 @@ def leaders(ranking: Iterable[Row], recordings: Iterable[Row]) -> Iterator[str]:
         best = max(first, key=lambda row: row["margin"])
         shown = best["sensor"] + " (simulated)" * ((best["sensor"], best["recording"]) in simulated)
         if best["verdict"].endswith("fails"):
-            shown = f"no sensor fulfils it; best is {shown}"
+            shown = f"no sensor fulfils it; nearest is {shown}"
         tied = f", tied with {best['tied_with']}" if best["tied_with"] else ""
-        yield one_line(f"{name}: {shown}: {in_words(best)}{tied}")
+        weak = ", on weak evidence" * (best["evidence"] == "weak")
+        yield one_line(f"{name}: {shown}: {in_words(best)}{weak}{tied}")
 
 
 def one_line(text: str, longest: int = _MOST_LETTERS) -> str:

@@ -19,7 +19,8 @@ from imubench_pipeline.faults import FAILURES
 from imubench_pipeline.fitness import DOUBTS, JUDGED
 from imubench_pipeline.fusion.columns import FUSION_TABLES
 from imubench_pipeline.repeatability import REPEATABILITY
-from imubench_pipeline.suitability.columns import CONDITIONS, IN_USE
+from imubench_pipeline.suitability.columns import IN_USE
+from imubench_pipeline.verdicts.columns import NEXT_STEPS, RANKING
 
 _FITTED = _number("fitted", "as in unit", "what the model has where that is not value; no estimate")
 _SENSOR = _text("sensor", "name of the sensor file")
@@ -307,34 +308,8 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _text("reason", "what is not known", required=False),
         _DOUBTED,
     ),
-    "ranking": (
-        _text("requirement", "file under config/requirements, without .yaml"),
-        _SENSOR,
-        _count("rank", "1 is the best; null: not ranked"),
-        _text("tied_with", "sensors whose intervals overlap", required=False),
-        _text("verdict", "passes, probably passes, probably fails, surely fails, ..."),
-        Column("decides", pa.bool_(), "-", "the limit with the least margin", required=True),
-        _text("recording", "that answers", required=False),
-        _text("error", "as in error_budget"),
-        _number("time", "s", "as in error_budget", required=True),
-        _number("at_most", "as in unit", "the limit as it was asked for"),
-        _number("confidence", "-", "chance of an error within it that was asked for"),
-        _number("limit", "as in unit", "the same as a standard deviation: the largest allowed"),
-        _number("sigma", "as in unit", "standard deviation of the error"),
-        _number("lower", "as in unit", "lower 95 % limit"),
-        _number("upper", "as in unit", "upper 95 % limit"),
-        _text("unit", "SI unit"),
-        _number("margin", "-", "limit over sigma"),
-        _number("chance", "-", "that sigma is within limit, as far as the estimates tell"),
-        _text("limit_verdict", "of this limit alone"),
-        _text("source", "the largest contribution", required=False),
-        _number("share", "-", "its part of the variance"),
-        _number("reached_after", "s", "time after which the limit is reached"),
-        *CONDITIONS,
-        _text("reason", "what is not known", required=False),
-        _DOUBTED,
-        _text("left_out", "recordings that do not decide, and why", required=False),
-    ),
+    "ranking": RANKING,
+    "next_steps": NEXT_STEPS,
     "published": (
         *_KEYS,
         _text("place", "table of the source"),

@@ -12,7 +12,7 @@ STEPS: Mapping[str, tuple[str, ...]] = {
     "reconstruct": ("reconstruction",),
     "datasheet": ("datasheet", "results"),
     "error_budget": ("expected_errors", "results"),
-    "ranking": ("selection", "results"),
+    "ranking": ("selection", "verdicts.next_steps", "results"),
     "fusion": ("fusion.of_run",),
     "earth_rotation": ("earth_rate.of_run",),
     "calibration": ("calibration.of_run",),

@@ -22,8 +22,11 @@ from imubench_pipeline.report.site import Site
 from imubench_pipeline.requirements import Requirement
 from imubench_pipeline.results import Key, parameter_rows
 from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
-from imubench_pipeline.selection import ranking_rows
+from imubench_pipeline.selection import ranked
 from imubench_pipeline.tables import build, write, write_arrow
+from imubench_pipeline.verdicts.basis import Basis
+from imubench_pipeline.verdicts.judgement import judgements
+from imubench_pipeline.verdicts.next_steps import next_step_rows
 
 Row = dict[str, Any]
 Rows = dict[str, list[Row]]
@@ -257,11 +260,13 @@ def joined(*several: Rows, requirements: Mapping[str, Any] | None = None) -> Tab
     devices = {(row["sensor"], row["recording"]): row["device"] for row in about}
     asked = {n: Requirement.model_validate(one) for n, one in (requirements or {}).items()}
     sensors = {row["sensor"]: {"price_class": None} for row in about}
-    errors = made["error_budget"].to_pylist()
+    basis = Basis.of(about, made["doubts"].to_pylist(), recommended)
+    judged = list(judgements(made["error_budget"].to_pylist(), asked, sensors, basis))
     return made | {
         "pooled": build("pooled", pooled_rows(recommended, biases, devices)),
         "drift": build("drift", drift_rows(recommended, biases, about)),
-        "ranking": build("ranking", ranking_rows(errors, asked, sensors)),
+        "ranking": build("ranking", ranked(judged, basis)),
+        "next_steps": build("next_steps", next_step_rows(judged, basis)),
         "fusion": build("fusion", fusion_rows(made, FUSION)),
     }
 

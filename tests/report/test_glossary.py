@@ -251,9 +251,9 @@ def values_in_tables() -> Iterator[tuple[str, str]]:
         yield severity, ""
     for verdict in [*datasheet.VERDICTS, *get_args(pooled.Verdict)]:
         yield verdict, "verdict"
-    for verdict in strings_in("selection.py", "verdict"):
+    for verdict in strings_in("verdicts/standing.py", "verdict"):
         yield verdict, "verdict"
-    for verdict in strings_in("selection.py", "ranking_rows"):
+    for verdict in strings_in("verdicts/judgement.py", "_outside"):
         if "price class" in verdict:
             yield verdict, "verdict"
     for verdict in (conditions.EXCLUDED, *conditions.CONDITIONAL.values()):

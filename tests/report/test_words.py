@@ -15,6 +15,7 @@ from imubench_pipeline.report.words import (
     sentence,
     started_text,
     untold,
+    verdict_words,
 )
 from imubench_pipeline.requirements import Requirement
 
@@ -114,7 +115,11 @@ def group(sensor: str, verdict: str, rank: int | str = "–", **values: Any) -> 
          "allowed": "5", "decides": True, "reason": reason},
     ]  # fmt: skip
     made = {"sensor": sensor, "verdict": verdict, "rank": rank, "limits": limits}
-    return made | {"tied_with": None, "simulated": False, "conditions": None} | values
+    return (
+        made
+        | {"tied_with": None, "simulated": False, "conditions": None, "weak": "", "unless": None}
+        | values
+    )
 
 
 NAMES = {name: name.upper() for name in "abcdefgh"}
@@ -138,6 +143,41 @@ def test_a_best_sensor_that_may_fail_is_not_said_to_pass(how: str) -> None:
     if how != "probably passes":
         begin = f"No sensor passes. Of 2 the nearest is A, which {how}. {FIGURES} Data of a."
     assert said == f"{begin} Surely fail: B."
+
+
+def test_weak_evidence_and_what_a_unit_would_turn_stand_with_the_verdict() -> None:
+    turned = "as logged it surely fails (margin 0.1); if the gyro is in °/s, it passes (margin 7)"
+    said = verdict(
+        group("a", "passes", 1, weak="one log of 11 min; spectrum not explained"),
+        group("b", "not enough data", unless=turned),
+        group("c", "surely fails", 2),
+    )
+    assert said.startswith(
+        "A is the best of 2 that could be judged and passes, on weak evidence (one log of 11 min; "
+        f"spectrum not explained). {FIGURES}"
+    )
+    assert said.endswith(f"Surely fail: C. Cannot be judged: B. B: {turned}.")
+
+
+def weak(reasons: str | None, **values: Any) -> str:
+    about = {"verdict": "passes", "evidence": "weak" if reasons else "strong",
+             "evidence_reasons": reasons, "recordings": 1, "specimens": 1, "spread_of": None,
+             "longest_log": 660.0}  # fmt: skip
+    return verdict_words(about | values)
+
+
+def test_what_makes_evidence_weak_is_said_in_words() -> None:
+    assert weak(None) == "passes"
+    assert weak("one_specimen, short_log, few_axes") == (
+        "passes, on weak evidence (one specimen; one log of 11 min; fewer than three axes)"
+    )
+    assert weak("one_specimen, periodic_drift, not_explained", spread_of="other sensors") == (
+        "passes, on weak evidence (one specimen, with the spread of other sensors; periodic drift; "
+        "spectrum not explained)"
+    )
+    assert weak("short_log, wide_interval", specimens=2, recordings=2, spread_of="specimens") == (
+        "passes, on weak evidence (no log beyond 11 min; wide interval from 2 specimens)"
+    )
 
 
 def test_a_simulated_best_sensor_is_called_so() -> None:

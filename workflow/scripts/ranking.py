@@ -1,4 +1,4 @@
-"""Rank the sensors for each requirement."""
+"""Rank the sensors for each requirement, and say what would help the verdicts most."""
 
 import json
 from pathlib import Path
@@ -6,28 +6,37 @@ from pathlib import Path
 import pyarrow.compute as pc
 
 from imubench_pipeline.requirements import Requirement
-from imubench_pipeline.selection import ranking_rows
+from imubench_pipeline.selection import ranked
 from imubench_pipeline.tables import build, read, write_arrow
+from imubench_pipeline.verdicts.basis import Basis
+from imubench_pipeline.verdicts.judgement import judgements
+from imubench_pipeline.verdicts.next_steps import next_step_rows
 
 
-def main(errors: Path, recordings: Path, settings: str, outputs: list[Path]) -> None:
-    """Write the table ``ranking``, as Parquet and CSV."""
+def main(tables: dict[str, Path], settings: str, outputs: list[Path]) -> None:
+    """Write the tables ``ranking`` and ``next_steps``, as Parquet and CSV."""
     given = json.loads(settings)
     requirements = {
         name: Requirement.model_validate(one) for name, one in given["requirements"].items()
     }
-    asked = read("error_budget", [errors]).filter(pc.field("requirement").is_valid())
-    about = read("recordings", [recordings]).to_pylist()
-    rows = ranking_rows(asked.to_pylist(), requirements, given["sensors"], about)
-    table = build("ranking", rows)
+    joined = {name: read(name, [path]) for name, path in tables.items()}
+    asked = joined.pop("error_budget").filter(pc.field("requirement").is_valid())
+    recommended = joined["parameters"].filter(pc.field("recommended"))
+    basis = Basis.of(
+        joined["recordings"].to_pylist(), joined["doubts"].to_pylist(), recommended.to_pylist()
+    )
+    judged = list(judgements(asked.to_pylist(), requirements, given["sensors"], basis))
+    made = {
+        "ranking": build("ranking", ranked(judged, basis)),
+        "next_steps": build("next_steps", next_step_rows(judged, basis)),
+    }
     for output in outputs:
-        write_arrow(table, output)
+        write_arrow(made[output.stem], output)
 
 
 if __name__ == "__main__":
     main(
-        Path(snakemake.input.errors),
-        Path(snakemake.input.recordings),
+        {name: Path(path) for name, path in snakemake.input.items()},
         snakemake.params.settings,
         [Path(path) for path in snakemake.output],
     )

@@ -45,11 +45,31 @@ def gravity(means: Mapping[str, float]) -> Finding | None:
     advice = "check unit, scale, offset and columns of the accelerometer"
     if norm < 0.05 * _GRAVITY:
         advice = "gravity seems to be taken off already (linear acceleration); use the raw figures"
-    for misread, words in _MISREAD:
-        if abs(norm / misread - 1.0) <= _TOLERANCE:
-            advice = words
+    for _, words in _misread(norm):
+        advice = words
     detail = f"the mean acceleration has a norm of {norm:.4g} m/s², expected {_GRAVITY:.4g}"
     return Finding("gravity_norm", "warning", f"{detail}: {advice}", norm)
+
+
+def factor_of_gravity(norm: float) -> float | None:
+    """Return by what accelerations are to be multiplied if their unit was mixed up.
+
+    Parameters
+    ----------
+    norm : float
+        Of the mean acceleration of a sensor at rest, m/s² as stated.
+
+    Returns
+    -------
+    float or None
+        None where it is that of gravity in no other unit.
+    """
+    return next((_GRAVITY / misread for misread, _ in _misread(norm)), None)
+
+
+def _misread(norm: float) -> list[tuple[float, str]]:
+    """Return the norms of gravity in a wrong unit that a norm may be, with what to state."""
+    return [one for one in _MISREAD if abs(norm / one[0] - 1.0) <= _TOLERANCE]
 
 
 def gyro_noise(densities: Mapping[str, float]) -> list[Finding]:

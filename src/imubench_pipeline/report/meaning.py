@@ -13,6 +13,7 @@ from imubench_pipeline.report.practical import (
     number_text,
     unit_of,
 )
+from imubench_pipeline.report.words import evidence_words
 from imubench_pipeline.requirements import DIMENSIONS, Requirement
 from imubench_pipeline.suitability.conditions import is_missing, parts_of
 
@@ -52,14 +53,17 @@ def rankings(
         for sensor in sorted(dict.fromkeys(row["sensor"] for row in own), key=_order(own)):
             limits = [row for row in own if row["sensor"] == sensor]
             recordings = {row["recording"] for row in limits}
+            stands = next(row for row in limits if row["decides"])
             groups.append(
                 {
                     "sensor": sensor,
                     "simulated": all(simulated.get((sensor, one), False) for one in recordings),
                     "rank": limits[0]["rank"] or "–",
                     "tied_with": limits[0]["tied_with"],
-                    "verdict": limits[0]["verdict"],
-                    "conditions": limits[0]["conditions"],
+                    "verdict": stands["verdict"],
+                    "conditions": stands["conditions"],
+                    "weak": evidence_words(stands) if stands["rank"] else "",
+                    "unless": stands["unless"],
                     "limits": [_limit(row, system) for row in limits],
                 }
             )

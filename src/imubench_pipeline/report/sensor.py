@@ -16,7 +16,7 @@ from imubench_pipeline.report.practical import limit_digits, symbol_text
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.start import summary
 from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView, Row
-from imubench_pipeline.report.words import counted
+from imubench_pipeline.report.words import counted, verdict_words
 from imubench_pipeline.suitability.conditions import in_words
 
 _MANY = 12
@@ -31,7 +31,7 @@ def sensor_page(site: Site, sensor: str) -> Page:
         *(view.device_page for view in own),
         [row for row in site.rows("pooled") if row["sensor"] == sensor],
         [row for row in site.rows("repeatability") if row["sensor"] == sensor],
-        [row for row in site.rows("ranking") if row["sensor"] == sensor],
+        list(_standings(site, sensor)),
         [row for row in site.rows("coverage") if row["sensor"] == sensor],
         site.looks[sensor],
     )
@@ -91,11 +91,20 @@ def _about(site: Site, sensor: str) -> str:
 
 def _standings(site: Site, sensor: str) -> Iterator[dict[str, str]]:
     """Yield how the sensor stands to each requirement."""
-    for row in site.rows("ranking"):
-        if row["sensor"] == sensor and row["decides"]:
+    deciding = [row for row in site.rows("ranking") if row["decides"]]
+    for row in deciding:
+        if row["sensor"] == sensor:
             title = site.settings["requirements"][row["requirement"]]["title"]
-            place = f", rank {row['rank']}" if row["rank"] else ""
-            yield {"title": title, "text": in_words(row) + place}
+            text = in_words(row)
+            if row["rank"]:
+                judged = sum(
+                    one["rank"] is not None and one["requirement"] == row["requirement"]
+                    for one in deciding
+                )
+                text = f"{verdict_words(row)}; rank {row['rank']} of {judged} that could be judged"
+            if row["unless"]:
+                text += f"; {row['unless']}"
+            yield {"title": title, "text": text}
 
 
 def _devices(own: Sequence[RecordingView]) -> Iterator[dict[str, Any]]:

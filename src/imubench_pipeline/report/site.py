@@ -242,7 +242,8 @@ class Site:
     @cached_property
     def key(self) -> str:
         """Digest of everything, for pages that show all recordings."""
-        parts = (self.rows(table) for table in ("pooled", "ranking", "drift", "coverage"))
+        shown = ("pooled", "ranking", "next_steps", "drift", "coverage")
+        parts = (self.rows(table) for table in shown)
         return _digest(self.common, [view.key for view in self.views], *parts)
 
     def key_of(self, *parts: object) -> str:

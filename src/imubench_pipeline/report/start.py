@@ -22,8 +22,8 @@ from imubench_pipeline.report.words import (
 )
 from imubench_pipeline.suitability.conditions import in_words
 
-_LONGEST_PART = 1 / 9
-"""Part of a log that tells an error of that length."""
+_STEPS = 3
+"""What is to do next that the start page names; the table has all."""
 
 
 def start_page(site: Site) -> Page:
@@ -47,6 +47,7 @@ def _start(site: Site) -> dict[str, Any]:
         "not_calibrated": list(_not_calibrated(site)),
         "changed": site.changed_devices(),
         "rankings": ranked,
+        "next_steps": list(_next_steps(site)),
         "forest": FOREST,
         "twins": [(name, name.replace("_", " ")) for name in site.channel_names],
         "parameter_tables": list(together.tables()),
@@ -159,32 +160,41 @@ def _rankings(site: Site) -> Iterator[dict[str, Any]]:
         }
 
 
+def _next_steps(site: Site) -> Iterator[dict[str, str]]:
+    """Yield what would turn or strengthen most verdicts."""
+    titles = {name: one["title"] for name, one in site.settings["requirements"].items()}
+    for row in site.rows("next_steps")[:_STEPS]:
+        about = "; ".join(titles[name] for name in listed_names(row["requirements"], titles))
+        yield {"sensor": row["sensor"], "text": sentence(row["text"]), "about": about}
+
+
 def _basis(site: Site, row: Row) -> str:
     """Return on which data a sensor is judged, and what puts them in doubt."""
     own = [v for v in site.views if v.sensor == row["sensor"] and v.static]
-    devices = {view.row["device"] for view in own}
     chosen = next((view for view in own if view.name == row["recording"]), None)
-    if chosen is None:
-        return f"Left out: {row['left_out']}." if row["left_out"] else ""
-    text = (
-        f"Judged by recording {chosen.name} ({duration_text(chosen.row['duration'])}, "
-        f"{counted(len(chosen.recommended()), 'axis', 'axes')}), one of "
-        f"{counted(len(own), 'recording')} of {counted(len(devices), 'device')}; other specimens "
-        "may differ."
-    )
-    if row["time"] > _LONGEST_PART * chosen.row["duration"]:
-        text += f" The log is short for {duration_text(row['time'])}."
-    models = chosen.rows("models")
-    unexplained = [m["channel"] for m in models if m["chosen"] and m["verdict"] == "not explained"]
-    if unexplained:
-        channels = ", ".join(name.replace("_", " ") for name in unexplained)
-        text += f" No model explains the spectrum of {channels}."
+    left_out = f" Left out: {row['left_out']}." if row["left_out"] else ""
+    if chosen is None or not row["recordings"]:
+        return left_out.strip()
+    axes = counted(len(chosen.recommended()), "axis", "axes")
+    log = f"recording {chosen.name} ({duration_text(chosen.row['duration'])}, {axes})"
+    if row["recordings"] == 1:
+        text = f"Judged by {log}; other specimens may differ."
+    else:
+        of = f"{counted(row['recordings'], 'recording')} of {counted(row['specimens'], 'specimen')}"
+        text = f"Judged by {of}, of which {log} is nearest to what is expected of the next one."
+    if row["spread"] is not None:
+        text += f" Spread: {100 * row['spread']:.2g} %, {_SPREAD_OF[row['spread_of']]}."
     doubts = list(dict.fromkeys(finding["finding"] for finding in chosen.warnings))
     if doubts:
         text += f" Doubts: {', '.join(term(name).name for name in doubts)}."
-    if row["left_out"]:
-        text += f" Left out: {row['left_out']}."
-    return text
+    return text + left_out
+
+
+_SPREAD_OF = {
+    "specimens": "from specimen to specimen",
+    "recordings": "from recording to recording of one specimen",
+    "other sensors": "taken from other sensors with several specimens",
+}
 
 
 def _margin(row: Row, group: dict[str, Any]) -> dict[str, Any]:
@@ -193,6 +203,7 @@ def _margin(row: Row, group: dict[str, Any]) -> dict[str, Any]:
     return {
         "sensor": row["sensor"],
         "verdict": group["verdict"],
+        "weak": group["weak"],
         "margin": row["margin"] if known else None,
         "low": row["limit"] / row["upper"] if bounded else None,
         "high": row["limit"] / row["lower"] if bounded else None,

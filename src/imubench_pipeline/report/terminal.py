@@ -144,11 +144,13 @@ def _ranking_lines(group: Mapping[str, Any], *, every: bool) -> Iterator[list[st
     sensor = one_line(group["sensor"] + " (simulated)" * group["simulated"])
     if group["tied_with"]:
         sensor += "\n" + one_line(f"tied with {group['tied_with']}")
-    first: list[str | Text] = [
-        str(group["rank"]),
-        sensor,
-        Text(one_line(in_words(group)), style=_STYLES.get(group["verdict"], "dim")),
-    ]
+    said = Text(one_line(in_words(group)), style=_STYLES.get(group["verdict"], "dim"))
+    if group["weak"]:
+        said.stylize("dim")
+        said.append(f"\non weak evidence: {group['weak']}", style="yellow")
+    if group["unless"]:
+        said.append(f"\n{one_line(group['unless'])}", style="yellow")
+    first: list[str | Text] = [str(group["rank"]), sensor, said]
     for limit in group["limits"]:
         if every or limit["decides"]:
             shown = limit["reason"]

@@ -81,6 +81,50 @@ def precision(row: Row, unit: PageUnit) -> str:
     return f"± {number_text(100.0 * half, 2)} %"
 
 
+def verdict_words(row: Row) -> str:
+    """Return a verdict with what makes its evidence weak.
+
+    Parameters
+    ----------
+    row : mapping
+        Of the table ``ranking``, of the limit that decides.
+    """
+    weak = evidence_words(row)
+    return f"{row['verdict']}, on weak evidence ({weak})" if weak else row["verdict"]
+
+
+def evidence_words(row: Row) -> str:
+    """Return what makes the evidence of a verdict weak; empty where it is strong or not known.
+
+    Parameters
+    ----------
+    row : mapping
+        Of the table ``ranking``.
+    """
+    if row["evidence"] != "weak":
+        return ""
+    return "; ".join(_weakness(code, row) for code in row["evidence_reasons"].split(", "))
+
+
+def _weakness(code: str, row: Row) -> str:
+    match code:
+        case "one_specimen":
+            borrowed = row["spread_of"] == "other sensors"
+            return "one specimen" + ", with the spread of other sensors" * borrowed
+        case "short_log":
+            length = duration_text(row["longest_log"])
+            return f"one log of {length}" if row["recordings"] == 1 else f"no log beyond {length}"
+        case "wide_interval" if row["spread_of"] == "specimens":
+            return f"wide interval from {row['specimens']} specimens"
+        case "few_axes":
+            return "fewer than three axes"
+        case "not_explained":
+            return "spectrum not explained"
+        case "doubtful":
+            return "the parameter that decides is doubtful"
+    return code.replace("_", " ")
+
+
 def requirement_verdict(
     groups: Sequence[Mapping[str, Any]], names: Mapping[str, str], basis: Mapping[str, str]
 ) -> str:
@@ -98,12 +142,15 @@ def requirement_verdict(
     if not groups:
         return "No recording answers it."
     ranked = [group for group in groups if group["rank"] != "–"]
+    turned = [f"{names[one['sensor']]}: {one['unless']}." for one in groups if one["unless"]]
     if not ranked:
-        return "No sensor can be ranked for it. " + _others(groups, names)
+        return " ".join(["No sensor can be ranked for it.", _others(groups, names), *turned])
     best = ranked[0]
     decides = next(limit for limit in best["limits"] if limit["decides"])
     said = names[best["sensor"]] + (" (simulated)" if best["simulated"] else "")
     first = _first(said, in_words(best), len(ranked), len(groups))
+    if best["weak"]:
+        first += f", on weak evidence ({best['weak']})"
     text = (
         f"{first}. The limit that decides is {decides['limit']}: {decides['sigma']} "
         f"{decides['unit']} expected ({decides['interval']}), {decides['allowed']} "
@@ -115,7 +162,7 @@ def requirement_verdict(
     if best["tied_with"]:
         tied = ", ".join(names.get(one, one) for one in listed_names(best["tied_with"], names))
         text += f" It cannot be told apart from {tied}."
-    return text + " " + _others([g for g in groups if g is not best], names)
+    return " ".join([text, _others([g for g in groups if g is not best], names), *turned])
 
 
 def _first(sensor: str, verdict: str, judged: int, asked: int) -> str:

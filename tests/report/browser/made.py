@@ -290,7 +290,7 @@ def rows_of(logs: Sequence[Log], rejected: Sequence[tuple[str, str]] = ()) -> Ro
     rows["pooled"] = [*pooled_rows(best, rows["fixed_bias"], devices)]
     prices = {name: {"price_class": one.price_class} for name, one in SENSORS.items()}
     errors = build("error_budget", rows["error_budget"]).to_pylist()
-    rows["ranking"] = [*ranking_rows(errors, REQUIREMENTS, prices)]
+    rows["ranking"] = [*ranking_rows(errors, REQUIREMENTS, prices, parameters=best)]
     tables = {name: build(name, rows.get(name, [])) for name in NEEDED}
     rows["fusion"] = [*fusion_rows(tables, FusionSettings(draws=100))]
     covered = coverage(SENSORS)

@@ -3,17 +3,17 @@
 kinds.margins = (figure) => {
   const found = pageData.rankings[figure.dataset.requirement].filter((one) => one.margin !== null);
   const names = found.map((one) => one.sensor).reverse();
-  const { ink, mark, soft } = inks();
+  const { ink, mark, paper } = inks();
   const traces = found.map((one) => {
     const look = pageData.looks.sensors[one.sensor];
     const colour = colourOf(look);
     return {
       type: "scatter", mode: "markers", x: [one.margin], y: [names.indexOf(one.sensor)],
-      marker: { color: colour, size: 11, symbol: look.marker },
+      marker: { color: one.weak ? paper : colour, size: 11, symbol: look.marker, line: { color: colour, width: one.weak ? 2 : 0 } },
       error_x: one.low !== null ? {
         type: "data", symmetric: false, array: [one.high - one.margin], arrayminus: [one.margin - one.low], color: colour, thickness: 2, width: 5,
       } : undefined,
-      hovertemplate: `${nameOf(one.sensor)}: ${one.verdict}<br>allowed over expected error: <b>${numberText(one.margin, 3)}</b><br>95 %: ${interval(one.low ?? NaN, one.high ?? NaN)}<extra></extra>`,
+      hovertemplate: `${nameOf(one.sensor)}: ${one.verdict}${one.weak ? `<br>weak evidence: ${one.weak}` : ""}<br>allowed over expected error: <b>${numberText(one.margin, 3)}</b><br>95 %: ${interval(one.low ?? NaN, one.high ?? NaN)}<extra></extra>`,
     };
   });
   const every = found.flatMap((one) => [one.margin, one.low, one.high]).filter((value) => value > 0);

@@ -1,0 +1,105 @@
+"""What is known of the recordings that a verdict stands on, beside their errors."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from imubench_pipeline.fitness import left_out
+from imubench_pipeline.sensor import quantity_of
+
+Row = Mapping[str, Any]
+Key = tuple[str, str]  # sensor, recording
+
+
+@dataclass(frozen=True)
+class Basis:
+    """The recordings of a run, by sensor and name.
+
+    Attributes
+    ----------
+    recordings : mapping
+        The row of the table ``recordings``.
+    doubts : mapping
+        The rows of the table ``doubts``.
+    channels : mapping
+        The channels of which something is known.
+    apart : mapping
+        Why a recording does not decide, of those that do not.
+    """
+
+    recordings: Mapping[Key, Row] = field(default_factory=dict)
+    doubts: Mapping[Key, Sequence[Row]] = field(default_factory=dict)
+    channels: Mapping[Key, frozenset[str]] = field(default_factory=dict)
+    apart: Mapping[Key, str] = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls,
+        recordings: Iterable[Row] = (),
+        doubts: Iterable[Row] = (),
+        parameters: Iterable[Row] = (),
+    ) -> Basis:
+        """Return it from rows of the tables of these names.
+
+        Parameters
+        ----------
+        recordings, doubts : iterable of mapping
+        parameters : iterable of mapping
+            Those of other methods than the recommended one do not count.
+        """
+        about = {_key(row): row for row in recordings}
+        doubted: dict[Key, list[Row]] = {}
+        for row in doubts:
+            doubted.setdefault(_key(row), []).append(row)
+        channels: dict[Key, set[str]] = {}
+        for row in parameters:
+            if row["recommended"] and row["value"] is not None:
+                channels.setdefault(_key(row), set()).add(row["channel"])
+        of_logs = {key: frozenset(names) for key, names in channels.items()}
+        return cls(about, doubted, of_logs, left_out(about.values()))
+
+    def device(self, key: Key) -> str:
+        """Return the specimen: by default each recording is one of its own."""
+        row = self.recordings.get(key)
+        return str(row["device"]) if row else key[1]
+
+    def duration(self, key: Key) -> float | None:
+        """Return the length of a recording, s; None where it is not known."""
+        row = self.recordings.get(key)
+        return row["duration"] if row else None
+
+    def simulated(self, key: Key) -> bool:
+        """Tell whether a recording is simulated."""
+        row = self.recordings.get(key)
+        return bool(row and row["simulated"])
+
+    def doubted(self, key: Key) -> str:
+        """Return the doubts of a recording in words; empty where there are none."""
+        row = self.recordings.get(key)
+        return (row["doubts"] or "") if row else ""
+
+    def axes(self, key: Key, quantity: str) -> int | None:
+        """Return how many axes of a quantity a recording has; None where that is not known."""
+        channels = self.channels.get(key)
+        if channels is None:
+            return None
+        return sum(quantity_of(channel) == quantity for channel in channels)
+
+    def factors(self, key: Key) -> dict[str, float]:
+        """Return by what a unit that may be mixed up multiplies a quantity that is mended.
+
+        A log has one unit for all axes of a quantity, so that a doubt of one axis is one of all.
+        """
+        found: dict[str, float] = {}
+        for row in self.doubts.get(key, ()):
+            if row["factor"] is not None:
+                # Gravity is told by all axes together: its doubt names no channel.
+                quantity = quantity_of(row["channel"]) if row["channel"] else "accel"
+                found.setdefault(quantity, row["factor"])
+        return found
+
+
+def _key(row: Row) -> Key:
+    return row["sensor"], row["recording"]

@@ -1,0 +1,83 @@
+"""Error budgets of white noise for the tests of verdicts."""
+
+from typing import Any
+
+from imubench_pipeline.estimators.estimate import Estimate
+from imubench_pipeline.expected_errors import error_rows, of_requirement
+from imubench_pipeline.requirements import Requirement
+from imubench_pipeline.selection import ranked
+from imubench_pipeline.tables import build
+from imubench_pipeline.verdicts.basis import Basis
+from imubench_pipeline.verdicts.judgement import judgements
+from imubench_pipeline.verdicts.next_steps import next_step_rows
+from tests.test_selection import white
+
+Rows = list[dict[str, Any]]
+Sensors = dict[str, dict[str, dict[str, Estimate]]]  # estimates by sensor and recording
+
+
+def requirement(*limits: tuple[str, str, str], **keys: Any) -> Requirement:
+    listed = [{"error": e, "after": t, "at_most": size} for e, t, size in limits]
+    given = {"title": "t", "static_window": "1 h", "limits": listed} | keys
+    return Requirement.model_validate(given)
+
+
+HEADING = requirement(("heading", "100 s", "0.1 deg"))
+LARGEST = 0.1 / 57.29577951308232 / 1.959963984540054  # rad, 1 sigma
+
+
+def gyro(margin: float, share: float = 0.01) -> dict[str, Estimate]:
+    """A gyro whose heading error fits so often into the limit of `HEADING`."""
+    return {"gyro_x": white(LARGEST / margin / (100 + 100**2 / 3600) ** 0.5, share)}
+
+
+def about(sensor: str, recording: str, **values: Any) -> dict[str, Any]:
+    row = {"sensor": sensor, "recording": recording, "device": recording, "status": "ok",
+           "simulated": False, "duration": 36000.0, "decides": True, "doubts": ""}  # fmt: skip
+    return row | values
+
+
+def doubt(sensor: str, recording: str, code: str, **values: Any) -> dict[str, Any]:
+    row = {"sensor": sensor, "recording": recording, "channel": "gyro_x", "code": code,
+           "parameters": None, "factor": None}  # fmt: skip
+    return row | values
+
+
+def three_axes(sensor: str, recording: str) -> Rows:
+    return [
+        {"sensor": sensor, "recording": recording, "channel": f"{quantity}_{axis}",
+         "recommended": True, "value": 1.0}
+        for quantity in ("gyro", "accel") for axis in "xyz"
+    ]  # fmt: skip
+
+
+def judge(
+    sensors: Sensors,
+    asked: dict[str, Requirement],
+    recordings: Rows | None = None,
+    doubts: Rows | None = None,
+    parameters: Rows | None = None,
+) -> tuple[Rows, Rows]:
+    """Return the tables ``ranking``, of the limits that decide, and ``next_steps``."""
+    questions = [q for name, one in asked.items() for q in of_requirement(name, one)]
+    errors: Rows = []
+    for sensor, logs in sensors.items():
+        for recording, estimates in logs.items():
+            names = {"sensor": sensor, "recording": recording}
+            rows = error_rows(names, estimates, questions, draws=400, seed=1)
+            errors += build("error_budget", rows).to_pylist()
+    if recordings is None:
+        recordings = [about(sensor, name) for sensor, logs in sensors.items() for name in logs]
+    if parameters is None:
+        parameters = [
+            row
+            for sensor, logs in sensors.items()
+            for name in logs
+            for row in three_axes(sensor, name)
+        ]
+    basis = Basis.of(recordings, doubts or [], parameters)
+    prices = {sensor: {"price_class": None} for sensor in sensors}
+    judged = list(judgements(errors, asked, prices, basis))
+    ranking = build("ranking", ranked(judged, basis)).to_pylist()
+    steps = build("next_steps", next_step_rows(judged, basis)).to_pylist()
+    return [row for row in ranking if row["decides"]], steps

@@ -1,0 +1,79 @@
+import math
+
+import pytest
+from scipy import stats
+
+from imubench_pipeline.verdicts.next_steps import specimens_needed
+from imubench_pipeline.verdicts.specimens import Expected, Spread
+from tests.verdicts.budgets import HEADING, about, doubt, gyro, judge, requirement, three_axes
+
+FACTOR = 1 / math.degrees(1.0)
+
+
+def test_what_turns_most_verdicts_comes_first() -> None:
+    asked = {"robot": HEADING, "other": requirement(("heading", "50 s", "0.1 deg"))}
+    sensors = {"unit": {"r": gyro(7.5 * FACTOR)}, "fine": {"r": gyro(5.0)}}
+    doubts = [doubt("unit", "r", "suspicious_unit", factor=FACTOR)]
+    _, (first, *others) = judge(sensors, asked, doubts=doubts)
+    assert (first["sensor"], first["recording"], first["action"]) == ("unit", "r", "check_unit")
+    assert (first["verdicts_turned"], first["requirements"]) == (2, "robot, other")
+    assert first["text"] == "check the unit of the gyro in r: it would turn 2 verdicts"
+    assert all(row["verdicts_turned"] == 0 for row in others)
+    (more,) = (row for row in others if row["sensor"] == "fine")
+    assert (more["action"], more["specimens"], more["recording"]) == ("add_specimens", 2, None)
+    assert more["text"] == ("log 2 more specimens: it would give 2 verdicts stronger evidence")
+
+
+@pytest.mark.parametrize("margin", [1.2, 1 / 1.2])
+def test_a_log_of_the_length_that_is_advised_settles_the_verdict(margin: float) -> None:
+    """White noise is known to a part that falls with the root of the length."""
+
+    def verdict(length: float) -> str:
+        (row,), _ = judge({"s": {"r": gyro(margin, 0.35 / math.sqrt(length))}}, {"robot": HEADING})
+        return row["verdict"]
+
+    _, steps = judge({"s": {"r": gyro(margin, 0.35)}}, {"robot": HEADING})
+    assert steps[0]["action"] == "log_longer" and steps[0]["verdicts_turned"] == 1
+    times = steps[0]["duration"] / 36000.0
+    assert verdict(1.0).startswith("probably")
+    assert verdict(0.7 * times).startswith("probably")
+    assert verdict(1.4 * times) in ("passes", "surely fails")
+
+
+def test_a_margin_of_one_is_settled_by_no_log() -> None:
+    _, steps = judge({"s": {"r": gyro(1.001, 0.3)}}, {"robot": HEADING})
+    assert {row["action"] for row in steps} == {"add_specimens"}
+
+
+def test_so_many_specimens_are_advised_as_it_takes() -> None:
+    spread, away = 0.3, math.log(2.5)
+    found = Expected(1.0, 0.1, 10.0, 0.9, 2, 2, Spread(spread**2, 1), "specimens")
+    more = specimens_needed(found, away)
+    assert more is not None
+
+    def half(count: int) -> float:
+        return float(stats.t.ppf(0.975, count - 1)) * spread * math.sqrt(1 + 1 / count)
+
+    assert half(2 + more) <= away < half(1 + more)
+    # t is never below 1.96.
+    assert specimens_needed(found, 1.9 * spread) is None
+
+
+def test_a_quantity_that_a_limit_needs_is_to_be_logged() -> None:
+    asked = {"along": requirement(("position", "10 s", "1 m"))}
+    gyros = [row for row in three_axes("s", "r") if row["channel"].startswith("gyro")]
+    _, (step,) = judge({"s": {"r": gyro(3.0)}}, asked, parameters=gyros)
+    assert (step["action"], step["verdicts_turned"]) == ("add_channels", 1)
+    assert step["text"] == (
+        "log the accelerometer, which r does not have: it would allow 1 verdict"
+    )
+
+
+def test_a_short_log_is_to_be_as_long_as_it_takes() -> None:
+    logs = [about("s", name, duration=600.0 * i) for i, name in enumerate("abc", start=1)]
+    sensors = {"s": {name: gyro(3.0, 0.05) for name in "abc"}}
+    _, (step,) = judge(sensors, {"robot": HEADING}, logs)
+    assert (step["action"], step["recording"], step["duration"]) == ("log_longer", "c", 9 * 3600)
+    assert step["text"] == (
+        "log c for 8.5 h more, 9 h in all: it would give 1 verdict stronger evidence"
+    )

@@ -1,0 +1,84 @@
+import math
+
+import pytest
+
+from imubench_pipeline.fitness import doubts
+from imubench_pipeline.quality.plausibility import gravity
+from tests.test_selection import white
+from tests.verdicts.budgets import HEADING, about, doubt, gyro, judge, requirement
+
+DEGREES = math.degrees(1.0)
+UNIT = [doubt("s", "r", "suspicious_unit", factor=1 / DEGREES)]
+UNFIT = about("s", "r", decides=False, doubts="suspicious unit (gyro_x)")
+ALONG = requirement(("position", "10 s", "1 m"), static_window="10 s")
+
+
+def test_a_sensor_in_another_unit_stands_as_it_would_in_the_right_one() -> None:
+    """The truth is the verdict on the same sensor, logged in the right unit."""
+    right = {"gyro_x": white(1e-4), "accel_x": white(1e-3)}
+    wrong = right | {"gyro_x": white(1e-4 * DEGREES)}
+    asked = {"heading": HEADING, "along": ALONG}
+    truth, _ = judge({"s": {"r": right}}, asked)
+    rows, _ = judge({"s": {"r": wrong}}, asked, [UNFIT], UNIT)
+    for row, true in zip(rows, truth, strict=True):
+        assert row["verdict"] == "not enough data" and row["rank"] is None
+        assert row["unless_margin"] == pytest.approx(true["margin"], rel=1e-9)
+        assert row["unless_verdict"] == true["verdict"]
+        assert row["logged_verdict"] == "surely fails"
+        assert row["logged_margin"] == pytest.approx(true["margin"] / DEGREES, rel=0.1)
+        assert row["unless"] == (
+            f"as logged it surely fails (margin {row['logged_margin']:.3g}); if the gyro is in "
+            f"°/s, and not rad/s, it {true['verdict']} (margin {true['margin']:.3g})"
+        )
+
+
+def test_a_verdict_that_stands_is_said_with_what_would_turn_it() -> None:
+    rows, _ = judge({"s": {"r": gyro(7.5 / DEGREES)}}, {"robot": HEADING}, doubts=UNIT)
+    assert rows[0]["verdict"] == "surely fails"
+    assert rows[0]["unless"] == "if the gyro is in °/s, and not rad/s, it passes (margin 7.5)"
+    assert (rows[0]["unless_verdict"], rows[0]["logged_verdict"]) == ("passes", None)
+    quiet = [doubt("s", "r", "suspicious_unit", factor=DEGREES)]
+    rows, _ = judge({"s": {"r": gyro(9.0)}}, {"robot": HEADING}, doubts=quiet)
+    assert (rows[0]["verdict"], rows[0]["unless_verdict"]) == ("passes", "surely fails")
+
+
+def test_a_unit_that_turns_nothing_is_not_spoken_of() -> None:
+    rows, _ = judge({"s": {"r": gyro(0.01 / DEGREES)}}, {"robot": HEADING}, doubts=UNIT)
+    assert rows[0]["unless"] is None
+
+
+def test_a_log_left_out_for_motion_says_what_it_gave_as_logged() -> None:
+    moved = about("s", "r", decides=False, doubts="motion (gyro_x)")
+    rows, steps = judge({"s": {"r": gyro(3.0)}}, {"robot": HEADING}, [moved])
+    assert rows[0]["verdict"] == "not enough data"
+    assert rows[0]["unless"] == "as logged it passes (margin 3)"
+    assert rows[0]["unless_verdict"] is None
+    assert steps[0]["action"] == "record_again"
+    # Where another recording decides, nothing hangs on the one that was left out.
+    logs = {"r": gyro(3.0), "fine": gyro(2.0)}
+    rows, _ = judge({"s": logs}, {"robot": HEADING}, [moved, about("s", "fine")])
+    assert (rows[0]["verdict"], rows[0]["unless"]) == ("passes", None)
+
+
+def test_a_turn_on_bias_that_is_stated_keeps_its_size() -> None:
+    turn_on = {"gyro": "0.001 deg/s", "accel": "1 mg"}
+    asked = requirement(("heading", "100 s", "1 deg"), static_window=None, turn_on=turn_on)
+    truth, _ = judge({"s": {"r": {"gyro_x": white(1e-4)}}}, {"robot": asked})
+    wrong = {"gyro_x": white(1e-4 * DEGREES)}
+    rows, _ = judge({"s": {"r": wrong}}, {"robot": asked}, [UNFIT], UNIT)
+    assert rows[0]["unless_margin"] == pytest.approx(truth[0]["margin"], rel=1e-9)
+
+
+@pytest.mark.parametrize(("norm", "factor"), [(9.8**2, 1 / 9.80665), (1.0, 9.80665), (5.0, None)])
+def test_gravity_in_another_unit_has_its_factor(norm: float, factor: float | None) -> None:
+    found = gravity({"accel_x": 0.0, "accel_y": 0.0, "accel_z": norm})
+    assert found is not None
+    (one,) = doubts([found.row("s", "r")], [], [])
+    assert one.factor == (factor and pytest.approx(factor))
+    if factor is not None:
+        right = {"gyro_x": white(1e-7), "accel_x": white(1e-2)}
+        truth, _ = judge({"s": {"r": right}}, {"along": ALONG})
+        wrong = right | {"accel_x": white(1e-2 / factor)}
+        kept = {**one.row(), "factor": one.factor}
+        rows, _ = judge({"s": {"r": wrong}}, {"along": ALONG}, [UNFIT], [kept])
+        assert rows[0]["unless_margin"] == pytest.approx(truth[0]["margin"], rel=1e-9)
