@@ -71,6 +71,7 @@ PARTS = (
     "datasheet",
     "datasheet_curve",
     "error_budget",
+    "backtest",
 )
 OF_RECORDING = ["quality.json", *(f"{t}.parquet" for t in (*OF_ONE_RECORDING, *PARTS))]
 FOLDERS = {}
@@ -269,10 +270,13 @@ rule datasheet:
 
 rule error_budget:
     input:
+        quality=FOLDER + "/quality.json",
         parameters=FOLDER + "/parameters.parquet",
         draws=FOLDER + "/draws.parquet",
+        deterministic=FOLDER + "/deterministic.parquet",
     output:
-        FOLDER + "/error_budget.parquet",
+        error_budget=FOLDER + "/error_budget.parquet",
+        backtest=FOLDER + "/backtest.parquet",
     group:
         "recording"
     resources:
@@ -387,6 +391,7 @@ rule tables:
 rule ranking:
     input:
         errors=RESULTS + "/tables/error_budget.parquet",
+        backtest=RESULTS + "/tables/backtest.parquet",
         recordings=RESULTS + "/tables/recordings.parquet",
     output:
         as_files("ranking"),

@@ -12,6 +12,7 @@ import numpy as np
 import pyarrow as pa
 
 from imubench_pipeline.allan import AllanCurve
+from imubench_pipeline.backtest import verdicts
 from imubench_pipeline.drift import drift_rows
 from imubench_pipeline.estimators.estimate import (
     CURVE,
@@ -303,7 +304,8 @@ def joined_tables(
     )
     unusual = unusual_rows(estimated, catalogue)
     of_estimates = joined.pop("estimate_findings").to_pylist()
-    found = [*of_logs, *of_estimates, *spectral_rows(joined), *unusual]
+    contradicted = verdicts.findings(joined["backtest"].to_pylist())
+    found = [*of_logs, *of_estimates, *spectral_rows(joined), *unusual, *contradicted]
     joined["findings"] = build("findings", found)
     doubted = list(doubts(joined["findings"].to_pylist(), estimated, joined["models"].to_pylist()))
     about = judged(about, doubted, json.loads(decide).get("include", ()))

@@ -19,6 +19,9 @@ _SURE = 0.975
 _NOTHING = {"sigma": None, "lower": None, "upper": None, "within": None, "reached_after": None}
 """What is known from a recording that does not decide."""
 
+_BACKTEST = ("requirement", "sensor", "recording", "channel", "error", "time")
+"""What names a row of the table ``backtest``."""
+
 _VAGUE = 4.0
 """Upper over lower limit of an error beyond which the logs say too little."""
 
@@ -82,6 +85,7 @@ def ranking_rows(
     requirements: Mapping[str, Requirement],
     sensors: Mapping[str, Mapping[str, Any]],
     recordings: Iterable[Row] = (),
+    backtests: Iterable[Row] = (),
 ) -> Iterator[Row]:
     """Rank the sensors for each requirement.
 
@@ -98,6 +102,8 @@ def ranking_rows(
         ``price_class`` of each sensor.
     recordings : iterable of mapping
         Rows of the table ``recordings``: those that do not decide are left out.
+    backtests : iterable of mapping
+        Rows of the table ``backtest``: what the logs themselves show, where they are long enough.
 
     Yields
     ------
@@ -106,6 +112,7 @@ def ranking_rows(
     """
     about = {(row["sensor"], row["recording"]): row for row in recordings}
     apart = left_out(about.values())
+    shown = {tuple(row[name] for name in _BACKTEST): row for row in backtests}
     by_requirement = defaultdict(list)
     for row in errors:
         key = row["sensor"], row["recording"]
@@ -138,6 +145,7 @@ def ranking_rows(
                     "at_most": standing.total["limit"] * requirement.sigmas,
                     "decides": standing is one,
                     **_limit_row(standing),
+                    **_backtest(name, standing, shown),
                     "doubts": about.get((sensor, standing.total["recording"]), {}).get(
                         "doubts", ""
                     ),
@@ -163,6 +171,25 @@ def _limit_row(standing: Standing) -> Row:
         "share": standing.share,
         "reached_after": total["reached_after"],
         "reason": total["reason"],
+    }
+
+
+def _backtest(
+    requirement: str, standing: Standing, shown: Mapping[tuple[Any, ...], Row]
+) -> dict[str, Any]:
+    """Return what the log of the channel that an error mostly comes of shows of its part."""
+    total = standing.total
+    words = (standing.source or "").split()
+    quantity = next((word for word in words if word in ("gyro", "accel")), None)
+    where = {"requirement": requirement, "channel": total[quantity] if quantity else None}
+    found = shown.get(tuple({**total, **where}[name] for name in _BACKTEST), {})
+    return {
+        "backtest_channel": where["channel"] if found.get("ratio") is not None else None,
+        **{
+            f"backtest_{name}": found.get(name)
+            for name in ("ratio", "ratio_lower", "ratio_upper", "windows")
+            if found.get("ratio") is not None
+        },
     }
 
 

@@ -7,6 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from imubench_pipeline.drift import LEVEL
+from imubench_pipeline.report.backtest import standing_text
 from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.datasheets import delta_rows
 from imubench_pipeline.report.meaning import budget_tables, budget_words
@@ -92,7 +93,8 @@ def _standings(site: Site, sensor: str) -> Iterator[dict[str, str]]:
         if row["sensor"] == sensor and row["decides"]:
             title = site.settings["requirements"][row["requirement"]]["title"]
             place = f", rank {row['rank']}" if row["rank"] else ""
-            yield {"title": title, "text": row["verdict"] + place}
+            shown = standing_text(row)
+            yield {"title": title, "text": row["verdict"] + place + (f"; {shown}" if shown else "")}
 
 
 def _devices(own: Sequence[RecordingView]) -> Iterator[dict[str, Any]]:
