@@ -80,7 +80,7 @@ def test_a_log_of_white_noise_drifts_as_its_budget_says(
         assert 1.0 < row["independent"] < row["windows"]
     # Most of it is the mean over 30 s, of which there are 247 in what is left of 8,000 s.
     assert 150 < heading["independent"] < 1.5 * 247
-    assert f"{heading['ratio']:.3g} times the prediction at 600 s" in words(heading)
+    assert f"{heading['ratio']:.2f} times the prediction at 600 s" in words(heading)
     assert not list(findings(rows.values()))
     assert list(rows.values()) == rows_of(logs, estimates)
 

@@ -30,7 +30,7 @@ BACKTEST_TABLES: dict[str, tuple[Column, ...]] = {
             "contradicted",
             pa.bool_(),
             "-",
-            "more than predicted, at 1 % for all rows of the recording together",
+            "1.1 times the prediction or more, sure at 1 % for all rows of the recording",
             required=False,
         ),
         text("unit", "SI unit"),

@@ -20,7 +20,7 @@ def words(row: Row) -> str:
     if row["ratio"] is None:
         return str(row["reason"])
     return (
-        f"this log drifted {row['ratio']:.3g} times the prediction at {row['time']:g} s "
+        f"this log drifted {row['ratio']:.2f} times the prediction at {row['time']:g} s "
         f"({row['ratio_lower']:.2f} to {row['ratio_upper']:.2f} are to be expected), "
         f"{row['windows']} windows, as good as {row['independent']:.3g} independent ones"
     )
