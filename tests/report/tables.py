@@ -257,11 +257,11 @@ def joined(*several: Rows, requirements: Mapping[str, Any] | None = None) -> Tab
     devices = {(row["sensor"], row["recording"]): row["device"] for row in about}
     asked = {n: Requirement.model_validate(one) for n, one in (requirements or {}).items()}
     sensors = {row["sensor"]: {"price_class": None} for row in about}
-    errors = made["error_budget"].to_pylist()
+    errors, shown = made["error_budget"].to_pylist(), made["backtest"].to_pylist()
     return made | {
         "pooled": build("pooled", pooled_rows(recommended, biases, devices)),
         "drift": build("drift", drift_rows(recommended, biases, about)),
-        "ranking": build("ranking", ranking_rows(errors, asked, sensors)),
+        "ranking": build("ranking", ranking_rows(errors, asked, sensors, backtests=shown)),
         "fusion": build("fusion", fusion_rows(made, FUSION)),
     }
 
