@@ -72,6 +72,7 @@ PARTS = (
     "datasheet",
     "datasheet_curve",
     "error_budget",
+    "backtest",
 )
 OF_RECORDING = ["quality.json", *(f"{t}.parquet" for t in (*OF_ONE_RECORDING, *PARTS))]
 FOLDERS = {}
@@ -271,11 +272,14 @@ rule datasheet:
 
 rule error_budget:
     input:
+        quality=FOLDER + "/quality.json",
         parameters=FOLDER + "/parameters.parquet",
         draws=FOLDER + "/draws.parquet",
         temperature=FOLDER + "/temperature.parquet",
+        deterministic=FOLDER + "/deterministic.parquet",
     output:
-        FOLDER + "/error_budget.parquet",
+        error_budget=FOLDER + "/error_budget.parquet",
+        backtest=FOLDER + "/backtest.parquet",
     group:
         "recording"
     resources:
@@ -392,7 +396,7 @@ rule ranking:
     input:
         **{
             table: f"{RESULTS}/tables/{table}.parquet"
-            for table in ("error_budget", "recordings", "doubts", "parameters")
+            for table in ("error_budget", "backtest", "recordings", "doubts", "parameters")
         },
     output:
         as_files("ranking", "next_steps"),

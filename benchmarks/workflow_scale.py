@@ -155,7 +155,7 @@ def _given(plan: Plan, step: str, sensor: str, name: str, recordings: Path) -> S
         "estimate": ("quality", "allan"),
         "reconstruct": ("quality", "allan", "parameters"),
         "datasheet": ("quality", "allan", "parameters", "fixed_bias"),
-        "error_budget": ("parameters", "draws", "temperature"),
+        "error_budget": ("quality", "parameters", "draws", "temperature", "deterministic"),
     }
     outputs = {
         "ingest": ("quality", "envelope", "histogram"),
@@ -163,7 +163,7 @@ def _given(plan: Plan, step: str, sensor: str, name: str, recordings: Path) -> S
         "estimate": ESTIMATED,
         "reconstruct": ("reconstruction", "scores"),
         "datasheet": ("datasheet", "datasheet_curve"),
-        "error_budget": ("error_budget",),
+        "error_budget": ("error_budget", "backtest"),
     }
     settings = {
         "ingest": lambda: plan.ingest_settings(sensor, name),

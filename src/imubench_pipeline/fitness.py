@@ -42,6 +42,7 @@ BEARS_ON: Mapping[str, frozenset[str]] = {
     "slow_noise_differs": _SLOW,
     "noise_grows": _WHITE,
     "noise_varies": _WHITE,
+    "backtest_contradicts": _SLOW,
     "large_offset": frozenset({"bias"}),
 }
 """The parameters on which a finding casts doubt; a warning that is not here, on all."""

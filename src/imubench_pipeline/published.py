@@ -13,7 +13,9 @@ from imubench_pipeline.comparable import SENSITIVITY
 from imubench_pipeline.estimators.estimate import SI_UNITS
 from imubench_pipeline.noise import FLOOR
 from imubench_pipeline.sensor import quantity_of
+from imubench_pipeline.sensor_model.truth import figures_of
 from imubench_pipeline.simulated_recordings import SimulatedRecording
+from imubench_pipeline.units import quantity_to_si
 
 Row = Mapping[str, Any]
 _Place = tuple[str, str, str, str]
@@ -134,3 +136,23 @@ def _printed(rows: Iterable[Row]) -> dict[_Place, list[float]]:
             parameter, factor = known
             found.setdefault(_place(row, parameter), []).append(row["comparable"] * factor)
     return found
+
+
+def truth_rows(truths: str) -> Iterator[Row]:
+    """Yield the rows of the table ``simulated_truth``."""
+    for entry in json.loads(truths):
+        recording = SimulatedRecording.model_validate(entry)
+        rate = quantity_to_si(recording.rate, "frequency")
+        for channel, truth in recording.channels.items():
+            for figure in figures_of(truth, channel, rate):
+                yield {
+                    "sensor": recording.sensor,
+                    "recording": recording.recording,
+                    "channel": channel,
+                    "parameter": figure.name,
+                    "component": figure.component,
+                    "value": figure.value,
+                    "unit": figure.unit,
+                    "assumed": bool({figure.setting, figure.name} & set(truth.assumed)),
+                    "source": recording.source,
+                }

@@ -12,6 +12,7 @@ import numpy as np
 import pyarrow as pa
 
 from imubench_pipeline.allan import AllanCurve
+from imubench_pipeline.backtest import verdicts
 from imubench_pipeline.config import DatasheetSettings
 from imubench_pipeline.drift import drift_rows
 from imubench_pipeline.estimators.estimate import (
@@ -35,15 +36,12 @@ from imubench_pipeline.fitness import (
     with_doubts_of_all,
 )
 from imubench_pipeline.pooled import pooled_rows
-from imubench_pipeline.published import published_rows
+from imubench_pipeline.published import published_rows, truth_rows
 from imubench_pipeline.quality.spectral import band_finding, line_findings
 from imubench_pipeline.repeatability import repeatability_rows
 from imubench_pipeline.sensor import Sensor, quantity_of
-from imubench_pipeline.sensor_model.truth import figures_of
-from imubench_pipeline.simulated_recordings import SimulatedRecording
 from imubench_pipeline.suspicion import suspicious, usual_figures
 from imubench_pipeline.tables import build, read
-from imubench_pipeline.units import quantity_to_si
 
 Row = Mapping[str, Any]
 
@@ -310,6 +308,8 @@ def joined_tables(
     unusual = unusual_rows(estimated, catalogue)
     of_estimates = joined.pop("estimate_findings").to_pylist()
     found = [*of_logs, *of_estimates, *spectral_rows(joined), *unusual]
+    if "backtest" in joined:
+        found += verdicts.findings(joined["backtest"].to_pylist())
     joined["findings"] = build("findings", found)
     doubted = list(doubts(joined["findings"].to_pylist(), estimated, joined["models"].to_pylist()))
     about = judged(about, doubted, json.loads(decide).get("include", ()))
@@ -398,23 +398,3 @@ def unusual_rows(parameters: Iterable[Row], catalogue: str) -> Iterator[Row]:
 def sensors_of(catalogue: str) -> dict[str, Sensor]:
     """Return the sensors as the plan wrote them."""
     return {name: Sensor.model_validate(one) for name, one in json.loads(catalogue).items()}
-
-
-def truth_rows(truths: str) -> Iterator[Row]:
-    """Yield the rows of the table ``simulated_truth``."""
-    for entry in json.loads(truths):
-        recording = SimulatedRecording.model_validate(entry)
-        rate = quantity_to_si(recording.rate, "frequency")
-        for channel, truth in recording.channels.items():
-            for figure in figures_of(truth, channel, rate):
-                yield {
-                    "sensor": recording.sensor,
-                    "recording": recording.recording,
-                    "channel": channel,
-                    "parameter": figure.name,
-                    "component": figure.component,
-                    "value": figure.value,
-                    "unit": figure.unit,
-                    "assumed": bool({figure.setting, figure.name} & set(truth.assumed)),
-                    "source": recording.source,
-                }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pyarrow as pa
 
 from imubench_pipeline.alignment.columns import ALIGNMENT_TABLES
+from imubench_pipeline.backtest.columns import BACKTEST_TABLES
 from imubench_pipeline.calibration.columns import CALIBRATION_TABLES
 from imubench_pipeline.columns import Column
 from imubench_pipeline.columns import count as _count
@@ -337,6 +338,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         Column("assumed", pa.bool_(), "-", "not published by the source: chosen"),
         _text("source", "where the parameters are published"),
     ),
+    **BACKTEST_TABLES,
     **DETERMINISTIC_TABLES,
     **DRAWN_TABLES,
     **FUSION_TABLES,
@@ -385,6 +387,7 @@ BY_RECORDING = (
     "simulated_truth",
     "published",
     "error_budget",
+    "backtest",
     *TURNED,
     *CALIBRATED,
     "alignment",

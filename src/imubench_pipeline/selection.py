@@ -21,6 +21,7 @@ def ranking_rows(
     recordings: Iterable[Row] = (),
     doubts: Iterable[Row] = (),
     parameters: Iterable[Row] = (),
+    backtests: Iterable[Row] = (),
 ) -> Iterator[Row]:
     """Rank the sensors for each requirement (see `ranked`).
 
@@ -31,7 +32,7 @@ def ranking_rows(
     requirements : mapping of str to Requirement
     sensors : mapping of str to mapping
         ``price_class`` of each sensor, and its ``abilities``, where known.
-    recordings, doubts, parameters : iterable of mapping
+    recordings, doubts, parameters, backtests : iterable of mapping
         Rows of the tables of these names: what is known of the recordings beside their errors.
 
     Yields
@@ -39,7 +40,7 @@ def ranking_rows(
     mapping
         One a requirement, sensor and limit.
     """
-    basis = Basis.of(recordings, doubts, parameters)
+    basis = Basis.of(recordings, doubts, parameters, backtests)
     yield from ranked(list(judgements(errors, requirements, sensors, basis)), basis)
 
 
@@ -82,6 +83,7 @@ def ranked(judged: Sequence[Judgement], basis: Basis) -> Iterator[Row]:
                     "decides": standing is one.decides,
                     **_limit_row(standing),
                     **_evidence_row(one.sensor, standing, weak, basis),
+                    **_backtest_row(name, standing, basis),
                     "doubts": basis.doubted(key),
                 }
 
@@ -115,6 +117,23 @@ def _evidence_row(sensor: str, standing: Standing, weak: Sequence[str], basis: B
         "longest_log": max((one for one in durations if one is not None), default=None),
         "evidence": ("weak" if weak else "strong") if standing.known else None,
         "evidence_reasons": ", ".join(weak) or None,
+    }
+
+
+def _backtest_row(requirement: str, standing: Standing, basis: Basis) -> Row:
+    """Return what the log of the channel that an error mostly comes of shows of its part."""
+    total = standing.total
+    words = (standing.source or "").split()
+    quantity = next((word for word in words if word in ("gyro", "accel")), None)
+    where = {"requirement": requirement, "channel": total[quantity] if quantity else None}
+    found = basis.backtest({**total, **where})
+    return {
+        "backtest_channel": where["channel"] if found.get("ratio") is not None else None,
+        **{
+            f"backtest_{name}": found.get(name)
+            for name in ("ratio", "ratio_lower", "ratio_upper", "windows")
+            if found.get("ratio") is not None
+        },
     }
 
 

@@ -11,7 +11,7 @@ STEPS: Mapping[str, tuple[str, ...]] = {
     "estimate": ("estimation",),
     "reconstruct": ("reconstruction",),
     "datasheet": ("datasheet", "results"),
-    "error_budget": ("expected_errors", "results"),
+    "error_budget": ("expected_errors", "backtest.of_recording", "results"),
     "ranking": ("selection", "verdicts.next_steps", "results"),
     "fusion": ("fusion.of_run",),
     "earth_rotation": ("earth_rate.of_run",),

@@ -260,7 +260,8 @@ def joined(*several: Rows, requirements: Mapping[str, Any] | None = None) -> Tab
     devices = {(row["sensor"], row["recording"]): row["device"] for row in about}
     asked = {n: Requirement.model_validate(one) for n, one in (requirements or {}).items()}
     sensors = {row["sensor"]: {"price_class": None} for row in about}
-    basis = Basis.of(about, made["doubts"].to_pylist(), recommended)
+    shown = made["backtest"].to_pylist()
+    basis = Basis.of(about, made["doubts"].to_pylist(), recommended, shown)
     judged = list(judgements(made["error_budget"].to_pylist(), asked, sensors, basis))
     return made | {
         "pooled": build("pooled", pooled_rows(recommended, biases, devices)),

@@ -17,6 +17,7 @@ import yaml
 from scipy.optimize import minimize_scalar
 
 from imubench_pipeline import coverage, datasheet, findings, pooled
+from imubench_pipeline.backtest import comparison
 from imubench_pipeline.error_budget import Gyrocompass, Start, budget
 from imubench_pipeline.estimators import estimate, lines
 from imubench_pipeline.estimators.identifiability import bounds_of
@@ -249,7 +250,11 @@ def values_in_tables() -> Iterator[tuple[str, str]]:
         yield status, ""
     for severity in get_args(findings.Severity):
         yield severity, ""
-    for verdict in [*datasheet.VERDICTS, *get_args(pooled.Verdict)]:
+    for verdict in [
+        *datasheet.VERDICTS,
+        *get_args(pooled.Verdict),
+        *get_args(comparison.Verdict),
+    ]:
         yield verdict, "verdict"
     for verdict in strings_in("verdicts/standing.py", "verdict"):
         yield verdict, "verdict"

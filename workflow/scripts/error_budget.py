@@ -1,23 +1,23 @@
-"""Say what the estimated noise of a recording means for dead reckoning."""
+"""Say what the estimated noise of a recording means for dead reckoning, and what its log shows."""
 
 import json
 from collections.abc import Iterator
 from pathlib import Path
 
+from imubench_pipeline.backtest.of_recording import backtest_rows
 from imubench_pipeline.config import ErrorBudgetSettings
 from imubench_pipeline.error_budget.printed_errors import in_use
 from imubench_pipeline.expected_errors import error_rows, of_requirement, standard
 from imubench_pipeline.printed import Datasheet
+from imubench_pipeline.recording import static_logs
 from imubench_pipeline.requirements import Requirement
 from imubench_pipeline.results import Row, recommended_estimates
 from imubench_pipeline.tables import read, write
 from imubench_pipeline.units import quantity_to_si
 
 
-def rows(
-    parameters: Path, draws: Path, temperature: Path, sensor: str, recording: str, settings: str
-) -> Iterator[Row]:
-    """Yield the rows of the table ``error_budget``; none of a rejected recording."""
+def main(inputs: dict[str, Path], names: dict[str, str], settings: str) -> dict[str, Iterator[Row]]:
+    """Return the rows of the tables ``error_budget`` and ``backtest``; none of a rejected log."""
     given = json.loads(settings)
     how = ErrorBudgetSettings.model_validate(given["error_budget"])
     times = [quantity_to_si(time, "time") for time in how.times]
@@ -25,28 +25,31 @@ def rows(
         quantity_to_si(how.static_window, "time"),
         quantity_to_si(how.latitude, "angle"),
     )
+    requirements = {
+        name: Requirement.model_validate(one) for name, one in given["requirements"].items()
+    }
     questions = list(standard(times, window, latitude, how.axes))
-    for name, requirement in given["requirements"].items():
-        questions += of_requirement(name, Requirement.model_validate(requirement))
-    estimates = recommended_estimates(parameters, draws)
+    for name, requirement in requirements.items():
+        questions += of_requirement(name, requirement)
+    estimates = recommended_estimates(inputs["parameters"], inputs["draws"])
     if not estimates:
-        return
-    names = {"sensor": sensor, "recording": recording}
-    datasheet = Datasheet.model_validate(given["datasheet"])
-    figures = in_use(datasheet, estimates, read("temperature", [temperature]).to_pylist())
-    yield from error_rows(
-        names, estimates, questions, draws=how.draws, seed=how.seed, figures=figures
-    )
+        return {"error_budget": iter(()), "backtest": iter(())}
+    drawn = {"draws": how.draws, "seed": how.seed}
+    logs = static_logs(inputs["quality"].parent)
+    apart = read("deterministic", [inputs["deterministic"]]).to_pylist()
+    temperature = read("temperature", [inputs["temperature"]]).to_pylist()
+    figures = in_use(Datasheet.model_validate(given["datasheet"]), estimates, temperature)
+    return {
+        "error_budget": error_rows(names, estimates, questions, figures=figures, **drawn),
+        "backtest": backtest_rows(names, logs, estimates, requirements, apart, **drawn),
+    }
 
 
 if __name__ == "__main__":
-    names = snakemake.wildcards
-    found = rows(
-        Path(snakemake.input.parameters),
-        Path(snakemake.input.draws),
-        Path(snakemake.input.temperature),
-        names.sensor,
-        names.recording,
+    found = main(
+        {name: Path(path) for name, path in snakemake.input.items()},
+        {name: snakemake.wildcards[name] for name in ("sensor", "recording")},
         snakemake.params.settings,
     )
-    write("error_budget", found, Path(snakemake.output[0]))
+    for table, path in snakemake.output.items():
+        write(table, found[table], Path(path))

@@ -23,7 +23,10 @@ def main(tables: dict[str, Path], settings: str, outputs: list[Path]) -> None:
     asked = joined.pop("error_budget").filter(pc.field("requirement").is_valid())
     recommended = joined["parameters"].filter(pc.field("recommended"))
     basis = Basis.of(
-        joined["recordings"].to_pylist(), joined["doubts"].to_pylist(), recommended.to_pylist()
+        joined["recordings"].to_pylist(),
+        joined["doubts"].to_pylist(),
+        recommended.to_pylist(),
+        joined["backtest"].to_pylist(),
     )
     judged = list(judgements(asked.to_pylist(), requirements, given["sensors"], basis))
     made = {

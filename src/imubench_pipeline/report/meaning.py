@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
+from imubench_pipeline.report.backtest import standing_text
 from imubench_pipeline.report.practical import (
     PageUnit,
     System,
@@ -97,6 +98,7 @@ def _limit(row: Row, system: System) -> dict[str, Any]:
         "reached": duration_text(reached) if reached is not None else "–",
         "decides": row["decides"],
         "reason": row["reason"] or "",
+        "backtest": standing_text(row),
     }
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from imubench_pipeline.recording import log_paths, read_metadata
 from imubench_pipeline.report import thermal
+from imubench_pipeline.report.backtest import backtest_lines
 from imubench_pipeline.report.calibration import at_rest
 from imubench_pipeline.report.datasheets import curve_distances, delta_rows
 from imubench_pipeline.report.meaning import budget_tables, budget_words
@@ -98,6 +99,9 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         "has_temperature": "temperature" in samples["envelope"],
         "at_rest": at_rest(view, site.system),
         "budget": budgets[0] if budgets else None,
+        "backtest": backtest_lines(
+            view.rows("backtest"), site.settings["requirements"], site.system
+        ),
         "budget_words": budget_words(site.settings["settings"]["error_budget"]),
         "provenance": list(provenance(view, channels, folder)),
         "sources": metadata_of(folder).get("sources", []),

@@ -7,6 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from imubench_pipeline.drift import LEVEL
+from imubench_pipeline.report.backtest import standing_text
 from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.datasheets import delta_rows, repeatability_lines
 from imubench_pipeline.report.meaning import budget_tables, budget_words
@@ -104,6 +105,9 @@ def _standings(site: Site, sensor: str) -> Iterator[dict[str, str]]:
                 text = f"{verdict_words(row)}; rank {row['rank']} of {judged} that could be judged"
             if row["unless"]:
                 text += f"; {row['unless']}"
+            shown = standing_text(row)
+            if shown:
+                text += f"; {shown}"
             yield {"title": title, "text": text}
 
 

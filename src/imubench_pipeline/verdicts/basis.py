@@ -12,6 +12,9 @@ from imubench_pipeline.sensor import quantity_of
 Row = Mapping[str, Any]
 Key = tuple[str, str]  # sensor, recording
 
+_BACKTEST = ("requirement", "sensor", "recording", "channel", "error", "time")
+"""What names a row of the table ``backtest``."""
+
 
 @dataclass(frozen=True)
 class Basis:
@@ -27,12 +30,15 @@ class Basis:
         The channels of which something is known.
     apart : mapping
         Why a recording does not decide, of those that do not.
+    backtests : mapping
+        What the logs themselves show, by what names the rows of the table ``backtest``.
     """
 
     recordings: Mapping[Key, Row] = field(default_factory=dict)
     doubts: Mapping[Key, Sequence[Row]] = field(default_factory=dict)
     channels: Mapping[Key, frozenset[str]] = field(default_factory=dict)
     apart: Mapping[Key, str] = field(default_factory=dict)
+    backtests: Mapping[tuple[Any, ...], Row] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -40,6 +46,7 @@ class Basis:
         recordings: Iterable[Row] = (),
         doubts: Iterable[Row] = (),
         parameters: Iterable[Row] = (),
+        backtests: Iterable[Row] = (),
     ) -> Basis:
         """Return it from rows of the tables of these names.
 
@@ -48,6 +55,7 @@ class Basis:
         recordings, doubts : iterable of mapping
         parameters : iterable of mapping
             Those of other methods than the recommended one do not count.
+        backtests : iterable of mapping
         """
         about = {_key(row): row for row in recordings}
         doubted: dict[Key, list[Row]] = {}
@@ -58,7 +66,12 @@ class Basis:
             if row["recommended"] and row["value"] is not None:
                 channels.setdefault(_key(row), set()).add(row["channel"])
         of_logs = {key: frozenset(names) for key, names in channels.items()}
-        return cls(about, doubted, of_logs, left_out(about.values()))
+        shown = {_backtested(row): row for row in backtests}
+        return cls(about, doubted, of_logs, left_out(about.values()), shown)
+
+    def backtest(self, of: Row) -> Row:
+        """Return what the log of a channel shows of an error of a requirement; else nothing."""
+        return self.backtests.get(_backtested(of), {})
 
     def device(self, key: Key) -> str:
         """Return the specimen: by default each recording is one of its own."""
@@ -99,6 +112,10 @@ class Basis:
                 quantity = quantity_of(row["channel"]) if row["channel"] else "accel"
                 found.setdefault(quantity, row["factor"])
         return found
+
+
+def _backtested(row: Row) -> tuple[Any, ...]:
+    return tuple(row[name] for name in _BACKTEST)
 
 
 def _key(row: Row) -> Key:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pyarrow as pa
 
+from imubench_pipeline.backtest.columns import BACKTESTED
 from imubench_pipeline.columns import Column, count, number, text
 from imubench_pipeline.suitability.columns import CONDITIONS
 
@@ -69,6 +70,7 @@ RANKING = (
     *_OF_SPECIMENS,
     *_OF_EVIDENCE,
     *_UNLESS,
+    *BACKTESTED,
 )
 """The table ``ranking``."""
 

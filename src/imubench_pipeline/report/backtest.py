@@ -1,0 +1,92 @@
+"""The back-test on the pages: what logs show of their own error budgets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from imubench_pipeline.report.practical import System, duration_text, number_text, unit_of
+from imubench_pipeline.requirements import DIMENSIONS
+
+Row = Mapping[str, Any]
+
+
+def backtest_lines(
+    rows: Sequence[Row], requirements: Mapping[str, Any], system: System
+) -> list[dict[str, Any]]:
+    """Return the lines of the table of a recording's back-test.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Of the table ``backtest``.
+    requirements : mapping
+        By name, as the plan wrote them.
+    system : str
+        Units of the page.
+    """
+    lines = []
+    for row in rows:
+        unit = unit_of(DIMENSIONS[row["error"]], system)
+        known = row["ratio"] is not None
+        lines.append(
+            {
+                "requirement": requirements.get(row["requirement"], {}).get("title")
+                or row["requirement"],
+                "channel": row["channel"].replace("_", " "),
+                "error": f"{row['error']}, {duration_text(row['time'])}",
+                "window": duration_text(row["window"]) if row["window"] is not None else "–",
+                "measured": f"{unit.text(row['measured'], 3)} {unit.sign}" if known else "–",
+                "predicted": f"{unit.text(row['predicted'], 3)} {unit.sign}"
+                if row["predicted"] is not None
+                else "–",
+                "ratio": number_text(row["ratio"], 3) if known else "–",
+                "range": range_text(row) if known else "",
+                "windows": f"{row['windows']} ({number_text(row['independent'], 2)} independent)"
+                if known
+                else "–",
+                "verdict": row["verdict"],
+                "contradicted": row["contradicted"],
+                "why": "; ".join(_remarks(row)),
+            }
+        )
+    return lines
+
+
+def range_text(row: Row, prefix: str = "") -> str:
+    """Return between what limits a ratio is to be expected.
+
+    Parameters
+    ----------
+    row : mapping
+        Of the table ``backtest``, or ``ranking``.
+    prefix : str
+        Of the names of its columns.
+    """
+    lower, upper = (number_text(row[f"{prefix}ratio_{end}"], 2) for end in ("lower", "upper"))
+    return f"{lower} to {upper}"
+
+
+def standing_text(row: Row) -> str:
+    """Return what the log shows of the error by which a sensor stands; empty where nothing.
+
+    Parameters
+    ----------
+    row : mapping
+        Of the table ``ranking``.
+    """
+    if row["backtest_ratio"] is None:
+        return ""
+    return (
+        f"the log drifted {number_text(row['backtest_ratio'], 3)} times the prediction at "
+        f"{duration_text(row['time'])} ({row['backtest_channel'].replace('_', ' ')}, "
+        f"{row['error']}; {range_text(row, 'backtest_')} is to be expected), "
+        f"{row['backtest_windows']} windows"
+    )
+
+
+def _remarks(row: Row) -> Iterator[str]:
+    if row["reason"]:
+        yield row["reason"]
+    elif row["taken_out"]:
+        yield f"in the log, not in the model: {row['taken_out'].replace('_', ' ')}"
