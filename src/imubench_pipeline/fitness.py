@@ -8,7 +8,6 @@ another, an axis is dead. Others leave the figures, and are said beside them.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -22,11 +21,12 @@ Row = Mapping[str, Any]
 Key = tuple[str, str]  # sensor, recording
 Fitness = Literal["fit", "fit with doubts", "unfit"]
 
-UNFIT = frozenset({"motion", "suspicious_unit", "large_offset", "stuck"})
+UNFIT = frozenset({"motion", "turning", "suspicious_unit", "stuck"})
 """Findings after which a log need not be that of a sensor at rest in its unit."""
 
 _SLOW = frozenset({"B", "B_curve", "sigma_min", "tau_min", "T_B", "K", "R"})
 _WHITE = frozenset({"N", "Q"})
+_SCALED = frozenset({"N", "Q", "B", "B_curve", "sigma_min", "K", "R", "bias"})
 
 BEARS_ON: Mapping[str, frozenset[str]] = {
     "knocks": _WHITE,
@@ -40,7 +40,7 @@ BEARS_ON: Mapping[str, frozenset[str]] = {
     "slow_noise_differs": _SLOW,
     "noise_grows": _WHITE,
     "noise_varies": _WHITE,
-    "large_offset": frozenset({"bias"}),
+    "suspicious_unit": _SCALED,
 }
 """The parameters on which a finding casts doubt; a warning that is not here, on all."""
 
@@ -64,10 +64,6 @@ DOUBTS = (
     text("reason", "in words"),
 )
 """The table ``doubts``."""
-
-_DEGREES = math.degrees(1.0)
-_LARGEST_SMALL = 1e-5
-"""rad/s/sqrt(Hz): a gyro's noise is suspicious for being above it, or for being below."""
 
 _SHOWN = 3
 """Doubts of a recording that are named; of more the number."""
@@ -329,9 +325,7 @@ def _of_finding(row: Row) -> Doubt:
 
 def _factor(row: Row) -> float | None:
     """Return by what a unit that was mixed up multiplies a value that is mended."""
-    if row["finding"] != "suspicious_unit":
-        return None
-    return 1.0 / _DEGREES if row["value"] > _LARGEST_SMALL else _DEGREES
+    return row["value"] if row["finding"] == "suspicious_unit" else None
 
 
 def _place(row: Row) -> tuple[str, str, str | None]:
