@@ -21,7 +21,7 @@ Row = Mapping[str, Any]
 Key = tuple[str, str]  # sensor, recording
 Fitness = Literal["fit", "fit with doubts", "unfit"]
 
-UNFIT = frozenset({"motion", "turning", "suspicious_unit", "stuck"})
+UNFIT = frozenset({"motion", "turning", "suspicious_unit", "unit_contradicts", "stuck"})
 """Findings after which a log need not be that of a sensor at rest in its unit."""
 
 _SLOW = frozenset({"B", "B_curve", "sigma_min", "tau_min", "T_B", "K", "R"})
@@ -41,6 +41,7 @@ BEARS_ON: Mapping[str, frozenset[str]] = {
     "noise_grows": _WHITE,
     "noise_varies": _WHITE,
     "suspicious_unit": _SCALED,
+    "unit_contradicts": _SCALED,
 }
 """The parameters on which a finding casts doubt; a warning that is not here, on all."""
 
@@ -325,7 +326,7 @@ def _of_finding(row: Row) -> Doubt:
 
 def _factor(row: Row) -> float | None:
     """Return by what a unit that was mixed up multiplies a value that is mended."""
-    return row["value"] if row["finding"] == "suspicious_unit" else None
+    return row["value"] if row["finding"] in ("suspicious_unit", "unit_contradicts") else None
 
 
 def _place(row: Row) -> tuple[str, str, str | None]:

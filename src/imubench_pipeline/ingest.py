@@ -144,6 +144,7 @@ def _ingest(
     ]
     static = provenance.get("kind", "static") == "static"
     findings = [finding for part in parts for finding in part.source.findings]
+    findings += [finding for part in parts for finding in part.source.contradicted_units()]
     bases = [_base(part, log, settings) for part in parts]
     for part, base in zip(parts, bases, strict=True):
         findings += column_findings(part.columns, base.rate, settings, static=static)

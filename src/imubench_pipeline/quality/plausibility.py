@@ -149,7 +149,8 @@ def _noise(channels: Mapping[str, Level], of: Mapping[str, Expected]) -> Iterato
                 detail = (
                     f"{name} has a noise of {figures[0]:.3g} {sign}; usual "
                     f"{of[quantity].noise_from} are {figures[2]:.3g} to {figures[3]:.3g}: are the "
-                    f"figures in {unit}, and not {level['unit']}? It would be {figures[1]:.3g} then; {_MEND}"
+                    f"figures in {unit}, and not {level['unit']}? It would be {figures[1]:.3g} "
+                    f"then; {_MEND}"
                 )
                 yield Finding("suspicious_unit", "warning", detail, factor, name)
                 break
