@@ -396,7 +396,13 @@ rule ranking:
     input:
         **{
             table: f"{RESULTS}/tables/{table}.parquet"
-            for table in ("error_budget", "backtest", "recordings", "doubts", "parameters")
+            for table in (
+                "error_budget",
+                "backtest",
+                "recordings",
+                "doubts",
+                "parameters",
+            )
         },
     output:
         as_files("ranking", "next_steps"),

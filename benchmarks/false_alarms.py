@@ -19,6 +19,9 @@ from imubench_pipeline.findings import Finding
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.quality.columns import column_findings
 from imubench_pipeline.quality.knocks import suspects
+from imubench_pipeline.quality.levels import kept_level
+from imubench_pipeline.quality.plausibility import implausible
+from imubench_pipeline.quality.rotation import gravity_turn
 from imubench_pipeline.quality.summary import ColumnSummary
 from imubench_pipeline.simulate import simulate
 
@@ -34,6 +37,7 @@ ACCELEROMETERS = (
     NoiseModel(N=1e-3, B=1e-3),
 )
 GRAVITY = (0.3, -0.2, 9.8)
+UNITS = {"gyro": "rad/s", "acce": "m/s^2"}
 
 
 def of_log(number: int) -> list[Finding]:
@@ -57,6 +61,9 @@ def of_log(number: int) -> list[Finding]:
         columns[name].add(log)
         if len(suspects(columns[name].blocks(), settings.knock)[0]):
             found.append(Finding("knocks", "warning", f"{name}, {rate} Hz", 1, name))
+    levels = {name: kept_level(column, rate, UNITS[name[:4]]) for name, column in columns.items()}
+    turn = gravity_turn([columns[f"accel_{axis}"].blocks() for axis in "xyz"], rate)
+    found += implausible(levels, turn, None)
     return found + column_findings(columns, rate, settings)
 
 

@@ -94,7 +94,6 @@ BEARS_ON: Mapping[str, frozenset[str]] = {
     "noise_varies": frozenset({"N", "Q"}),
     # Of the unit, and not of the noise.
     "suspicious_unit": frozenset(),
-    "large_offset": frozenset(),
     "gravity_norm": frozenset(),
     # A note; others only tell what is there, such as the step of a register.
     "short_recording": SLOW,

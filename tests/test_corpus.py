@@ -62,10 +62,12 @@ def plan_of(place: Path) -> Plan:
 
 
 def ingested(plan: Plan, sensor: str, kept: Path) -> Quality:
-    """Ingest the one recording of a sensor."""
+    """Ingest the one recording of a sensor, and hold it against its sensor file."""
     (key,) = (key for key in plan.recordings if key[0] == sensor)
     settings = plan.ingest_settings(*key)
-    return ingest_as_planned(plan.recordings[key].path, settings, *key, kept)
+    quality = ingest_as_planned(plan.recordings[key].path, settings, *key, kept)
+    quality.findings.extend(quality.implausible(plan.sensors[sensor]))
+    return quality
 
 
 def names_of(quality: Quality) -> set[str]:

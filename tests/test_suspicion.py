@@ -42,8 +42,8 @@ def test_every_other_sensor_of_the_papers_is_usual() -> None:
 
 
 USUAL = {
-    ("gyro", "N"): Usual(0.005 * DEG, 0.001 * DEG, 9),
-    ("accel", "N"): Usual(1e-3, 4e-4, 9),
+    ("gyro", "N"): Usual(0.005 * DEG, 0.001 * DEG, 0.01 * DEG, 9),
+    ("accel", "N"): Usual(1e-3, 4e-4, 3e-3, 9),
 }
 
 
@@ -54,7 +54,11 @@ USUAL = {
         ("gyro", 0.099 * DEG, None),
         ("gyro", 6e-5 * DEG, None),  # below a twentieth of the median, not of the least
         ("gyro", 4e-5 * DEG, "25 times below the least of 9 sensors, 0.001 °/s/√Hz: is it in rad"),
-        ("accel", 0.98, "is its unit right?"),
+        ("gyro", 20.0 * DEG, "is it in thousandths of its unit? It would be 0.02 °/s/√Hz then"),
+        ("gyro", 100.0 * DEG, "is its unit right?"),
+        ("accel", 0.98, "is it in thousandths of its unit? It would be 99.9 µg/√Hz then"),
+        ("accel", 2.1e-2, "is it in m/s², and not g? It would be 218 µg/√Hz then"),
+        ("accel", 0.1, "is its unit right?"),
         ("accel", 1.9e-2, None),
     ],
 )
@@ -62,6 +66,17 @@ def test_twenty_times_off(quantity: str, N: float, said: str | None) -> None:
     found = suspicious(quantity, {"N": N, "B": 1.0}, USUAL)
     assert len(found) == (said is not None)
     assert (said or "") in "".join(found)
+
+
+def test_a_figure_is_held_against_its_own_datasheet() -> None:
+    loud = {"N": 0.2 * DEG}
+    assert suspicious("gyro", {"N": 0.3 * DEG}, USUAL, loud) == []
+    (said,) = suspicious("gyro", {"N": 0.3 * DEG}, USUAL, {"N": 0.002 * DEG})
+    assert said.endswith("is it in degrees, and not rad? It would be 0.00524 °/s/√Hz then")
+    (said,) = suspicious("gyro", {"N": 0.3 * DEG}, USUAL, {"N": 0.04 * DEG})
+    assert said.endswith("is its unit right?")
+    (said,) = suspicious("gyro", {"N": 57.3 * 0.2 * DEG}, USUAL, loud)
+    assert said.endswith("It would be 0.2 °/s/√Hz then")
 
 
 def with_walk(value: float) -> Sensor:

@@ -32,6 +32,7 @@ def check(plan: Plan) -> Iterator[tuple[str, str, Quality]]:
         with tempfile.TemporaryDirectory(prefix="imubench.") as folder:
             settings = plan.ingest_settings(sensor, name)
             quality = ingest_as_planned(recording.path, settings, sensor, name, Path(folder))
+            quality.findings.extend(quality.implausible(plan.sensors.get(sensor)))
             for channel, log in static_logs(Path(folder)).items():
                 for finding in spectral_findings(channel, log, plan.bandwidth(sensor, name)):
                     quality.findings.append(dict(finding.row(sensor, name)))

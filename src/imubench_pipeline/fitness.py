@@ -8,7 +8,6 @@ another, an axis is dead. Others leave the figures, and are said beside them.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -17,18 +16,17 @@ import pyarrow as pa
 
 from imubench_pipeline.columns import Column, number, text
 from imubench_pipeline.findings import LEFT_OUT
-from imubench_pipeline.quality.plausibility import factor_of_gravity
-from imubench_pipeline.sensor import quantity_of
 
 Row = Mapping[str, Any]
 Key = tuple[str, str]  # sensor, recording
 Fitness = Literal["fit", "fit with doubts", "unfit"]
 
-UNFIT = frozenset({"motion", "suspicious_unit", "large_offset", "stuck"})
+UNFIT = frozenset({"motion", "turning", "suspicious_unit", "unit_contradicts", "stuck"})
 """Findings after which a log need not be that of a sensor at rest in its unit."""
 
 _SLOW = frozenset({"B", "B_curve", "sigma_min", "tau_min", "T_B", "K", "R"})
 _WHITE = frozenset({"N", "Q"})
+_SCALED = frozenset({"N", "Q", "B", "B_curve", "sigma_min", "K", "R", "bias"})
 
 BEARS_ON: Mapping[str, frozenset[str]] = {
     "knocks": _WHITE,
@@ -43,7 +41,8 @@ BEARS_ON: Mapping[str, frozenset[str]] = {
     "noise_grows": _WHITE,
     "noise_varies": _WHITE,
     "backtest_contradicts": _SLOW,
-    "large_offset": frozenset({"bias"}),
+    "suspicious_unit": _SCALED,
+    "unit_contradicts": _SCALED,
 }
 """The parameters on which a finding casts doubt; a warning that is not here, on all."""
 
@@ -67,11 +66,6 @@ DOUBTS = (
     text("reason", "in words"),
 )
 """The table ``doubts``."""
-
-_DEGREES = math.degrees(1.0)
-_LARGEST_SMALL = 1e-5
-"""rad/s/sqrt(Hz), and of the minimum of the Allan deviation rad/s: a gyro's noise is suspicious for
-being above it, or for being below."""
 
 _SHOWN = 3
 """Doubts of a recording that are named; of more the number."""
@@ -333,12 +327,7 @@ def _of_finding(row: Row) -> Doubt:
 
 def _factor(row: Row) -> float | None:
     """Return by what a unit that was mixed up multiplies a value that is mended."""
-    if row["finding"] == "gravity_norm":
-        return factor_of_gravity(row["value"])
-    of_gyro = row["channel"] is not None and quantity_of(row["channel"]) == "gyro"
-    if of_gyro and row["finding"] in ("suspicious_unit", "unusual_figure"):
-        return 1.0 / _DEGREES if row["value"] > _LARGEST_SMALL else _DEGREES
-    return None
+    return row["value"] if row["finding"] in ("suspicious_unit", "unit_contradicts") else None
 
 
 def _place(row: Row) -> tuple[str, str, str | None]:

@@ -18,6 +18,8 @@ from imubench_pipeline.faults import Failure
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.parts import Part, leave_out_knocks, read_part
 from imubench_pipeline.quality.columns import column_findings
+from imubench_pipeline.quality.levels import kept_level
+from imubench_pipeline.quality.rotation import GravityTurn, gravity_turn
 from imubench_pipeline.quality.summary import ColumnSummary
 from imubench_pipeline.readers import (
     POSITION,
@@ -43,13 +45,18 @@ class Ingested:
         A row of the table ``recordings`` without the names.
     findings : list of Finding
     channels : dict
-        Rate in Hz, points of the grid and segments of each channel that goes on.
+        Rate in Hz, points of the grid, segments and levels of each channel that goes on.
+    samples : str or None
+        Digest of the samples.
+    gravity : GravityTurn or None
+        How gravity turns against the sensor.
     """
 
     summary: dict[str, Any]
     findings: list[Finding]
     channels: dict[str, dict[str, Any]] = field(default_factory=dict)
     samples: str | None = None
+    gravity: GravityTurn | None = None
 
     def quality(self, names: dict[str, Any]) -> Quality:
         """Return what ``quality.json`` says, with the names of the recording."""
@@ -60,6 +67,7 @@ class Ingested:
             [dict(finding.row(sensor, recording)) for finding in self.findings],
             self.channels,
             self.samples,
+            gravity=asdict(self.gravity) if self.gravity else None,
         )
 
 
@@ -136,6 +144,7 @@ def _ingest(
     ]
     static = provenance.get("kind", "static") == "static"
     findings = [finding for part in parts for finding in part.source.findings]
+    findings += [finding for part in parts for finding in part.source.contradicted_units()]
     bases = [_base(part, log, settings) for part in parts]
     for part, base in zip(parts, bases, strict=True):
         findings += column_findings(part.columns, base.rate, settings, static=static)
@@ -202,8 +211,12 @@ def _ingest(
         raise RecordingError(f"no channel can be used: {reasons}")
     for temporary, final in written:
         temporary.replace(final)
+    column = {name: found for part in parts for name, found in part.columns.items()}
+    units = {str(name): source.unit for name, source in log.channels.items()}
     channels = {
-        name: {"rate": kept.rate, "grid": kept.grid, "segments": kept.segments} | counts[name]
+        name: {"rate": kept.rate, "grid": kept.grid, "segments": kept.segments}
+        | counts[name]
+        | kept_level(column[name], kept.rate, units[name])
         for name, kept in channel_logs(folder).items()
     }
     begin = notes.use.start
@@ -211,7 +224,17 @@ def _ingest(
         f if f.start is None else replace(f, start=f.start + begin, end=(f.end or 0.0) + begin)
         for f in findings
     ]
-    return Ingested(summary, findings, channels, _digest(folder))
+    return Ingested(summary, findings, channels, _digest(folder), _gravity(parts, bases))
+
+
+def _gravity(parts: list[Part], bases: list[timebase.TimeBase]) -> GravityTurn | None:
+    """Return how gravity turns against the sensor; None: it does not, or it is not seen."""
+    axes = [f"accel_{axis}" for axis in "xyz"]
+    place = {name: n for n, part in enumerate(parts) for name in part.columns if name in axes}
+    if len({(parts[n].digest(), parts[n].rows) for n in place.values()}) != 1 or len(place) < 3:
+        return None  # they have no clock in common
+    blocks = [parts[place[name]].columns[name].blocks() for name in axes]
+    return gravity_turn(blocks, bases[place[axes[0]]].rate)
 
 
 def _knock_findings(

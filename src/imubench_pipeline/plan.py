@@ -396,11 +396,10 @@ class Plan:
         return _text({"report": {"units": self.run.report.units}})
 
     def catalogue(self) -> str:
-        """Return the datasheets of all sensor files, with vendor and model."""
+        """Return all sensor files without how logs are written."""
         return _text(
             {
-                name: sensor.model_dump(mode="json", include={"vendor", "model", "datasheet"})
-                | {"log": _ANY_LOG}
+                name: sensor.model_dump(mode="json", exclude={"log"}) | {"log": _ANY_LOG}
                 for name, sensor in self.sensors.items()
             }
         )

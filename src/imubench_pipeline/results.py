@@ -26,7 +26,6 @@ from imubench_pipeline.estimators.estimate import (
 )
 from imubench_pipeline.failures import read_with_failures, with_failures, without
 from imubench_pipeline.faults import Failure
-from imubench_pipeline.findings import Finding
 from imubench_pipeline.fitness import (
     doubts,
     judged,
@@ -37,10 +36,12 @@ from imubench_pipeline.fitness import (
 )
 from imubench_pipeline.pooled import pooled_rows
 from imubench_pipeline.published import published_rows, truth_rows
+from imubench_pipeline.quality.plausibility import implausible
+from imubench_pipeline.quality.rotation import GravityTurn
 from imubench_pipeline.quality.spectral import band_finding, line_findings
 from imubench_pipeline.repeatability import repeatability_rows
 from imubench_pipeline.sensor import Sensor, quantity_of
-from imubench_pipeline.suspicion import suspicious, usual_figures
+from imubench_pipeline.suspicion import unusual_rows
 from imubench_pipeline.tables import build, read
 
 Row = Mapping[str, Any]
@@ -69,11 +70,27 @@ class Quality:
     samples: str | None
     failure: dict[str, Any] | None = None
     """Why the ingest failed (`imubench_pipeline.failures.Failure`)."""
+    gravity: dict[str, Any] | None = None
+    """How gravity turns against the sensor (`imubench_pipeline.quality.rotation.GravityTurn`)."""
 
     @classmethod
     def read(cls, path: Path) -> Quality:
         """Read the file that `ingest` wrote."""
         return cls(**json.loads(path.read_text(encoding="utf-8")))
+
+    def implausible(self, sensor: Sensor | None) -> list[dict[str, Any]]:
+        """Return the rows of findings on what can be of no sensor at rest in its unit.
+
+        Parameters
+        ----------
+        sensor : Sensor or None
+            What the file of the sensor says; None: there is none.
+        """
+        about = self.recording
+        turn = GravityTurn(**self.gravity) if self.gravity else None
+        static = about.get("kind", "static") == "static"
+        found = implausible(self.channels, turn, sensor, static=static)
+        return [dict(finding.row(about["sensor"], about["recording"])) for finding in found]
 
 
 def allan_rows(key: Key, curve: AllanCurve) -> Iterator[Row]:
@@ -305,9 +322,15 @@ def joined_tables(
         joined["deterministic"],
         {(row["sensor"], row["recording"]): row.get("duration") or 0.0 for row in about},
     )
-    unusual = unusual_rows(estimated, catalogue)
+    sensors = sensors_of(catalogue)
+    of_levels = (
+        row
+        for quality in qualities
+        for row in quality.implausible(sensors.get(quality.recording["sensor"]))
+    )
+    unusual = unusual_rows(estimated, sensors)
     of_estimates = joined.pop("estimate_findings").to_pylist()
-    found = [*of_logs, *of_estimates, *spectral_rows(joined), *unusual]
+    found = [*of_logs, *of_levels, *of_estimates, *spectral_rows(joined), *unusual]
     if "backtest" in joined:
         found += verdicts.findings(joined["backtest"].to_pylist())
     joined["findings"] = build("findings", found)
@@ -379,20 +402,6 @@ def spectral_rows(tables: Mapping[str, pa.Table]) -> Iterator[Row]:
         if row["band"] is not None:
             for finding in band_finding(row["channel"], row["band"], row["band_source"] or ""):
                 yield finding.row(row["sensor"], row["recording"])
-
-
-def unusual_rows(parameters: Iterable[Row], catalogue: str) -> Iterator[Row]:
-    """Yield the rows of the table ``findings`` about estimates far from what vendors print."""
-    usual = usual_figures(sensors_of(catalogue))
-    for row in parameters:
-        # What vendors print of B is the minimum of the curve.
-        figure = {"N": "N", "sigma_min": "B"}.get(row["parameter"])
-        value = row["value"]
-        if figure is None or value is None:
-            continue
-        for sentence in suspicious(quantity_of(row["channel"]), {figure: value}, usual):
-            finding = Finding("unusual_figure", "warning", sentence, value, row["channel"])
-            yield finding.row(row["sensor"], row["recording"])
 
 
 def sensors_of(catalogue: str) -> dict[str, Sensor]:

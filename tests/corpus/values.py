@@ -131,7 +131,7 @@ ENTRIES = [
         "acceleration in g that is said to be m s-2",
         file(text(three(1 / GRAVITY))),
         STAMPED | {"channels": AXES},
-        kept(ROWS, "gravity_norm"),
+        kept(ROWS, "suspicious_unit"),
     ),
     Entry(
         "acceleration without gravity",
@@ -145,7 +145,7 @@ ENTRIES = [
         STAMPED,
         kept(LONG, "suspicious_unit"),
     ),
-    Entry("gyro that turns", file(gyro(NOISE + 2)), STAMPED, kept(LONG, "large_offset")),
+    Entry("gyro that turns", file(gyro(NOISE + 2)), STAMPED, kept(LONG, "turning")),
     Entry(
         "log of 99 samples",
         file(log(99)),

@@ -104,7 +104,7 @@ def test_hostile_names(tmp_path: Path) -> None:
 @examples(150)
 def test_any_name(name: str) -> None:
     from imubench_pipeline.inspection.names import meaning
-    from imubench_pipeline.inspection.spellings import divided
+    from imubench_pipeline.readers.spellings import divided
 
     meaning(name)
     for dimension in ("time", "angular_rate", "acceleration", "temperature"):

@@ -152,47 +152,6 @@ def test_rounding_is_not_taken_for_repeats_or_for_a_stuck_axis(
     assert set(names(log)) <= {"quantised", "coarse"}
 
 
-def test_gravity_in_a_wrong_unit_is_named(rng: np.random.Generator) -> None:
-    noise = 0.01 * rng.standard_normal((3, 5000))
-    direction = np.array([0.6, 0.0, 0.8])[:, None] * 9.80665
-    for factor, words in (
-        (1 / 9.80665, "state unit g"),
-        (1000 / 9.80665, "state unit mg"),
-        (9.80665, "state unit m/s^2, and not g"),
-        (1e-3 * 9.80665, "state unit m/s^2, and not mg"),
-        (1e-3, "state unit g, and not mg"),
-        (1000.0, "state unit mg, and not g"),
-        (0.0, "taken off already"),
-        (1.7, "check unit, scale"),
-    ):
-        columns = {
-            f"accel_{axis}": summary(values)
-            for axis, values in zip("xyz", factor * direction + noise, strict=True)
-        }
-        (finding,) = [
-            f for f in column_findings(columns, RATE, SETTINGS) if f.finding == "gravity_norm"
-        ]
-        assert words in finding.detail
-    columns = {
-        f"accel_{axis}": summary(values)
-        for axis, values in zip("xyz", direction + noise, strict=True)
-    }
-    assert column_findings(columns, RATE, SETTINGS) == []
-
-
-def test_degrees_taken_for_radians_are_suspected(rng: np.random.Generator) -> None:
-    log = np.degrees(an_hour(rng, 600.0) - 0.009)
-    (finding,) = findings(log)
-    assert finding.finding == "suspicious_unit"
-    assert "are the figures in °/s, and not rad/s" in finding.detail
-    (finding,) = findings(np.radians(an_hour(rng, 600.0)))
-    assert "are the figures in rad/s, and not °/s" in finding.detail
-
-
-def test_a_turning_sensor_is_not_at_rest(rng: np.random.Generator) -> None:
-    assert names(an_hour(rng, 60.0) + 1.0) == ["large_offset"]
-
-
 @pytest.mark.parametrize(
     ("log", "found"),
     [

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.inspection.draft import UNKNOWN, Entry
 from imubench_pipeline.inspection.names import words_of
-from imubench_pipeline.inspection.spellings import divided, unit_of
 from imubench_pipeline.readers.batch import SECONDS
 from imubench_pipeline.readers.contents import HeldColumn, HeldTable
+from imubench_pipeline.readers.spellings import divided, unit_of
 from imubench_pipeline.readers.started import date_of
 from imubench_pipeline.readers.text_stamps import DAY
 from imubench_pipeline.sensor import Reader

@@ -20,8 +20,8 @@ from imubench_pipeline.inspection.names import (
     meaning,
     quantity_of_text,
 )
-from imubench_pipeline.inspection.spellings import said, unit_of
 from imubench_pipeline.readers.contents import Contents, HeldColumn, HeldTable
+from imubench_pipeline.readers.spellings import said, unit_of
 from imubench_pipeline.sensor import Reader
 from imubench_pipeline.units import STANDARD_GRAVITY, conversion
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from imubench_pipeline.inspection.block import printable
 from imubench_pipeline.inspection.names import meaning
-from imubench_pipeline.inspection.spellings import said
 from imubench_pipeline.readers.contents import Contents, HeldColumn, HeldTable
+from imubench_pipeline.readers.spellings import said
 
 _MOST = 40
 _WIDEST_NAME, _WIDEST_VALUES = 44, 60

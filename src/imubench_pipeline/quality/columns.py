@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 
 from imubench_pipeline.config import QualitySettings
 from imubench_pipeline.findings import Finding
-from imubench_pipeline.quality import levels, plausibility, stationarity
+from imubench_pipeline.quality import levels, stationarity
 from imubench_pipeline.quality.summary import LARGEST, ColumnSummary
 from imubench_pipeline.readers.batch import POSITION, TABLE_RATE, TEMPERATURE
 from imubench_pipeline.sensor import QUANTITIES, quantity_of
@@ -54,7 +54,6 @@ def column_findings(
         if static:
             findings += _changes(channel, column, rate, settings)
     findings += _repeated(usable, settings)
-    findings += _implausible(usable, rate)
     return findings
 
 
@@ -209,18 +208,3 @@ def _repeated(columns: Mapping[str, ColumnSummary], settings: QualitySettings) -
                 "and record each sample once"
             )
             yield Finding("repeated_samples", "warning", detail, share, channel)
-
-
-def _implausible(columns: Mapping[str, ColumnSummary], rate: float) -> list[Finding]:
-    means = {name: levels.level_of(column) for name, column in columns.items()}
-    densities = {
-        name: levels.noise_of(column) / math.sqrt(rate)
-        for name, column in columns.items()
-        if quantity_of(name) == "gyro"
-    }
-    gravity = plausibility.gravity(means)
-    return [
-        *([gravity] if gravity else []),
-        *plausibility.gyro_noise(densities),
-        *plausibility.gyro_offset(means),
-    ]

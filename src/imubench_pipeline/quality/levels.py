@@ -1,9 +1,10 @@
-"""What the values of a column tell by themselves: stuck, saturated, repeated, coarse."""
+"""What the values of a column tell by themselves: stuck, saturated, repeated, coarse; how noisy."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,12 @@ from imubench_pipeline.quality.summary import ColumnSummary
 
 _SURE = 1e-9
 """Chance of a run by accident below which it is none."""
+
+_FEWEST_STEPS = 8
+"""Steps between block means that tell an Allan deviation to a third."""
+
+_NORMAL_MEDIAN = 0.4549
+"""Median of the square of a standard normal variable."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +56,54 @@ def quantisation(column: ColumnSummary) -> Quantisation | None:
 def noise_of(column: ColumnSummary) -> float:
     """Return the usual standard deviation of the samples of a block, SI."""
     return _median(column.blocks().spread)
+
+
+def kept_level(column: ColumnSummary, rate: float, unit: str) -> dict[str, Any]:
+    """Return what is kept of the level of a channel, to be judged beside its datasheet.
+
+    Parameters
+    ----------
+    column : ColumnSummary
+    rate : float
+        Hz.
+    unit : str
+        In which the log is said to be written.
+
+    Returns
+    -------
+    dict
+        ``mean``, SI; ``density``, see `density_of`; ``unit``.
+    """
+    return {"mean": level_of(column), "density": density_of(column, rate), "unit": unit}
+
+
+def density_of(column: ColumnSummary, rate: float) -> tuple[float, float | None]:
+    """Return between which limits the white noise density of a column lies, roughly.
+
+    The spread within blocks over √rate is too small behind a low-pass, the Allan deviation of the
+    block means times √τ too large where slow noise reaches τ, and both where it is of a register.
+
+    Parameters
+    ----------
+    column : ColumnSummary
+    rate : float
+        Hz.
+
+    Returns
+    -------
+    (least, most) : float, float or None
+        SI/√Hz, two-sided: N. None: there are too few blocks to tell how large it may be.
+    """
+    blocks = column.blocks()
+    spread = noise_of(column) / math.sqrt(rate)
+    steps = np.diff(np.where(blocks.count > 0.9 * blocks.size, blocks.mean, np.nan))
+    steps = steps[np.isfinite(steps)]
+    if len(steps) < _FEWEST_STEPS:
+        return spread, None
+    variance = float(np.median(steps**2)) / (2.0 * _NORMAL_MEDIAN)
+    slow = math.sqrt(variance * blocks.size / rate)
+    least_bit = column.step if np.isfinite(column.step) else 0.0
+    return min(spread, slow), max(spread, slow, least_bit / math.sqrt(12.0 * rate))
 
 
 def level_of(column: ColumnSummary) -> float:

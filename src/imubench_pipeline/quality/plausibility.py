@@ -1,121 +1,188 @@
-"""Whether figures can be those of a resting inertial sensor in the unit that is stated."""
+"""Whether figures can be those of a resting inertial sensor in the unit that is stated.
+
+It is told from the levels that a recording leaves, beside what the file of its sensor prints: so an
+edit of a datasheet need not read the log again.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
 
 from imubench_pipeline.findings import Finding
+from imubench_pipeline.quality.expected import Expected, expected
+from imubench_pipeline.quality.rotation import GravityTurn
+from imubench_pipeline.sensor import QUANTITIES, Sensor, quantity_of
+from imubench_pipeline.units import STANDARD_GRAVITY, conversion, from_si
 
-_GRAVITY = 9.80665
+Level = Mapping[str, Any]
+"""Of a channel, as `imubench_pipeline.quality.levels.kept_level` returns it."""
+
 _TOLERANCE = 0.15
-_MISREAD = (
-    (1.0, "the figures look like g; state unit g"),
-    (1000.0, "the figures look like mg; state unit mg"),
-    (_GRAVITY**2, "the figures look like m/s²; state unit m/s^2, and not g"),
-    (_GRAVITY**2 / 1000.0, "the figures look like m/s²; state unit m/s^2, and not mg"),
-    (_GRAVITY / 1000.0, "the figures look like g; state unit g, and not mg"),
-    (_GRAVITY * 1000.0, "the figures look like mg; state unit mg, and not g"),
-)
-"""Norm in m/s² of gravity that was read in a wrong unit."""
+"""Part of gravity that the mean of an accelerometer may be off."""
 
-_LOUD = math.radians(0.25)
-_QUIET = math.radians(2e-4)
-"""White noise that no MEMS gyro has, rad/s/√Hz: twenty times that of a usual one, or a tenth of
-the best."""
+_FAR = 2.5
+"""Times beyond what is usual from which a noise is suspicious: above 10 times or below 0.16 times
+what a datasheet prints, and of a gyro without one above 0.15 °/s/√Hz or below 2e-4."""
 
-_DEGREES = math.degrees(1.0)
-_LARGEST_OFFSET = math.radians(30.0)
+_EXPLAINED = 1.5
+"""Times beyond what is usual that a noise may be in the unit that is asked for instead."""
 
+_UNITS: Mapping[str, Sequence[str]] = {
+    "gyro": ("rad/s", "deg/s", "mdeg/s", "mrad/s", "deg/h"),
+    "accel": ("m/s^2", "g", "mg", "ug"),
+}
+"""In which loggers write, the usual ones first."""
 
-def gravity(means: Mapping[str, float]) -> Finding | None:
-    """Check that the norm of a resting accelerometer is that of gravity.
+_SHOWN = {"gyro": ("°/s/√Hz", "gyro_density"), "accel": ("µg/√Hz", "accel_density")}
 
-    Parameters
-    ----------
-    means : mapping of str to float
-        Mean of each accelerometer axis, m/s²; nothing is said unless all three are there.
-    """
-    axes = [means.get(f"accel_{axis}") for axis in "xyz"]
-    if any(value is None for value in axes):
-        return None
-    norm = math.sqrt(sum((value or 0.0) ** 2 for value in axes))
-    if abs(norm / _GRAVITY - 1.0) <= _TOLERANCE:
-        return None
-    advice = "check unit, scale, offset and columns of the accelerometer"
-    if norm < 0.05 * _GRAVITY:
-        advice = "gravity seems to be taken off already (linear acceleration); use the raw figures"
-    for _, words in _misread(norm):
-        advice = words
-    detail = f"the mean acceleration has a norm of {norm:.4g} m/s², expected {_GRAVITY:.4g}"
-    return Finding("gravity_norm", "warning", f"{detail}: {advice}", norm)
+_TILTED = math.radians(10.0)
+"""Turn of gravity over a log that no drift of an accelerometer makes: 0.17 g."""
+
+_TILTING = math.radians(1.0)
+_AGREES = 0.25
+"""The same where gyros turn with it, and part of its rate that they may be off."""
 
 
-def factor_of_gravity(norm: float) -> float | None:
-    """Return by what accelerations are to be multiplied if their unit was mixed up.
+def implausible(
+    channels: Mapping[str, Level],
+    gravity: GravityTurn | None,
+    sensor: Sensor | None,
+    *,
+    static: bool = True,
+) -> list[Finding]:
+    """Return what speaks against a sensor at rest whose figures are in the stated unit.
 
     Parameters
     ----------
-    norm : float
-        Of the mean acceleration of a sensor at rest, m/s² as stated.
-
-    Returns
-    -------
-    float or None
-        None where it is that of gravity in no other unit.
+    channels : mapping of str to mapping
+        The levels of each channel.
+    gravity : GravityTurn or None
+        How gravity turns against the sensor.
+    sensor : Sensor or None
+        What its file says; None: there is none.
+    static : bool
+        The sensor was to be at rest.
     """
-    return next((_GRAVITY / misread for misread, _ in _misread(norm)), None)
-
-
-def _misread(norm: float) -> list[tuple[float, str]]:
-    """Return the norms of gravity in a wrong unit that a norm may be, with what to state."""
-    return [one for one in _MISREAD if abs(norm / one[0] - 1.0) <= _TOLERANCE]
-
-
-def gyro_noise(densities: Mapping[str, float]) -> list[Finding]:
-    """Check that gyros are as noisy as gyros are.
-
-    Parameters
-    ----------
-    densities : mapping of str to float
-        White noise density of each gyro axis, roughly, rad/s/√Hz.
-    """
-    found = []
-    for channel, density in densities.items():
-        shown = math.degrees(density)
-        if density > _LOUD:
-            detail = (
-                f"{channel} has a noise of {shown:.3g} °/s/√Hz, twenty times that of a MEMS gyro: "
-                f"are the figures in °/s, and not rad/s? It would be {shown / _DEGREES:.3g} then"
-            )
-        elif density < _QUIET:
-            detail = (
-                f"{channel} has a noise of {shown:.3g} °/s/√Hz, which no MEMS gyro reaches: are "
-                f"the figures in rad/s, and not °/s? It would be {shown * _DEGREES:.3g} then"
-            )
-        else:
-            continue
-        found.append(Finding("suspicious_unit", "warning", detail, density, channel))
+    of = {quantity: expected(sensor, quantity) for quantity in QUANTITIES}
+    found = [*_noise(channels, of)]
+    if gravity is None or gravity.swept < _TILTED:  # its mean is not gravity then
+        found += _gravity(channels)
+    if static:
+        mending = {f.channel: f.value for f in found if f.finding == "suspicious_unit"}
+        means = {
+            name: level["mean"] * mending.get(name, 1.0)
+            for name, level in channels.items()
+            if quantity_of(name) == "gyro"
+        }
+        found += [*_turning(means, of["gyro"])] or [*_tilting(means, gravity)]
     return found
 
 
-def gyro_offset(means: Mapping[str, float]) -> list[Finding]:
-    """Check that the mean of a resting gyro is an offset and not a rotation.
+def mistakes(unit: str, quantity: str) -> Iterator[tuple[str, float]]:
+    """Yield the units that may be meant instead of one, and the factor that mends the figures.
 
     Parameters
     ----------
-    means : mapping of str to float
-        Mean of each channel, rad/s or m/s².
+    unit : str
+        As stated.
+    quantity : str
+        ``gyro`` or ``accel``.
     """
-    return [
-        Finding(
-            "large_offset",
-            "warning",
-            f"{channel} has a mean of {math.degrees(mean):.4g} °/s: is the sensor at rest, and is "
-            "the unit right?",
-            mean,
-            channel,
-        )
-        for channel, mean in means.items()
-        if channel.startswith("gyro") and abs(mean) > _LARGEST_OFFSET
-    ]
+    dimension = QUANTITIES[quantity]
+    stated = conversion(unit, dimension)[0]
+    for other in _UNITS[quantity]:
+        factor = conversion(other, dimension)[0] / stated
+        if not math.isclose(factor, 1.0):
+            yield other, factor
+
+
+def _gravity(channels: Mapping[str, Level]) -> Iterator[Finding]:
+    """Yield what the mean of three accelerometers tells, which is gravity."""
+    axes = [f"accel_{axis}" for axis in "xyz"]
+    if not set(axes) <= channels.keys():
+        return
+    norm = math.hypot(*(channels[name]["mean"] for name in axes))
+    if abs(norm / STANDARD_GRAVITY - 1.0) <= _TOLERANCE:
+        return
+    units = {channels[name]["unit"] for name in axes}
+    unit = units.pop()
+    detail = f"the mean acceleration has a norm of {norm:.4g} m/s², expected {STANDARD_GRAVITY:.4g}"
+    for other, factor in mistakes(unit, "accel") if not units else ():
+        if abs(norm * factor / STANDARD_GRAVITY - 1.0) <= _TOLERANCE:
+            said = f"{detail}: are the figures in {other}, and not {unit}? {_MEND}"
+            for name in axes:
+                yield Finding("suspicious_unit", "warning", said, factor, name)
+            return
+    advice = "check unit, scale, offset and columns of the accelerometer"
+    if norm < 0.05 * STANDARD_GRAVITY:
+        advice = "gravity seems to be taken off already (linear acceleration); use the raw figures"
+    yield Finding("gravity_norm", "warning", f"{detail}: {advice}", norm)
+
+
+_MEND = "state the right 'unit' in the sensor file"
+
+
+def _noise(channels: Mapping[str, Level], of: Mapping[str, Expected]) -> Iterator[Finding]:
+    """Yield the channels whose noise is usual in another unit alone."""
+    weighed = {f"accel_{axis}" for axis in "xyz"} <= channels.keys()
+    for name, level in channels.items():
+        quantity = quantity_of(name)
+        usual = of[quantity].noise
+        if usual is None or (quantity == "accel" and weighed):
+            continue  # gravity tells better
+        low, high = level["density"]
+        if low > _FAR * usual[1]:
+            shown = low
+        elif high is not None and high < usual[0] / _FAR:
+            shown = high
+        else:
+            continue
+        high = math.inf if high is None else high
+        for unit, factor in mistakes(level["unit"], quantity):
+            if low * factor <= _EXPLAINED * usual[1] and high * factor >= usual[0] / _EXPLAINED:
+                sign, dimension = _SHOWN[quantity]
+                figures = [from_si(x, sign, dimension) for x in (shown, shown * factor, *usual)]
+                detail = (
+                    f"{name} has a noise of {figures[0]:.3g} {sign}; usual "
+                    f"{of[quantity].noise_from} are {figures[2]:.3g} to {figures[3]:.3g}: are the "
+                    f"figures in {unit}, and not {level['unit']}? It would be {figures[1]:.3g} "
+                    f"then; {_MEND}"
+                )
+                yield Finding("suspicious_unit", "warning", detail, factor, name)
+                break
+
+
+def _turning(means: Mapping[str, float], usual: Expected) -> Iterator[Finding]:
+    """Yield the gyros whose mean no offset explains."""
+    for name, mean in means.items():
+        if abs(mean) > usual.offset:
+            detail = (
+                f"{name} has a mean of {math.degrees(mean):.4g} °/s, more than the "
+                f"{math.degrees(usual.offset):.3g} °/s that an offset may be {usual.offset_from}: "
+                "the sensor turns, or its unit is another"
+            )
+            yield Finding("turning", "warning", detail, mean, name)
+
+
+def _tilting(means: Mapping[str, float], gravity: GravityTurn | None) -> Iterator[Finding]:
+    """Yield a turn that gravity shows, alone or together with the gyros."""
+    if gravity is None or gravity.swept < _TILTING:
+        return
+    seen = np.array(gravity.rate)
+    rate = float(np.linalg.norm(seen))
+    gyro = np.array([means.get(f"gyro_{axis}", np.nan) for axis in "xyz"])
+    # The accelerometers do not show what turns about the vertical.
+    along = float(gyro @ seen) / rate
+    together = abs(along / rate - 1.0) < _AGREES
+    if gravity.swept < _TILTED and not together:
+        return
+    beside = f", and the gyros {math.degrees(along):.3g} °/s about that axis" if together else ""
+    detail = (
+        f"gravity turns against the sensor by {math.degrees(gravity.swept):.3g}° in all, steadily "
+        f"at {math.degrees(rate):.3g} °/s{beside}: the sensor turns, or is tilted"
+    )
+    yield Finding("turning", "warning", detail, rate)

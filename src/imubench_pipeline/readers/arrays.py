@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import re
 from abc import abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from itertools import islice
 from pathlib import Path
@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from imubench_pipeline.readers.array_table import DATES, NUMBERS, Column, Table, UnusableError
 from imubench_pipeline.readers.array_time import ArrayTime
 from imubench_pipeline.readers.batch import Batch, LogFile, RecordingError, stated_in
+from imubench_pipeline.readers.stated_units import StatedUnit, stated
 
 _BLOCK_ROWS = 1 << 18
 _BLOCK_BYTES = 1 << 26
@@ -113,6 +114,7 @@ class ArrayFile(LogFile):
             _check_kind(places[key], key, NUMBERS)
         if self.log.time is not None:
             places[_TIME] = self._time_place(by_name)
+        self.units = _stated_units(places)
         return places
 
     def _time_place(self, tables: dict[str, Table]) -> _Place:
@@ -143,6 +145,18 @@ class ArrayFile(LogFile):
         place = _place(tables, time.column, variable, _TIME)
         _check_kind(place, _TIME, NUMBERS if time.unit else DATES)
         return place
+
+
+def _stated_units(places: Mapping[str, _Place]) -> dict[str, StatedUnit]:
+    """Return the units that a file states of its channels."""
+    found = {}
+    for name, (table, position) in places.items():
+        label = table.column(position).label or table.name.rpartition("/")[2]
+        beside = (table.unit(position), f"an attribute of {table.shown}")
+        unit = stated(name, (beside,), label)
+        if unit is not None:
+            found[name] = unit
+    return found
 
 
 def check_not_empty(path: Path) -> None:

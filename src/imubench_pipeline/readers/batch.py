@@ -6,13 +6,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.findings import Finding
-from imubench_pipeline.sensor import QUANTITIES, ColumnSource, LogFormat, quantity_of
+from imubench_pipeline.readers.stated_units import StatedUnit, contradictions
+from imubench_pipeline.sensor import CHANNELS, QUANTITIES, ColumnSource, LogFormat, quantity_of
 from imubench_pipeline.units import conversion
 
 TEMPERATURE = "temperature"
@@ -89,7 +90,14 @@ class LogFile(ABC):
         Sampling rate that the file itself states, Hz; known after the first batch.
     findings : list of Finding
         What was left out or passed over; complete once `batches` is exhausted.
+    units : dict of str to StatedUnit
+        Units of channels that the file itself states, known after the first batch.
+    fixed_units, fixed_by
+        Units that the format fixes, by quantity, and what it is called.
     """
+
+    fixed_units: ClassVar[Mapping[str, str]] = {}
+    fixed_by: ClassVar[str] = ""
 
     path: Path
     log: LogFormat
@@ -97,6 +105,7 @@ class LogFile(ABC):
     started: str | None = None
     rate: float | None = None
     findings: list[Finding] = field(default_factory=list)
+    units: dict[str, StatedUnit] = field(default_factory=dict)
 
     @abstractmethod
     def batches(self) -> Iterator[Batch]:
@@ -107,6 +116,15 @@ class LogFile(ABC):
         RecordingError
             If the file is not what its sensor file says, or is corrupt inside.
         """
+
+    def contradicted_units(self) -> list[Finding]:
+        """Return the channels of which the file states another unit than the sensor file."""
+        fixed = {
+            name: StatedUnit(self.fixed_units[quantity_of(name)], self.fixed_by)
+            for name in self.sources
+            if name in CHANNELS and self.fixed_units
+        }
+        return contradictions(self.path.name, self.sources, fixed | self.units)
 
     def seconds(self, stamps: NDArray[Any], first: Any) -> NDArray[np.float64]:
         """Convert stamps as written to s since the first one; integers lose no digit."""

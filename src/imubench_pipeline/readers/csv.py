@@ -19,6 +19,7 @@ from imubench_pipeline.readers.text_preamble import stated_rate, stated_start
 from imubench_pipeline.readers.text_records import Records
 from imubench_pipeline.readers.text_stamps import StampError
 from imubench_pipeline.readers.text_time import TextTime, time_columns
+from imubench_pipeline.readers.text_units import text_units
 
 _BLOCK_BYTES = 1 << 20  # pyarrow reads 32 of them ahead
 _ADVICE = (
@@ -42,6 +43,7 @@ class CsvFile(LogFile):
         columns = {
             name: layout.position(source.column, name) for name, source in self.sources.items()
         }
+        self.units = text_units(layout, columns)
         preamble = [line.decode("utf-8", "replace") for line in layout.preamble]
         self.rate, self.started = stated_rate(preamble), stated_start(preamble)
         time = None if self.log.time is None else TextTime(self, layout)

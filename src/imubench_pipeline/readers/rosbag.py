@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +55,9 @@ class Source(Protocol):
 
 class RosbagFile(LogFile):
     """One topic of a ROS bag."""
+
+    fixed_units: ClassVar = {"gyro": "rad/s", "accel": "m/s^2"}
+    fixed_by: ClassVar = "the type sensor_msgs/Imu of its topic"
 
     def batches(self) -> Iterator[Batch]:
         """Yield the records in the order of the bag (see `LogFile.batches`)."""

@@ -8,10 +8,10 @@ import numpy as np
 
 from imubench_pipeline.readers.contents import FIRST, NOTHING_STATED, ROWS, HeldColumn, HeldTable
 from imubench_pipeline.readers.text_cells import Decimal, is_missing, is_number
-from imubench_pipeline.readers.text_header import completed, says_units
 from imubench_pipeline.readers.text_layout import TextLayout, find_layout
 from imubench_pipeline.readers.text_preamble import stated_rate, stated_start
 from imubench_pipeline.readers.text_stamp_forms import stamp_forms, stamps_of
+from imubench_pipeline.readers.text_units import line_of_units
 from imubench_pipeline.sensor import Reader
 
 _NOTES = 12
@@ -33,7 +33,7 @@ def held(path: Path, reader: Reader) -> list[HeldTable]:
     """
     layout = find_layout(path, NOTHING_STATED, [], [])
     before = [line.decode("utf-8", "replace") for line in layout.preamble]
-    units, units_line = _units(layout)
+    units, units_line = line_of_units(layout)
     rows = [row for row in layout.rows[:ROWS] if len(row) >= len(layout.names)]
     rows = rows[:-1] or rows  # the last one may be cut short
     named = layout.names != [str(number) for number in range(1, len(layout.names) + 1)]
@@ -56,19 +56,6 @@ def held(path: Path, reader: Reader) -> list[HeldTable]:
             )[:_NOTES],
         )
     ]
-
-
-def _units(layout: TextLayout) -> tuple[dict[int, str], bytes]:
-    """Return the units that a line beside the names says, by the positions of columns; and it."""
-    for raw in layout.preamble:
-        if raw == layout.header:
-            continue
-        text = raw.decode("utf-8", "replace")
-        sign = next((sign for sign in layout.comments if text.startswith(sign)), "")
-        cells = layout.split.names(text.lstrip(sign) if sign else text, len(layout.names))
-        if completed(cells, layout.names) and says_units(cells):
-            return {place: cell.strip("()[]{}<> ") for place, cell in enumerate(cells)}, raw
-    return {}, b""
 
 
 def _column(

@@ -61,6 +61,8 @@ _LONGEST_LOG = 1e9
 class UbxFile(LogFile):
     """A log of a u-blox receiver."""
 
+    fixed_units, fixed_by = UNITS, "the format of u-blox"
+
     def batches(self) -> Iterator[Batch]:
         """Yield the records in the order of the file (see `LogFile.batches`)."""
         self._check_columns()

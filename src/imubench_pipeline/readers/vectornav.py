@@ -30,7 +30,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pyarrow as pa
@@ -60,6 +60,9 @@ HOST, COUNTER = "host_time", "counter"
 
 class VectorNavFile(LogFile):
     """A log of VectorNav's ASCII sentences."""
+
+    fixed_units: ClassVar = {"gyro": "rad/s", "accel": "m/s^2"}
+    fixed_by: ClassVar = "the format of VectorNav"
 
     def batches(self) -> Iterator[Batch]:
         """Yield the records in the order of the file (see `LogFile.batches`)."""

@@ -16,12 +16,27 @@ from typing import Any
 from scipy.special import ndtr
 
 from imubench_pipeline.suitability.conditions import is_missing
+from imubench_pipeline.units import STANDARD_GRAVITY
 from imubench_pipeline.verdicts.basis import Basis
 from imubench_pipeline.verdicts.sources import quantity_behind
 from imubench_pipeline.verdicts.standing import Standing, deciding, limit_of, standings
 
 Row = Mapping[str, Any]
 Factors = Mapping[str, float]  # by quantity
+
+_MEANT = {
+    "gyro": (
+        (math.radians(1.0), "°/s, and not rad/s"),
+        (math.degrees(1.0), "rad/s, and not °/s"),
+    ),
+    "accel": (
+        (STANDARD_GRAVITY, "g, and not m/s²"),
+        (1.0 / STANDARD_GRAVITY, "m/s², and not g"),
+        (1e-3, "mg, and not g"),
+        (1e3, "g, and not mg"),
+    ),
+}
+"""What is meant where a factor mends figures."""
 
 _NORMAL = 1.959963984540054  # 97.5 % of the standard normal
 
@@ -159,9 +174,11 @@ def _outcome(standing: Standing) -> str:
 def _units(factors: Factors) -> str:
     named = []
     for quantity, factor in sorted(factors.items(), reverse=True):
-        if quantity == "gyro":
-            units = "°/s, and not rad/s" if factor < 1.0 else "rad/s, and not °/s"
-            named.append(f"the gyro is in {units}")
+        name = "gyro" if quantity == "gyro" else "accelerometer"
+        for size, units in _MEANT[quantity]:
+            if math.isclose(factor, size, rel_tol=1e-6):
+                named.append(f"the {name} is in {units}")
+                break
         else:
-            named.append(f"the accelerometer's figures are to be taken {factor:.3g} times")
+            named.append(f"the figures of the {name} are to be taken {factor:.3g} times")
     return " and ".join(named)

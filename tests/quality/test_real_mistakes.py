@@ -1,0 +1,182 @@
+"""Real logs with a mistake in them: each is found, and makes them unfit; without it they are fit.
+
+The mistake is in the sensor file, or in the values, the rest is as it was recorded.
+"""
+
+from __future__ import annotations
+
+import gzip
+import math
+from collections.abc import Callable, Mapping
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from imubench_pipeline.config import QualitySettings
+from imubench_pipeline.fitness import doubts, fitness
+from imubench_pipeline.ingest import ingest
+from imubench_pipeline.sensor import CHANNELS, RecordingNotes, Sensor, read_sensors
+from imubench_pipeline.validation import parse
+from tests.conftest import PROJECT
+
+NAMES = {"sensor": "s", "device": "d", "recording": "r", "kind": "static"}
+CATALOGUE = read_sensors(PROJECT / "config/sensors")
+ROWS = 60_000
+
+Rows = list[dict[str, Any]]
+
+
+@pytest.fixture
+def adis16405(shared: Path) -> np.ndarray:
+    """The first ten minutes of a real log: three gyros in °/s, three accelerometers in g."""
+    with gzip.open(shared / "logs/adis16405/imu1.csv.gz", "rt") as file:
+        return np.loadtxt(islice(file, 1, ROWS + 1), delimiter=",")
+
+
+def written(folder: Path, values: np.ndarray, names: tuple[str, ...] = CHANNELS) -> Path:
+    path = folder / "log.csv"
+    np.savetxt(path, values, "%.9g", ",", header=",".join(names), comments="")
+    return path
+
+
+def sensor(name: str, **log: Any) -> Sensor:
+    """Return a shipped sensor whose log is written otherwise."""
+    data = CATALOGUE[name].model_dump(exclude_unset=True)
+    data["log"] |= log
+    return parse(Sensor, data, name)
+
+
+def in_units(gyro: str, accel: str) -> dict[str, Any]:
+    return {
+        name: {"column": name, "unit": gyro if name.startswith("gyro") else accel}
+        for name in CHANNELS
+    }
+
+
+def findings(path: Path, of: Sensor, folder: Path) -> Rows:
+    """Return what is found of a log, by the ingest and beside the datasheet."""
+    kept = ingest(path, of.log, RecordingNotes(), QualitySettings(), folder / "kept", NAMES)
+    quality = kept.quality(NAMES)
+    return quality.findings + quality.implausible(of)
+
+
+def unfit(found: Rows) -> dict[str, dict[str | None, float]]:
+    """Return channels and factors of the doubts that make a recording unfit, by finding."""
+    doubted = list(doubts(found, [], []))
+    serious: dict[str, dict[str | None, float]] = {}
+    for one in doubted:
+        if one.unfit:
+            serious.setdefault(one.code, {})[one.channel] = one.factor or 0.0
+    assert (fitness(doubted) == "unfit") == bool(serious)
+    return serious
+
+
+@pytest.mark.parametrize(
+    ("name", "place"), [("cats_tag", "cats/day1.csv.gz"), ("mpu6050", "mpu6050")]
+)
+def test_the_logs_as_they_are(shared: Path, tmp_path: Path, name: str, place: str) -> None:
+    found = findings(shared / "logs" / place, CATALOGUE[name], tmp_path)
+    assert unfit(found) == {}
+    assert not {"gravity_norm", "repeated_samples"} & {row["finding"] for row in found}
+
+
+def test_the_log_without_a_mistake(adis16405: np.ndarray, tmp_path: Path) -> None:
+    found = findings(written(tmp_path, adis16405), CATALOGUE["adis16405"], tmp_path)
+    assert {row["finding"] for row in found} <= {"quantised", "knocks", "short_recording"}
+
+
+UNITS = [
+    ("rad/s", "g", {"gyro": 180 / math.pi}),
+    ("mdeg/s", "g", {"gyro": 1e-3}),
+    ("deg/s", "m/s^2", {"accel": 1 / 9.80665}),
+    ("deg/s", "mg", {"accel": 1e-3}),
+    ("deg/s", "ug", {"accel": 1e-6}),
+]
+
+
+@pytest.mark.parametrize(("gyro", "accel", "factors"), UNITS)
+def test_a_log_in_another_unit_than_the_sensor_file_states(
+    adis16405: np.ndarray, tmp_path: Path, gyro: str, accel: str, factors: Mapping[str, float]
+) -> None:
+    path = written(tmp_path, adis16405)
+    of = sensor("adis16405", channels=in_units(gyro, accel))
+    serious = unfit(findings(path, of, tmp_path))
+    (quantity, factor), = factors.items()  # fmt: skip
+    assert serious == {
+        "suspicious_unit": {f"{quantity}_{axis}": pytest.approx(1 / factor) for axis in "xyz"}
+    }
+
+
+def test_a_log_in_radians_that_the_sensor_file_takes_for_degrees(
+    adis16405: np.ndarray, tmp_path: Path
+) -> None:
+    path = written(tmp_path, adis16405 * ([math.radians(1)] * 3 + [1] * 3))
+    serious = unfit(findings(path, CATALOGUE["adis16405"], tmp_path))
+    assert serious == {
+        "suspicious_unit": {f"gyro_{axis}": pytest.approx(57.29578) for axis in "xyz"}
+    }
+
+
+def test_a_log_on_a_slow_turntable(adis16405: np.ndarray, tmp_path: Path) -> None:
+    adis16405[:, 2] -= 15.0  # °/s about the vertical
+    path = written(tmp_path, adis16405)
+    serious = unfit(findings(path, CATALOGUE["adis16405"], tmp_path))
+    assert set(serious) == {"turning"} and set(serious["turning"]) == {"gyro_z"}
+
+
+def test_a_log_that_tilts_steadily(adis16405: np.ndarray, tmp_path: Path) -> None:
+    speed = math.radians(0.1)
+    angle = speed * np.arange(len(adis16405)) / 100.0
+    values = adis16405.copy()  # it turns about y, by less than the offset of the gyro there
+    values[:, 3] = adis16405[:, 3] * np.cos(angle) - adis16405[:, 5] * np.sin(angle)
+    values[:, 5] = adis16405[:, 5] * np.cos(angle) + adis16405[:, 3] * np.sin(angle)
+    found = findings(written(tmp_path, values), CATALOGUE["adis16405"], tmp_path)
+    assert set(unfit(found)) == {"turning"}
+    (turn,) = (row for row in found if row["finding"] == "turning")
+    assert turn["value"] == pytest.approx(speed, rel=0.05)
+    assert "in all, steadily at 0.1 °/s" in turn["detail"]
+
+
+# ---------------------------------------------------------------------- units in the log
+
+
+def of_header(folder: Path, values: np.ndarray) -> tuple[Path, dict[str, Any]]:
+    names = tuple(f"{name} ({'rad/s' if name[0] == 'g' else 'g'})" for name in CHANNELS)
+    channels = in_units("deg/s", "g")
+    for place, source in enumerate(channels.values()):
+        source["column"] = place + 1
+    return written(folder, values, names), {"channels": channels}
+
+
+def of_attribute(folder: Path, values: np.ndarray) -> tuple[Path, dict[str, Any]]:
+    path = folder / "log.h5"
+    channels = in_units("deg/s", "g")
+    with h5py.File(path, "w") as file:
+        for place, quantity in enumerate(("gyro", "accel")):
+            file[quantity] = values[:, 3 * place : 3 * place + 3]
+            file[quantity].attrs["units"] = ("rad/s", "g")[place]
+    for place, source in enumerate(channels.values()):
+        source |= {"column": place % 3 + 1, "variable": ("gyro", "accel")[place // 3]}
+    return path, {"reader": "hdf5", "channels": channels}
+
+
+@pytest.mark.parametrize(
+    ("writing", "where"),
+    [(of_header, "(the name 'gyro_x (rad/s)')"), (of_attribute, "(an attribute of gyro)")],
+)
+def test_a_unit_in_the_log_that_the_sensor_file_contradicts(
+    adis16405: np.ndarray, tmp_path: Path, writing: Callable[..., Any], where: str
+) -> None:
+    path, log = writing(tmp_path, adis16405)
+    found = findings(path, sensor("adis16405", **log), tmp_path)
+    # The figures are in °/s, as the sensor file says: what is doubted is only what is said.
+    assert unfit(found) == {
+        "unit_contradicts": {f"gyro_{axis}": pytest.approx(57.29578) for axis in "xyz"}
+    }
+    first = next(row["detail"] for row in found if row["finding"] == "unit_contradicts")
+    assert f"states rad/s for gyro_x {where}" in first
+    assert "the sensor file deg/s (log.channels.gyro_x.unit)" in first
