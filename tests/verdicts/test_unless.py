@@ -2,8 +2,6 @@ import math
 
 import pytest
 
-from imubench_pipeline.fitness import doubts
-from imubench_pipeline.quality.plausibility import gravity
 from tests.test_selection import white
 from tests.verdicts.budgets import HEADING, about, doubt, gyro, judge, requirement
 
@@ -69,16 +67,15 @@ def test_a_turn_on_bias_that_is_stated_keeps_its_size() -> None:
     assert rows[0]["unless_margin"] == pytest.approx(truth[0]["margin"], rel=1e-9)
 
 
-@pytest.mark.parametrize(("norm", "factor"), [(9.8**2, 1 / 9.80665), (1.0, 9.80665), (5.0, None)])
-def test_gravity_in_another_unit_has_its_factor(norm: float, factor: float | None) -> None:
-    found = gravity({"accel_x": 0.0, "accel_y": 0.0, "accel_z": norm})
-    assert found is not None
-    (one,) = doubts([found.row("s", "r")], [], [])
-    assert one.factor == (factor and pytest.approx(factor))
-    if factor is not None:
-        right = {"gyro_x": white(1e-7), "accel_x": white(1e-2)}
-        truth, _ = judge({"s": {"r": right}}, {"along": ALONG})
-        wrong = right | {"accel_x": white(1e-2 / factor)}
-        kept = {**one.row(), "factor": one.factor}
-        rows, _ = judge({"s": {"r": wrong}}, {"along": ALONG}, [UNFIT], [kept])
-        assert rows[0]["unless_margin"] == pytest.approx(truth[0]["margin"], rel=1e-9)
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [(9.80665, "g, and not m/s²"), (1 / 9.80665, "m/s², and not g"), (1e-3, "mg, and not g")],
+)
+def test_an_accelerometer_in_another_unit_turns_what_it_makes(factor: float, words: str) -> None:
+    right = {"gyro_x": white(1e-7), "accel_x": white(1e-2)}
+    truth, _ = judge({"s": {"r": right}}, {"along": ALONG})
+    wrong = right | {"accel_x": white(1e-2 / factor)}
+    unit = [doubt("s", "r", "suspicious_unit", channel="accel_x", factor=factor)]
+    rows, _ = judge({"s": {"r": wrong}}, {"along": ALONG}, [UNFIT], unit)
+    assert rows[0]["unless_margin"] == pytest.approx(truth[0]["margin"], rel=1e-9)
+    assert f"if the accelerometer is in {words}, it " in rows[0]["unless"]
