@@ -43,6 +43,7 @@ FOLDER = RESULTS + "/recordings/{sensor}/{recording}"
 JOINED = sorted(set(TABLES) - set(OF_ONE_RECORDING))
 RANKED = {
     "ranking",
+    "shortlist",
     "fusion",
     "coverage",
     "coverage_by_vendor",
@@ -401,6 +402,25 @@ rule ranking:
         code=plan.code("ranking"),
     run:
         steps.run("ranking", input, output, params, wildcards)
+
+
+rule shortlist:
+    input:
+        **{
+            table: f"{RESULTS}/tables/{table}.parquet"
+            for table in ("recordings", "parameters", "ranking")
+        },
+    output:
+        as_files("shortlist"),
+    group:
+        "comparison"
+    resources:
+        **ASKED,
+    params:
+        settings=plan.shortlist_settings(),
+        code=plan.code("shortlist"),
+    run:
+        steps.run("shortlist", input, output, params, wildcards)
 
 
 rule fusion:

@@ -37,7 +37,7 @@ from imubench_pipeline.fitness import (
 from imubench_pipeline.pooled import pooled_rows
 from imubench_pipeline.published import published_rows
 from imubench_pipeline.quality.spectral import band_finding, line_findings
-from imubench_pipeline.repeatability import repeatability_rows
+from imubench_pipeline.repeatability.rows import repeatability_rows
 from imubench_pipeline.sensor import Sensor, quantity_of
 from imubench_pipeline.sensor_model.truth import figures_of
 from imubench_pipeline.simulated_recordings import SimulatedRecording

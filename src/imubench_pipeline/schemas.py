@@ -18,7 +18,8 @@ from imubench_pipeline.estimators.columns import DRAWN_TABLES
 from imubench_pipeline.faults import FAILURES
 from imubench_pipeline.fitness import DOUBTS, JUDGED
 from imubench_pipeline.fusion.columns import FUSION_TABLES
-from imubench_pipeline.repeatability import REPEATABILITY
+from imubench_pipeline.repeatability.columns import REPEATABILITY
+from imubench_pipeline.shortlist.columns import SHORTLIST
 
 _FITTED = _number("fitted", "as in unit", "what the model has where that is not value; no estimate")
 _SENSOR = _text("sensor", "name of the sensor file")
@@ -332,6 +333,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _DOUBTED,
         _text("left_out", "recordings that do not decide, and why", required=False),
     ),
+    "shortlist": SHORTLIST,
     "published": (
         *_KEYS,
         _text("place", "table of the source"),
