@@ -417,7 +417,8 @@ rule shortlist:
     resources:
         **ASKED,
     params:
-        settings=plan.shortlist_settings(),
+        settings=plan.ranking_settings(),
+        catalogue=plan.catalogue("price_class"),
         code=plan.code("shortlist"),
     run:
         steps.run("shortlist", input, output, params, wildcards)

@@ -329,15 +329,6 @@ class Plan:
             }
         )
 
-    def shortlist_settings(self) -> str:
-        """Return requirements, and the datasheets and price classes of all sensor files."""
-        return _text(
-            {
-                "requirements": self._requirements("note", "example"),
-                "catalogue": self._catalogue("price_class"),
-            }
-        )
-
     def _requirements(self, *unused: str) -> dict[str, object]:
         """Return what applications need, without what a step does not use of it."""
         return {
@@ -398,16 +389,15 @@ class Plan:
         """Return what the figures of all sensors show beside the tables."""
         return _text({"report": {"units": self.run.report.units}})
 
-    def catalogue(self) -> str:
-        """Return the datasheets of all sensor files, with vendor and model."""
-        return _text(self._catalogue())
-
-    def _catalogue(self, *more: str) -> dict[str, object]:
-        shown = {"vendor", "model", "datasheet", *more}
-        return {
-            name: sensor.model_dump(mode="json", include=shown) | {"log": _ANY_LOG}
-            for name, sensor in self.sensors.items()
-        }
+    def catalogue(self, *more: str) -> str:
+        """Return the datasheets of all sensor files, with vendor and model, and more keys."""
+        keys = {"vendor", "model", "datasheet", *more}
+        return _text(
+            {
+                name: sensor.model_dump(mode="json", include=keys) | {"log": _ANY_LOG}
+                for name, sensor in self.sensors.items()
+            }
+        )
 
     def truths(self, sensor: str) -> str:
         """Return the true parameters of the simulated recordings of a sensor."""

@@ -74,6 +74,7 @@ def test_a_run_leaves_tables_and_a_report(project: Project) -> None:
         "index.html",
         "recordings.html",
         "datasheets.html",
+        "shortlist.html",
         "fusion.html",
         "earth_rate.html",
         "theory.html",

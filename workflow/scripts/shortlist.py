@@ -9,14 +9,11 @@ from imubench_pipeline.shortlist.of_run import NEEDED, rows_of_run
 from imubench_pipeline.tables import build, write_arrow
 
 
-def main(tables: dict[str, Path], settings: str, outputs: list[Path]) -> None:
+def main(tables: dict[str, Path], settings: str, catalogue: str, outputs: list[Path]) -> None:
     """Write the table ``shortlist``, as Parquet and CSV."""
-    given = json.loads(settings)
-    requirements = {
-        name: Requirement.model_validate(one) for name, one in given["requirements"].items()
-    }
-    sensors = sensors_of(json.dumps(given["catalogue"]))
-    table = build("shortlist", rows_of_run(requirements, sensors, tables))
+    asked = json.loads(settings)["requirements"]
+    requirements = {name: Requirement.model_validate(one) for name, one in asked.items()}
+    table = build("shortlist", rows_of_run(requirements, sensors_of(catalogue), tables))
     for output in outputs:
         write_arrow(table, output)
 
@@ -25,5 +22,6 @@ if __name__ == "__main__":
     main(
         {name: Path(snakemake.input[name]) for name in NEEDED},
         snakemake.params.settings,
+        snakemake.params.catalogue,
         [Path(path) for path in snakemake.output],
     )
