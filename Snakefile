@@ -44,6 +44,7 @@ JOINED = sorted(set(TABLES) - set(OF_ONE_RECORDING))
 RANKED = {
     "ranking",
     "shortlist",
+    "repeatability",
     "fusion",
     "coverage",
     "coverage_by_vendor",
@@ -354,7 +355,6 @@ rule sensor_tables:
         truths=lambda w: plan.truths(w.sensor),
         catalogue=plan.catalogue(),
         decide=plan.settings("decide"),
-        datasheet=plan.settings("datasheet"),
         code=plan.code("sensor_tables"),
         attempt=lambda w: plan.attempt("sensor_tables", w.sensor),
     run:
@@ -422,6 +422,24 @@ rule shortlist:
         code=plan.code("shortlist"),
     run:
         steps.run("shortlist", input, output, params, wildcards)
+
+
+rule repeatability:
+    input:
+        biases=RESULTS + "/tables/fixed_bias.parquet",
+        recordings=RESULTS + "/tables/recordings.parquet",
+    output:
+        as_files("repeatability"),
+    group:
+        "comparison"
+    resources:
+        **ASKED,
+    params:
+        settings=plan.settings("datasheet"),
+        catalogue=plan.catalogue(),
+        code=plan.code("repeatability"),
+    run:
+        steps.run("repeatability", input, output, params, wildcards)
 
 
 rule fusion:

@@ -13,6 +13,7 @@ STEPS: Mapping[str, tuple[str, ...]] = {
     "datasheet": ("datasheet", "results"),
     "error_budget": ("expected_errors", "results"),
     "ranking": ("selection", "results"),
+    "repeatability": ("repeatability.rows", "config", "results"),
     "shortlist": ("shortlist.of_run", "results"),
     "fusion": ("fusion.of_run",),
     "earth_rotation": ("earth_rate.of_run",),
