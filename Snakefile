@@ -44,6 +44,8 @@ JOINED = sorted(set(TABLES) - set(OF_ONE_RECORDING))
 RANKED = {
     "ranking",
     "next_steps",
+    "shortlist",
+    "repeatability",
     "fusion",
     "coverage",
     "coverage_by_vendor",
@@ -357,9 +359,8 @@ rule sensor_tables:
         **ASKED,
     params:
         truths=lambda w: plan.truths(w.sensor),
-        catalogue=plan.catalogue(),
+        catalogue=plan.catalogue("price_class"),
         decide=plan.settings("decide"),
-        datasheet=plan.settings("datasheet"),
         code=plan.code("sensor_tables"),
         attempt=lambda w: plan.attempt("sensor_tables", w.sensor),
     run:
@@ -415,6 +416,44 @@ rule ranking:
         code=plan.code("ranking"),
     run:
         steps.run("ranking", input, output, params, wildcards)
+
+
+rule shortlist:
+    input:
+        **{
+            table: f"{RESULTS}/tables/{table}.parquet"
+            for table in ("recordings", "parameters", "ranking")
+        },
+    output:
+        as_files("shortlist"),
+    group:
+        "comparison"
+    resources:
+        **ASKED,
+    params:
+        settings=plan.ranking_settings(),
+        catalogue=plan.catalogue("price_class"),
+        code=plan.code("shortlist"),
+    run:
+        steps.run("shortlist", input, output, params, wildcards)
+
+
+rule repeatability:
+    input:
+        biases=RESULTS + "/tables/fixed_bias.parquet",
+        recordings=RESULTS + "/tables/recordings.parquet",
+    output:
+        as_files("repeatability"),
+    group:
+        "comparison"
+    resources:
+        **ASKED,
+    params:
+        settings=plan.settings("datasheet"),
+        catalogue=plan.catalogue(),
+        code=plan.code("repeatability"),
+    run:
+        steps.run("repeatability", input, output, params, wildcards)
 
 
 rule fusion:

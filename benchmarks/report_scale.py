@@ -39,7 +39,16 @@ TRUTH = {
     "accel": {"N": "60 ug/sqrt(Hz)", "B": "30 ug", "T_B": "60 s", "K": "100 ug/sqrt(h)"},
 }
 CHANNELS = [f"{quantity}_{axis}" for quantity in TRUTH for axis in "xyz"]
-OF_ALL = ("ranking", "fusion", "coverage", "coverage_by_vendor", "pooled", "drift")
+OF_ALL = (
+    "ranking",
+    "shortlist",
+    "repeatability",
+    "fusion",
+    "coverage",
+    "coverage_by_vendor",
+    "pooled",
+    "drift",
+)
 
 
 def one_recording(folder: Path) -> Path:

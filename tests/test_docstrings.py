@@ -11,6 +11,8 @@ SOURCE = PROJECT / "src/imubench_pipeline"
 PUBLIC = ["allan", "confidence", "noise", "simulate", "score", "datasheet", "units",
           "estimators/curve", "estimators/least_squares", "readers/__init__", "ingest",
           "coverage", "suspicion", "conversions", "overbound", "requirements", "selection",
+          "repeatability/rows", "shortlist/classes", "shortlist/figures", "shortlist/of_run",
+          "shortlist/rows", "export/temperature",
           "expected_errors", "error_budget/budget", "error_budget/growth", "export/choice",
           "export/growth", "export/mapping", "export/request", "export/of_run", "overview",
           "drift", "tables", "provenance", "report/practical", "report/words", "report/meaning",

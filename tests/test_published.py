@@ -121,9 +121,10 @@ def tables(
 
 
 def thermal(name: str, value: float | None, unit: str) -> Row:
-    limits = {"lower": value * 0.9, "upper": value * 1.1} if value else {}
+    limits = {"lower": value and value * 0.9, "upper": value and value * 1.1}
     status = "not_identified" if value is None else "ok"
     return NAMES | {"parameter": name, "value": value, "unit": unit, "status": status,
+                    "reason": None,
                     "compensated": True} | limits  # fmt: skip
 
 

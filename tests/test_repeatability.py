@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from imubench_pipeline.repeatability import repeatability_rows
+from imubench_pipeline.repeatability.rows import repeatability_rows
 from imubench_pipeline.sensor import Sensor
 from imubench_pipeline.tables import build
 from imubench_pipeline.validation import parse

@@ -19,6 +19,7 @@ from imubench_pipeline.report import command as report
 from imubench_pipeline.report.static_figures import command as figures
 from imubench_pipeline.sensor import RecordingNotes, Sensor
 from imubench_pipeline.sensor_model import command as simulation
+from imubench_pipeline.shortlist import command as shortlist
 from imubench_pipeline.simulated_recordings import Board, Simulated
 from imubench_pipeline.tables import replacing, write_content, write_json
 from imubench_pipeline.units import UnitError, quantity_to_si
@@ -73,6 +74,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _add_export(commands.add_parser("export", help="write what a filter or simulator loads"))
     show.add_arguments(
         commands.add_parser("show", help="show the comparison of the sensors in the terminal")
+    )
+    shortlist.add_arguments(
+        commands.add_parser(
+            "shortlist", help="say by datasheets alone which sensors are worth logging"
+        )
     )
     report.add_arguments(
         commands.add_parser("report", help="write the report again, elsewhere or in one file")
@@ -260,6 +266,7 @@ _COMMANDS = {
     "inspect": _inspect,
     "export": _export,
     "show": show.run,
+    "shortlist": shortlist.run,
     "report": report.run,
     "figures": figures.run,
     "simulate": simulation.run,

@@ -395,11 +395,12 @@ class Plan:
         """Return what the figures of all sensors show beside the tables."""
         return _text({"report": {"units": self.run.report.units}})
 
-    def catalogue(self) -> str:
-        """Return all sensor files without how logs are written."""
+    def catalogue(self, *more: str) -> str:
+        """Return the datasheets of all sensor files, with vendor and model, and more keys."""
+        keys = {"vendor", "model", "datasheet", *more}
         return _text(
             {
-                name: sensor.model_dump(mode="json", exclude={"log"}) | {"log": _ANY_LOG}
+                name: sensor.model_dump(mode="json", include=keys) | {"log": _ANY_LOG}
                 for name, sensor in self.sensors.items()
             }
         )

@@ -90,6 +90,8 @@ _OF_ALL: Mapping[str, tuple[float, float, float, float]] = {
     "outlook": (350, 0.1, 3, 0.005),
     "tables": (300, 0.5, 1, 0.005),
     "ranking": (300, 0.1, 1, 0.01),
+    "shortlist": (300, 0.2, 3, 0.01),
+    "repeatability": (300, 0.1, 1, 0.01),
     "fusion": (300, 0.2, 6, 0.01),
     "coverage": (300, 0, 1, 0),
     "exports": (300, 0.5, 1, 0.05),

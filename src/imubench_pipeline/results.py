@@ -13,7 +13,6 @@ import pyarrow as pa
 
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.backtest import verdicts
-from imubench_pipeline.config import DatasheetSettings
 from imubench_pipeline.drift import drift_rows
 from imubench_pipeline.estimators.estimate import (
     CURVE,
@@ -39,7 +38,6 @@ from imubench_pipeline.published import published_rows, truth_rows
 from imubench_pipeline.quality.plausibility import implausible
 from imubench_pipeline.quality.rotation import GravityTurn
 from imubench_pipeline.quality.spectral import band_finding, line_findings
-from imubench_pipeline.repeatability import repeatability_rows
 from imubench_pipeline.sensor import Sensor, quantity_of
 from imubench_pipeline.suspicion import unusual_rows
 from imubench_pipeline.tables import build, read
@@ -279,11 +277,7 @@ def _by(table: pa.Table, *names: str) -> dict[tuple[str, ...], pa.Table]:
 
 
 def joined_tables(
-    parts: Mapping[str, list[Path]],
-    truths: str,
-    catalogue: str,
-    decide: str = "{}",
-    datasheet: str = "{}",
+    parts: Mapping[str, list[Path]], truths: str, catalogue: str, decide: str = "{}"
 ) -> dict[str, pa.Table]:
     """Join the results of the recordings of a sensor.
 
@@ -295,8 +289,8 @@ def joined_tables(
         Those that are simulated, as the plan wrote them.
     catalogue : str
         The sensor files, likewise.
-    decide, datasheet : str
-        Sections of the configuration: which recordings decide, and the tolerance, as JSON.
+    decide : str
+        The section of the configuration that says which recordings decide, as JSON.
 
     Returns
     -------
@@ -341,9 +335,6 @@ def joined_tables(
     apart = left_out(about)
     pools = pooled_rows(undecided(estimated, apart), undecided(biases, apart), devices)
     joined["pooled"] = build("pooled", with_doubts_of_all(pools, about))
-    how = DatasheetSettings.model_validate(json.loads(datasheet))
-    repeated = repeatability_rows(biases, about, sensors_of(catalogue), how.tolerance)
-    joined["repeatability"] = build("repeatability", repeated)
     for name in _JUDGED & joined.keys():
         joined[name] = build(name, with_doubts(joined[name].to_pylist(), about))
     truth = list(truth_rows(truths))

@@ -19,7 +19,8 @@ from imubench_pipeline.estimators.columns import DRAWN_TABLES
 from imubench_pipeline.faults import FAILURES
 from imubench_pipeline.fitness import DOUBTS, JUDGED
 from imubench_pipeline.fusion.columns import FUSION_TABLES
-from imubench_pipeline.repeatability import REPEATABILITY
+from imubench_pipeline.repeatability.columns import REPEATABILITY
+from imubench_pipeline.shortlist.columns import SHORTLIST
 from imubench_pipeline.suitability.columns import IN_USE
 from imubench_pipeline.verdicts.columns import NEXT_STEPS, RANKING
 
@@ -311,6 +312,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
     ),
     "ranking": RANKING,
     "next_steps": NEXT_STEPS,
+    "shortlist": SHORTLIST,
     "published": (
         *_KEYS,
         _text("place", "table of the source"),

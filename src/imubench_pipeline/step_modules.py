@@ -13,6 +13,8 @@ STEPS: Mapping[str, tuple[str, ...]] = {
     "datasheet": ("datasheet", "results"),
     "error_budget": ("expected_errors", "backtest.of_recording", "results"),
     "ranking": ("selection", "verdicts.next_steps", "results"),
+    "repeatability": ("repeatability.rows", "config", "results"),
+    "shortlist": ("shortlist.of_run", "results"),
     "fusion": ("fusion.of_run",),
     "earth_rotation": ("earth_rate.of_run",),
     "calibration": ("calibration.of_run",),

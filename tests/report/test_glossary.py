@@ -24,6 +24,7 @@ from imubench_pipeline.estimators.identifiability import bounds_of
 from imubench_pipeline.noise import FLOOR, GaussMarkov, NoiseModel
 from imubench_pipeline.report import glossary as module
 from imubench_pipeline.report.glossary import UnknownTermError, glossary, term
+from imubench_pipeline.shortlist import rows as shortlist
 from imubench_pipeline.suitability import conditions
 from imubench_pipeline.units import from_si, to_si
 from imubench_pipeline.validation import ConfigError
@@ -267,6 +268,8 @@ def values_in_tables() -> Iterator[tuple[str, str]]:
         yield verdict, "verdict"
     for verdict in ("changed", "as before"):  # of the table drift
         yield verdict, "verdict"
+    for verdict in shortlist.VERDICTS:
+        yield verdict, "shortlist"
     for published in get_args(coverage.Published):
         yield published, "published"
     for kind in get_args(get_type_hints(lines.Line)["kind"]):

@@ -164,6 +164,7 @@ def test_a_first_run_writes_every_page_and_the_start_page_last(report: Report) -
         "devices/one/unit 7.html",
         "sensors/one.html",
         "sensors/two.html",
+        "shortlist.html",
         "theory.html",
         "made.html",
     }
@@ -389,7 +390,7 @@ def test_reports_of_every_shape_are_sound(tmp_path: Path, shape: str, units: str
 
 def test_nothing_to_show_is_still_a_report(tmp_path: Path) -> None:
     written = publish(run(), tmp_path)
-    assert set(written) == ASSETS | OF_ALL | {"theory.html", "made.html"}
+    assert set(written) == ASSETS | OF_ALL | {"shortlist.html", "theory.html", "made.html"}
     page = read_pages(tmp_path)["index.html"]
     assert "0 recordings of 0 sensors" in page.text
     assert not {"comparison", "parameters", "verdict"} & page.ids

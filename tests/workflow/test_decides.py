@@ -83,7 +83,8 @@ def test_exports_and_pages_say_so(project: Project) -> None:
 def test_who_includes_it_has_it_decide(project: Project) -> None:
     project.settings = ["decide={include: [one/b]}"]
     assert set(project.jobs()) == {
-        "sensor_tables", "tables", "ranking", "fusion", "exports", "figures", "report",
+        "sensor_tables", "tables", "ranking", "shortlist", "repeatability", "fusion", "exports",
+        "figures", "report",
     }  # fmt: skip
     done = project.run()
     assert done.returncode == 0, done.stdout + done.stderr

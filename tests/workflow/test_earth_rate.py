@@ -171,7 +171,18 @@ def test_steps_and_directions_run_their_own_again(project: Project) -> None:
 
 
 def _joined() -> set[Job]:
-    return {(rule, "") for rule in ("ranking", "fusion", "exports", "figures", "report")}
+    return {
+        (rule, "")
+        for rule in (
+            "ranking",
+            "shortlist",
+            "repeatability",
+            "fusion",
+            "exports",
+            "figures",
+            "report",
+        )
+    }
 
 
 def test_one_core_gives_the_same_tables(project: Project, tmp_path: Path) -> None:

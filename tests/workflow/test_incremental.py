@@ -17,7 +17,19 @@ from tests.workflow.project import CHANNELS, Job, Project, linked, put_log, put_
 pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("workflow")]
 
 STEPS = ("ingest", "allan", "estimate", "reconstruct", "datasheet", "error_budget")
-TOGETHER = {(rule, "") for rule in ("tables", "ranking", "fusion", "exports", "figures", "report")}
+TOGETHER = {
+    (rule, "")
+    for rule in (
+        "tables",
+        "ranking",
+        "shortlist",
+        "repeatability",
+        "fusion",
+        "exports",
+        "figures",
+        "report",
+    )
+}
 ONE = ("one/a", "one/big")
 ALL = (*ONE, "two/f")
 BIG = 60_000  # samples, of a log above 1 MB
@@ -194,7 +206,7 @@ def test_an_edit_of_a_datasheet_runs_its_comparison(project: Project) -> None:
 
 def test_an_edit_of_a_price_class_runs_the_ranking(project: Project) -> None:
     put_sensor(project.folder / "sensors/one.yaml", price_class="consumer")
-    assert project.job_list() == {("ranking", ""), ("report", "")}
+    assert project.job_list() == {("ranking", ""), ("shortlist", ""), ("report", "")}
 
 
 def test_an_edit_of_a_threshold_runs_every_log(project: Project) -> None:

@@ -19,7 +19,18 @@ STEPS_OF_A_RECORDING = dict.fromkeys(
     ("ingest", "allan", "estimate", "reconstruct", "datasheet", "error_budget"), 1
 )
 GLOBAL_STEPS = dict.fromkeys(
-    ("sensor_tables", "tables", "ranking", "fusion", "exports", "figures", "report"), 1
+    (
+        "sensor_tables",
+        "tables",
+        "ranking",
+        "shortlist",
+        "repeatability",
+        "fusion",
+        "exports",
+        "figures",
+        "report",
+    ),
+    1,
 )
 
 
@@ -74,6 +85,7 @@ def test_a_run_leaves_tables_and_a_report(project: Project) -> None:
         "index.html",
         "recordings.html",
         "datasheets.html",
+        "shortlist.html",
         "fusion.html",
         "earth_rate.html",
         "theory.html",

@@ -130,7 +130,7 @@ def repeatability_lines(
     for row in rows:
         if row["sensor"] != sensor:
             continue
-        unit = page_unit(quantity_of(row["channel"]), "signal", system)
+        unit = page_unit(quantity_of(row["channel"]), "adev", system)
         yield {
             "device": row["device"],
             "channel": row["channel"].replace("_", " "),

@@ -23,6 +23,7 @@ from imubench_pipeline.report.practical import units_of_pages
 from imubench_pipeline.report.rate_table import table_page
 from imubench_pipeline.report.recording import recording_page
 from imubench_pipeline.report.sensor import device_page, sensor_page
+from imubench_pipeline.report.shortlist import shortlist_page
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.start import datasheets_page, recordings_page, start_page
 from imubench_pipeline.report.static_figures.files import figure_text
@@ -80,6 +81,7 @@ def pages(site: Site) -> Iterator[Page]:
             yield device_page(site, path)
     yield recordings_page(site)
     yield datasheets_page(site)
+    yield shortlist_page(site)
     yield fusion_page(site)
     if site.settings.get("boards"):
         yield boards_page(site)

@@ -24,6 +24,7 @@ NAVIGATION = (
     ("index.html", "Comparison"),
     ("recordings.html", "Recordings"),
     ("datasheets.html", "Datasheets"),
+    ("shortlist.html", "Before buying"),
     ("fusion.html", "Fusion"),
     ("boards.html", "Boards"),
     ("earth_rate.html", "Earth’s rate"),

@@ -1,0 +1,1 @@
+"""How the fixed bias differs from one turn-on to the next, against what vendors print."""

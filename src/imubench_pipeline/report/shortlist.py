@@ -1,0 +1,76 @@
+"""The page of what datasheets alone say for each requirement, before anything is bought."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from imubench_pipeline.report.practical import number_text
+from imubench_pipeline.report.site import Page, Site
+
+Row = Mapping[str, Any]
+
+
+def shortlist_page(site: Site) -> Page:
+    """Return the page of all sensors of the catalogue, for every requirement.
+
+    Parameters
+    ----------
+    site : Site
+    """
+    rows = site.rows("shortlist")
+
+    def context() -> dict[str, Any]:
+        asked = site.settings["requirements"]
+        return {
+            "boards": [
+                {
+                    "title": asked[name]["title"],
+                    "note": asked[name].get("note"),
+                    "rows": [_line(site, row) for row in rows if row["requirement"] == name],
+                }
+                for name in dict.fromkeys(row["requirement"] for row in rows)
+            ]
+        }
+
+    return Page("shortlist.html", "shortlist.html.jinja", site.key_of(rows, site.sensors), context)
+
+
+def _line(site: Site, row: Row) -> dict[str, Any]:
+    sensor, verdict, best, worst, measured, _ = cells(row)
+    return {
+        **row,
+        "name": site.names.get(row["sensor"], sensor),
+        "logged": row["sensor"] in site.sensors,
+        "verdict": verdict,
+        "best": best,
+        "worst": worst,
+        "measured": measured,
+    }
+
+
+def cells(row: Row) -> list[str]:
+    """Return sensor, verdict, margins at best, at worst and measured, and the limit, as texts."""
+    measured = _margin(row["measured_margin"])
+    if row["measured_margin_of"] == "simulated logs":
+        measured += " (simulated)"
+    return [
+        row["sensor"],
+        row["verdict"],
+        _margin(row["best_margin"]),
+        _margin(row["worst_margin"]) if row["best_margin"] is not None else "–",
+        measured,
+        row["decides"] or row["reason"] or "",
+    ]
+
+
+def notes(rows: Sequence[Row]) -> Iterator[str]:
+    """Yield what is assumed of each sensor, or why it is not judged, in a line each."""
+    for row in rows:
+        said = [row["reason"], row["assumed"]]
+        if any(said):
+            yield f"{row['sensor']}: {'; '.join(filter(None, said))}"
+
+
+def _margin(value: float | None) -> str:
+    return "–" if value is None else number_text(value, 3)

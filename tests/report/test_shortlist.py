@@ -1,0 +1,54 @@
+"""The page of what datasheets alone say, and the bias repeatability on the page of a sensor."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from imubench_pipeline.report.publish import publish
+from imubench_pipeline.tables import build
+from tests.report.pages import Read, sound_pages
+from tests.report.tables import HOUR, ROBOT, joined, recording_rows, site
+
+HOSTILE = "<b>grades</b> & more"
+ROW = {"requirement": "robot", "sensor": "one", "price_class": "consumer", "best_margin": 2.0,
+       "worst_margin": 0.25, "decides": "heading within 5 deg", "verdict": "worth logging",
+       "measured_margin_of": "simulated logs", "measured_margin": 1.234,
+       "measured_verdict": "probably passes", "assumed": HOSTILE}  # fmt: skip
+OTHERS: list[dict[str, Any]] = [
+    {"requirement": "robot", "sensor": "unlogged", "best_margin": 0.5, "verdict": "cannot pass"},
+    {"requirement": "robot", "sensor": "silent", "verdict": "not judged", "reason": "no gyro"},
+]
+REPEATED = {"sensor": "one", "device": "unit 7", "channel": "gyro_x", "recordings": 3,
+            "power_cycled": "unknown", "printed": 4.0, "unit": "deg/h", "kind": "typ",
+            "comparable": 4 * HOUR, "measured": 2 * HOUR, "lower": HOUR, "upper": 12 * HOUR,
+            "delta": -0.5, "verdict": "not sure", "reason": "the power"}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def read(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Read]:
+    tables = joined(recording_rows("one", "day"), requirements={"robot": ROBOT}) | {
+        "shortlist": build("shortlist", [ROW, *OTHERS]),
+        "repeatability": build("repeatability", [REPEATED]),
+    }
+    folder: Path = tmp_path_factory.mktemp("report")
+    publish(site(tables, requirements={"robot": ROBOT}), folder)
+    return sound_pages(folder, {f"figures/allan_gyro_x.{kind}" for kind in ("svg", "pdf")})
+
+
+def test_best_worst_and_measured_stand_side_by_side(read: dict[str, Read]) -> None:
+    page = read["shortlist.html"]
+    (line,) = page.naming("one", "tr")
+    for text in ("worth logging", "0.25", "1.23 (simulated)", "probably passes", HOSTILE):
+        assert text in line.text
+    (line,) = page.naming("unlogged", "tr")
+    assert "cannot pass" in line.text and "0.5" in line.text
+    (line,) = page.naming("silent", "tr")
+    assert "not judged" in line.text and "no gyro" in line.text
+
+
+def test_the_spread_of_turn_ons_stands_on_the_page_of_the_sensor(read: dict[str, Read]) -> None:
+    page = read["sensors/one.html"]
+    assert "Bias from one turn-on to the next" in page.text
+    assert any("not sure" in one.text and "the power" in one.text
+               for one in page.naming("unit 7", "tr"))  # fmt: skip
