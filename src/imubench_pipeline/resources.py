@@ -79,7 +79,7 @@ _OF_A_RECORDING: Mapping[str, tuple[float, float, float, float, float]] = {
     "estimate": (400, 5, 10, 0.7, 0.1),
     "reconstruct": (350, 15, 1, 1.3, 0.6),
     "datasheet": (300, 0, 1, 0, 0),
-    "error_budget": (300, 20, 3, 0.5, 0.05),
+    "error_budget": (350, 0, 3, 0.5, 0.05),
     "earth_rotation": (450, 60, 15, 0, 3),
     "calibration": (450, 60, 5, 0, 1),
 }

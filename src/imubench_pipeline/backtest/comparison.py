@@ -8,15 +8,16 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from imubench_pipeline.backtest.covariance import WindowCovariance
 from imubench_pipeline.backtest.prediction import Predicted
-from imubench_pipeline.backtest.windows import block_means, errors, window
+from imubench_pipeline.backtest.windows import Window, errors
 from imubench_pipeline.error_budget.budget import of_sensor
 from imubench_pipeline.error_budget.growth import Calibrated
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.phase import Phase
 
+Array = NDArray[np.float64]
 Verdict = Literal["as predicted", "more than predicted", "less than predicted"]
 
 SHORTEST = 3
@@ -103,8 +104,8 @@ class Comparison:
 
 def compare(
     asked: DeadReckoning,
-    phase: Phase,
-    rate: float,
+    cut: Window,
+    means: Sequence[Array],
     model: NoiseModel,
     drawn: Sequence[NoiseModel],
     *,
@@ -115,10 +116,10 @@ def compare(
     Parameters
     ----------
     asked : DeadReckoning
-    phase : Phase
-        Of the log.
-    rate : float
-        Hz.
+    cut : Window
+        That of the times at rest and in motion.
+    means : sequence of ndarray
+        Of the blocks of each segment of the log, NaN where samples are missing.
     model : NoiseModel
         Of the log; it has a term.
     drawn : sequence of NoiseModel
@@ -134,14 +135,10 @@ def compare(
     lower, upper = np.quantile([asked.sigma(one) for one in drawn], [0.025, 0.975])
     # The draws of what is absent lie above it: the value itself is inside.
     budget = (predicted, min(float(lower), predicted), max(float(upper), predicted))
-    cut = window(asked.rest, asked.time, rate)
-    if cut is None:
-        shorter = min(asked.rest, asked.time)
-        return Comparison(0, *budget, reason=f"at {rate:g} Hz no sample lies in {shorter:g} s")
     covariance = WindowCovariance(cut, asked.order, asked.factor)
-    found = errors(block_means(phase, cut.block, rate), covariance.weights, covariance.lags)
+    found = errors(means, covariance.weights, covariance.lags)
     if found.count <= (SHORTEST - 1) * cut.blocks:
-        return Comparison(found.count, *budget, reason=_too_few(asked, phase, rate, found.count))
+        return Comparison(found.count, *budget, reason=_too_few(asked, cut, means, found.count))
     possible = [one for one in drawn if one.terms] or [model]
     by_draws = Predicted([covariance.spread(one, found) for one in possible], efficient)
     least, most = by_draws.limits()
@@ -156,11 +153,11 @@ def compare(
     )
 
 
-def _too_few(asked: DeadReckoning, phase: Phase, rate: float, count: int) -> str:
+def _too_few(asked: DeadReckoning, cut: Window, means: Sequence[Array], count: int) -> str:
     """Return why a log has too few windows."""
     span, needed = asked.rest + asked.time, asked.duration_needed
-    longest = max(stop - start for start, stop in phase.segments) / rate
+    longest = cut.block * max(len(segment) for segment in means)
     wanted = f"{SHORTEST} windows of {span:g} s, one after the other, need {needed:g} s"
     if longest < needed:
-        return f"log too short: {wanted}; its longest part without a break has {longest:.4g} s"
+        return f"log too short: {wanted}; its longest part without a break has {longest:.3g} s"
     return f"gaps leave {count} overlapping windows: {wanted} without a gap"

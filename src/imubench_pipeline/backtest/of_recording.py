@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from functools import cache
 from typing import Any
 
+from imubench_pipeline.backtest.block_means import block_means
 from imubench_pipeline.backtest.comparison import Comparison, DeadReckoning, compare
+from imubench_pipeline.backtest.windows import window
 from imubench_pipeline.error_budget import draw_models, drawn_jointly
 from imubench_pipeline.estimators.estimate import Estimate
-from imubench_pipeline.phase import Phase, integrate
 from imubench_pipeline.recording import ChannelLog
-from imubench_pipeline.requirements import DIMENSIONS, Error, Requirement
+from imubench_pipeline.requirements import DIMENSIONS, Error, Limit, Requirement
 from imubench_pipeline.sensor import quantity_of
 from imubench_pipeline.simulate import channel_rng
 from imubench_pipeline.units import SI_UNITS, STANDARD_GRAVITY, quantity_to_si
@@ -94,48 +94,56 @@ def _of_channel(
     seed: int,
 ) -> Iterator[dict[str, Any]]:
     """Yield the rows of a channel, without the names of its recording."""
-    quantity = quantity_of(channel)
+    listed = [
+        (_about(channel, name, limit), _asked(channel, requirement, limit, estimate))
+        for name, requirement in requirements.items()
+        for limit in requirement.limits
+        if (quantity_of(channel), limit.error) in (*_ORDERS, ("gyro", "north"))
+    ]
+    cuts = {
+        asked: window(asked.rest, asked.time, log.rate)
+        for _, asked in listed
+        if isinstance(asked, DeadReckoning)
+    }
+    lengths = {cut.block for cut in cuts.values() if cut}
+    means = block_means(log.blocks(), log.segments, log.rate, lengths)
     drawn = draw_models(estimate, draws, channel_rng(seed, *names.values(), channel, "backtest"))
-
-    @cache
-    def phase() -> Phase:
-        # Only where a limit is held against this channel.
-        return integrate(log.blocks(), log.grid, holes=log.holes, segments=log.segments)
-
-    for name, requirement in requirements.items():
-        for limit in requirement.limits:
-            about = {
-                "channel": channel,
-                "requirement": name,
-                "error": limit.error,
-                "time": limit.seconds,
-                "unit": SI_UNITS[DIMENSIONS[limit.error]],
+    jointly = drawn_jointly(estimate)
+    for about, asked in listed:
+        if not isinstance(asked, DeadReckoning):
+            yield about | {"reason": asked}
+        elif (cut := cuts[asked]) is None:
+            yield about | {
+                "reason": f"two samples are further apart than the times: {log.rate:g} Hz"
             }
-            if limit.error == "north" and quantity == "gyro":
-                yield about | {"reason": _NORTH}
-            elif (quantity, limit.error) not in _ORDERS:
-                continue
-            elif requirement.static_window is None:
-                yield about | {"reason": _TURN_ON}
-            elif not estimate.model.terms:
-                yield about | {"reason": "nothing is known of the noise of this channel"}
-            else:
-                order, factor = _ORDERS[quantity, limit.error]
-                rest = quantity_to_si(requirement.static_window, "time")
-                asked = DeadReckoning(order, rest, limit.seconds, factor)
-                found = compare(
-                    asked,
-                    phase(),
-                    log.rate,
-                    estimate.model,
-                    drawn,
-                    efficient=drawn_jointly(estimate),
-                )
-                yield about | _columns(asked, found)
+        else:
+            found = compare(asked, cut, means[cut.block], estimate.model, drawn, efficient=jointly)
+            yield about | _columns(asked, found)
 
 
-_NORTH = "a log at one position does not tell the bias of a gyro from the Earth's rate"
-_TURN_ON = "turn_on: a log shows one turn-on bias, not how these scatter"
+def _about(channel: str, requirement: str, limit: Limit) -> dict[str, Any]:
+    return {
+        "channel": channel,
+        "requirement": requirement,
+        "error": limit.error,
+        "time": limit.seconds,
+        "unit": SI_UNITS[DIMENSIONS[limit.error]],
+    }
+
+
+def _asked(
+    channel: str, requirement: Requirement, limit: Limit, estimate: Estimate
+) -> DeadReckoning | str:
+    """Return what a limit asks of a channel, or why its log cannot answer."""
+    if limit.error == "north":
+        return "a log at one position does not tell the bias of a gyro from the Earth's rate"
+    if requirement.static_window is None:
+        return "turn_on: a log shows one turn-on bias, not how these scatter"
+    if not estimate.model.terms:
+        return "nothing is known of the noise of this channel"
+    order, factor = _ORDERS[quantity_of(channel), limit.error]
+    rest = quantity_to_si(requirement.static_window, "time")
+    return DeadReckoning(order, rest, limit.seconds, factor)
 
 
 def _columns(asked: DeadReckoning, found: Comparison) -> dict[str, Any]:

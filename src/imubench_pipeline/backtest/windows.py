@@ -15,17 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.phase import Phase
-
 Array = NDArray[np.float64]
 
 BLOCKS = range(8, 25)
 """Blocks in the shorter part of a window. With 8 the windows, which begin a block apart, tell of
 white noise 99 % of what windows at every sample would, and the weights of a double integration,
 level over a block, change its rms by 0.2 %; more are taken where they divide both parts evenly."""
-
-PRESENT = 0.9
-"""Part of the samples of a block that must be there, as of a cluster of the Allan variance."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +91,8 @@ def window(rest: float, time: float, rate: float) -> Window | None:
         None where its shorter part has no sample.
     """
     shorter, longer = sorted((rest, time))
-    most = math.floor(shorter * rate + 1e-9)
+    # A rate that is found from stamps may be a little low.
+    most = math.floor(1.001 * shorter * rate)
     if most < 1:
         return None
     counts = [number for number in BLOCKS if number <= most] or [most]
@@ -112,37 +108,6 @@ def _uneven(number: int, shorter: float, longer: float, rate: float) -> float:
     # Blocks have a sample more or less: the mean of 1 / size is above 1 / mean size.
     part = samples % 1.0
     return abs(round(others) / others - 1.0) + part * (1.0 - part) / samples**2
-
-
-def block_means(phase: Phase, block: float, rate: float) -> list[Array]:
-    """Return the means of consecutive blocks of each segment, NaN where samples are missing.
-
-    Parameters
-    ----------
-    phase : Phase
-        Of the log.
-    block : float
-        Length of a block, s: at least a sample.
-    rate : float
-        Hz.
-
-    Returns
-    -------
-    list of ndarray
-        rad/s or m/s^2, less a constant.
-    """
-    found = []
-    for start, stop in phase.segments:
-        blocks = math.floor((stop - start) / (block * rate) + 1e-9)
-        # A block has a sample more or less where the samples do not divide evenly.
-        edges = start + np.rint(np.arange(blocks + 1) * (block * rate)).astype(np.int64)
-        size = np.diff(edges)
-        there = size if phase.present is None else np.diff(phase.present[edges])
-        sums = np.diff(phase.theta[edges])
-        means = np.full(blocks, np.nan)
-        np.divide(sums, there, out=means, where=there >= PRESENT * size)
-        found.append(means)
-    return found
 
 
 @dataclass(frozen=True)
