@@ -12,6 +12,7 @@ PUBLIC = ["allan", "confidence", "noise", "simulate", "score", "datasheet", "uni
           "estimators/curve", "estimators/least_squares", "readers/__init__", "ingest",
           "coverage", "suspicion", "conversions", "overbound", "requirements", "selection",
           "expected_errors", "error_budget/budget", "error_budget/growth", "error_budget/in_use",
+          "error_budget/largest",
           "error_budget/parts", "error_budget/printed_errors", "suitability/abilities",
           "suitability/conditions", "export/choice",
           "export/growth", "export/mapping", "export/request", "export/of_run", "overview",

@@ -11,7 +11,13 @@ from typing import Any
 from imubench_pipeline.fitness import left_out
 from imubench_pipeline.requirements import Requirement
 from imubench_pipeline.suitability.abilities import Abilities
-from imubench_pipeline.suitability.conditions import Rests, is_missing, named, parts_of
+from imubench_pipeline.suitability.conditions import (
+    Rests,
+    is_condition,
+    named,
+    once_calibrated,
+    parts_of,
+)
 
 Row = Mapping[str, Any]
 
@@ -20,6 +26,14 @@ _SURE = 0.975
 
 _NOTHING = {"sigma": None, "lower": None, "upper": None, "within": None, "reached_after": None}
 """What is known from a recording that does not decide."""
+
+_WORST_FIRST = (
+    "surely fails",
+    "probably fails",
+    "not enough data",
+    "probably passes",
+    "passes",
+)
 
 _VAGUE = 4.0
 """Upper over lower limit of an error beyond which the logs say too little."""
@@ -39,15 +53,15 @@ class Standing:
         Its part of the variance.
     parts : str or None
         All sources that count.
-    missing : tuple of mapping
-        Rows of sources whose figure is not known.
+    conditions : tuple of mapping
+        Rows of sources whose figure is not known, or breaks the limit until it is calibrated.
     """
 
     total: Row
     source: str | None = None
     share: float | None = None
     parts: str | None = None
-    missing: tuple[Row, ...] = ()
+    conditions: tuple[Row, ...] = ()
 
     @property
     def known(self) -> bool:
@@ -128,7 +142,7 @@ def ranking_rows(
             sensor: Rests.of(
                 requirement.must,
                 Abilities.model_validate(sensors[sensor].get("abilities", {})),
-                [row for standing in found for row in standing.missing],
+                [row for standing in found for row in standing.conditions],
             )
             for sensor, found in standings.items()
         }
@@ -146,7 +160,7 @@ def ranking_rows(
             outside = None if requirement.admits(price_class) else "outside the price class"
             if outside and price_class is None:
                 outside = "price class not stated"
-            verdict, conditions = rests[sensor].verdict(one.verdict)
+            verdict, conditions = rests[sensor].verdict(_overall(found, one))
             for standing in found:
                 yield {
                     "requirement": name,
@@ -209,15 +223,15 @@ def _standings(rows: list[Row], requirement: Requirement) -> dict[str, list[Stan
                 for row in parts
                 if row["source"] != "total" and row["recording"] == total["recording"]
             ]
-            missing = tuple(row for row in own_parts if is_missing(row))
-            sources = [row for row in own_parts if not is_missing(row)]
+            conditions = tuple(row for row in own_parts if is_condition(row))
+            sources = [row for row in own_parts if row["sigma"] is not None]
             largest = max(sources, key=lambda row: row["sigma"], default=None)
             if largest is None or total["sigma"] == 0.0:
-                standings.append(Standing(total, missing=missing))
+                standings.append(Standing(total, conditions=conditions))
             else:
                 share = (largest["sigma"] / total["sigma"]) ** 2
                 shares = parts_of(total["sigma"], sources)
-                standings.append(Standing(total, named(largest), share, shares, missing))
+                standings.append(Standing(total, named(largest), share, shares, conditions))
         found[sensor] = standings
     return found
 
@@ -228,6 +242,14 @@ def _deciding(standings: list[Standing]) -> Standing:
     worst = min(known, key=lambda one: one.margin, default=standings[0])
     unknown = [one for one in standings if not one.known]
     return worst if not unknown or worst.verdict == "surely fails" else unknown[0]
+
+
+def _overall(standings: list[Standing], deciding: Standing) -> str:
+    """Return the verdict on a sensor: of the limit that decides, or of all if it is calibrated."""
+    once = [once_calibrated(one.verdict, one.total, one.conditions) for one in standings]
+    if deciding.known and once != [one.verdict for one in standings]:
+        return min(once, key=_WORST_FIRST.index)
+    return deciding.verdict
 
 
 def _rank(
