@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from decimal import ROUND_DOWN, Decimal
 from typing import Any
 
 from imubench_pipeline.requirements import Must
@@ -114,10 +115,16 @@ class Rests:
         for (measured, cause), largest in self.figures.items():
             text, *units = _FIGURES[cause]
             unit = units[measured == "accel"]
-            size = f"{from_si(largest, unit, _DIMENSIONS[unit]):.2g} {unit} (1 sigma)"
+            size = f"{_down(from_si(largest, unit, _DIMENSIONS[unit])):g} {unit} (1 sigma)"
             yield text.format(sensor=_SENSORS[measured], largest=size)
         if self.unknown:
             yield f"it has what it must (not known: {', '.join(self.unknown)})"
+
+
+def _down(value: float) -> float:
+    """Return a number above 0 cut to three digits: rounded up it would no more keep the limit."""
+    step = Decimal(1).scaleb(Decimal(value).adjusted() - 2)
+    return float(Decimal(value).quantize(step, rounding=ROUND_DOWN))
 
 
 def in_words(row: Row) -> str:
