@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -16,7 +15,6 @@ from imubench_pipeline.error_budget import (
     Budget,
     Figures,
     Gyrocompass,
-    Missing,
     Quantity,
     Start,
     Uncalibrated,
@@ -28,10 +26,9 @@ from imubench_pipeline.error_budget import (
     interval,
     time_until,
 )
-from imubench_pipeline.error_budget.printed_errors import PRINTED
+from imubench_pipeline.error_budget.largest import Largest, source_row
 from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.printed import FIGURE_DIMENSIONS
 from imubench_pipeline.requirements import DIMENSIONS, Axis, Environment, Error, Requirement
 from imubench_pipeline.sensor import quantity_of
 from imubench_pipeline.simulate import channel_rng
@@ -296,43 +293,11 @@ def error_rows(
                 or None,
             }
         )
+        largest = Largest.of(found, question.limit, upper)
         for contribution in sorted(found.contributions, key=lambda one: -one.sigma):
-            figure = contribution.figure
-            yield (
-                asked
-                | chosen
-                | {
-                    "source": contribution.source,
-                    "sigma": contribution.sigma,
-                    "cause": contribution.cause,
-                    "origin": figure.origin if figure else "measured",
-                    "kind": figure.kind if figure else None,
-                    "convention": figure.convention if figure else None,
-                }
-            )
+            yield asked | chosen | source_row(contribution) | largest.of_bias(contribution)
         for one in found.missing if question.limit is not None else ():
-            room = _room(question.limit, found.total, upper) / math.sqrt(len(found.missing))
-            yield asked | chosen | _missing_row(one, room)
-
-
-def _room(limit: float | None, total: float, upper: float) -> float:
-    """Return what may come to a total within a limit: to its upper limit, where that fits."""
-    assert limit is not None  # there is none to keep otherwise
-    taken = upper if upper < limit else total
-    return math.sqrt(max(limit**2 - taken**2, 0.0))
-
-
-def _missing_row(missing: Missing, room: float) -> dict[str, Any]:
-    """Return the row of a source that is not known, with the largest figure that has room."""
-    dimension = FIGURE_DIMENSIONS[missing.quantity][PRINTED[missing.cause]][0]
-    return {
-        "source": missing.source,
-        "cause": missing.cause,
-        "origin": "not known",
-        "largest": room / missing.lever if room else None,
-        "largest_unit": SI_UNITS[dimension],
-        "reason": missing.reason,
-    }
+            yield asked | chosen | largest.of_missing(one)
 
 
 def _drawn(figures: Figures, draws: int, rng: np.random.Generator) -> list[Figures]:

@@ -84,12 +84,32 @@ def test_the_largest_figure_is_that_with_which_the_limit_is_just_kept(
 def test_a_tilt_has_the_turn_on_bias_of_the_datasheet() -> None:
     asked = requirement("attitude", "5 deg", environment={})
     found = ranking(asked, known={"accel": ACCEL}, unknown={})
-    # 50 mg are 2.86 deg, 5.6 deg at 95 %.
-    assert found["known"]["verdict"] == "surely fails"
+    # 50 mg are 2.86 deg, 5.6 deg at 95 %: it fails as delivered, and its margin says so.
+    assert found["known"]["limit_verdict"] == "surely fails" and found["known"]["margin"] < 1.0
+    assert found["known"]["verdict"] == "passes if"
+    assert found["known"]["conditions"] == found["unknown"]["conditions"]
     assert found["known"]["source"] == "initial tilt by accel turn-on bias (datasheet, typ)"
     assert found["unknown"]["verdict"] == "passes if"
     assert "its accelerometers are calibrated to 4" in found["unknown"]["conditions"]
     assert "mg (1 sigma)" in found["unknown"]["conditions"]
+
+
+def test_a_bias_that_is_calibrated_as_it_says_keeps_the_limit() -> None:
+    asked = requirement("attitude", "5 deg", environment={})
+    said = ranking(asked, s={"accel": ACCEL})["s"]["conditions"]
+    size = float(said.partition("calibrated to ")[2].split()[0])
+    for share, verdict in ((0.97, "passes"), (1.05, "passes if")):
+        offset = {"offset": {"value": share * size, "unit": "mg", "kind": "1sigma"}}
+        assert ranking(asked, s={"accel": offset})["s"]["verdict"] == verdict
+
+
+def test_no_calibration_helps_where_another_limit_fails() -> None:
+    limits = [
+        {"error": "attitude", "after": "60 s", "at_most": "5 deg"},
+        {"error": "heading", "after": "60 s", "at_most": "0.001 deg"},
+    ]
+    row = ranking(requirement(limits=limits, environment={}), s={"accel": ACCEL})["s"]
+    assert (row["verdict"], row["conditions"]) == ("surely fails", None)
 
 
 def test_what_fails_already_has_no_condition() -> None:

@@ -16,7 +16,7 @@ from imubench_pipeline.report.practical import (
 )
 from imubench_pipeline.report.words import evidence_words
 from imubench_pipeline.requirements import DIMENSIONS, Requirement
-from imubench_pipeline.suitability.conditions import is_missing, parts_of
+from imubench_pipeline.suitability.conditions import parts_of
 
 Row = Mapping[str, Any]
 Simulated = Mapping[tuple[str, str], bool]
@@ -164,7 +164,7 @@ def _cell(rows: Sequence[Row], unit: PageUnit) -> dict[str, Any]:
     lines = [shown]
     if _sensible(total, total["sigma"]):
         lines.append(interval_text(total, unit))
-    sources = [row for row in rows if row["source"] != "total" and not is_missing(row)]
+    sources = [row for row in rows if row["source"] != "total"]
     if total["sigma"] > 0.0:
         lines += (parts_of(total["sigma"], sources) or "").split("; ")
     return {"lines": lines, "note": total["reason"] or "", "class": "number"}

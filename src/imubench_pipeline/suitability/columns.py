@@ -9,8 +9,12 @@ IN_USE = (
     text("origin", "of a source: measured, datasheet, requirement or not known", required=False),
     text("kind", "of a printed figure: typ, max, 1sigma, ...", required=False),
     text("convention", "how a figure became a standard deviation", required=False),
-    number("largest", "as in largest_unit", "1 sigma of an unknown figure that keeps the limit"),
-    text("largest_unit", "SI unit of the figure that is not known", required=False),
+    number(
+        "largest",
+        "as in largest_unit",
+        "1 sigma with which the limit is kept",
+    ),
+    text("largest_unit", "SI unit of the figure", required=False),
 )
 """Where a source of the table ``error_budget`` is from."""
 

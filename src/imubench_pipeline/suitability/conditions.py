@@ -3,13 +3,16 @@
 A sensor that is known not to have what a requirement says it must is excluded. One whose known
 errors pass, but of which a figure is not known that the use brings into play, passes if that
 figure is below the largest that leaves the limit kept; several that are not known share what room
-there is, so that with all of them at their largest the limit is just reached.
+there is, so that with all of them at their largest the limit is just reached. One whose printed
+turn-on bias alone breaks a limit passes if it is calibrated to what there is room for.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from decimal import ROUND_DOWN, Decimal
 from typing import Any
 
 from imubench_pipeline.requirements import Must
@@ -65,8 +68,8 @@ class Rests:
     unknown : tuple of str
         What it must have, and nobody knows whether it has.
     figures : mapping of (str, str) to float
-        Figures that are not known, by ``gyro`` or ``accel`` and cause, with the largest with which
-        every limit is kept, SI.
+        Figures that are not known, or too large, by ``gyro`` or ``accel`` and cause, with the
+        largest with which every limit is kept, SI.
     """
 
     lacking: tuple[str, ...]
@@ -74,7 +77,7 @@ class Rests:
     figures: Mapping[tuple[str, str], float]
 
     @classmethod
-    def of(cls, must: Must, has: Abilities, missing: Iterable[Row]) -> Rests:
+    def of(cls, must: Must, has: Abilities, conditions: Iterable[Row]) -> Rests:
         """Return what the verdict on a sensor rests on.
 
         Parameters
@@ -83,12 +86,12 @@ class Rests:
             Of the requirement.
         has : Abilities
             Of the sensor.
-        missing : iterable of mapping
-            Rows of the table ``error_budget`` whose figure is not known, of all limits.
+        conditions : iterable of mapping
+            Rows of the table ``error_budget`` that a limit rests on, of all limits.
         """
         lacking, unknown = judge(must, has)
         figures: dict[tuple[str, str], float] = {}
-        for row in missing:
+        for row in conditions:
             key = _measured(row), row["cause"]
             largest = row["largest"] or 0.0
             figures[key] = min(figures.get(key, largest), largest)
@@ -112,10 +115,16 @@ class Rests:
         for (measured, cause), largest in self.figures.items():
             text, *units = _FIGURES[cause]
             unit = units[measured == "accel"]
-            size = f"{from_si(largest, unit, _DIMENSIONS[unit]):.2g} {unit} (1 sigma)"
+            size = f"{_down(from_si(largest, unit, _DIMENSIONS[unit])):g} {unit} (1 sigma)"
             yield text.format(sensor=_SENSORS[measured], largest=size)
         if self.unknown:
             yield f"it has what it must (not known: {', '.join(self.unknown)})"
+
+
+def _down(value: float) -> float:
+    """Return a number above 0 cut to three digits: rounded up it would no more keep the limit."""
+    step = Decimal(1).scaleb(Decimal(value).adjusted() - 2)
+    return float(Decimal(value).quantize(step, rounding=ROUND_DOWN))
 
 
 def in_words(row: Row) -> str:
@@ -136,14 +145,37 @@ def _measured(row: Row) -> str:
     return next(word for word in row["source"].split() if word in _SENSORS)
 
 
-def is_missing(row: Row) -> bool:
-    """Tell whether a row of the table ``error_budget`` is of a figure that is not known.
+def is_condition(row: Row) -> bool:
+    """Tell whether a limit rests on the figure of a source, a row of the table ``error_budget``.
 
     Parameters
     ----------
     row : mapping
     """
-    return row["origin"] == "not known"
+    return row["largest_unit"] is not None
+
+
+def once_calibrated(words: str, total: Row, conditions: Iterable[Row]) -> str:
+    """Return the verdict on an error when the biases that break its limit are calibrated.
+
+    A bias is in every draw of the total by its square, and so in the limits of the total.
+
+    Parameters
+    ----------
+    words : str
+        The verdict on the error as it is.
+    total : mapping
+        Row of the table ``error_budget``.
+    conditions : iterable of mapping
+        Rows of sources that the limit rests on.
+    """
+    squares = [row["sigma"] ** 2 for row in conditions if row["sigma"] is not None]
+    if not squares or words in CONDITIONAL:
+        return words
+    for size, better in (("upper", "passes"), ("sigma", "probably passes")):
+        if total[size] ** 2 - math.fsum(squares) < total["limit"] ** 2:
+            return better
+    return words
 
 
 def parts_of(total: float, sources: Iterable[Row], least: float = 0.01) -> str | None:

@@ -8,7 +8,7 @@ from typing import Any
 
 from imubench_pipeline.requirements import Requirement
 from imubench_pipeline.suitability.abilities import Abilities
-from imubench_pipeline.suitability.conditions import Rests
+from imubench_pipeline.suitability.conditions import Rests, once_calibrated
 from imubench_pipeline.verdicts.basis import Basis, Row
 from imubench_pipeline.verdicts.evidence import weaknesses
 from imubench_pipeline.verdicts.specimens import Spread, usual_spread
@@ -17,6 +17,14 @@ from imubench_pipeline.verdicts.unless import Unless, unless
 
 _NOTHING = {"sigma": None, "lower": None, "upper": None, "within": None, "reached_after": None}
 """What is known from a recording that does not decide."""
+
+_WORST_FIRST = (
+    "surely fails",
+    "probably fails",
+    "not enough data",
+    "probably passes",
+    "passes",
+)
 
 
 @dataclass(frozen=True)
@@ -56,12 +64,20 @@ class Judgement:
     @property
     def verdict(self) -> str:
         """What is said of the sensor."""
-        return self.outside or self.rests.verdict(self.decides.verdict)[0]
+        return self.outside or self.rests.verdict(self._of_errors)[0]
 
     @property
     def conditions(self) -> str | None:
         """On what the verdict rests, or why the sensor is excluded, in words."""
-        return None if self.outside else self.rests.verdict(self.decides.verdict)[1]
+        return None if self.outside else self.rests.verdict(self._of_errors)[1]
+
+    @property
+    def _of_errors(self) -> str:
+        """The verdict on what is known: of the limit that decides, or of all once calibrated."""
+        once = [_once_calibrated(one) for one in self.standings]
+        if self.decides.known and once != [one.verdict for one in self.standings]:
+            return min(once, key=_WORST_FIRST.index)
+        return self.decides.verdict
 
     @property
     def compared(self) -> bool:
@@ -117,7 +133,7 @@ def judgements(
                 Rests.of(
                     requirement.must,
                     Abilities.model_validate(sensors[sensor].get("abilities", {})),
-                    [row for each in found for row in each.missing],
+                    [row for each in found for row in each.conditions],
                 ),
                 unless(sensor, rows, one, basis),
             )
@@ -148,6 +164,15 @@ def _usual(
                 by_limit.setdefault(limit_of(one.total), []).append(one.expected.spread)
     found = {key: usual_spread(spreads) for key, spreads in by_limit.items()}
     return {key: spread for key, spread in found.items() if spread is not None}
+
+
+def _once_calibrated(one: Standing) -> str:
+    error = {
+        "limit": one.total["limit"],
+        "sigma": one.expected.sigma,
+        "upper": one.expected.upper,
+    }
+    return once_calibrated(one.verdict, error, one.conditions)
 
 
 def _outside(requirement: Requirement, price_class: str | None) -> str | None:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from imubench_pipeline.suitability.conditions import is_missing, named, parts_of
+from imubench_pipeline.suitability.conditions import is_condition, named, parts_of
 from imubench_pipeline.verdicts.specimens import Expected, Spread, expected
 
 Row = Mapping[str, Any]
@@ -38,8 +38,8 @@ class Standing:
         Its part of the variance.
     parts : str or None
         All sources that count.
-    missing : tuple of mapping
-        Rows of sources whose figure is not known.
+    conditions : tuple of mapping
+        Rows of sources whose figure is not known, or breaks the limit until it is calibrated.
     """
 
     total: Row
@@ -48,7 +48,7 @@ class Standing:
     source: str | None = None
     share: float | None = None
     parts: str | None = None
-    missing: tuple[Row, ...] = ()
+    conditions: tuple[Row, ...] = ()
 
     @property
     def known(self) -> bool:
@@ -134,14 +134,14 @@ def _standing(parts: Sequence[Row], devices: Mapping[str, str], usual: Spread | 
     own = [
         row for row in parts if row["source"] != "total" and row["recording"] == answer["recording"]
     ]
-    missing = tuple(row for row in own if is_missing(row))
-    sources = [row for row in own if not is_missing(row)]
+    conditions = tuple(row for row in own if is_condition(row))
+    sources = [row for row in own if row["sigma"] is not None]
     largest = max(sources, key=lambda row: row["sigma"], default=None)
     if largest is None or answer["sigma"] == 0.0:
-        return Standing(answer, known, found, missing=missing)
+        return Standing(answer, known, found, conditions=conditions)
     share = (largest["sigma"] / answer["sigma"]) ** 2
     parts_said = parts_of(answer["sigma"], sources)
-    return Standing(answer, known, found, named(largest), share, parts_said, missing)
+    return Standing(answer, known, found, named(largest), share, parts_said, conditions)
 
 
 def deciding(found: Sequence[Standing]) -> Standing:

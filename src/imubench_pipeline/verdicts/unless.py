@@ -15,7 +15,6 @@ from typing import Any
 
 from scipy.special import ndtr
 
-from imubench_pipeline.suitability.conditions import is_missing
 from imubench_pipeline.units import STANDARD_GRAVITY
 from imubench_pipeline.verdicts.basis import Basis
 from imubench_pipeline.verdicts.sources import quantity_behind
@@ -123,9 +122,9 @@ def scaled(parts: Sequence[Row], factors: Factors) -> list[Row]:
     sources = [
         {**row, "sigma": factors.get(quantity_behind(row["source"]) or "", 1.0) * row["sigma"]}
         for row in parts
-        if row["source"] != "total" and not is_missing(row)
+        if row["source"] != "total" and row["sigma"] is not None
     ]
-    missing = [row for row in parts if is_missing(row)]
+    missing = [row for row in parts if row["source"] != "total" and row["sigma"] is None]
     (total,) = (row for row in parts if row["source"] == "total")
     if not total["sigma"] or not sources:
         return list(parts)
