@@ -151,8 +151,8 @@ def test_a_ranking_has_its_verdicts_in_words(
     assert words(lines[good]) == "1 good passes 0.25 of 1° heading 4"
     assert words(lines[good + 1]) == "tied with made 0.2 to 0.333 after 60 s"
     assert "surely fails" in lines[good + 2] and "made (simulated)" in lines[good + 2]
-    assert "not enough data" in lines[good + 4]
-    assert "no accelerometer in the recording" in lines[good + 4]
+    (third,) = (line for line in lines if "not enough data" in line)
+    assert "no accelerometer in the recording" in third
     assert "position" not in text  # another limit decides
     assert "Ranking for drone" in text
 
