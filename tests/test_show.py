@@ -48,9 +48,12 @@ PARAMETERS = [
 RANKING = [
     standing("good", tied_with="made"),
     standing("good", decides=False, error="position", unit="m", limit=2.0, sigma=1.0, margin=2.0),
-    standing("made", rank=2, margin=0.5, sigma=2 * DEGREE, verdict="surely fails"),
+    standing("made", rank=2, margin=0.5, sigma=2 * DEGREE, verdict="surely fails", specimens=1,
+             recordings=1, longest_log=660.0, evidence="weak",
+             evidence_reasons="one_specimen, short_log"),
     standing("third", rank=None, verdict="not enough data", sigma=None, margin=None,
-             reason="no accelerometer in the recording"),
+             reason="no accelerometer in the recording",
+             unless="if the gyro is in °/s, and not rad/s, it passes (margin 7.5)"),
     standing("made", requirement="drone"),
 ]  # fmt: skip
 
@@ -73,6 +76,11 @@ def results(tmp_path: Path) -> Path:
              "detail": "twice"},
         ],
         "ranking": RANKING,
+        "next_steps": [
+            {"sensor": "third", "recording": "run", "requirements": "robot", "action": "check_unit",
+             "verdicts_turned": 4 - i, "verdicts_strengthened": 0, "text": f"step {i}"}
+            for i in range(4)
+        ],
         "failures": [],
         "parameters": PARAMETERS,
     }  # fmt: skip
@@ -121,6 +129,19 @@ def test_what_was_compared_comes_first(results: Path, capsys: pytest.CaptureFixt
     assert "twice" not in text and "a note" not in text
 
 
+def test_weak_evidence_what_would_turn_a_verdict_and_what_to_do_are_said(
+    results: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = shown(capsys, results, "--width", 200)
+    assert after(text, "What to do next: 3") == (
+        "third: step 0 (robot) third: step 1 (robot) third: step 2 (robot)"
+    )
+    ranking = after(text, "Ranking for robot")
+    for part in ("on weak evidence: one specimen;", "log of 11 min",
+                 "if the gyro is in °/s, and not", "rad/s, it passes (margin 7.5)"):  # fmt: skip
+        assert part in ranking
+
+
 def test_a_ranking_has_its_verdicts_in_words(
     results: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -130,8 +151,8 @@ def test_a_ranking_has_its_verdicts_in_words(
     assert words(lines[good]) == "1 good passes 0.25 of 1° heading 4"
     assert words(lines[good + 1]) == "tied with made 0.2 to 0.333 after 60 s"
     assert "surely fails" in lines[good + 2] and "made (simulated)" in lines[good + 2]
-    assert "not enough data" in lines[good + 4]
-    assert "no accelerometer in the recording" in lines[good + 4]
+    (third,) = (line for line in lines if "not enough data" in line)
+    assert "no accelerometer in the recording" in third
     assert "position" not in text  # another limit decides
     assert "Ranking for drone" in text
 
@@ -217,7 +238,7 @@ def test_results_without_tables_say_what_is_missing(
     results: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     said = refused(capsys, results / "nowhere")
-    assert "no table recordings, findings, failures, ranking, parameters" in said
+    assert "no table recordings, findings, failures, ranking, next_steps, parameters" in said
     assert "expected the folder of the results" in said and "`snakemake -c2` makes it" in said
     (results / "tables/ranking.parquet").write_bytes(b"")
     assert "`snakemake -c2` makes the tables again" in refused(capsys, results)

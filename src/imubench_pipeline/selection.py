@@ -96,7 +96,7 @@ def _limit_row(standing: Standing) -> Row:
         "sigma": found.sigma,
         "lower": found.lower,
         "upper": found.upper,
-        "margin": standing.margin if known else None,
+        "margin": _margin(standing),
         "chance": standing.chance if known else None,
         "limit_verdict": standing.verdict,
         "source": standing.source,
@@ -144,10 +144,14 @@ def _unless_row(one: Judgement) -> Row:
     return {
         "unless": unless_words(found),
         "unless_verdict": found.mended and found.mended.verdict,
-        "unless_margin": found.mended and found.mended.margin,
+        "unless_margin": _margin(found.mended),
         "logged_verdict": found.logged and found.logged.verdict,
-        "logged_margin": found.logged and found.logged.margin,
+        "logged_margin": _margin(found.logged),
     }
+
+
+def _margin(standing: Standing | None) -> float | None:
+    return standing.margin if standing is not None and standing.known else None
 
 
 def _rank(sensor: str, compared: Mapping[str, Judgement]) -> tuple[int, list[str]]:

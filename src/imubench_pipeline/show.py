@@ -11,7 +11,7 @@ from typing import Any
 
 Rows = list[Mapping[str, Any]]
 
-_NEEDED = ("recordings", "findings", "failures", "ranking", "parameters")
+_NEEDED = ("recordings", "findings", "failures", "ranking", "next_steps", "parameters")
 _NARROWEST = 40
 
 

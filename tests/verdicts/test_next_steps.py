@@ -3,6 +3,7 @@ import math
 import pytest
 from scipy import stats
 
+from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.verdicts.next_steps import specimens_needed
 from imubench_pipeline.verdicts.specimens import Expected, Spread
 from tests.verdicts.budgets import HEADING, about, doubt, gyro, judge, requirement, three_axes
@@ -67,6 +68,22 @@ def test_a_quantity_that_a_limit_needs_is_to_be_logged() -> None:
     assert step["text"] == (
         "log the accelerometer, which r does not have: it would allow 1 verdict"
     )
+
+
+def test_a_log_of_which_nothing_is_known_is_to_be_longer() -> None:
+    silent = {"gyro_x": Estimate("likelihood", {"N": Parameter(None, "not_shown", "too short")})}
+    rows = [row | {"value": None} for row in three_axes("s", "r")]
+    for duration, actions in ((60.0, ["log_longer"]), (9.1 * 3600, [])):
+        logs = [about("s", "r", duration=duration)]
+        _, steps = judge({"s": {"r": silent}}, {"robot": HEADING}, logs, parameters=rows)
+        assert [step["action"] for step in steps] == actions
+
+
+def test_a_doubt_of_a_unit_that_turns_nothing_is_one_of_evidence() -> None:
+    doubts = [doubt("s", "r", "unusual_figure", factor=FACTOR), doubt("s", "r", "knocks")]
+    _, steps = judge({"s": {"r": gyro(0.01 * FACTOR)}}, {"robot": HEADING}, doubts=doubts)
+    found = {row["action"]: (row["verdicts_turned"], row["verdicts_strengthened"]) for row in steps}
+    assert found == {"check_unit": (0, 1), "record_again": (0, 1), "add_specimens": (0, 1)}
 
 
 def test_a_short_log_is_to_be_as_long_as_it_takes() -> None:

@@ -40,6 +40,17 @@ def test_a_verdict_that_stands_is_said_with_what_would_turn_it() -> None:
     assert (rows[0]["verdict"], rows[0]["unless_verdict"]) == ("passes", "surely fails")
 
 
+def test_a_failure_that_a_unit_would_lift_may_leave_another_limit_open() -> None:
+    both = requirement(("heading", "100 s", "0.1 deg"), ("position", "10 s", "1 m"))
+    rows, _ = judge({"s": {"r": gyro(7.5 / DEGREES)}}, {"robot": both}, doubts=UNIT)
+    assert (rows[0]["verdict"], rows[0]["unless_verdict"]) == ("surely fails", "not enough data")
+    assert rows[0]["unless_margin"] is None
+    assert rows[0]["unless"] == (
+        "if the gyro is in °/s, and not rad/s, it cannot be judged "
+        "(no accelerometer in the recording)"
+    )
+
+
 def test_a_unit_that_turns_nothing_is_not_spoken_of() -> None:
     rows, _ = judge({"s": {"r": gyro(0.01 / DEGREES)}}, {"robot": HEADING}, doubts=UNIT)
     assert rows[0]["unless"] is None

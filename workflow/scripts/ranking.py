@@ -21,7 +21,8 @@ def main(tables: dict[str, Path], settings: str, outputs: list[Path]) -> None:
     }
     joined = {name: read(name, [path]) for name, path in tables.items()}
     asked = joined.pop("error_budget").filter(pc.field("requirement").is_valid())
-    recommended = joined["parameters"].filter(pc.field("recommended"))
+    columns = ["sensor", "recording", "channel", "recommended", "value"]
+    recommended = joined["parameters"].select(columns).filter(pc.field("recommended"))
     basis = Basis.of(
         joined["recordings"].to_pylist(),
         joined["doubts"].to_pylist(),

@@ -160,12 +160,22 @@ def _rankings(site: Site) -> Iterator[dict[str, Any]]:
         }
 
 
-def _next_steps(site: Site) -> Iterator[dict[str, str]]:
+def _next_steps(site: Site) -> Iterator[dict[str, Any]]:
     """Yield what would turn or strengthen most verdicts."""
     titles = {name: one["title"] for name, one in site.settings["requirements"].items()}
     for row in site.rows("next_steps")[:_STEPS]:
         about = "; ".join(titles[name] for name in listed_names(row["requirements"], titles))
-        yield {"sensor": row["sensor"], "text": sentence(row["text"]), "about": about}
+        own = [
+            view.simulated
+            for view in site.views
+            if view.sensor == row["sensor"] and row["recording"] in (None, view.name)
+        ]
+        yield {
+            "sensor": row["sensor"],
+            "simulated": all(own),
+            "text": sentence(row["text"]),
+            "about": about,
+        }
 
 
 def _basis(site: Site, row: Row) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from textwrap import wrap
 from typing import Any
 
 from rich.console import RenderableType
@@ -37,6 +38,9 @@ _STYLES = {
     "surely fails": "red",
 }
 _LONGEST_FINDING = 400
+_STEPS = 3
+_BESIDE = 34
+"""Columns of what stands below a verdict."""
 
 
 def parts(
@@ -53,7 +57,8 @@ def parts(
     Parameters
     ----------
     tables : mapping of str to sequence of mapping
-        ``recordings``, ``findings``, ``failures``, ``ranking`` and ``parameters`` of a run.
+        ``recordings``, ``findings``, ``failures``, ``ranking``, ``next_steps`` and ``parameters``
+        of a run.
     requirement : str or None
         The ranking for this one alone, with every limit; None: for all, with the limit that
         decides.
@@ -71,6 +76,7 @@ def parts(
     yield from _listed("Failed", left_out(tables["failures"]))
     yield from _listed("Rejected", rejections(tables["recordings"]))
     yield from _listed("Warnings", map(_finding, serious(tables["findings"])), cut=True)
+    yield from _listed("What to do next", map(_next_step, tables["next_steps"][:_STEPS]))
     yield from _ranking_tables(tables["ranking"], requirement, about, system, width)
     chosen = [
         row
@@ -117,6 +123,10 @@ def _finding(row: Row) -> str:
     return one_line(f"{place} ({name}): {row['detail']}", _LONGEST_FINDING)
 
 
+def _next_step(row: Row) -> str:
+    return one_line(f"{row['sensor']}: {row['text']} ({row['requirements']})", _LONGEST_FINDING)
+
+
 def _ranking_tables(
     rows: Sequence[Row], requirement: str | None, about: About, system: System, width: int
 ) -> Iterator[RenderableType]:
@@ -147,9 +157,10 @@ def _ranking_lines(group: Mapping[str, Any], *, every: bool) -> Iterator[list[st
     said = Text(one_line(in_words(group)), style=_STYLES.get(group["verdict"], "dim"))
     if group["weak"]:
         said.stylize("dim")
-        said.append(f"\non weak evidence: {group['weak']}", style="yellow")
-    if group["unless"]:
-        said.append(f"\n{one_line(group['unless'])}", style="yellow")
+    weak = f"on weak evidence: {group['weak']}" if group["weak"] else ""
+    for line in (weak, one_line(group["unless"] or "", _LONGEST_FINDING)):
+        # The names have what the other columns leave.
+        said.append("".join(f"\n{part}" for part in wrap(line, _BESIDE)), style="yellow")
     first: list[str | Text] = [str(group["rank"]), sensor, said]
     for limit in group["limits"]:
         if every or limit["decides"]:

@@ -27,7 +27,7 @@ class Basis:
     doubts : mapping
         The rows of the table ``doubts``.
     channels : mapping
-        The channels of which something is known.
+        The channels that were analysed, and whether anything is known of their noise.
     apart : mapping
         Why a recording does not decide, of those that do not.
     backtests : mapping
@@ -36,7 +36,7 @@ class Basis:
 
     recordings: Mapping[Key, Row] = field(default_factory=dict)
     doubts: Mapping[Key, Sequence[Row]] = field(default_factory=dict)
-    channels: Mapping[Key, frozenset[str]] = field(default_factory=dict)
+    channels: Mapping[Key, Mapping[str, bool]] = field(default_factory=dict)
     apart: Mapping[Key, str] = field(default_factory=dict)
     backtests: Mapping[tuple[Any, ...], Row] = field(default_factory=dict)
 
@@ -61,13 +61,15 @@ class Basis:
         doubted: dict[Key, list[Row]] = {}
         for row in doubts:
             doubted.setdefault(_key(row), []).append(row)
-        channels: dict[Key, set[str]] = {}
+        channels: dict[Key, dict[str, bool]] = {}
         for row in parameters:
-            if row["recommended"] and row["value"] is not None:
-                channels.setdefault(_key(row), set()).add(row["channel"])
-        of_logs = {key: frozenset(names) for key, names in channels.items()}
+            if row["recommended"]:
+                of_log = channels.setdefault(_key(row), {})
+                of_log[row["channel"]] = of_log.get(row["channel"], False) or (
+                    row["value"] is not None
+                )
         shown = {_backtested(row): row for row in backtests}
-        return cls(about, doubted, of_logs, left_out(about.values()), shown)
+        return cls(about, doubted, channels, left_out(about.values()), shown)
 
     def backtest(self, of: Row) -> Row:
         """Return what the log of a channel shows of an error of a requirement; else nothing."""
@@ -94,11 +96,16 @@ class Basis:
         return (row["doubts"] or "") if row else ""
 
     def axes(self, key: Key, quantity: str) -> int | None:
-        """Return how many axes of a quantity a recording has; None where that is not known."""
+        """Return of how many axes of a quantity the noise is known; None: nobody says."""
         channels = self.channels.get(key)
         if channels is None:
             return None
-        return sum(quantity_of(channel) == quantity for channel in channels)
+        return sum(quantity_of(channel) == quantity for channel, told in channels.items() if told)
+
+    def lacks(self, key: Key, quantity: str) -> bool:
+        """Tell whether a recording has no axis of a quantity."""
+        channels = self.channels.get(key)
+        return channels is not None and quantity not in map(quantity_of, channels)
 
     def factors(self, key: Key) -> dict[str, float]:
         """Return by what a unit that may be mixed up multiplies a quantity that is mended.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
@@ -74,30 +74,30 @@ def _steps(one: Judgement, basis: Basis) -> Iterator[_Step]:
     """Yield what would help one verdict: to turn it, and to make its evidence stronger."""
     if one.unless is not None:
         action: Action = "check_unit" if one.unless.factors else "record_again"
-        quantities = " and ".join(f"the {_NAMES[name]}" for name in one.unless.factors)
         for key, doubts in one.unless.doubts.items():
-            yield _Step(action, key, one.name, turns=True, what=quantities or doubts)
-    decides = one.decides
-    if not decides.known:
-        yield from _for_channels(one, basis)
+            what = _quantities(basis.factors(key)) or doubts
+            yield _Step(action, key, one.name, turns=True, what=what)
+    if not one.decides.known:
+        yield from _to_know(one, basis)
         return
-    settled = one.verdict in ("passes", "surely fails")
-    if not settled:
+    if one.verdict not in ("passes", "surely fails"):
         yield from _to_settle(one, basis)
     for reason in one.reasons:
         yield from _to_strengthen(one, reason, basis)
 
 
-def _for_channels(one: Judgement, basis: Basis) -> Iterator[_Step]:
-    """Yield that a quantity is to be logged which a limit needs and a recording lacks."""
+def _to_know(one: Judgement, basis: Basis) -> Iterator[_Step]:
+    """Yield what a recording lacks of which nothing is known, or how long it is to be."""
     total = one.decides.total
     key = one.sensor, total["recording"]
     if key in basis.apart:
         return
     needs = ("gyro",) if total["error"] in ("heading", "north") else ("gyro", "accel")
-    missing = [f"the {_NAMES[name]}" for name in needs if basis.axes(key, name) == 0]
+    missing = [name for name in needs if basis.lacks(key, name)]
     if missing:
-        yield _Step("add_channels", key, one.name, turns=True, what=" and ".join(missing))
+        yield _Step("add_channels", key, one.name, turns=True, what=_quantities(missing))
+    elif _told_by(one) > (basis.duration(key) or math.inf):
+        yield _Step("log_longer", key, one.name, turns=True, duration=_told_by(one))
 
 
 _NAMES = {"gyro": "gyro", "accel": "accelerometer"}
@@ -164,10 +164,17 @@ def _to_strengthen(one: Judgement, reason: str, basis: Basis) -> Iterator[_Step]
     elif reason not in REASONS:
         for total in one.decides.totals:
             own = one.sensor, total["recording"]
-            codes = {row["code"] for row in basis.doubts.get(own, ())}
-            if reason in codes:
+            said = [row for row in basis.doubts.get(own, ()) if row["code"] == reason]
+            if any(row["factor"] is not None for row in said):
+                what = _quantities(basis.factors(own))
+                yield _Step("check_unit", own, one.name, False, what=what)
+            elif said:
                 what = reason.replace("_", " ")
                 yield _Step("record_again", own, one.name, False, what=what)
+
+
+def _quantities(names: Iterable[str]) -> str:
+    return " and ".join(f"the {_NAMES[name]}" for name in names)
 
 
 def _longest(sensor: str, standing: Standing, basis: Basis) -> tuple[Key, float | None]:

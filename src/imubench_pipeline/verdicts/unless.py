@@ -166,7 +166,8 @@ def unless_words(found: Unless) -> str:
 
 def _outcome(standing: Standing) -> str:
     if standing.verdict == "not enough data":
-        return "cannot be told either"
+        reason = "" if standing.known else f" ({standing.total['reason']})"
+        return f"cannot be judged{reason}"
     return f"{standing.verdict} (margin {standing.margin:.3g})"
 
 
