@@ -6,6 +6,7 @@ import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.fitness import (
+    UNFIT,
     doubts,
     fitness,
     judged,
@@ -47,7 +48,7 @@ def test_a_log_of_which_nothing_is_found_is_fit() -> None:
     assert (row["fitness"], row["decides"], row["doubts"]) == ("fit", True, "")
 
 
-@pytest.mark.parametrize("name", ["motion", "suspicious_unit", "turning", "stuck"])
+@pytest.mark.parametrize("name", sorted(UNFIT))
 def test_what_need_not_be_a_sensor_at_rest_in_its_unit_does_not_decide(name: str) -> None:
     severity = "fatal" if name == "stuck" else "warning"
     found = list(doubts([finding("noise_grows"), finding(name, severity)], [], []))
@@ -80,6 +81,19 @@ def test_a_unit_mixed_up_has_its_factor() -> None:
     (one,) = doubts([finding("suspicious_unit", value=57.29577951)], [], [])
     assert one.factor == 57.29577951
     assert "T_B" not in one.parameters and "N" in one.parameters
+
+
+def test_a_unit_of_time_mixed_up_has_a_factor_for_each_parameter() -> None:
+    found = list(doubts([finding("rate_implausible", value=1e-6)], [], []))
+    assert {one.parameters: one.factor for one in found} == {
+        ("N",): pytest.approx(1e-3),
+        ("Q", "T_B", "tau_min"): pytest.approx(1e-6),
+        ("K",): pytest.approx(1e3),
+        ("R",): pytest.approx(1e6),
+    }
+    assert fitness(found) == "unfit"
+    (row,) = judged([ABOUT], found, ())
+    assert row["doubts"] == "rate implausible (gyro_x)"
 
 
 def test_a_recording_that_was_not_analysed_does_not_decide() -> None:

@@ -21,12 +21,23 @@ Row = Mapping[str, Any]
 Key = tuple[str, str]  # sensor, recording
 Fitness = Literal["fit", "fit with doubts", "unfit"]
 
-UNFIT = frozenset({"motion", "turning", "suspicious_unit", "unit_contradicts", "stuck"})
+UNFIT = frozenset(
+    {"motion", "turning", "suspicious_unit", "unit_contradicts", "rate_implausible", "stuck"}
+)
 """Findings after which a log need not be that of a sensor at rest in its unit."""
 
 _SLOW = frozenset({"B", "B_curve", "sigma_min", "tau_min", "T_B", "K", "R"})
 _WHITE = frozenset({"N", "Q"})
-_SCALED = frozenset({"N", "Q", "B", "B_curve", "sigma_min", "K", "R", "bias"})
+_OF_UNIT = dict.fromkeys(("N", "Q", "B", "B_curve", "sigma_min", "K", "R", "bias"), 1.0)
+_OF_TIME = {"N": 0.5, "Q": 1.0, "T_B": 1.0, "tau_min": 1.0, "K": -0.5, "R": -1.0}
+
+SCALES: Mapping[str, Mapping[str, float]] = {
+    "suspicious_unit": _OF_UNIT,
+    "unit_contradicts": _OF_UNIT,
+    "rate_implausible": _OF_TIME,
+}
+"""Findings whose value is a factor that mends samples, or times, and the power of it that mends
+each parameter: N² = σ²(τ) τ, so that N goes with the root of time."""
 
 BEARS_ON: Mapping[str, frozenset[str]] = {
     "knocks": _WHITE,
@@ -41,8 +52,7 @@ BEARS_ON: Mapping[str, frozenset[str]] = {
     "noise_grows": _WHITE,
     "noise_varies": _WHITE,
     "backtest_contradicts": _SLOW,
-    "suspicious_unit": _SCALED,
-    "unit_contradicts": _SCALED,
+    **{name: frozenset(powers) for name, powers in SCALES.items()},
 }
 """The parameters on which a finding casts doubt; a warning that is not here, on all."""
 
@@ -134,7 +144,7 @@ def doubts(
     models : iterable of mapping
         Rows of the table ``models``.
     """
-    found = [_of_finding(row) for row in findings if _casts_doubt(row)]
+    found = [one for row in findings if _casts_doubt(row) for one in _of_finding(row)]
     found += [
         Doubt(
             *_place(row),
@@ -311,23 +321,23 @@ def _casts_doubt(row: Row) -> bool:
     return row["severity"] == "warning" or row["finding"] in UNFIT
 
 
-def _of_finding(row: Row) -> Doubt:
+def _of_finding(row: Row) -> Iterator[Doubt]:
+    """Yield the doubt of a finding, or one for each factor by which parameters may change."""
     code = row["finding"]
-    return Doubt(
-        *_place(row),
-        code=code,
-        parameters=tuple(sorted(BEARS_ON.get(code, ()))),
-        unfit=code in UNFIT,
-        factor=_factor(row),
-        start=row["start"],
-        end=row["end"],
-        reason=row["detail"],
-    )
-
-
-def _factor(row: Row) -> float | None:
-    """Return by what a unit that was mixed up multiplies a value that is mended."""
-    return row["value"] if row["finding"] in ("suspicious_unit", "unit_contradicts") else None
+    by_factor: dict[float | None, list[str]] = {}
+    for name, power in SCALES.get(code, {}).items():
+        by_factor.setdefault(row["value"] ** power, []).append(name)
+    for factor, names in (by_factor or {None: [*BEARS_ON.get(code, ())]}).items():
+        yield Doubt(
+            *_place(row),
+            code=code,
+            parameters=tuple(sorted(names)),
+            unfit=code in UNFIT,
+            factor=factor,
+            start=row["start"],
+            end=row["end"],
+            reason=row["detail"],
+        )
 
 
 def _place(row: Row) -> tuple[str, str, str | None]:

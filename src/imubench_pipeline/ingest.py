@@ -214,7 +214,7 @@ def _ingest(
     column = {name: found for part in parts for name, found in part.columns.items()}
     units = {str(name): source.unit for name, source in log.channels.items()}
     channels = {
-        name: {"rate": kept.rate, "grid": kept.grid, "segments": kept.segments}
+        name: {"grid": kept.grid, "segments": kept.segments}
         | counts[name]
         | kept_level(column[name], kept.rate, units[name])
         for name, kept in channel_logs(folder).items()

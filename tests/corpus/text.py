@@ -97,7 +97,7 @@ LAYOUTS = [
         "csv in Latin-1",
         file(WHOLE.replace("wx", "w (°/s) µ").encode("latin-1")),
         STAMPED | {"channels": {"gyro_x": {"column": "w (°/s) µ", "unit": "rad/s"}}},
-        kept(ROWS),
+        kept(ROWS, "unit_contradicts"),
     ),
     Entry(
         "csv with a name twice",

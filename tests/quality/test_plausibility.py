@@ -10,6 +10,7 @@ from imubench_pipeline.findings import Finding
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.quality.levels import density_of, kept_level
 from imubench_pipeline.quality.plausibility import implausible
+from imubench_pipeline.quality.rates import implausible_rates
 from imubench_pipeline.quality.rotation import gravity_turn
 from imubench_pipeline.quality.summary import ColumnSummary
 from imubench_pipeline.sensor import Sensor
@@ -153,6 +154,40 @@ def test_one_accelerometer_is_judged_by_its_noise(rng: np.random.Generator) -> N
     (finding,) = found({"accel_x": 1000 * log}, {"accel": "g"}, sensor)
     assert "are the figures in mg, and not g?" in finding.detail
     assert found({"accel_x": 1000 * log}, {"accel": "g"}) == []  # nothing is known of it
+
+
+# ------------------------------------------------------------------------------------- rate
+
+
+@pytest.mark.parametrize("rate", [0.2, 1.0, 20.0, 100.0, 1000.0, 8000.0])
+@pytest.mark.parametrize("factor", [1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6, 1e9])
+def test_a_unit_of_time_that_is_another_is_named(rate: float, factor: float) -> None:
+    read = factor * rate
+    found = implausible_rates({"gyro_x": read, "accel_x": read}, {"gyro_x": None, "accel_x": 200})
+    if 0.11 < read < 1e4:
+        assert found == []  # some sensor does that
+        return
+    assert {f.finding for f in found} == {"rate_implausible"}
+    if 20.0 <= rate <= 1000.0:
+        (finding,) = found
+        assert (finding.value, finding.channel) == (pytest.approx(factor), None)
+        assert f"{rate:.4g} Hz then" in finding.detail
+
+
+def test_a_rate_is_held_against_the_bandwidth() -> None:
+    def found(rate: float, bandwidth: float) -> list[float]:
+        return [f.value for f in implausible_rates({"gyro_x": rate}, {"gyro_x": bandwidth})]
+
+    assert found(6000.0, 40.0) == [60.0]  # 100 Hz in minutes
+    assert found(3900.0, 40.0) == []
+    assert found(32_000.0, 4000.0) == []
+    assert found(50_000.0, 4000.0) == [1e3]
+
+
+def test_rates_of_one_clock_alone_are_those_of_its_channels() -> None:
+    rates = {"gyro_x": 1e5, "gyro_y": 1e5, "accel_x": 100.0}
+    found = implausible_rates(rates, dict.fromkeys(rates))
+    assert [f.channel for f in found] == ["gyro_x", "gyro_y"]
 
 
 # ---------------------------------------------------------------------------------- turning

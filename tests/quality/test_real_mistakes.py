@@ -141,6 +141,30 @@ def test_a_log_that_tilts_steadily(adis16405: np.ndarray, tmp_path: Path) -> Non
     assert "in all, steadily at 0.1 °/s" in turn["detail"]
 
 
+@pytest.mark.parametrize("unit", ["ms", "us", "ns"])
+def test_stamps_in_another_unit_than_the_sensor_file_states(
+    shared: Path, tmp_path: Path, unit: str
+) -> None:
+    data = CATALOGUE["mpu6050"].model_dump(exclude_unset=True)["log"]
+    of = sensor("mpu6050", time=data["time"] | {"unit": unit})
+    found = findings(shared / "logs/mpu6050", of, tmp_path)
+    assert set(unfit(found)) == {"rate_implausible"}
+    factor = {"ms": 1e3, "us": 1e6, "ns": 1e9}[unit]
+    (row,) = (row for row in found if row["finding"] == "rate_implausible")
+    assert row["value"] == factor
+    (of_noise,) = (one for one in doubts([row], [], []) if "N" in one.parameters)
+    assert of_noise.factor == pytest.approx(math.sqrt(factor))
+
+
+def test_a_log_that_is_read_faster_than_it_samples(adis16405: np.ndarray, tmp_path: Path) -> None:
+    # Its accelerometers have steps as large as their noise, and repeat a quarter by chance.
+    path = written(tmp_path, adis16405[(np.arange(ROWS) * 0.75).astype(int)])
+    found = findings(path, CATALOGUE["adis16405"], tmp_path)
+    repeated = {row["channel"] for row in found if row["finding"] == "repeated_samples"}
+    assert repeated == set(CHANNELS)
+    assert unfit(found) == {}
+
+
 # ---------------------------------------------------------------------- units in the log
 
 

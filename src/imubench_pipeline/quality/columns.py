@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from imubench_pipeline.config import QualitySettings
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.quality import levels, stationarity
+from imubench_pipeline.quality.repeats import repeats_beyond_chance
 from imubench_pipeline.quality.summary import LARGEST, ColumnSummary
 from imubench_pipeline.readers.batch import POSITION, TABLE_RATE, TEMPERATURE
 from imubench_pipeline.sensor import QUANTITIES, quantity_of
@@ -174,10 +175,12 @@ def _changes(
         yield Finding("step", "warning", detail, step.size, channel, at, at)
     warm = stationarity.warm_up(blocks, settings.warm_up)
     if warm is not None:
+        than = "a later part not at all"  # in steps so coarse
+        if warm.usual > 0.0:
+            than = f"{abs(warm.drift) / warm.usual:.0f} times as much as in a later part"
         detail = (
             f"{channel} drifts by {_figure(channel, warm.drift)} in its first "
-            f"{warm.end / rate:.5g} s, {abs(warm.drift) / warm.usual:.0f} times as much as in a "
-            "later part; leave it out with 'use: {start: "
+            f"{warm.end / rate:.5g} s, {than}; leave it out with 'use: {{start: "
             f"{math.ceil(warm.end / rate)}"
             "}' beside the log, or quality.trim_warm_up"
         )
@@ -195,16 +198,14 @@ def _changes(
 
 
 def _repeated(columns: Mapping[str, ColumnSummary], settings: QualitySettings) -> Iterator[Finding]:
-    """Yield columns whose samples are repeated more often than their steps explain."""
+    """Yield columns whose samples are repeated more often than rounding explains."""
     for channel, column in columns.items():
-        share = column.repeats / max(column.present - 1, 1)
-        steps = levels.quantisation(column)
-        # Two normal samples rounded to steps of s sigma are equal with a chance of s / 3.54.
-        expected = min(1.0, steps.over_noise / 3.54) if steps else 0.0
-        if share > settings.repeated + 1.5 * expected:
+        beyond, chance = repeats_beyond_chance(column)
+        if beyond > settings.repeated:
+            share = column.repeats / max(column.present - 1, 1)
             detail = (
-                f"{channel} repeats the sample before in {100 * share:.0f} % of the records: it "
-                "is read faster than it samples, or passed through a filter; state its own rate, "
-                "and record each sample once"
+                f"{channel} repeats the sample before in {100 * share:.0f} % of the records, of "
+                f"which rounding explains {100 * chance:.2g} %: it is read faster than it samples; "
+                "state its own rate, and record each sample once"
             )
             yield Finding("repeated_samples", "warning", detail, share, channel)

@@ -72,9 +72,10 @@ def kept_level(column: ColumnSummary, rate: float, unit: str) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``mean``, SI; ``density``, see `density_of`; ``unit``.
+        ``mean``, SI; ``density``, see `density_of`; ``unit``; ``rate``.
     """
-    return {"mean": level_of(column), "density": density_of(column, rate), "unit": unit}
+    density = density_of(column, rate)
+    return {"mean": level_of(column), "density": density, "unit": unit, "rate": rate}
 
 
 def density_of(column: ColumnSummary, rate: float) -> tuple[float, float | None]:

@@ -14,6 +14,7 @@ import numpy as np
 
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.quality.expected import Expected, expected
+from imubench_pipeline.quality.rates import implausible_rates
 from imubench_pipeline.quality.rotation import GravityTurn
 from imubench_pipeline.sensor import QUANTITIES, Sensor, quantity_of
 from imubench_pipeline.units import STANDARD_GRAVITY, conversion, from_si
@@ -68,7 +69,10 @@ def implausible(
         The sensor was to be at rest.
     """
     of = {quantity: expected(sensor, quantity) for quantity in QUANTITIES}
-    found = [*_noise(channels, of)]
+    rates = {name: level["rate"] for name, level in channels.items()}
+    found = implausible_rates(rates, {name: of[quantity_of(name)].bandwidth for name in channels})
+    if not found:  # else the density is that of another time
+        found += _noise(channels, of)
     if gravity is None or gravity.swept < _TILTED:  # its mean is not gravity then
         found += _gravity(channels)
     if static:

@@ -22,7 +22,14 @@ LARGEST = 1e75
 _PRESENT, _MISSING, _INFINITE, _LOW, _HIGH, _AT_LOW, _AT_HIGH = range(7)
 _LAST, _RUN, _LONGEST, _LONGEST_END, _REPEATS, _STEP, _TAKEN = range(7, 14)
 _FILLED, _COUNT, _SUM, _SQUARES, _LEAST, _MOST, _SHIFT = range(14, 21)
-_SIZE = 21
+_PAIRS, _FAR_PAIRS, _FAR_REPEATS, _CHANGES, _SINGLE = range(21, 26)
+_SIZE = 26
+
+FAR = 64
+"""Samples between two that no usual low-pass makes alike."""
+
+_ONE_STEP = 1.5
+"""Least steps that are not one: the steps of printed figures may differ by a digit."""
 
 
 def _start() -> Array:
@@ -87,6 +94,31 @@ class ColumnSummary:
     def repeats(self) -> int:
         """Samples that equal the one before."""
         return int(self._state[_REPEATS])
+
+    @property
+    def pairs(self) -> int:
+        """Neighbours that were compared: in all pieces in which any are equal."""
+        return int(self._state[_PAIRS])
+
+    @property
+    def far_pairs(self) -> int:
+        """Samples that were compared with that `FAR` before, where neighbours were."""
+        return int(self._state[_FAR_PAIRS])
+
+    @property
+    def far_repeats(self) -> int:
+        """Samples among them that equal that."""
+        return int(self._state[_FAR_REPEATS])
+
+    @property
+    def steps(self) -> int:
+        """Neighbours that differ, as far as they were compared since the smallest step."""
+        return int(self._state[_CHANGES])
+
+    @property
+    def single_steps(self) -> int:
+        """Neighbours among them that differ by the smallest step."""
+        return int(self._state[_SINGLE])
 
     @property
     def step(self) -> float:
@@ -213,7 +245,12 @@ def _take_each(piece: Array, state: Array) -> None:
     low, high, at_low, at_high = state[_LOW], state[_HIGH], state[_AT_LOW], state[_AT_HIGH]
     shift, total, squares = state[_SHIFT], state[_SUM], state[_SQUARES]
     least, most = state[_LEAST], state[_MOST]
+    changes, single = state[_CHANGES], state[_SINGLE]
     count, repeats = 0, 0
+    for i in range(FAR, piece.size):
+        if abs(piece[i]) <= LARGEST and abs(piece[i - FAR]) <= LARGEST:
+            state[_FAR_PAIRS] += 1
+            state[_FAR_REPEATS] += piece[i] == piece[i - FAR]
     for i in range(piece.size):
         x = piece[i]
         if not abs(x) <= LARGEST:
@@ -241,7 +278,11 @@ def _take_each(piece: Array, state: Array) -> None:
         else:
             away = abs(x - last)
             if away < step:
+                if _ONE_STEP * away < step:
+                    changes, single = 0.0, 0.0  # what was counted were several of these steps
                 step = away
+            changes += 1
+            single += away < _ONE_STEP * step
             run = 1.0
             last = x
         if run > state[_LONGEST]:
@@ -250,6 +291,8 @@ def _take_each(piece: Array, state: Array) -> None:
     state[_PRESENT] += count
     state[_COUNT] += count
     state[_REPEATS] += repeats
+    state[_PAIRS] += count
+    state[_CHANGES], state[_SINGLE] = changes, single
     state[_LAST], state[_RUN], state[_STEP] = last, run, step
     state[_LOW], state[_HIGH], state[_AT_LOW], state[_AT_HIGH] = low, high, at_low, at_high
     state[_SHIFT], state[_SUM], state[_SQUARES] = shift, total, squares
