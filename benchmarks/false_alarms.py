@@ -3,7 +3,9 @@
 python benchmarks/false_alarms.py [--logs 200] [--processes 2]
 
 Each log has six channels, of sensors from quiet to noisy, with and without flicker noise and
-random walk, quantised or not, and lasts from a quarter of an hour to three hours.
+random walk, and lasts from a quarter of an hour to three hours. A third has no register, others one
+of 0.3 to 6 standard deviations of the noise, of which some are rounded again to few digits. That a
+register is coarse is what is wanted, and counted apart.
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ from __future__ import annotations
 import argparse
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,7 +21,9 @@ from imubench_pipeline.config import QualitySettings
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.quality.columns import column_findings
+from imubench_pipeline.quality.copies import copied_channels
 from imubench_pipeline.quality.knocks import suspects
+from imubench_pipeline.quality.levels import quantisation
 from imubench_pipeline.quality.summary import ColumnSummary
 from imubench_pipeline.simulate import simulate
 
@@ -34,6 +39,11 @@ ACCELEROMETERS = (
     NoiseModel(N=1e-3, B=1e-3),
 )
 GRAVITY = (0.3, -0.2, 9.8)
+REGISTERS = (0.0, 0.0, 0.3, 1.0, 3.0, 6.0)
+"""Steps over the noise."""
+
+DIGITS = (0.0, 0.0, 0.13, 0.41)
+"""Digits over the step of the register."""
 
 
 def of_log(number: int) -> list[Finding]:
@@ -42,7 +52,7 @@ def of_log(number: int) -> list[Finding]:
     rate = float(rng.choice([20.0, 50.0, 100.0]))
     samples = int(rng.choice([0.25, 1.0, 3.0]) * 3600.0 * rate)
     gyro, accelerometer = rng.choice(len(GYROS)), rng.choice(len(ACCELEROMETERS))
-    coarse = float(rng.choice([0.0, 0.3]))
+    coarse, digits = float(rng.choice(REGISTERS)), float(rng.choice(DIGITS))
     columns: dict[str, ColumnSummary] = {}
     settings = QualitySettings()
     found = []
@@ -53,11 +63,16 @@ def of_log(number: int) -> list[Finding]:
         if coarse:
             step = coarse * model.N * np.sqrt(rate)
             log = np.round(log / step) * step
+            log = np.round(log / (digits * step)) * (digits * step) if digits else log
         columns[name] = ColumnSummary()
         columns[name].add(log)
-        if len(suspects(columns[name].blocks(), settings.knock)[0]):
+        steps = quantisation(columns[name])
+        if len(suspects(columns[name].blocks(), settings.knock, steps.step if steps else None)[0]):
             found.append(Finding("knocks", "warning", f"{name}, {rate} Hz", 1, name))
-    return found + column_findings(columns, rate, settings)
+    found += column_findings(columns, rate, settings)
+    found += copied_channels(columns)
+    of_register = {"coarse", "stuck"} if coarse >= 1.0 else set()
+    return [f if f.finding not in of_register else replace(f, severity="note") for f in found]
 
 
 def main() -> None:
@@ -75,7 +90,7 @@ def main() -> None:
     for found in logs:
         for finding in found:
             if finding.severity != "note":
-                print(f"  {finding.detail}")
+                print(f"  {finding.finding}: {finding.detail}")
 
 
 if __name__ == "__main__":

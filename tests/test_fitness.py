@@ -47,7 +47,19 @@ def test_a_log_of_which_nothing_is_found_is_fit() -> None:
     assert (row["fitness"], row["decides"], row["doubts"]) == ("fit", True, "")
 
 
-@pytest.mark.parametrize("name", ["motion", "suspicious_unit", "large_offset", "stuck"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "motion",
+        "suspicious_unit",
+        "large_offset",
+        "stuck",
+        "channel_twice",
+        "log_twice",
+        "joined",
+        "interleaved",
+    ],
+)
 def test_what_need_not_be_a_sensor_at_rest_in_its_unit_does_not_decide(name: str) -> None:
     severity = "fatal" if name == "stuck" else "warning"
     found = list(doubts([finding("noise_grows"), finding(name, severity)], [], []))

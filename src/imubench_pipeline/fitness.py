@@ -22,14 +22,26 @@ Row = Mapping[str, Any]
 Key = tuple[str, str]  # sensor, recording
 Fitness = Literal["fit", "fit with doubts", "unfit"]
 
-UNFIT = frozenset({"motion", "suspicious_unit", "large_offset", "stuck"})
-"""Findings after which a log need not be that of a sensor at rest in its unit."""
+UNFIT = frozenset(
+    {
+        "motion",
+        "suspicious_unit",
+        "large_offset",
+        "stuck",
+        "channel_twice",
+        "log_twice",
+        "joined",
+        "interleaved",
+    }
+)
+"""Findings after which a log need not be that of one sensor at rest in its unit."""
 
 _SLOW = frozenset({"B", "B_curve", "sigma_min", "tau_min", "T_B", "K", "R"})
 _WHITE = frozenset({"N", "Q"})
 
 BEARS_ON: Mapping[str, frozenset[str]] = {
     "knocks": _WHITE,
+    "held_samples": _WHITE,
     "step": _SLOW | {"bias"},
     "bias_step": _SLOW | {"bias"},
     "warm_up": _SLOW | {"bias"},

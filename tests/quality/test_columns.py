@@ -5,6 +5,7 @@ import pytest
 
 from imubench_pipeline.config import QualitySettings
 from imubench_pipeline.findings import Finding
+from imubench_pipeline.fitness import UNFIT
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.quality.columns import column_findings
 from imubench_pipeline.quality.summary import ColumnSummary
@@ -204,6 +205,13 @@ def test_a_turning_sensor_is_not_at_rest(rng: np.random.Generator) -> None:
 def test_a_column_that_cannot_be_used_is_fatal(log: np.ndarray, found: str) -> None:
     finding = findings(log)[0]
     assert (finding.finding, finding.severity) == (found, "fatal")
+
+
+def test_an_axis_that_is_zero_throughout_is_told_as_such() -> None:
+    (finding,) = findings(np.zeros(5000))
+    assert (finding.finding, finding.severity, finding.value) == ("stuck", "fatal", 0.0)
+    assert "is exactly 0 in all 5000 samples" in finding.detail
+    assert finding.finding in UNFIT
 
 
 def test_steps_of_the_temperature_are_noted(rng: np.random.Generator) -> None:

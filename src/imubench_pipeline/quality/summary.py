@@ -13,6 +13,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from imubench_pipeline.quality.blocks import FIRST_SIZE, Blocks, Gathering
+from imubench_pipeline.quality.excerpts import Excerpt, Excerpts
+from imubench_pipeline.quality.repeats import Repeats
 
 Array = NDArray[np.float64]
 
@@ -39,6 +41,8 @@ class ColumnSummary:
 
     _state: Array = field(default_factory=_start)
     _blocks: Gathering = field(default_factory=Gathering)
+    _excerpts: Excerpts = field(default_factory=Excerpts)
+    repeated: Repeats = field(default_factory=Repeats)
 
     def add(self, values: Array) -> Array:
         """Count a piece of the column and return it with what is not finite made missing."""
@@ -46,7 +50,10 @@ class ColumnSummary:
         number, infinite = _take(np.ascontiguousarray(values), self._state, rows)
         if number:
             self._blocks.add(rows[:number])
-        return np.where(np.abs(values) <= LARGEST, values, np.nan) if infinite else values
+        kept = np.where(np.abs(values) <= LARGEST, values, np.nan) if infinite else values
+        self._excerpts.add(kept)
+        self.repeated.add(kept)
+        return kept
 
     @property
     def present(self) -> int:
@@ -92,6 +99,10 @@ class ColumnSummary:
     def step(self) -> float:
         """Smallest difference between neighbours that differ, SI; infinite if none do."""
         return float(self._state[_STEP])
+
+    def excerpts(self) -> list[Excerpt]:
+        """Return pieces of the column, evenly over all of it."""
+        return self._excerpts.pieces()
 
     def blocks(self) -> Blocks:
         """Return the statistics of the blocks, the last one as far as it goes."""
