@@ -109,8 +109,8 @@ def empty(log: np.ndarray) -> None:
         (polled, "repeated_samples", "warning", 0.5, None),
         (coarse, "coarse", "warning", None, None),
         (quantised, "quantised", "note", 0.3 * SIGMA, None),
-        (infinite, "not_finite", "warning", 2.0, None),
-        (empty, "empty_cells", "note", 10.0, None),
+        (infinite, "not_finite", "warning", 2.0, (0.05, 0.06)),
+        (empty, "empty_cells", "note", 10.0, (0.1, 0.2)),
     ],
 )
 def test_what_is_wrong_is_found_with_its_size_and_its_time(

@@ -49,7 +49,7 @@ def column_findings(
             continue
         fatal = _unusable(channel, column, settings)
         findings += [fatal] if fatal else []
-        findings += _cells(channel, column)
+        findings += _cells(channel, column, rate)
         if fatal is None:
             usable[channel] = column
     steps = {channel: levels.quantisation(column) for channel, column in usable.items()}
@@ -93,17 +93,20 @@ def _unusable(channel: str, column: ColumnSummary, settings: QualitySettings) ->
     return None
 
 
-def _cells(channel: str, column: ColumnSummary) -> Iterator[Finding]:
+def _cells(channel: str, column: ColumnSummary, rate: float) -> Iterator[Finding]:
+    length, last = column.longest_gap
+    begin, end = (last - length) / rate, last / rate
+    most = f"; at most {length} records in a row ({length / rate:.3g} s), from {begin:.5g} s on"
     if column.missing:
         detail = f"{channel} has {column.missing} records without a number"
-        detail += "; treated as missing samples"
-        yield Finding("empty_cells", "note", detail, column.missing, channel)
+        detail += f"{most}; treated as missing samples"
+        yield Finding("empty_cells", "note", detail, column.missing, channel, begin, end)
     if column.not_finite:
         detail = (
-            f"{channel} has {column.not_finite} infinities, or figures beyond {LARGEST:g}; treated "
-            "as missing samples"
+            f"{channel} has {column.not_finite} infinities, or figures beyond {LARGEST:g}{most}; "
+            "treated as missing samples"
         )
-        yield Finding("not_finite", "warning", detail, column.not_finite, channel)
+        yield Finding("not_finite", "warning", detail, column.not_finite, channel, begin, end)
 
 
 def _temperature(column: ColumnSummary) -> Iterator[Finding]:

@@ -24,7 +24,8 @@ LARGEST = 1e75
 _PRESENT, _MISSING, _INFINITE, _LOW, _HIGH, _AT_LOW, _AT_HIGH = range(7)
 _LAST, _RUN, _LONGEST, _LONGEST_END, _REPEATS, _STEP, _TAKEN = range(7, 14)
 _FILLED, _COUNT, _SUM, _SQUARES, _LEAST, _MOST, _SHIFT = range(14, 21)
-_SIZE = 21
+_GAP, _LONGEST_GAP, _GAP_END = range(21, 24)
+_SIZE = 24
 
 
 def _start() -> Array:
@@ -69,6 +70,11 @@ class ColumnSummary:
     def not_finite(self) -> int:
         """Infinities, and figures beyond `LARGEST`."""
         return int(self._state[_INFINITE])
+
+    @property
+    def longest_gap(self) -> tuple[int, int]:
+        """Length of the longest run of records without a finite number, and one past its end."""
+        return int(self._state[_LONGEST_GAP]), int(self._state[_GAP_END])
 
     @property
     def low(self) -> float:
@@ -179,6 +185,7 @@ def _take_plain(piece: Array, state: Array) -> bool:
     state[_MOST] = max(state[_MOST], most)
     state[_STEP] = min(state[_STEP], step)
     state[_LAST], state[_RUN] = piece[-1], 1.0
+    state[_GAP] = 0.0
     return True
 
 
@@ -224,12 +231,18 @@ def _take_each(piece: Array, state: Array) -> None:
     low, high, at_low, at_high = state[_LOW], state[_HIGH], state[_AT_LOW], state[_AT_HIGH]
     shift, total, squares = state[_SHIFT], state[_SUM], state[_SQUARES]
     least, most = state[_LEAST], state[_MOST]
+    gap = state[_GAP]
     count, repeats = 0, 0
     for i in range(piece.size):
         x = piece[i]
         if not abs(x) <= LARGEST:
             state[_MISSING if np.isnan(x) else _INFINITE] += 1
+            gap += 1.0
+            if gap > state[_LONGEST_GAP]:
+                state[_LONGEST_GAP] = gap
+                state[_GAP_END] = state[_TAKEN] + i + 1
             continue
+        gap = 0.0
         count += 1
         if np.isnan(shift):
             shift = x
@@ -265,3 +278,4 @@ def _take_each(piece: Array, state: Array) -> None:
     state[_LOW], state[_HIGH], state[_AT_LOW], state[_AT_HIGH] = low, high, at_low, at_high
     state[_SHIFT], state[_SUM], state[_SQUARES] = shift, total, squares
     state[_LEAST], state[_MOST] = least, most
+    state[_GAP] = gap
