@@ -207,6 +207,14 @@ def test_a_column_that_cannot_be_used_is_fatal(log: np.ndarray, found: str) -> N
     assert (finding.finding, finding.severity) == (found, "fatal")
 
 
+def test_a_coarse_register_that_seldom_changes_has_no_warm_up() -> None:
+    """Its parts have medians that do not change at all, but for the first."""
+    log = np.zeros(300_000)
+    log[:4000] = 1.0
+    log[::501] += 1.0
+    assert "warm_up" not in names(log)
+
+
 def test_an_axis_that_is_zero_throughout_is_told_as_such() -> None:
     (finding,) = findings(np.zeros(5000))
     assert (finding.finding, finding.severity, finding.value) == ("stuck", "fatal", 0.0)

@@ -7,6 +7,7 @@ import pytest
 
 from imubench_pipeline.quality.excerpts import MOST, PIECE, Excerpts, together
 from imubench_pipeline.quality.held import held
+from imubench_pipeline.quality.joined import interleaved
 from imubench_pipeline.quality.levels import quantisation
 from imubench_pipeline.quality.register import hidden_step
 from imubench_pipeline.quality.summary import ColumnSummary
@@ -82,6 +83,16 @@ def test_a_line_is_no_second_sensor(shared: Path, frequency: float) -> None:
         line = np.sin(2 * np.pi * frequency * np.arange(len(values)) / 100.0 + 0.3)
         values[:] = np.round((values + 0.7 * values.std() * line) / 1e-3) * 1e-3
     assert "interleaved" not in {name for name, _ in warnings(log)}
+
+
+def test_a_knock_makes_no_second_sensor(rng: np.random.Generator) -> None:
+    log = rng.standard_normal(6000)
+    log[3000] = 1e9
+    log[rng.random(6000) < 0.1] = np.nan
+    log[4200:5400] = np.nan
+    column = ColumnSummary()
+    column.add(log)
+    assert list(interleaved("gyro_x", column)) == []
 
 
 @pytest.mark.parametrize("every", [3, 10, 100])

@@ -20,8 +20,8 @@ _FEWEST = 64
 """Increments of a piece that must not be 0."""
 
 _SAME = 1.0 - 1e-6
-"""Correlation of the increments of a copy; a vibration that both axes feel needs 700 times the
-noise for it."""
+"""Correlation of the increments of a copy; a vibration that both axes feel needs 1000 times
+the noise for it."""
 
 _ROUNDED = 0.999
 """That of a copy that was rounded, if no sample is further off than its rounding."""
@@ -30,7 +30,7 @@ _FEW_LEVELS = 64
 _LOW_ENTROPY = 4 * WINDOW
 """Changes of a stretch that count where there are few levels. Of a sinusoid in steps of 20 to 100
 times its noise, up to 120 changes come again by chance in 600 000 samples; of white noise, random
-walks and low-passed noise in steps of 0.01 to 8 sigma not one window of 64 (30 kinds of logs)."""
+walks and low-passed noise in steps of 0.01 to 8 sigma not one window of 64 (24 kinds of noise)."""
 
 _TWICE = 0.1
 """Part of the samples that occurred before from which the log is no record of a noise."""
@@ -77,7 +77,7 @@ def _factor(one: list[Excerpt], other: list[Excerpt]) -> float | None:
         if min(np.count_nonzero(dx), np.count_nonzero(dy)) < _FEWEST:
             continue
         xx, yy, xy = float(dx @ dx), float(dy @ dy), float(dx @ dy)
-        correlation = abs(xy) / np.sqrt(xx * yy)
+        correlation = abs(xy) / (np.sqrt(xx) * np.sqrt(yy))
         slopes.append(xy / xx)
         rounded = correlation > _ROUNDED and _within_rounding(x, y, xy / xx)
         alike.append(correlation > _SAME or rounded)

@@ -41,6 +41,12 @@ _STEP = 1.2
 _APART = 5.0
 """Standard deviations of the noise by which two sensors in turn differ if only their levels do."""
 
+_PART = 128
+"""Pairs of samples of a part."""
+
+_MEDIAN = 1.2533
+"""Standard deviation of a median over that of a mean."""
+
 _MAD = 1.4826
 
 
@@ -190,19 +196,16 @@ def interleaved(channel: str, column: ColumnSummary) -> Iterator[Finding]:
     levels, noises, units, sizes = [], [], [], []
     pieces = [piece for piece in column.excerpts() if len(piece.values) >= PIECE // 4]
     for piece in pieces:
-        even, odd = piece.values[0::2], piece.values[1::2]
-        number = min(len(even), len(odd))
-        apart = even[:number] - odd[:number]
-        # Differences between samples of one sensor: neither drift nor the other's level.
-        scatter = [float(np.nanstd(np.diff(part))) / math.sqrt(2.0) for part in (even, odd)]
-        if not min(scatter) > 0.0:
+        found = _of_turns(piece.values)
+        if found is None:
             continue
-        usual = math.hypot(*scatter) / math.sqrt(2.0)
-        levels.append(abs(float(np.nanmean(apart))) / usual)
-        # Of white noise; the differences make that of the noise 3/2 times as large.
-        units.append(2.0 / math.sqrt(len(piece.values)))
-        noises.append(abs(math.log(scatter[0] / scatter[1])))
-        sizes.append(math.sqrt(3.0 / len(piece.values)))
+        level, noise, samples = found
+        levels.append(level)
+        noises.append(noise)
+        # Of white noise, and of a median; the differences make that of the noise 3/2 times as
+        # large.
+        units.append(_MEDIAN * 2.0 / math.sqrt(samples))
+        sizes.append(_MEDIAN * math.sqrt(3.0 / samples))
     if not levels:
         return
     level, noise = float(np.median(levels)), float(np.median(noises))
@@ -221,6 +224,32 @@ def interleaved(channel: str, column: ColumnSummary) -> Iterator[Finding]:
         "every other sample seems to be of another sensor; write each sensor into a log of its own"
     )
     yield Finding("interleaved", "warning", detail, level, channel)
+
+
+def _of_turns(values: Array) -> tuple[float, float, int] | None:
+    """Return how even and odd samples differ: level over noise, log of the noises, and of how many.
+
+    Medians over parts of the piece, so that a knock decides nothing.
+    """
+    whole = len(values) // (2 * _PART) * 2 * _PART
+    pairs = values[:whole].reshape(-1, _PART, 2)
+    there: NDArray[np.bool_] = np.isfinite(pairs[:, :, 0]) & np.isfinite(pairs[:, :, 1])
+    # Differences between samples of one sensor: neither drift nor the other's level.
+    steps = np.diff(pairs, axis=1)
+    known = there[:, 1:] & there[:, :-1]
+    enough = known.sum(axis=1) >= _PART // 4
+    if not enough.any():
+        return None
+    there, known = there[enough], known[enough]
+    apart = np.where(there, pairs[enough, :, 0] - pairs[enough, :, 1], 0.0)
+    squares = np.where(known[:, :, None], steps[enough] ** 2, 0.0).sum(axis=1)
+    scatter = np.sqrt(0.5 * squares / known.sum(axis=1)[:, None])
+    if not scatter.min() > 0.0:
+        return None
+    usual = float(np.median(np.sqrt((scatter**2).mean(axis=1))))
+    level = float(np.median(apart.sum(axis=1) / there.sum(axis=1)))
+    noise = float(np.median(np.log(scatter[:, 0] / scatter[:, 1])))
+    return abs(level) / usual, abs(noise), 2 * int(there.sum())
 
 
 def _every_other(pieces: Sequence[Excerpt], first: int) -> list[Excerpt]:
