@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.config import QualitySettings
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.quality.repeats import repeats_beyond_chance
+from imubench_pipeline.quality.repeated_samples import repeats_beyond_chance
 from imubench_pipeline.quality.summary import ColumnSummary
 from imubench_pipeline.simulate import simulate
 

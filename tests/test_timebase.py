@@ -188,7 +188,21 @@ def test_one_hole_of_any_length_is_placed(length: int) -> None:
     kept[10_000 : 10_000 + length] = False
     base, points = found(GRID[kept])
     np.testing.assert_array_equal(points, np.flatnonzero(kept))
-    assert base.findings[0].value == length
+    finding = base.findings[0]
+    assert finding.value == length
+    assert (finding.start, finding.end) == pytest.approx((100.0, 100.0 + length / 100.0))
+
+
+def test_the_longest_of_many_holes_is_placed(rng: np.random.Generator) -> None:
+    kept = rng.random(len(GRID)) >= 0.01
+    kept[[0, -1]] = True
+    kept[31_000:31_400] = False
+    base, _ = found(GRID[kept])
+    (finding,) = base.findings
+    first = 1 + int(np.flatnonzero(kept[:31_000])[-1])
+    last = 31_400 + int(np.flatnonzero(kept[31_400:])[0])
+    assert (finding.start, finding.end) == pytest.approx((first / 100.0, last / 100.0))
+    assert f"the longest {(last - first) / 100.0:.3g} s, from 3" in finding.detail
 
 
 def test_a_gap_beyond_the_longest_hole_divides() -> None:
@@ -199,11 +213,27 @@ def test_a_gap_beyond_the_longest_hole_divides() -> None:
     assert base.rate == pytest.approx(100.0)
     np.testing.assert_array_equal(points, np.arange(100_000))
     assert names(base) == ["segments"]
+    (finding,) = base.findings
+    assert (finding.start, finding.end) == pytest.approx((500.0, 500.0))
+    assert "1 times, by up to 4500 s forward, after 500 s of samples" in finding.detail
 
 
 def test_a_restarted_clock_divides() -> None:
     base, _ = found(np.concatenate([GRID, GRID[:20_000]]))
     assert base.segments == ((0, 50_000), (50_000, 70_000))
+    assert "by up to 499.99 s backwards, after 500 s" in base.findings[0].detail
+
+
+def test_the_longest_pause_of_jittered_stamps_is_placed(rng: np.random.Generator) -> None:
+    stamps = GRID + 0.02 * rng.standard_normal(len(GRID))
+    stamps[20_000:] += 40.0
+    stamps[35_000:] += 300.0
+    base, _ = found(stamps)
+    (jittered, segments) = base.findings
+    assert (jittered.finding, segments.finding) == ("jittered_stamps", "segments")
+    assert segments.start == pytest.approx(350.0, abs=0.1)
+    assert "2 times, by up to 299.94 s forward, after 350" in segments.detail
+    assert jittered.value < 0.2 and 0.0 <= (jittered.start or 0.0) <= 500.0
 
 
 def test_repeated_stamps_are_left_out_and_counted() -> None:

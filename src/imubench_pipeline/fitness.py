@@ -22,9 +22,20 @@ Key = tuple[str, str]  # sensor, recording
 Fitness = Literal["fit", "fit with doubts", "unfit"]
 
 UNFIT = frozenset(
-    {"motion", "turning", "suspicious_unit", "unit_contradicts", "rate_implausible", "stuck"}
+    {
+        "motion",
+        "turning",
+        "suspicious_unit",
+        "unit_contradicts",
+        "rate_implausible",
+        "stuck",
+        "channel_twice",
+        "log_twice",
+        "joined",
+        "interleaved",
+    }
 )
-"""Findings after which a log need not be that of a sensor at rest in its unit."""
+"""Findings after which a log need not be that of one sensor at rest in its unit."""
 
 _SLOW = frozenset({"B", "B_curve", "sigma_min", "tau_min", "T_B", "K", "R"})
 _WHITE = frozenset({"N", "Q"})
@@ -41,6 +52,7 @@ each parameter: N² = σ²(τ) τ, so that N goes with the root of time."""
 
 BEARS_ON: Mapping[str, frozenset[str]] = {
     "knocks": _WHITE,
+    "held_samples": _WHITE,
     "step": _SLOW | {"bias"},
     "bias_step": _SLOW | {"bias"},
     "warm_up": _SLOW | {"bias"},

@@ -18,6 +18,7 @@ from imubench_pipeline.faults import Failure
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.parts import Part, leave_out_knocks, read_part
 from imubench_pipeline.quality.columns import column_findings
+from imubench_pipeline.quality.copies import copied_channels
 from imubench_pipeline.quality.levels import kept_level
 from imubench_pipeline.quality.rotation import GravityTurn, gravity_turn
 from imubench_pipeline.quality.summary import ColumnSummary
@@ -150,6 +151,10 @@ def _ingest(
         findings += column_findings(part.columns, base.rate, settings, static=static)
         if static:  # what is sensed of a turn looks like a knock
             findings += _knock_findings(part, base.rate, settings, scratch)
+    beside = {TEMPERATURE, POSITION, TABLE_RATE}
+    findings += copied_channels(
+        {name: c for part in parts for name, c in part.columns.items() if name not in beside}
+    )
     unusable = {finding.channel for finding in findings if finding.severity == "fatal"}
     groups = _shared_bases(parts, bases)
     if len({part.rows for part in parts if not part.stamped}) > 1:

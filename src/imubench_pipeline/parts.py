@@ -13,6 +13,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from imubench_pipeline.findings import Finding
+from imubench_pipeline.quality import levels
 from imubench_pipeline.quality.knocks import Knock, knocks, suspects
 from imubench_pipeline.quality.summary import ColumnSummary
 from imubench_pipeline.readers import Batch, LogFile, RecordingError
@@ -167,13 +168,16 @@ def leave_out_knocks(
     """
     blocks = {name: column.blocks() for name, column in part.columns.items()}
     doubtful = [name for name, b in blocks.items() if len(suspects(b, sigmas)[0])]
+    steps = {name: levels.quantisation(part.columns[name]) for name in doubtful}
+    step = {name: found.step if found else None for name, found in steps.items()}
+    doubtful = [name for name in doubtful if len(suspects(blocks[name], sigmas, step[name])[0])]
     if not doubtful:
         return {}
     part.writer.finish({})
     part.writer.__exit__(None, None, None)
     found = {}
     for name in doubtful:
-        here = list(knocks(_pieces(part.data, name), blocks[name], sigmas, longest))
+        here = list(knocks(_pieces(part.data, name), blocks[name], sigmas, longest, step[name]))
         if here:
             found[name] = here
     _write_again(part, found, scratch)

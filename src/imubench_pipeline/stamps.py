@@ -113,12 +113,14 @@ class Track:
         Records, and points of the grid up to the last one.
     off_grid, duplicates, unstamped : int
         Records whose stamp lies between two points, repeats a point, or is missing.
-    holes, longest : int
-        Number of holes, and the points of the longest.
+    holes, longest, longest_at : int
+        Number of holes, the points of the longest, and the first of them.
     elapsed, steps
         s, and grid points, between stamped records of the same segment.
     starts : list of int
         First grid point of each segment.
+    jumps : list of float
+        Step of the stamps at each of them, s; NaN at the first.
     marks : list of (int, float)
         Grid point and stamp of a record now and then, to see the rate drift.
     """
@@ -132,9 +134,11 @@ class Track:
     unstamped: int = 0
     holes: int = 0
     longest: int = 0
+    longest_at: int = 0
     elapsed: float = 0.0
     steps: int = 0
     starts: list[int] = field(default_factory=list)
+    jumps: list[float] = field(default_factory=list)
     marks: list[tuple[int, float]] = field(default_factory=list)
     _state: NDArray[np.float64] = field(
         default_factory=lambda: np.array([np.nan, np.nan, np.nan, np.nan, 0.0])
@@ -159,17 +163,20 @@ class Track:
         """Return the grid point of each record of a block; -1 for a repeated one."""
         points = np.empty(len(block), dtype=np.int64)
         breaks = np.empty(len(block), dtype=np.int64)
-        counts = np.zeros(7, dtype=np.int64)
+        jumps = np.empty(len(block))
+        counts = np.zeros(8, dtype=np.int64)
         if np.isnan(self._state[2]):
             self._state[2] = self.interval
         self.elapsed += _follow(
-            block, self.longest_hole, self.grid, self._state, points, breaks, counts
+            block, self.longest_hole, self.grid, self._state, points, breaks, jumps, counts
         )
         self.starts += breaks[: counts[0]].tolist()
+        self.jumps += jumps[: counts[0]].tolist()
         self.off_grid += int(counts[1])
         self.duplicates += int(counts[2])
         self.holes += int(counts[3])
-        self.longest = max(self.longest, int(counts[4]))
+        if counts[4] > self.longest:
+            self.longest, self.longest_at = int(counts[4]), int(counts[7])
         self.unstamped += int(counts[5])
         self.steps += int(counts[6])
         for start in range(0, len(block), _MARK):
@@ -196,6 +203,7 @@ def _follow(
     state: NDArray[np.float64],
     points: NDArray[np.int64],
     breaks: NDArray[np.int64],
+    jumps: NDArray[np.float64],
     counts: NDArray[np.int64],
 ) -> float:
     """Give each stamp its grid point; return the seconds between stamps.
@@ -225,6 +233,7 @@ def _follow(
         if np.isnan(last) or step < -max(1.0, 10.0 * interval) or step > longest_hole:
             point += 1
             breaks[counts[0]] = point
+            jumps[counts[0]] = step
             counts[0] += 1
             origin = stamp
             late = False
@@ -258,7 +267,8 @@ def _follow(
             late = whole == 2 and error < 0.0 and i > 0
             if whole > 1:
                 counts[3] += 1
-                counts[4] = max(counts[4], whole - 1)
+                if whole - 1 > counts[4]:
+                    counts[4], counts[7] = whole - 1, point + 1
             point += whole
             origin += whole * interval + _TRACKING * error
             interval += _TRACKING**2 / 4.0 * error

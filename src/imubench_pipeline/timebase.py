@@ -178,23 +178,27 @@ def _grid_findings(found: Track, interval: float) -> list[Finding]:
     findings = []
     missing = found.grid - (found.rows - found.duplicates)
     if missing:
+        begin, end = (
+            point * interval for point in (found.longest_at, found.longest_at + found.longest)
+        )
         findings.append(
             Finding(
                 "missing_samples",
                 "note" if missing < 0.01 * found.grid else "warning",
                 f"{missing} of {found.grid} samples are missing ({found.holes} holes, the "
-                f"longest {found.longest * interval:.3g} s); they are left out of the clusters",
+                f"longest {end - begin:.3g} s, from {begin:.5g} s on); they are left out of the "
+                "clusters",
                 missing,
+                start=begin,
+                end=end,
             )
         )
     if len(found.starts) > 1:
         findings.append(
-            Finding(
-                "segments",
-                "warning",
-                f"the clock jumps or stops {len(found.starts) - 1} times; the recording is "
-                f"analysed as {len(found.starts)} segments",
-                len(found.starts),
+            _segments(
+                "the clock jumps or stops",
+                [point * interval for point in found.starts[1:]],
+                found.jumps[1:],
             )
         )
     if found.duplicates:
@@ -217,6 +221,32 @@ def _grid_findings(found: Track, interval: float) -> list[Finding]:
             )
         )
     return findings
+
+
+def _segments(what: str, times: list[float], jumps: list[float]) -> Finding:
+    """Return the finding of pauses, with the place of the longest one.
+
+    Parameters
+    ----------
+    what : str
+        What the clock does.
+    times : list of float
+        s of samples before each.
+    jumps : list of float
+        Step of the stamps at each, s; below 0: backwards.
+    """
+    longest = max(range(len(jumps)), key=lambda k: abs(jumps[k]))
+    jump, at = jumps[longest], times[longest]
+    direction = "backwards" if jump < 0 else "forward"
+    return Finding(
+        "segments",
+        "warning",
+        f"{what} {len(jumps)} times, by up to {abs(jump):.5g} s {direction}, after {at:.5g} s of "
+        f"samples; the recording is analysed as {len(jumps) + 1} segments",
+        len(jumps) + 1,
+        start=at,
+        end=at,
+    )
 
 
 def _rate_findings(rate: float, stated: float | None, settings: QualitySettings) -> list[Finding]:
@@ -270,8 +300,8 @@ def _arrival_order(
     # A pause is long against the mean interval and against the steps of stamps that are shared.
     mean = _span(stamps) / max(found.rows - 1, 1)
     gap = max(1.0, 100 * mean, 10 * found.interval) * (1 + 1e-6)
-    rows, last, worst = 0, np.nan, 0.0
-    starts = [0]
+    rows, last, worst, worst_at = 0, np.nan, 0.0, 0
+    starts, jumps = [0], []
     # Between the records with which a stamp changes: samples that share one are counted whole.
     changed_at, changed_stamp = 0, np.nan
     samples, elapsed = 0, 0.0
@@ -283,7 +313,10 @@ def _arrival_order(
         steps = np.diff(held)
         cut = np.abs(steps) > gap
         starts += [rows + int(i) for i in np.flatnonzero(cut)]
-        worst = max(worst, float(steps[np.isfinite(steps) & ~cut].max(initial=0.0)))
+        jumps += steps[cut].tolist()
+        usual = np.where(np.isfinite(steps) & ~cut, steps, 0.0)
+        if usual.max(initial=0.0) > worst:
+            worst, worst_at = float(usual.max()), rows + int(usual.argmax())
         changes = np.flatnonzero((steps != 0) & np.isfinite(steps))
         if len(changes):
             at = np.concatenate(([changed_at], rows + changes))
@@ -302,24 +335,19 @@ def _arrival_order(
             "jittered_stamps",
             "warning",
             f"the stamps lie on no uniform grid ({100 * found.off_grid / found.rows:.0f} % of them "
-            f"off it, {found.holes} pauses, intervals up to {1e3 * worst:.3g} ms); "
-            f"the samples are taken as consecutive at the mean rate of {rate:.6g} Hz, so lost "
-            "samples cannot be seen",
+            f"off it, {found.holes} pauses, intervals up to {1e3 * worst:.3g} ms, at "
+            f"{worst_at / rate:.5g} s); the samples are taken as consecutive at the mean rate of "
+            f"{rate:.6g} Hz, so lost samples cannot be seen",
             worst,
+            start=worst_at / rate,
+            end=worst_at / rate,
         ),
         *_rate_findings(rate, stated, settings),
     ]
     segments = tuple(zip(starts, [*starts[1:], rows], strict=True))
     if len(segments) > 1:
-        findings.append(
-            Finding(
-                "segments",
-                "warning",
-                f"the stamps stop or run backwards {len(segments) - 1} times; the recording is "
-                f"analysed as {len(segments)} segments",
-                len(segments),
-            )
-        )
+        times = [start / rate for start in starts[1:]]
+        findings.append(_segments("the stamps stop or run backwards", times, jumps))
     return TimeBase(
         rate,
         "stamps",

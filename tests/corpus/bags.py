@@ -154,7 +154,7 @@ ENTRIES = [
         "ros 1 bag whose clock was set back",
         holding("ros1", turned_back),
         STAMPED,
-        kept(ROWS + 200, "segments"),
+        kept(ROWS + 200, "segments", "log_twice"),
     ),
     Entry("ros 2 bag in sqlite", holding("sqlite", lambda: imu("sqlite")), STAMPED, kept(ROWS)),
     Entry("ros 2 bag in sqlite alone", alone("sqlite"), STAMPED, kept(ROWS)),

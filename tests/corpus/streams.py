@@ -121,7 +121,7 @@ RECEIVERS = [
         "ubx after a restart",
         file(UBX + b"".join(RAW[:50]), "log.ubx"),
         ubx(),
-        kept(ROWS + 500, "segments"),
+        kept(ROWS + 500, "segments", "log_twice"),
     ),
 ]
 

@@ -135,7 +135,7 @@ ENTRIES = [
     ),
     Entry(
         "acceleration without gravity",
-        file(text(three(1.0) | {"az": three(1.0)["ax"]})),
+        file(text(three(1.0) | {"az": three(1.0)["ax"][::-1]})),
         STAMPED | {"channels": AXES},
         kept(ROWS, "gravity_norm"),
     ),

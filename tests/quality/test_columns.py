@@ -5,6 +5,7 @@ import pytest
 
 from imubench_pipeline.config import QualitySettings
 from imubench_pipeline.findings import Finding
+from imubench_pipeline.fitness import UNFIT
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.quality.columns import column_findings
 from imubench_pipeline.quality.summary import ColumnSummary
@@ -108,8 +109,8 @@ def empty(log: np.ndarray) -> None:
         (polled, "repeated_samples", "warning", 0.5, None),
         (coarse, "coarse", "warning", None, None),
         (quantised, "quantised", "note", 0.3 * SIGMA, None),
-        (infinite, "not_finite", "warning", 2.0, None),
-        (empty, "empty_cells", "note", 10.0, None),
+        (infinite, "not_finite", "warning", 2.0, (0.05, 0.06)),
+        (empty, "empty_cells", "note", 10.0, (0.1, 0.2)),
     ],
 )
 def test_what_is_wrong_is_found_with_its_size_and_its_time(
@@ -163,6 +164,21 @@ def test_rounding_is_not_taken_for_repeats_or_for_a_stuck_axis(
 def test_a_column_that_cannot_be_used_is_fatal(log: np.ndarray, found: str) -> None:
     finding = findings(log)[0]
     assert (finding.finding, finding.severity) == (found, "fatal")
+
+
+def test_a_coarse_register_that_seldom_changes_has_no_warm_up() -> None:
+    """Its parts have medians that do not change at all, but for the first."""
+    log = np.zeros(300_000)
+    log[:4000] = 1.0
+    log[::501] += 1.0
+    assert "warm_up" not in names(log)
+
+
+def test_an_axis_that_is_zero_throughout_is_told_as_such() -> None:
+    (finding,) = findings(np.zeros(5000))
+    assert (finding.finding, finding.severity, finding.value) == ("stuck", "fatal", 0.0)
+    assert "is exactly 0 in all 5000 samples" in finding.detail
+    assert finding.finding in UNFIT
 
 
 def test_steps_of_the_temperature_are_noted(rng: np.random.Generator) -> None:

@@ -7,11 +7,13 @@ from imubench_pipeline.config import QualitySettings
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.ingest import ingest
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.quality.knocks import knocks
+from imubench_pipeline.quality.knocks import knocks, suspects
+from imubench_pipeline.quality.levels import quantisation
 from imubench_pipeline.quality.summary import ColumnSummary
 from imubench_pipeline.recording import channel_logs
 from imubench_pipeline.sensor import LogFormat, RecordingNotes
 from imubench_pipeline.simulate import simulate
+from tests.quality.real import adis16405
 
 RATE = 50.0
 MODEL = NoiseModel(N=1.1e-3, B=2e-3, T_B=30.0, K=2e-4)
@@ -22,7 +24,9 @@ def found_in(log: np.ndarray, sigmas: float = 10.0) -> list[tuple[int, int]]:
     column = ColumnSummary()
     column.add(log)
     pieces = np.array_split(log, 5)
-    return [(k.first, k.last) for k in knocks(pieces, column.blocks(), sigmas, 25)]
+    steps = quantisation(column)
+    step = steps.step if steps else None
+    return [(k.first, k.last) for k in knocks(pieces, column.blocks(), sigmas, 25, step)]
 
 
 def test_knocks_are_found_where_they_are(rng: np.random.Generator) -> None:
@@ -49,6 +53,38 @@ def test_quiet_logs_have_none(rng: np.random.Generator) -> None:
     for model in (MODEL, NoiseModel(N=1e-3, K=1e-2), NoiseModel(N=1e-3, B=1e-2)):
         assert found_in(simulate(model, RATE, 300_000, rng)) == []
     assert found_in(np.full(3000, np.nan)) == []
+
+
+@pytest.mark.parametrize("often", [0.005, 0.02, 0.3])
+def test_one_step_of_a_coarse_register_is_no_knock(rng: np.random.Generator, often: float) -> None:
+    """A register that is mostly at one value: its noise is a small part of a step."""
+    step = 0.05
+    log = 9.8 + step * (rng.random(100_000) < often)
+    log[::17_000] -= step
+    column = ColumnSummary()
+    column.add(log)
+    if often < 0.01:  # a knock by the noise alone
+        assert len(suspects(column.blocks(), 10.0)[0]) > 10
+    assert found_in(log) == []
+    log[50_000] += 12 * step
+    ((first, last),) = found_in(log)
+    assert first <= 50_000 < last
+
+
+def test_steps_of_a_real_log_are_no_knocks(shared: Path) -> None:
+    """Its accelerations in steps so wide that nearly all samples are the same."""
+    excused = 0
+    for name, values in adis16405(shared).items():
+        for step in (0.1, 0.14, 0.18) if name in ("accel_x", "accel_y") else ():
+            coarse = np.round(values / step) * step
+            column = ColumnSummary()
+            column.add(coarse)
+            found = found_in(coarse)
+            excused += len(suspects(column.blocks(), 10.0)[0]) - len(found)
+            for first, last in found:
+                away = np.abs(coarse[first:last] - np.median(coarse))
+                assert away.max() > 1.9 * step
+    assert excused > 20
 
 
 def kept(tmp_path: Path, log: np.ndarray) -> tuple[list[str], np.ndarray]:

@@ -21,6 +21,10 @@ def test_counts_are_those_of_the_whole_column(log: np.ndarray, pieces: int) -> N
     assert column.present == len(finite)
     assert column.missing == np.isnan(log).sum()
     assert column.not_finite == beyond.sum()
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], np.isnan(log) | beyond, [0]))))
+    gaps = edges[1::2] - edges[::2]
+    expected = (gaps.max(), edges[1::2][gaps.argmax()]) if len(gaps) else (0, 0)
+    assert column.longest_gap == expected
     if len(finite) == 0:
         return
     assert (column.low, column.high) == (finite.min(), finite.max())

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 
 from imubench_pipeline.config import QualitySettings
 from imubench_pipeline.findings import Finding
-from imubench_pipeline.quality import levels, stationarity
-from imubench_pipeline.quality.repeats import repeats_beyond_chance
+from imubench_pipeline.quality import copies, held, joined, levels, stationarity
+from imubench_pipeline.quality.repeated_samples import repeats_beyond_chance
 from imubench_pipeline.quality.summary import LARGEST, ColumnSummary
 from imubench_pipeline.readers.batch import POSITION, TABLE_RATE, TEMPERATURE
 from imubench_pipeline.sensor import QUANTITIES, quantity_of
@@ -16,6 +16,9 @@ from imubench_pipeline.units import SI_UNITS, from_si
 
 _USUAL = {"gyro": ("deg/s", "°/s"), "accel": ("mg", "mg")}
 """Unit in which a reader knows the figures of each quantity, and its sign."""
+
+_ROUNDING = 1.5
+"""Step over noise from which the rounding makes most of the noise."""
 
 
 def column_findings(
@@ -47,14 +50,18 @@ def column_findings(
             continue
         fatal = _unusable(channel, column, settings)
         findings += [fatal] if fatal else []
-        findings += _cells(channel, column)
+        findings += _cells(channel, column, rate)
         if fatal is None:
             usable[channel] = column
+    steps = {channel: levels.quantisation(column) for channel, column in usable.items()}
     for channel, column in usable.items():
-        findings += _values(channel, column, rate, settings)
+        findings += _values(channel, column, steps[channel], rate, settings)
         if static:
-            findings += _changes(channel, column, rate, settings)
-    findings += _repeated(usable, settings)
+            findings += _changes(channel, column, steps[channel], rate, settings)
+            findings += joined.joined(channel, column, rate)
+            findings += joined.interleaved(channel, column)
+        findings += _repeated(channel, column, steps[channel], settings)
+    findings += copies.repeated_stretches(usable, steps, rate)
     return findings
 
 
@@ -77,25 +84,29 @@ def _unusable(channel: str, column: ColumnSummary, settings: QualitySettings) ->
         )
         return Finding("too_short", "fatal", detail, column.present, channel)
     if column.low == column.high:
+        stays = "is exactly 0" if column.low == 0.0 else f"stays at {_figure(channel, column.low)}"
         detail = (
-            f"{channel} never changes (it stays at {_figure(channel, column.low)}); the axis is "
-            "dead or the column is not the one meant"
+            f"{channel} never changes (it {stays} in all {column.present} samples); the axis is "
+            "dead or was not read, or the column is not the one meant"
         )
         return Finding("stuck", "fatal", detail, column.low, channel)
     return None
 
 
-def _cells(channel: str, column: ColumnSummary) -> Iterator[Finding]:
+def _cells(channel: str, column: ColumnSummary, rate: float) -> Iterator[Finding]:
+    length, last = column.longest_gap
+    begin, end = (last - length) / rate, last / rate
+    most = f"; at most {length} records in a row ({length / rate:.3g} s), from {begin:.5g} s on"
     if column.missing:
         detail = f"{channel} has {column.missing} records without a number"
-        detail += "; treated as missing samples"
-        yield Finding("empty_cells", "note", detail, column.missing, channel)
+        detail += f"{most}; treated as missing samples"
+        yield Finding("empty_cells", "note", detail, column.missing, channel, begin, end)
     if column.not_finite:
         detail = (
-            f"{channel} has {column.not_finite} infinities, or figures beyond {LARGEST:g}; treated "
-            "as missing samples"
+            f"{channel} has {column.not_finite} infinities, or figures beyond {LARGEST:g}{most}; "
+            "treated as missing samples"
         )
-        yield Finding("not_finite", "warning", detail, column.not_finite, channel)
+        yield Finding("not_finite", "warning", detail, column.not_finite, channel, begin, end)
 
 
 def _temperature(column: ColumnSummary) -> Iterator[Finding]:
@@ -109,21 +120,25 @@ def _temperature(column: ColumnSummary) -> Iterator[Finding]:
 
 
 def _values(
-    channel: str, column: ColumnSummary, rate: float, settings: QualitySettings
+    channel: str,
+    column: ColumnSummary,
+    steps: levels.Quantisation | None,
+    rate: float,
+    settings: QualitySettings,
 ) -> Iterator[Finding]:
     """Yield what the values tell by themselves."""
-    steps = levels.quantisation(column)
+    rounded = "; the figures were rounded after it" if steps is not None and steps.hidden else ""
     if steps is not None and steps.levels < settings.fewest_levels:
         detail = (
             f"{channel} has {steps.levels:.0f} levels of {_figure(channel, steps.step)}, fewer "
             f"than {settings.fewest_levels}: its noise is that of the rounding; record "
-            "in more digits or in a finer range"
+            f"in more digits or in a finer range{rounded}"
         )
         yield Finding("coarse", "warning", detail, steps.levels, channel)
     elif steps is not None and steps.over_noise > settings.step_over_noise:
         detail = (
             f"{channel} is quantised in steps of {_figure(channel, steps.step)}, "
-            f"{steps.over_noise:.2g} of its noise"
+            f"{steps.over_noise:.2g} of its noise{rounded}"
         )
         yield Finding("quantised", "note", detail, steps.step, channel)
     length, end = column.longest_run
@@ -138,7 +153,7 @@ def _values(
             (end - length) / rate,
             end / rate,
         )
-    piled = levels.saturated(column, settings.saturated)
+    piled = levels.saturated(column, steps, settings.saturated)
     if piled is not None:
         side, number = piled
         value = column.low if side == "lowest" else column.high
@@ -150,7 +165,11 @@ def _values(
 
 
 def _changes(
-    channel: str, column: ColumnSummary, rate: float, settings: QualitySettings
+    channel: str,
+    column: ColumnSummary,
+    steps: levels.Quantisation | None,
+    rate: float,
+    settings: QualitySettings,
 ) -> Iterator[Finding]:
     """Yield what is not the same from beginning to end."""
     blocks = column.blocks()
@@ -186,7 +205,7 @@ def _changes(
         )
         yield Finding("warm_up", "warning", detail, warm.drift, channel, 0.0, warm.end / rate)
     change = stationarity.variance_change(blocks)
-    if change is not None and change[0] > settings.variance_ratio:
+    if change is not None and not _rounding(steps) and change[0] > settings.variance_ratio:
         ratio, first, last = change
         detail = (
             f"the noise of {channel} is {ratio:.3g} times as large from {first / rate:.5g} s to "
@@ -197,15 +216,28 @@ def _changes(
         )
 
 
-def _repeated(columns: Mapping[str, ColumnSummary], settings: QualitySettings) -> Iterator[Finding]:
-    """Yield columns whose samples are repeated more often than rounding explains."""
-    for channel, column in columns.items():
-        beyond, chance = repeats_beyond_chance(column)
-        if beyond > settings.repeated:
-            share = column.repeats / max(column.present - 1, 1)
-            detail = (
-                f"{channel} repeats the sample before in {100 * share:.0f} % of the records, of "
-                f"which rounding explains {100 * chance:.2g} %: it is read faster than it samples; "
-                "state its own rate, and record each sample once"
-            )
-            yield Finding("repeated_samples", "warning", detail, share, channel)
+def _rounding(steps: levels.Quantisation | None) -> bool:
+    """Tell whether spread and repeats say where the level lies between two steps, and no more."""
+    return steps is not None and steps.over_noise > _ROUNDING
+
+
+def _repeated(
+    channel: str,
+    column: ColumnSummary,
+    steps: levels.Quantisation | None,
+    settings: QualitySettings,
+) -> Iterator[Finding]:
+    """Yield whether samples are repeated regularly, or more often than rounding explains."""
+    regularly = list(held.held_samples(channel, column))
+    yield from regularly
+    if regularly or _rounding(steps):
+        return
+    beyond, chance = repeats_beyond_chance(column)
+    if beyond > settings.repeated:
+        share = column.repeats / max(column.present - 1, 1)
+        detail = (
+            f"{channel} repeats the sample before in {100 * share:.0f} % of the records, of "
+            f"which rounding explains {100 * chance:.2g} %: it is read faster than it samples; "
+            "state its own rate, and record each sample once"
+        )
+        yield Finding("repeated_samples", "warning", detail, share, channel)

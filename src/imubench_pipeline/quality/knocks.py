@@ -24,6 +24,10 @@ _SETTLED = 4.0
 _CALM = 5
 """So many samples in a row must be settled before a knock is over."""
 
+_STEPS = 2.0
+"""Steps of a register that an outlier must be away. By one it always may be, and its level lies
+between two where it drifts: 1.5 left one knock in 60 clean logs with registers of up to 6 sigma."""
+
 _AROUND = 5
 """Samples on either side that are left out with a knock."""
 
@@ -37,7 +41,8 @@ class Knock:
     first, last : int
         First and one-past-last record to leave out.
     size : float
-        Largest distance from the level, in standard deviations.
+        Largest distance from the level, in standard deviations, or in what `suspects` takes for
+        them.
     """
 
     first: int
@@ -45,7 +50,9 @@ class Knock:
     size: float
 
 
-def suspects(blocks: Blocks, sigmas: float) -> tuple[NDArray[np.int64], Array, Array]:
+def suspects(
+    blocks: Blocks, sigmas: float, step: float | None = None
+) -> tuple[NDArray[np.int64], Array, Array]:
     """Return the blocks that hold an outlier, with the level and the noise around them.
 
     Parameters
@@ -53,13 +60,17 @@ def suspects(blocks: Blocks, sigmas: float) -> tuple[NDArray[np.int64], Array, A
     blocks : Blocks
     sigmas : float
         Distance from the level that counts, in standard deviations of the samples.
+    step : float or None
+        Least significant bit, SI; a change by one is no outlier. None: of no register.
 
     Returns
     -------
     number : ndarray of int, shape (n,)
     level, noise : ndarray, shape (n,)
-        Median of the means, and of the spreads, of the blocks around, SI.
+        Median of the means of the blocks around, and what counts as their noise, SI: the median
+        of their spreads, or more where that is small against the step.
     """
+    least = _STEPS * (step or 0.0) / sigmas
     there = np.isfinite(blocks.spread)
     usual = np.median(blocks.spread[there]) if there.any() else np.inf
     reach = np.maximum(blocks.high - blocks.mean, blocks.mean - blocks.low)
@@ -74,6 +85,7 @@ def suspects(blocks: Blocks, sigmas: float) -> tuple[NDArray[np.int64], Array, A
         near = around[np.argsort(np.abs(around - k))[:4]]
         level = float(np.median(blocks.mean[near]))
         noise = float(np.median(blocks.spread[around]))
+        noise = max(noise, least) if noise > 0.0 else 0.0
         if max(blocks.high[k] - level, level - blocks.low[k]) > sigmas * noise > 0.0:
             number.append(int(k))
             levels.append(level)
@@ -81,7 +93,13 @@ def suspects(blocks: Blocks, sigmas: float) -> tuple[NDArray[np.int64], Array, A
     return np.array(number, dtype=np.int64), np.array(levels), np.array(noises)
 
 
-def knocks(pieces: Iterable[Array], blocks: Blocks, sigmas: float, longest: int) -> Iterator[Knock]:
+def knocks(
+    pieces: Iterable[Array],
+    blocks: Blocks,
+    sigmas: float,
+    longest: int,
+    step: float | None = None,
+) -> Iterator[Knock]:
     """Yield the knocks of a column.
 
     Parameters
@@ -94,8 +112,10 @@ def knocks(pieces: Iterable[Array], blocks: Blocks, sigmas: float, longest: int)
         As `suspects` takes it.
     longest : int
         Records: what lasts longer is motion, and not a knock.
+    step : float or None
+        As `suspects` takes it.
     """
-    number, level, noise = suspects(blocks, sigmas)
+    number, level, noise = suspects(blocks, sigmas, step)
     if len(number) == 0:
         return
     wanted = {int(k): i for i, k in enumerate(number)}

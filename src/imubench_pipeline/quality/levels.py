@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from imubench_pipeline.quality.register import hidden_step
 from imubench_pipeline.quality.summary import ColumnSummary
 
 _SURE = 1e-9
@@ -33,11 +34,14 @@ class Quantisation:
         Steps between the lowest and the highest sample, and one.
     over_noise : float
         Step over the standard deviation of the samples.
+    hidden : bool
+        The figures were rounded again, so that their differences are no multiples of it.
     """
 
     step: float
     levels: float
     over_noise: float
+    hidden: bool = False
 
 
 def quantisation(column: ColumnSummary) -> Quantisation | None:
@@ -45,11 +49,13 @@ def quantisation(column: ColumnSummary) -> Quantisation | None:
     spread = noise_of(column)
     if not (0.0 < column.step < np.inf and spread > 0.0):
         return None
+    hidden = hidden_step(column.excerpts())
+    step = column.step if hidden is None else hidden
     # Two neighbours of n continuous samples come as close as spread / n.
-    if column.step < 20.0 * spread / column.present:
+    if step < 20.0 * spread / column.present:
         return None
     return Quantisation(
-        column.step, (column.high - column.low) / column.step + 1.0, column.step / spread
+        step, (column.high - column.low) / step + 1.0, step / spread, hidden is not None
     )
 
 
@@ -125,12 +131,16 @@ def longest_by_chance(column: ColumnSummary) -> float:
     return 1.0 + math.log(_SURE / column.present) / math.log(share)
 
 
-def saturated(column: ColumnSummary, share: float) -> tuple[str, int] | None:
+def saturated(
+    column: ColumnSummary, steps: Quantisation | None, share: float
+) -> tuple[str, int] | None:
     """Tell whether samples pile up at an extreme.
 
     Parameters
     ----------
     column : ColumnSummary
+    steps : Quantisation or None
+        Of the column.
     share : float
         Part of the samples at an extreme that counts.
 
@@ -139,7 +149,6 @@ def saturated(column: ColumnSummary, share: float) -> tuple[str, int] | None:
     (side, number) or None
         ``lowest`` or ``highest``, and the samples there.
     """
-    steps = quantisation(column)
     if steps is not None and steps.levels < 10:
         return None  # so few levels that an extreme is nothing special
     for side, number in zip(("lowest", "highest"), column.at_extremes, strict=True):

@@ -122,7 +122,8 @@ def warm_up(blocks: Blocks, times: float) -> WarmUp | None:
     rest = np.abs(drifts[_PARTS // 2 :])
     usual, first = _median(rest), float(drifts[0])
     most = float(np.max(rest[np.isfinite(rest)], initial=0.0))
-    if not (abs(first) > times * usual and abs(first) > 2.0 * most):
+    # Parts that do not drift at all are those of a coarse register: nothing to compare with.
+    if not (usual > 0.0 and abs(first) > times * usual and abs(first) > 2.0 * most):
         return None
     calm = np.flatnonzero(np.abs(drifts) < 3.0 * usual)
     end = int(calm[0]) if len(calm) else _PARTS

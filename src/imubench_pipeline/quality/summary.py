@@ -13,6 +13,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from imubench_pipeline.quality.blocks import FIRST_SIZE, Blocks, Gathering
+from imubench_pipeline.quality.excerpts import Excerpt, Excerpts
+from imubench_pipeline.quality.repeats import Repeats
 
 Array = NDArray[np.float64]
 
@@ -23,7 +25,8 @@ _PRESENT, _MISSING, _INFINITE, _LOW, _HIGH, _AT_LOW, _AT_HIGH = range(7)
 _LAST, _RUN, _LONGEST, _LONGEST_END, _REPEATS, _STEP, _TAKEN = range(7, 14)
 _FILLED, _COUNT, _SUM, _SQUARES, _LEAST, _MOST, _SHIFT = range(14, 21)
 _PAIRS, _FAR_PAIRS, _FAR_REPEATS, _CHANGES, _SINGLE = range(21, 26)
-_SIZE = 26
+_GAP, _LONGEST_GAP, _GAP_END = range(26, 29)
+_SIZE = 29
 
 FAR = 64
 """Samples between two that no usual low-pass makes alike."""
@@ -46,6 +49,8 @@ class ColumnSummary:
 
     _state: Array = field(default_factory=_start)
     _blocks: Gathering = field(default_factory=Gathering)
+    _excerpts: Excerpts = field(default_factory=Excerpts)
+    repeated: Repeats = field(default_factory=Repeats)
 
     def add(self, values: Array) -> Array:
         """Count a piece of the column and return it with what is not finite made missing."""
@@ -53,7 +58,10 @@ class ColumnSummary:
         number, infinite = _take(np.ascontiguousarray(values), self._state, rows)
         if number:
             self._blocks.add(rows[:number])
-        return np.where(np.abs(values) <= LARGEST, values, np.nan) if infinite else values
+        kept = np.where(np.abs(values) <= LARGEST, values, np.nan) if infinite else values
+        self._excerpts.add(kept)
+        self.repeated.add(kept)
+        return kept
 
     @property
     def present(self) -> int:
@@ -69,6 +77,11 @@ class ColumnSummary:
     def not_finite(self) -> int:
         """Infinities, and figures beyond `LARGEST`."""
         return int(self._state[_INFINITE])
+
+    @property
+    def longest_gap(self) -> tuple[int, int]:
+        """Length of the longest run of records without a finite number, and one past its end."""
+        return int(self._state[_LONGEST_GAP]), int(self._state[_GAP_END])
 
     @property
     def low(self) -> float:
@@ -124,6 +137,10 @@ class ColumnSummary:
     def step(self) -> float:
         """Smallest difference between neighbours that differ, SI; infinite if none do."""
         return float(self._state[_STEP])
+
+    def excerpts(self) -> list[Excerpt]:
+        """Return pieces of the column, evenly over all of it."""
+        return self._excerpts.pieces()
 
     def blocks(self) -> Blocks:
         """Return the statistics of the blocks, the last one as far as it goes."""
@@ -200,6 +217,7 @@ def _take_plain(piece: Array, state: Array) -> bool:
     state[_MOST] = max(state[_MOST], most)
     state[_STEP] = min(state[_STEP], step)
     state[_LAST], state[_RUN] = piece[-1], 1.0
+    state[_GAP] = 0.0
     return True
 
 
@@ -246,6 +264,7 @@ def _take_each(piece: Array, state: Array) -> None:
     shift, total, squares = state[_SHIFT], state[_SUM], state[_SQUARES]
     least, most = state[_LEAST], state[_MOST]
     changes, single = state[_CHANGES], state[_SINGLE]
+    gap = state[_GAP]
     count, repeats = 0, 0
     for i in range(FAR, piece.size):
         if abs(piece[i]) <= LARGEST and abs(piece[i - FAR]) <= LARGEST:
@@ -255,7 +274,12 @@ def _take_each(piece: Array, state: Array) -> None:
         x = piece[i]
         if not abs(x) <= LARGEST:
             state[_MISSING if np.isnan(x) else _INFINITE] += 1
+            gap += 1.0
+            if gap > state[_LONGEST_GAP]:
+                state[_LONGEST_GAP] = gap
+                state[_GAP_END] = state[_TAKEN] + i + 1
             continue
+        gap = 0.0
         count += 1
         if np.isnan(shift):
             shift = x
@@ -297,3 +321,4 @@ def _take_each(piece: Array, state: Array) -> None:
     state[_LOW], state[_HIGH], state[_AT_LOW], state[_AT_HIGH] = low, high, at_low, at_high
     state[_SHIFT], state[_SUM], state[_SQUARES] = shift, total, squares
     state[_LEAST], state[_MOST] = least, most
+    state[_GAP] = gap

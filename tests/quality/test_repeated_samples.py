@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from imubench_pipeline.quality.repeats import _parts, repeats_beyond_chance
+from imubench_pipeline.quality.repeated_samples import _parts, repeats_beyond_chance
 from imubench_pipeline.quality.summary import ColumnSummary
 
 
