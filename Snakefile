@@ -432,7 +432,9 @@ rule shortlist:
         **ASKED,
     params:
         settings=plan.ranking_settings(),
-        catalogue=plan.catalogue("price_class"),
+        catalogue=plan.catalogue(
+            "price_class", "temperature_range", "rate", "mass", "power"
+        ),
         code=plan.code("shortlist"),
     run:
         steps.run("shortlist", input, output, params, wildcards)

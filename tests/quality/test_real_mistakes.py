@@ -156,11 +156,17 @@ def test_stamps_in_another_unit_than_the_sensor_file_states(
     assert of_noise.factor == pytest.approx(math.sqrt(factor))
 
 
-def test_a_log_that_is_read_faster_than_it_samples(adis16405: np.ndarray, tmp_path: Path) -> None:
+@pytest.mark.parametrize("clock", ["held_samples", "repeated_samples"])
+def test_a_log_that_is_read_faster_than_it_samples(
+    adis16405: np.ndarray, tmp_path: Path, rng: np.random.Generator, clock: str
+) -> None:
     # Its accelerometers have steps as large as their noise, and repeat a quarter by chance.
-    path = written(tmp_path, adis16405[(np.arange(ROWS) * 0.75).astype(int)])
+    regular = (np.arange(ROWS) * 0.75).astype(int)
+    at_random = np.sort(rng.integers(0, ROWS, ROWS))
+    rows = regular if clock == "held_samples" else at_random
+    path = written(tmp_path, adis16405[rows])
     found = findings(path, CATALOGUE["adis16405"], tmp_path)
-    repeated = {row["channel"] for row in found if row["finding"] == "repeated_samples"}
+    repeated = {row["channel"] for row in found if row["finding"] == clock}
     assert repeated == set(CHANNELS)
     assert unfit(found) == {}
 

@@ -16,6 +16,6 @@ SHORTLIST = (
     number("measured_margin", "-", "limit over error by its logs: see the table ranking"),
     text("measured_verdict", "as of the table ranking", required=False),
     text("assumed", "what is not printed, and what stands for it", required=False),
-    text("reason", "why it is not judged", required=False),
+    text("reason", "what it lacks, or why it is not judged", required=False),
 )
 """The table ``shortlist``."""

@@ -1,4 +1,9 @@
-"""Which sensors of a catalogue are worth logging for a requirement: the table ``shortlist``."""
+"""Which sensors of a catalogue are worth logging for a requirement: the table ``shortlist``.
+
+What comes in use counts as its datasheet prints it (see `error_budget.in_use`). A turn-on bias can
+be calibrated away: it is left out at best, and there at worst. Where a figure is not published the
+worst is not known.
+"""
 
 from __future__ import annotations
 
@@ -6,25 +11,31 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-from imubench_pipeline.expected_errors import Question, of_requirement
-from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.error_budget.in_use import BIASES, Figure
+from imubench_pipeline.error_budget.in_use import Figures as InUse
+from imubench_pipeline.error_budget.printed_errors import of_datasheet
+from imubench_pipeline.expected_errors import AxisErrors, Question, of_requirement
 from imubench_pipeline.requirements import Requirement
 from imubench_pipeline.sensor import Sensor
 from imubench_pipeline.shortlist.classes import MeasuredRanges
 from imubench_pipeline.shortlist.columns import SHORTLIST
 from imubench_pipeline.shortlist.figures import End, Figures, figures_of
+from imubench_pipeline.suitability.abilities import Abilities, abilities, judge
 
 Row = Mapping[str, Any]
 
 VERDICTS: Mapping[str, str] = {
-    "cannot pass": "fails even with the best that its datasheet allows",
+    "cannot pass": "lacks what it must have, or fails even with the best that its datasheet allows",
     "worth logging": "passes at its best and not, or nobody knows, at its worst: a log decides",
     "passes at its worst": "passes with the worst that its datasheet allows",
     "not judged": "too little is published, or it is outside the price class",
 }
 """What a verdict says."""
 
-_NOTHING = NoiseModel()
+_NOTHING = AxisErrors()
+_QUANTITIES = ("gyro", "accel")
+_ALONE = dict.fromkeys(_QUANTITIES, _NOTHING)
+_CALIBRATED: InUse = dict.fromkeys(BIASES, Figure(sigma=0.0))
 
 
 def shortlist_rows(
@@ -60,7 +71,7 @@ def shortlist_rows(
         questions = list(of_requirement(name, requirement))
         rows = []
         for sensor, figures in found.items():
-            row = _judged(requirement, questions, sensors[sensor].price_class, figures)
+            row = _judged(requirement, questions, sensors[sensor], figures)
             standing = measured.get((name, sensor))
             if standing is not None and standing["margin"] is not None:
                 of_model = simulated.get((sensor, standing["recording"]), False)
@@ -76,29 +87,49 @@ def shortlist_rows(
 def _judged(
     requirement: Requirement,
     questions: Sequence[Question],
-    price_class: str | None,
+    sensor: Sensor,
     figures: Mapping[str, Figures | str],
 ) -> dict[str, Any]:
     row: dict[str, Any] = dict.fromkeys(column.name for column in SHORTLIST)
-    row["price_class"] = price_class
+    row["price_class"] = price_class = sensor.price_class
+    lacking, unknown = judge(requirement.must, _before_buying(sensor))
+    if lacking:
+        return row | {"verdict": "cannot pass", "reason": "; ".join(lacking)}
     needed = dict.fromkeys(quantity for one in questions for quantity in one.needs)
     known = {q: one for q in needed if isinstance(one := figures[q], Figures)}
     if len(known) < len(needed):
         why = "; ".join(one for q in needed if isinstance(one := figures[q], str))
         return row | {"verdict": "not judged", "reason": why}
-    best = [_margin(one, known, "best") for one in questions]
+    in_use = {quantity: of_datasheet(sensor.datasheet, f"{quantity}_x") for quantity in known}
+    best = [_margin(one, known, in_use, "best")[0] for one in questions]
     least = min(range(len(best)), key=best.__getitem__)
+    worst = None
+    bounded = all(one.bounded for one in known.values())
+    assumed = [words for one in known.values() for words in one.assumed]
+    if bounded:
+        margins, missing = zip(
+            *(_margin(one, known, in_use, "worst") for one in questions), strict=True
+        )
+        worst = min(margins) if not any(missing) else None
+        assumed += dict.fromkeys(words for each in missing for words in each)
     row |= {
         "best_margin": best[least],
+        "worst_margin": worst,
         "decides": requirement.limits[least].text,
-        "assumed": "; ".join(words for one in known.values() for words in one.assumed) or None,
+        "assumed": "; ".join([*assumed, *(f"{name}: not known" for name in unknown)]) or None,
     }
-    if all(one.bounded for one in known.values()):
-        row["worst_margin"] = min(_margin(one, known, "worst") for one in questions)
     if not requirement.admits(price_class):
         why = "outside the price class" if price_class else "price class not stated"
         return row | {"verdict": "not judged", "reason": why}
     return row | {"verdict": _verdict(row["best_margin"], row["worst_margin"])}
+
+
+def _before_buying(sensor: Sensor) -> Abilities:
+    """Return what a sensor has, logged or not: all axes of the quantities that it measures."""
+    has = abilities(sensor)
+    quantities = [name for name in _QUANTITIES if name not in has.without]
+    channels = tuple(f"{name}_{axis}" for name in quantities for axis in "xyz")
+    return has.model_copy(update={"channels": channels, "logged_rate": None})
 
 
 def _verdict(best: float, worst: float | None) -> str:
@@ -107,19 +138,20 @@ def _verdict(best: float, worst: float | None) -> str:
     return "passes at its worst" if worst is not None and worst >= 1.0 else "worth logging"
 
 
-def _margin(question: Question, figures: Mapping[str, Figures], end: End) -> float:
-    """Return the limit over the error, of the best or the worst models of the quantities."""
+def _margin(
+    question: Question, figures: Mapping[str, Figures], in_use: Mapping[str, InUse], end: End
+) -> tuple[float, list[str]]:
+    """Return the limit over the error at one end, and what that leaves out, in words."""
     pick = min if end == "best" else max
-
-    def alone(quantity: str, model: NoiseModel) -> float:
-        pair = (model, _NOTHING) if quantity == "gyro" else (_NOTHING, model)
-        return question.answer(*pair).total
-
-    chosen = {"gyro": _NOTHING, "accel": _NOTHING}
+    beside = _CALIBRATED if end == "best" else {}
+    chosen = dict.fromkeys(_QUANTITIES, _NOTHING)
     for quantity in question.needs:
-        # The quantities are independent: each has its own extreme.
         models = figures[quantity].models(end)
-        chosen[quantity] = pick(models, key=lambda one, of=quantity: alone(of, one))  # type: ignore[misc]  # a default binds the loop's variable
-    total = question.answer(chosen["gyro"], chosen["accel"]).total
+        axes = [AxisErrors(model, {**in_use[quantity], **beside}) for model in models]
+        # The quantities are independent: each has its own extreme.
+        totals = [question.answer(**{**_ALONE, quantity: one}).total for one in axes]
+        chosen[quantity] = axes[totals.index(pick(totals))]
+    found = question.answer(**chosen)
     assert question.limit is not None  # of a requirement
-    return question.limit / total if total > 0.0 else math.inf
+    margin = question.limit / found.total if found.total > 0.0 else math.inf
+    return margin, [f"{one.source}: not known ({one.reason})" for one in found.missing]
