@@ -102,7 +102,9 @@ def test_a_drift_that_no_model_has_is_a_doubt_and_stands_in_the_ranking(
     assert "periodic drift" in finding["detail"] and "600 s" in finding["detail"]
     (doubt,) = doubts([finding], [], [])
     assert not doubt.unfit and {"K", "B_curve"} <= set(doubt.parameters)
-    about = [NAMES | {"status": "ok"}]
+    about = [
+        NAMES | {"status": "ok", "simulated": True, "duration": SAMPLES / RATE, "device": None}
+    ]
     assert judged(about, [doubt], ())[0]["doubts"] == "backtest contradicts (gyro_x)"
     questions = of_requirement("robot", ROBOT)
     errors = error_rows(NAMES, estimates, questions, draws=20, seed=1)
@@ -113,7 +115,7 @@ def test_a_drift_that_no_model_has_is_a_doubt_and_stands_in_the_ranking(
             {"robot": ROBOT},
             {"s": {"price_class": None}},
             judged(about, [doubt], ()),
-            rows,
+            backtests=rows,
         ),
     ).to_pylist()
     by_error = {row["error"]: row for row in ranking}
