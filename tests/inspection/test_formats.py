@@ -200,6 +200,36 @@ def test_what_ros_calls_linear_acceleration_is_measured(tmp_path: Path) -> None:
     assert "gravity is 9.81: is the unit right?" in found.proof.said
 
 
+@pytest.mark.parametrize("order", [("/camera/accel", "/camera/gyro"), ("/a_gyro", "/b_accel")])
+def test_a_gyro_and_an_accelerometer_in_topics_of_their_own(
+    tmp_path: Path, order: tuple[str, str]
+) -> None:
+    # Cameras write the message of an IMU for each, with zeros for what the other one has.
+    rows = test_rosbag.figures(400) * 0.01 + [0, 0, 0, 0, 0, 9.8]
+    of = {
+        name: rows * ([1] * 3 + [0] * 3 if "gyro" in name else [0] * 3 + [1] * 3) for name in order
+    }
+    topics = {
+        name: test_rosbag.imu_topic("mcap", one[:: 1 + ("accel" in name)])
+        for name, one in of.items()
+    }
+    path = test_rosbag.bag(tmp_path, "mcap", topics)
+    found = inspect(path)
+    taken = found.draft.log()["channels"]
+    assert set(taken) == set(CHANNELS)
+    assert all(entry["variable"].endswith(name.split("_")[0]) for name, entry in taken.items())
+    assert "nothing was measured here" in found.block
+    assert found.complete, found.block
+
+
+def test_a_gyro_that_nobody_wrote_is_not_drafted(tmp_path: Path) -> None:
+    rows = test_rosbag.figures(50) * [0, 0, 0, 0.01, 0.01, 0.01] + [0, 0, 0, 0, 0, 9.8]
+    path = test_rosbag.bag(tmp_path, "ros1", {"/imu": test_rosbag.imu_topic("ros1", rows)})
+    found = inspect(path)
+    assert set(found.draft.channels) == {"accel_x", "accel_y", "accel_z"}
+    assert "nothing was measured here" in found.block
+
+
 def test_two_imus_in_a_bag(tmp_path: Path) -> None:
     rows = test_rosbag.figures(50) * 0.01 + [0, 0, 0, 0, 0, 9.8]
     topics = {name: test_rosbag.imu_topic("mcap", rows) for name in ("/b/imu", "/a/imu")}

@@ -119,6 +119,8 @@ def _why_not(group: Group) -> str:
         return "of a filter or about the measurement, not what the sensor measures"
     if group.rank == WITHOUT_GRAVITY and group.gravity_unit is None:
         return "without gravity: not what the accelerometer measures"
+    if group.quantity != "temperature" and len(group.columns) > 1 and group.constant:
+        return "the same in all of the first records: nothing was measured here"
     return ""
 
 

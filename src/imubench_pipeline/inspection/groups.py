@@ -31,6 +31,8 @@ GRAVITIES: Mapping[str, float] = {"g": 1.0, "m/s^2": STANDARD_GRAVITY, "mg": 100
 
 _NEAR, _STATED_NEAR = 0.1, 0.2
 _NAMELESS = 0.05
+_TELLING = 40
+"""Records of all axes that are the same, from which a sensor was not read."""
 _FIXED: tuple[Reader, ...] = ("rosbag",)
 """Formats in which the names are those of the format: there linear acceleration is measured."""
 
@@ -77,6 +79,12 @@ class Group:
             return None
         means = [_mean(column) for column in self.columns.values()]
         return None if None in means else float(np.linalg.norm(np.array(means, np.float64)))
+
+    @property
+    def constant(self) -> bool:
+        """Whether no axis ever changes in the first records: fields that nothing was put into."""
+        known = [column.values[np.isfinite(column.values)] for column in self.columns.values()]
+        return all(values.size >= _TELLING and np.ptp(values) == 0.0 for values in known)
 
     @property
     def gravity_unit(self) -> str | None:
