@@ -128,7 +128,7 @@ FIGURES = "The limit that decides is position, 2 min: 3 m expected (2 to 4), 5 m
 
 
 def verdict(*groups: dict[str, Any]) -> str:
-    return requirement_verdict(groups, NAMES, BASIS).strip()
+    return " ".join(requirement_verdict(groups, NAMES, BASIS))
 
 
 def test_the_best_sensor_is_named_with_the_figure_that_decides_and_its_data() -> None:
@@ -321,3 +321,15 @@ def test_nouns_are_counted(number: int, words: str) -> None:
 
 def test_irregular_nouns_are_counted() -> None:
     assert (counted(1, "axis", "axes"), counted(3, "axis", "axes")) == ("1 axis", "3 axes")
+
+
+def test_several_conditions_are_counted_in_the_answer_and_listed_beside_it() -> None:
+    conditions = "its gyro scale factor error is below 1200 ppm (1 sigma); it has what it must"
+    best = group("a", "probably passes if", 1, conditions=conditions)
+    answer, _, listed = requirement_verdict([best], NAMES, BASIS)
+    assert answer == "No sensor surely passes. A, the only one, probably passes on 2 conditions."
+    assert listed == f"Conditions: {conditions}."
+    best = group("a", "passes if", 1, conditions="its file says more")
+    answer, *rest = requirement_verdict([best, group("b", "surely fails", 2)], NAMES, BASIS)
+    assert answer.endswith("The best of 2, A, passes if its file says more.")
+    assert not any(line.startswith("Conditions") for line in rest)

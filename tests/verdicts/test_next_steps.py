@@ -94,3 +94,17 @@ def test_a_short_log_is_to_be_as_long_as_it_takes() -> None:
     assert step["text"] == (
         "log c for 8.5 h more, 9 h in all: it would give 1 verdict stronger evidence"
     )
+
+
+def test_what_no_file_says_is_to_be_found_out_and_no_log_settles_it() -> None:
+    turns = {"environment": {"turns": "360 deg", "temperature_change": "2 K"}}
+    asked = {"robot": requirement(("heading", "100 s", "0.1 deg"), **turns)}
+    (row,), steps = judge({"s": {"r": gyro(5.0)}}, asked)
+    assert row["verdict"] == "passes if"
+    first = steps[0]
+    assert (first["action"], first["verdicts_strengthened"]) == ("find_figures", 1)
+    assert first["text"] == (
+        "find out what its file does not say: gyro temperature coefficient, gyro scale factor "
+        "error: it would free 1 verdict of a condition"
+    )
+    assert "log_longer" not in {one["action"] for one in steps}

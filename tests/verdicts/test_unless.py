@@ -24,10 +24,13 @@ def test_a_sensor_in_another_unit_stands_as_it_would_in_the_right_one() -> None:
         assert row["unless_verdict"] == true["verdict"]
         assert row["logged_verdict"] == "surely fails"
         assert row["logged_margin"] == pytest.approx(true["margin"] / DEGREES, rel=0.1)
+        same = true["verdict"] == "surely fails"
+        outcome = "does so too" if same else true["verdict"]
         assert row["unless"] == (
             f"as logged it surely fails (margin {row['logged_margin']:.3g}); if the gyro is in "
-            f"°/s, and not rad/s, it {true['verdict']} (margin {true['margin']:.3g})"
+            f"°/s, and not rad/s, it {outcome} (margin {true['margin']:.3g})"
         )
+    assert {row["unless_verdict"] for row in rows} > {"surely fails"}
 
 
 def test_a_verdict_that_stands_is_said_with_what_would_turn_it() -> None:

@@ -127,7 +127,7 @@ def _weakness(code: str, row: Row) -> str:
 
 def requirement_verdict(
     groups: Sequence[Mapping[str, Any]], names: Mapping[str, str], basis: Mapping[str, str]
-) -> str:
+) -> list[str]:
     """Return which sensor fulfils a requirement best, and how the others stand, in sentences.
 
     Parameters
@@ -138,31 +138,42 @@ def requirement_verdict(
         Name of each sensor as it is shown.
     basis : mapping
         On which data each sensor is judged, in words.
+
+    Returns
+    -------
+    list of str
+        The answer, and what is to be known beside it, a line each.
     """
     if not groups:
-        return "No recording answers it."
+        return ["No recording answers it."]
     ranked = [group for group in groups if group["rank"] != "–"]
     turned = [f"{names[one['sensor']]}: {one['unless']}." for one in groups if one["unless"]]
     if not ranked:
-        return " ".join(["No sensor can be ranked for it.", _others(groups, names), *turned])
+        return ["No sensor can be ranked for it.", *_others(groups, names), *turned]
     best = ranked[0]
     decides = next(limit for limit in best["limits"] if limit["decides"])
     said = names[best["sensor"]] + (" (simulated)" if best["simulated"] else "")
-    first = _first(said, in_words(best), len(ranked), len(groups))
+    verdict, conditions = in_words(best), []
+    if (best["conditions"] or "").count("; ") and best["verdict"].endswith(" if"):
+        conditions = best["conditions"].split("; ")
+        verdict = f"{best['verdict'].removesuffix(' if')} on {len(conditions)} conditions"
+    first = _first(said, verdict, len(ranked), len(groups))
     if best["weak"]:
         first += f", on weak evidence ({best['weak']})"
-    text = (
-        f"{first}. The limit that decides is {decides['limit']}: {decides['sigma']} "
+    figures = (
+        f"The limit that decides is {decides['limit']}: {decides['sigma']} "
         f"{decides['unit']} expected ({decides['interval']}), {decides['allowed']} "
         f"{decides['unit']} allowed (1σ)."
     )
     if decides["reason"]:
-        text += f" Not counted: {decides['reason']}."
-    text += f" {basis[best['sensor']]}"
+        figures += f" Not counted: {decides['reason']}."
+    lines = [f"{first}.", f"{figures} {basis[best['sensor']]}"]
+    if conditions:
+        lines.append(f"Conditions: {'; '.join(conditions)}.")
     if best["tied_with"]:
         tied = ", ".join(names.get(one, one) for one in listed_names(best["tied_with"], names))
-        text += f" It cannot be told apart from {tied}."
-    return " ".join([text, _others([g for g in groups if g is not best], names), *turned])
+        lines.append(f"It cannot be told apart from {tied}.")
+    return [*lines, *_others([g for g in groups if g is not best], names), *turned]
 
 
 def _first(sensor: str, verdict: str, judged: int, asked: int) -> str:
@@ -176,7 +187,7 @@ def _first(sensor: str, verdict: str, judged: int, asked: int) -> str:
         return f"{sensor} is the best of {of} and passes"
     if verdict == "probably passes":
         return f"No sensor surely passes. The best of {of}, {sensor}, probably passes"
-    if " if " in verdict:
+    if " if " in verdict or verdict.endswith(" conditions"):
         return f"No sensor passes without a condition. The best of {of}, {sensor}, {verdict}"
     return f"No sensor passes. Of {of} the nearest is {sensor}, which {verdict}"
 
@@ -191,7 +202,7 @@ def listed_names(text: str, known: Mapping[str, str]) -> list[str]:
     return [text]
 
 
-def _others(groups: Sequence[Mapping[str, Any]], names: Mapping[str, str]) -> str:
+def _others(groups: Sequence[Mapping[str, Any]], names: Mapping[str, str]) -> list[str]:
     """Return how many sensors have each verdict, and which where they are few."""
     parts = []
     found: dict[str, list[str]] = {}
@@ -208,7 +219,7 @@ def _others(groups: Sequence[Mapping[str, Any]], names: Mapping[str, str]) -> st
         if own:
             listed = ", ".join(own) if len(own) <= _FEW else f"{len(own)} sensors"
             parts.append(f"{said}: {listed}.")
-    return " ".join(parts)
+    return parts
 
 
 _FEW = 4

@@ -13,6 +13,7 @@ from typing import Any
 
 from imubench_pipeline.error_budget.in_use import BIASES, Figure
 from imubench_pipeline.error_budget.in_use import Figures as InUse
+from imubench_pipeline.error_budget.parts import Budget
 from imubench_pipeline.error_budget.printed_errors import of_datasheet
 from imubench_pipeline.expected_errors import AxisErrors, Question, of_requirement
 from imubench_pipeline.requirements import Requirement
@@ -101,17 +102,13 @@ def _judged(
         why = "; ".join(one for q in needed if isinstance(one := figures[q], str))
         return row | {"verdict": "not judged", "reason": why}
     in_use = {quantity: of_datasheet(sensor.datasheet, f"{quantity}_x") for quantity in known}
-    best = [_margin(one, known, in_use, "best")[0] for one in questions]
+    best, missing = _margins(questions, known, in_use, "best")
     least = min(range(len(best)), key=best.__getitem__)
     worst = None
-    bounded = all(one.bounded for one in known.values())
-    assumed = [words for one in known.values() for words in one.assumed]
-    if bounded:
-        margins, missing = zip(
-            *(_margin(one, known, in_use, "worst") for one in questions), strict=True
-        )
-        worst = min(margins) if not any(missing) else None
-        assumed += dict.fromkeys(words for each in missing for words in each)
+    if all(one.bounded for one in known.values()):
+        margins, missing = _margins(questions, known, in_use, "worst")
+        worst = min(margins) if not missing else None
+    assumed = [words for one in known.values() for words in one.assumed] + missing
     row |= {
         "best_margin": best[least],
         "worst_margin": worst,
@@ -138,10 +135,28 @@ def _verdict(best: float, worst: float | None) -> str:
     return "passes at its worst" if worst is not None and worst >= 1.0 else "worth logging"
 
 
-def _margin(
+def _margins(
+    questions: Sequence[Question],
+    figures: Mapping[str, Figures],
+    in_use: Mapping[str, InUse],
+    end: End,
+) -> tuple[list[float], list[str]]:
+    """Return the limit over the error of each question, and what they all leave out, in words."""
+    budgets = [_budget(one, figures, in_use, end) for one in questions]
+    margins = [
+        one.limit / found.total if found.total > 0.0 else math.inf
+        for one, found in zip(questions, budgets, strict=True)
+        if one.limit is not None  # of a requirement every one has
+    ]
+    missing = (
+        f"{one.source}: not known ({one.reason})" for found in budgets for one in found.missing
+    )
+    return margins, list(dict.fromkeys(missing))
+
+
+def _budget(
     question: Question, figures: Mapping[str, Figures], in_use: Mapping[str, InUse], end: End
-) -> tuple[float, list[str]]:
-    """Return the limit over the error at one end, and what that leaves out, in words."""
+) -> Budget:
     pick = min if end == "best" else max
     beside = _CALIBRATED if end == "best" else {}
     chosen = dict.fromkeys(_QUANTITIES, _NOTHING)
@@ -151,7 +166,4 @@ def _margin(
         # The quantities are independent: each has its own extreme.
         totals = [question.answer(**{**_ALONE, quantity: one}).total for one in axes]
         chosen[quantity] = axes[totals.index(pick(totals))]
-    found = question.answer(**chosen)
-    assert question.limit is not None  # of a requirement
-    margin = question.limit / found.total if found.total > 0.0 else math.inf
-    return margin, [f"{one.source}: not known ({one.reason})" for one in found.missing]
+    return question.answer(**chosen)

@@ -45,6 +45,14 @@ _FIGURES = {
 }
 """By cause: the condition, and the unit of the figure of a gyro and of an accelerometer."""
 
+_NAMES = {
+    "temperature": "temperature coefficient",
+    "scale_factor": "scale factor error",
+    "g_sensitivity": "g-sensitivity",
+    "vibration_rectification": "vibration rectification",
+}
+"""Of the figures that a datasheet can tell of every specimen."""
+
 _DIMENSIONS = {
     "deg/s": "angular_rate",
     "mg": "acceleration",
@@ -110,6 +118,15 @@ class Rests:
         if words not in CONDITIONAL or not said:
             return words, None
         return CONDITIONAL[words], "; ".join(said)
+
+    def unknown_figures(self) -> list[str]:
+        """Return the names of the figures that its file does not say, but for turn-on biases."""
+        causes = [
+            f"{_SENSORS[measured]} {_NAMES[cause]}"
+            for measured, cause in self.figures
+            if cause in _NAMES
+        ]
+        return [*causes, *self.unknown]
 
     def _conditions(self) -> Iterator[str]:
         for (measured, cause), largest in self.figures.items():

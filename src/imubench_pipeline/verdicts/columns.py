@@ -78,7 +78,10 @@ NEXT_STEPS = (
     text("sensor", "name of the sensor file"),
     text("recording", "name of the recording; null: a new one", required=False),
     text("requirements", "whose verdicts it is about"),
-    text("action", "check_unit, record_again, add_channels, log_longer or add_specimens"),
+    text(
+        "action",
+        "check_unit, find_figures, add_channels, record_again, log_longer or add_specimens",
+    ),
     count("verdicts_turned", "verdicts that it may change, or settle", required=True),
     count("verdicts_strengthened", "verdicts whose evidence it makes stronger", required=True),
     number("duration", "s", "length of the log that it takes"),

@@ -15,7 +15,9 @@ from imubench_pipeline.verdicts.judgement import Judgement
 from imubench_pipeline.verdicts.specimens import Expected
 from imubench_pipeline.verdicts.standing import Standing
 
-Action = Literal["check_unit", "add_channels", "record_again", "log_longer", "add_specimens"]
+Action = Literal[
+    "check_unit", "find_figures", "add_channels", "record_again", "log_longer", "add_specimens"
+]
 """What can be done, the cheapest first."""
 
 _ORDER = get_args(Action)
@@ -80,8 +82,11 @@ def _steps(one: Judgement, basis: Basis) -> Iterator[_Step]:
     if not one.decides.known:
         yield from _to_know(one, basis)
         return
-    if one.verdict not in ("passes", "surely fails"):
+    if one.decides.verdict not in ("passes", "surely fails"):
         yield from _to_settle(one, basis)
+    if one.compared and (unknown := one.rests.unknown_figures()):
+        what = ", ".join(unknown)
+        yield _Step("find_figures", (one.sensor, None), one.name, turns=False, what=what)
     for reason in one.reasons:
         yield from _to_strengthen(one, reason, basis)
 
@@ -195,7 +200,9 @@ def _row(steps: Sequence[_Step], basis: Basis) -> dict[str, Any]:
     strengthened = {step.requirement for step in steps} - turned
     duration = max((step.duration for step in steps if step.duration), default=None)
     specimens = max((step.specimens for step in steps if step.specimens), default=None)
-    whats = ", ".join(dict.fromkeys(step.what for step in steps if step.what))
+    whats = ", ".join(
+        dict.fromkeys(part for step in steps if step.what for part in step.what.split(", "))
+    )
     sensor, recording = first.key
     effect = _effect(first.action, len(turned), len(strengthened))
     logged = basis.duration((sensor, recording)) if recording else None
@@ -224,6 +231,8 @@ def _what_to_do(
     match action:
         case "check_unit":
             return f"check the unit of {what} in {recording}"
+        case "find_figures":
+            return f"find out what its file does not say: {what}"
         case "record_again":
             return f"record {recording} again ({what})"
         case "add_channels":
@@ -240,6 +249,8 @@ _WOULD = {"check_unit": "turn", "record_again": "allow", "add_channels": "allow"
 
 
 def _effect(action: Action, turned: int, strengthened: int) -> str:
+    if action == "find_figures":
+        return f"it would free {_verdicts(strengthened)} of a condition"
     parts = []
     if turned:
         parts.append(f"would {_WOULD.get(action, 'settle')} {_verdicts(turned)}")

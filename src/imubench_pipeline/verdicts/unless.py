@@ -160,7 +160,10 @@ def unless_words(found: Unless) -> str:
     if found.logged is not None:
         parts.append(f"as logged it {_outcome(found.logged)}")
     if found.mended is not None:
-        parts.append(f"if {_units(found.factors)}, it {_outcome(found.mended)}")
+        outcome = _outcome(found.mended)
+        if found.logged is not None and found.logged.verdict == found.mended.verdict:
+            outcome = outcome.replace(found.mended.verdict, "does so too")
+        parts.append(f"if {_units(found.factors)}, it {outcome}")
     return "; ".join(parts)
 
 
@@ -180,5 +183,6 @@ def _units(factors: Factors) -> str:
                 named.append(f"the {name} is in {units}")
                 break
         else:
-            named.append(f"the figures of the {name} are to be taken {factor:.3g} times")
+            times, way = (1.0 / factor, "large") if factor < 1.0 else (factor, "small")
+            named.append(f"the figures of the {name} are {times:.3g} times too {way}")
     return " and ".join(named)
