@@ -237,7 +237,7 @@ def test_what_is_not_printed_is_not_known_and_it_is_said_why() -> None:
     reasons = {cause: one.reason or "" for cause, one in found.items()}
     assert "a least value" in reasons["turn_on_bias"]
     assert "does not publish" in reasons["nonlinearity"]
-    assert "does not give it" in reasons["scale_factor"]
+    assert "does not say" in reasons["scale_factor"]
     assert "grade A" in reasons["g_sensitivity"]
     assert set(PRINTED.values()) == set(IN_USE)
 

@@ -21,6 +21,9 @@ from tests.fuzz.supervision import HANG_S, Fuzzing
 from tests.readers.test_ubx import raw, samples, truth
 
 SECONDS = 2.0
+QUICK = ("csv", "hdf5", "ubx")
+"""Readers that are fuzzed for a moment in every run of the tests, and the others in `release`."""
+
 _read: Counter[str] = Counter()
 
 
@@ -66,9 +69,9 @@ def takes_all(path: Path, log: LogFormat) -> str:
     [
         ("raises", "KeyError: 'no such field'"),
         ("crashes", "signal 11"),
-        ("hangs", "no answer for 2 s"),
+        pytest.param("hangs", "no answer for 2 s", marks=pytest.mark.release),
         ("hogs", "MemoryError: took 11"),
-        ("takes_all", "Unable to allocate"),
+        pytest.param("takes_all", "Unable to allocate", marks=pytest.mark.release),
     ],
 )
 def test_a_bad_reader_is_caught(tmp_path: Path, bad: str, fault: str) -> None:
@@ -88,18 +91,21 @@ def test_a_reader_that_fails_with_every_log_is_caught(tmp_path: Path) -> None:
     assert found.inputs == 0
 
 
-@pytest.mark.parametrize("reader", READERS)
+@pytest.mark.parametrize(
+    "reader",
+    [name if name in QUICK else pytest.param(name, marks=pytest.mark.release) for name in READERS],
+)
 def test_readers_survive_a_moment(tmp_path: Path, reader: str) -> None:
     found = Fuzzing(reader, SECONDS, tmp_path).run()
     assert not found.failures, found.folders
-    assert found.inputs > 40
-    assert len(found.outcomes) > 5
+    assert found.inputs > 10
+    assert len(found.outcomes) > 3
 
 
 def test_the_command_tells_what_it_did(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     given = ["--reader", "numpy", "--minutes", "0.01", "--failures", str(tmp_path)]
     assert main(given) == 0
-    head, row = capsys.readouterr().out.splitlines()
+    head, row = capsys.readouterr().out.splitlines()[-2:]  # before it, how far it is
     assert head.split() == ["reader", "inputs", "seconds", "outcomes", "failures"]
     assert row.split()[0] == "numpy"
 

@@ -39,12 +39,12 @@ def test_a_walk_is_seldom_a_drift() -> None:
     # Known to 18 %: the walk is as dense as the white noise at the twentieth cosine.
     K = 2.0 * np.pi * 1e-4 * 20.0 / (2.0 * SAMPLES / RATE)
     doubted = 0
-    for seed in range(40):
+    for seed in range(12):
         rng = np.random.default_rng(seed)
         walk = np.cumsum(K / np.sqrt(RATE) * rng.standard_normal(SAMPLES))
         _, reason = k_of(WHITE * rng.standard_normal(SAMPLES) + walk)
         doubted += "drift with" in (reason or "")
-    assert doubted <= 8
+    assert doubted <= 4
 
 
 @pytest.mark.parametrize("seed", range(4))

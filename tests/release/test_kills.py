@@ -1,4 +1,4 @@
-"""A few kills at random moments; the release command has many, and full disks."""
+"""A few kills at random moments; `tests.release.kills` has many, and full disks."""
 
 import contextlib
 import shutil
@@ -9,7 +9,7 @@ import pytest
 from tests.release.kills import Killer
 from tests.release.small import NIGHTLY, SNAKEMAKE, Undisturbed
 
-pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("workflow")]
+pytestmark = [pytest.mark.release, pytest.mark.workflow, pytest.mark.xdist_group("workflow")]
 
 KILLS = (
     ("all", SNAKEMAKE),

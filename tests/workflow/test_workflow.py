@@ -124,6 +124,7 @@ def test_one_core_and_two_give_the_same_tables(project: Project, tmp_path: Path)
         assert path.read_bytes() == (alone.results / "tables" / path.name).read_bytes(), path.name
 
 
+@pytest.mark.release
 def test_an_edit_of_a_datasheet_runs_its_deltas_and_the_global_steps(project: Project) -> None:
     density = {"value": 0.02, "unit": "deg/s/sqrt(Hz)"}
     put_sensor(project.folder / "sensors/one.yaml", datasheet={"gyro": {"noise_density": density}})
@@ -136,6 +137,7 @@ def test_an_edit_of_a_datasheet_runs_its_deltas_and_the_global_steps(project: Pr
     assert printed == {"one": 0.02, "two": 0.01}
 
 
+@pytest.mark.release
 def test_one_more_log_runs_its_own_steps_and_the_global_ones(project: Project) -> None:
     put_log(project.folder / "logs/two/b.csv", 4)
     assert project.jobs() == STEPS_OF_A_RECORDING | GLOBAL_STEPS | {"outlook": 1}
@@ -149,6 +151,7 @@ def test_one_more_log_runs_its_own_steps_and_the_global_ones(project: Project) -
     assert same >= of_others | {"recordings/two/a.html", "theory.html", "made.html"}
 
 
+@pytest.mark.release
 def test_a_removed_log_runs_the_global_steps(project: Project) -> None:
     (project.folder / "logs/two/b.csv").unlink()
     assert project.jobs() == GLOBAL_STEPS | {"outlook": 1}
@@ -198,6 +201,7 @@ def test_a_wrong_setting_stops_the_run_before_it_begins(project: Project) -> Non
     assert "Traceback" not in done.stdout + done.stderr
 
 
+@pytest.mark.release
 def test_steps_that_were_killed_after_an_edit_are_run_again(project: Project) -> None:
     sensor = project.folder / "sensors/one.yaml"
     written = yaml.safe_load(sensor.read_text())
