@@ -40,8 +40,8 @@ class Named(SimpleNamespace):
         yield from self._unnamed
         yield from (value for _, value in self.items())
 
-    def __getitem__(self, place: int) -> Any:
-        return list(self)[place]
+    def __getitem__(self, place: int | str) -> Any:
+        return getattr(self, place) if isinstance(place, str) else list(self)[place]
 
 
 class OneRecording:
