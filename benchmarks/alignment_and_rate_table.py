@@ -32,6 +32,7 @@ from imubench_pipeline.calibration.pointing import Pointing
 from imubench_pipeline.calibration.rate_table import RateTable
 from imubench_pipeline.calibration.schedule import Schedule
 from imubench_pipeline.calibration.still import StillRun
+from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.earth_rate.experiment import Dwell, Experiment
 from imubench_pipeline.earth_rate.simulation import (
     ASSUMED_LATITUDE,
@@ -39,7 +40,6 @@ from imubench_pipeline.earth_rate.simulation import (
     PAPER_RATE,
     simulate_runs,
 )
-from imubench_pipeline.error_budget import EARTH_RATE
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.sigma_range import drawn_from_covariance, sigma_range
 

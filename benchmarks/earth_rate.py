@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.earth_rate.bound import block_length, cramer_rao
 from imubench_pipeline.earth_rate.experiment import Experiment
 from imubench_pipeline.earth_rate.kalman import Filtered, RateFilter
@@ -39,7 +40,6 @@ from imubench_pipeline.earth_rate.simulation import (
     simulate_log,
     simulate_runs,
 )
-from imubench_pipeline.error_budget import EARTH_RATE
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.sensor_model.model import SensorModel
 

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import simpson, solve_ivp
 
+from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.error_budget import (
-    EARTH_RATE,
     Budget,
     Calibrated,
     Contribution,

@@ -8,8 +8,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
+from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.error_budget import (
-    EARTH_RATE,
     Calibrated,
     Gyrocompass,
     Levelled,

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
+from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.error_budget import (
     Contribution,
     Figure,
@@ -20,7 +21,6 @@ from imubench_pipeline.error_budget import (
     time_until,
 )
 from imubench_pipeline.error_budget.growth import Calibrated, Uncalibrated
-from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE
 from imubench_pipeline.error_budget.in_use import (
     Cause,
     levers,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -19,8 +19,7 @@ from imubench_pipeline.thermal.fit import fit_temperature
 from imubench_pipeline.thermal.path import TemperaturePath
 from imubench_pipeline.thermal.register import step_of
 from imubench_pipeline.thermal.result import ThermalFit
-
-Row = Mapping[str, Any]
+from imubench_pipeline.typing import Row
 
 _ENOUGH = 1 << 16
 """Samples that show the step of a register."""

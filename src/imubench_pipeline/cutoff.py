@@ -39,8 +39,7 @@ from imubench_pipeline.filter_readings import (
     drawn,
 )
 from imubench_pipeline.spectrum import Spectrum
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _SHOWS = 2.0
 """Log likelihood that white noise beside a process must gain to be there."""

@@ -38,7 +38,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtr, stdtrit
 
-from imubench_pipeline.pooled import POOLED, Row, bounded_exp, points_about_median, usable
+from imubench_pipeline.pooled import POOLED, bounded_exp, points_about_median, usable
+from imubench_pipeline.typing import Row
 
 Order = Literal["started", "name"]
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,9 +38,8 @@ from imubench_pipeline.results import Key, allan_rows, draw_rows, parameter_rows
 from imubench_pipeline.sensor import quantity_of
 from imubench_pipeline.simulate import channel_rng
 from imubench_pipeline.thermal.path import TemperaturePath, temperature_path
+from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si
-
-Row = Mapping[str, Any]
 
 
 @dataclass

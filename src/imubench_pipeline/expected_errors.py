@@ -32,9 +32,8 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.requirements import DIMENSIONS, Axis, Environment, Error, Requirement
 from imubench_pipeline.sensor import quantity_of
 from imubench_pipeline.simulate import channel_rng
+from imubench_pipeline.typing import Row
 from imubench_pipeline.units import SI_UNITS, difference_to_si, quantity_to_si
-
-Row = Mapping[str, Any]
 
 _NAMELESS: Mapping[str, Figures] = MappingProxyType({})
 

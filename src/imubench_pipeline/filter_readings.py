@@ -7,12 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.filter_fits import Tried
 from imubench_pipeline.sensor_model.low_pass import LowPass
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 SIGMAS = 1.96
 

@@ -16,8 +16,8 @@ import pyarrow as pa
 
 from imubench_pipeline.columns import Column, number, text
 from imubench_pipeline.findings import LEFT_OUT
+from imubench_pipeline.typing import Row
 
-Row = Mapping[str, Any]
 Key = tuple[str, str]  # sensor, recording
 Fitness = Literal["fit", "fit with doubts", "unfit"]
 

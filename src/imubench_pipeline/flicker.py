@@ -10,13 +10,13 @@ from scipy.optimize import nnls
 
 from imubench_pipeline.noise_terms import (
     PEAK_TAU,
-    Array,
     Flicker,
     GaussMarkov,
     Term,
     WhiteNoise,
     sampled_gauss_markov_shape,
 )
+from imubench_pipeline.typing import Array
 
 _MEMBERS_A_DECADE = 2.5
 _POINTS_A_DECADE = 20

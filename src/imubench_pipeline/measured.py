@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.comparable import Comparable
+from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.estimators.curve_bias import of_model
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.noise import FLOOR
-from imubench_pipeline.units import STANDARD_GRAVITY
 
 _EARTH_RATE = 7.292115e-5
 """rad/s; its part in the mean of a gyro depends on how the axis stands."""

@@ -24,8 +24,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, RandomWalk
 from imubench_pipeline.state_space import StateSpace
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 BLOCK = 64
 """Samples whose mean is one measurement of the slow part."""

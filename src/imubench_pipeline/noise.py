@@ -14,7 +14,6 @@ from imubench_pipeline.flicker import bank
 from imubench_pipeline.noise_terms import (
     FLOOR,
     PEAK_TAU,
-    Array,
     Flicker,
     GaussMarkov,
     Quantization,
@@ -29,6 +28,7 @@ from imubench_pipeline.noise_terms import (
     sampled_gauss_markov_shape,
 )
 from imubench_pipeline.state_space import StateSpace
+from imubench_pipeline.typing import Array
 
 __all__ = [
     "FLOOR",

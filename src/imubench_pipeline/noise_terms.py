@@ -13,10 +13,11 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from imubench_pipeline.sampled_flicker import sampled_flicker_shape, sampled_flicker_sums
 from imubench_pipeline.state_space import StateSpace
+from imubench_pipeline.typing import Array
 
 PEAK = 0.4365
 """Peak of the Allan deviation of a Gauss-Markov process over sqrt(S_B T_B)."""
@@ -34,8 +35,6 @@ _SERIES = [(-1) ** (k + 1) * (2.0**k - 4.0) / (2.0 * math.factorial(k)) for k in
 _WALK_BELOW = 1e-3
 """Cluster length over T_B below which a Gauss-Markov process is a random walk to a thousandth, and
 the second differences of its sum's covariance begin to cancel."""
-
-Array = NDArray[np.float64]
 
 
 class Term(ABC):

@@ -26,8 +26,8 @@ from imubench_pipeline.phase import (
     sum_sizes,
 )
 from imubench_pipeline.threads import in_threads
+from imubench_pipeline.typing import Array
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Samples = NDArray[np.floating[Any]]
 

@@ -52,7 +52,6 @@ import numpy as np
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.export.growth import growth, growth_of
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
-from imubench_pipeline.noise_terms import Array
 from imubench_pipeline.smallest_model import (
     FAMILIES,
     Family,
@@ -60,6 +59,7 @@ from imubench_pipeline.smallest_model import (
     count_of_points,
     smallest,
 )
+from imubench_pipeline.typing import Array
 
 _LOOKS_AT = 0.37
 """f tau at which the Allan variance looks: where sin^4(x) / x^2 is largest, over pi."""

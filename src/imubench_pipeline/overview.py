@@ -29,8 +29,8 @@ from imubench_pipeline.recording import (
     was_at_rest,
 )
 from imubench_pipeline.results import Key
+from imubench_pipeline.typing import Array
 
-Array = NDArray[np.float64]
 Row = dict[str, Any]
 
 BUCKETS = 400

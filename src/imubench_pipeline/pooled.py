@@ -36,8 +36,9 @@ from typing import Any, Literal, TypeGuard
 
 from scipy.special import chdtrc, chdtri, fdtrc, stdtrit
 
+from imubench_pipeline.typing import Row
+
 Verdict = Literal["agree", "differ"]
-Row = Mapping[str, Any]
 
 LEVEL = 0.01
 """Probability, where recordings agree, of saying that they differ."""

@@ -15,9 +15,9 @@ from imubench_pipeline.noise import FLOOR
 from imubench_pipeline.sensor import quantity_of
 from imubench_pipeline.sensor_model.truth import figures_of
 from imubench_pipeline.simulated_recordings import SimulatedRecording
+from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si
 
-Row = Mapping[str, Any]
 _Place = tuple[str, str, str, str]
 
 _DATASHEET = {

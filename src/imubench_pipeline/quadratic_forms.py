@@ -11,11 +11,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import gammaincinv, ndtr
 
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 LOWER_TAIL = 0.025
 """Chance at which the degrees of freedom of the lower tail are those of the quantile."""

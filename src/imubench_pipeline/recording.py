@@ -21,8 +21,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from imubench_pipeline.readers.batch import POSITION, TABLE_RATE, TEMPERATURE
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 ROW_GROUP = 1 << 20
 """Rows of a row group."""

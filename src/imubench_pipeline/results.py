@@ -41,8 +41,7 @@ from imubench_pipeline.quality.spectral import band_finding, line_findings
 from imubench_pipeline.sensor import Sensor, quantity_of
 from imubench_pipeline.suspicion import unusual_rows
 from imubench_pipeline.tables import build, read
-
-Row = Mapping[str, Any]
+from imubench_pipeline.typing import Row
 
 
 @dataclass(frozen=True)

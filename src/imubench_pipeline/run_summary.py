@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 from imubench_pipeline.findings import LEFT_OUT
 from imubench_pipeline.suitability.conditions import in_words
 from imubench_pipeline.tables import read
-
-Row = Mapping[str, Any]
+from imubench_pipeline.typing import Row
 
 _NEEDED = ("recordings", "findings", "ranking", "failures")
 _MOST_LINES = 10

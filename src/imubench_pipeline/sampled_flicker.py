@@ -6,9 +6,9 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _TABLE = 1 << 12
 """Cluster sizes up to which the Allan variance of sampled flicker is summed up exactly."""

@@ -6,12 +6,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from imubench_pipeline.requirements import Requirement
+from imubench_pipeline.typing import Row
 from imubench_pipeline.verdicts.basis import Basis
 from imubench_pipeline.verdicts.judgement import Judgement, judgements
 from imubench_pipeline.verdicts.standing import Standing
 from imubench_pipeline.verdicts.unless import unless_words
-
-Row = Mapping[str, Any]
 
 
 def ranking_rows(

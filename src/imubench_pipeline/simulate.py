@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 from imubench_pipeline.allan import of_phase
 from imubench_pipeline.noise import NoiseModel, Quantization, Ramp, Sinusoid, WhiteNoise
 from imubench_pipeline.phase import integrate
+from imubench_pipeline.typing import Array
 from imubench_pipeline.variance_covariance import variance_covariance
-
-Array = NDArray[np.float64]
 
 _BLOCK = 1 << 20
 _SUMS = 1 << 12

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.earth_rate.experiment import Experiment
 from imubench_pipeline.earth_rate.simulation import true_rate
-from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE
 from imubench_pipeline.readers.batch import TEMPERATURE
 from imubench_pipeline.sensor import ColumnSource, LogFormat
 from imubench_pipeline.sensor_model.imu import simulate_imu

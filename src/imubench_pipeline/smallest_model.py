@@ -24,7 +24,7 @@ from imubench_pipeline.noise import (
     WhiteNoise,
     bias_instability,
 )
-from imubench_pipeline.noise_terms import Array
+from imubench_pipeline.typing import Array
 
 Family = Literal["N+K", "N+GM", "N+GM+K"]
 

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from imubench_pipeline.noise import NoiseModel, Quantization, Ramp, Sinusoid
 from imubench_pipeline.presence import Presence
 from imubench_pipeline.quadratic_forms import tail_degrees, variance_degrees
+from imubench_pipeline.typing import Array
 
-Array = NDArray[np.float64]
 Span = tuple[int, int]
 
 _STEPS = 32

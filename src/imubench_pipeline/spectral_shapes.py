@@ -11,12 +11,10 @@ import math
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.noise_terms import driving_density
 from imubench_pipeline.spectrum import SINGLE, Spectrum
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _POINTS = 6
 """Frequencies at which a bin is sampled."""

@@ -17,8 +17,7 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from imubench_pipeline.phase import split
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 SINGLE = 64
 """Lowest ordinates that stay single."""

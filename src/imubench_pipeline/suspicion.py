@@ -9,9 +9,10 @@ from statistics import median
 from typing import Any
 
 from imubench_pipeline.comparable import Comparable, comparables
+from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.sensor import QUANTITIES, Sensor, quantity_of
-from imubench_pipeline.units import STANDARD_GRAVITY, from_si
+from imubench_pipeline.units import from_si
 
 _FAR = 20.0
 _FEWEST = 5

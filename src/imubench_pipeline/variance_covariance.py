@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _STRATA_IN_DECADE = 640
 _BELOW_LARGEST = 1e-3

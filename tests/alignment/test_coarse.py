@@ -9,8 +9,8 @@ from imubench_pipeline.alignment.attitude import euler_angles, matrix
 from imubench_pipeline.alignment.coarse import coarse_accuracy, coarse_alignment, mean_vectors
 from imubench_pipeline.alignment.simulation import simulate_triad, true_means
 from imubench_pipeline.alignment.triad import Positions, Site, Triad
+from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.earth_rate.experiment import Dwell, Experiment
-from imubench_pipeline.error_budget import EARTH_RATE
 from imubench_pipeline.noise import NoiseModel
 from tests.alignment.triads import ALIKE, ATTITUDE, ONE, POSITIONS, SITE, TWO, UNLIKE
 

@@ -11,9 +11,9 @@ from imubench_pipeline.alignment.fine import UNKNOWN, FineAlignment, align
 from imubench_pipeline.alignment.simulation import simulate_triad, true_means
 from imubench_pipeline.alignment.triad import Positions, Triad
 from imubench_pipeline.calibration.observability import NotObservableError
+from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.earth_rate.experiment import Dwell, Experiment, block_means
 from imubench_pipeline.earth_rate.simulation import PAPER_MODEL
-from imubench_pipeline.error_budget import EARTH_RATE
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.sensor_model.model import SensorModel
 from imubench_pipeline.sensor_model.simulation import simulate

@@ -13,7 +13,7 @@ from imubench_pipeline.alignment.fine import OPEN
 from imubench_pipeline.alignment.of_sensor import TIMES, noise_at_rest, outlook_tables
 from imubench_pipeline.alignment.triad import Site, Triad
 from imubench_pipeline.config import EarthRateSettings
-from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE
+from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.results import Key, parameter_rows

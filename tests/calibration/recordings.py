@@ -9,7 +9,7 @@ import numpy as np
 
 from imubench_pipeline.calibration.of_run import calibration_tables
 from imubench_pipeline.config import EarthRateSettings
-from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE
+from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.simulate import simulate
 from tests.earth_rate.recordings import SENSOR

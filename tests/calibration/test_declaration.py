@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from imubench_pipeline.calibration.declaration import AtRest, OnRateTable
-from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE
+from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.plan import Plan
 from imubench_pipeline.validation import ConfigError, parse
 from tests.calibration.recordings import STEPS, UP

@@ -5,9 +5,9 @@ import pytest
 
 from imubench_pipeline.calibration.pointing import Pointing
 from imubench_pipeline.calibration.still import StillRun, bias_at_rest, not_observable
+from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.earth_rate.experiment import Dwell, Experiment
 from imubench_pipeline.earth_rate.simulation import PAPER_MODEL, simulate_runs
-from imubench_pipeline.error_budget import EARTH_RATE
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.sensor_model.model import SensorModel
 from imubench_pipeline.sensor_model.simulation import simulate

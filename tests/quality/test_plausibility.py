@@ -6,6 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
+from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.quality.levels import density_of, kept_level
@@ -15,7 +16,7 @@ from imubench_pipeline.quality.rotation import gravity_turn
 from imubench_pipeline.quality.summary import ColumnSummary
 from imubench_pipeline.sensor import Sensor
 from imubench_pipeline.simulate import simulate
-from imubench_pipeline.units import STANDARD_GRAVITY, conversion
+from imubench_pipeline.units import conversion
 from imubench_pipeline.validation import parse
 from tests.test_configuration import SENSOR
 

@@ -8,8 +8,9 @@ from imubench_pipeline.allan import cluster_sizes, of_blocks, of_phase
 from imubench_pipeline.config import AllanSettings
 from imubench_pipeline.phase import integrate
 from imubench_pipeline.recording import static_logs
-from imubench_pipeline.results import Key, Row, allan_rows
+from imubench_pipeline.results import Key, allan_rows
 from imubench_pipeline.tables import write
+from imubench_pipeline.typing import Row
 
 
 def curves(folder: Path, sensor: str, recording: str, settings: AllanSettings) -> Iterator[Row]:

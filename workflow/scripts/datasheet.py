@@ -9,8 +9,9 @@ from imubench_pipeline.comparable import SENSITIVITY, comparables
 from imubench_pipeline.datasheet import bias_deltas, curve_rms, deltas
 from imubench_pipeline.measured import sensitivity
 from imubench_pipeline.printed import Datasheet
-from imubench_pipeline.results import Quality, Row, curves, estimates
+from imubench_pipeline.results import Quality, curves, estimates
 from imubench_pipeline.tables import read, write
+from imubench_pipeline.typing import Row
 
 
 def rows(folder: Path, sensor: str, recording: str, settings: str) -> Iterator[Row]:

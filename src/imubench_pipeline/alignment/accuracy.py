@@ -15,15 +15,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.alignment.attitude import euler_angles
 from imubench_pipeline.alignment.coarse import coarse_accuracy, coarse_alignment, mean_vectors
 from imubench_pipeline.alignment.fine import OPEN, FineAlignment
 from imubench_pipeline.alignment.simulation import simulate_triad
 from imubench_pipeline.alignment.triad import Positions, Site, Triad
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 TURNING = 2.0
 """Time between two positions, s."""

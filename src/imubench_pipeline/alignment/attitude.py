@@ -11,9 +11,9 @@ in error by the small angles psi of the navigation frame,
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 STEEPEST = 1e-6
 """Least cosine of the pitch at which roll and heading are two angles."""

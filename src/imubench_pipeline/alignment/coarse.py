@@ -14,13 +14,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.alignment.attitude import of_euler_angles
 from imubench_pipeline.alignment.triad import Positions, Site, Triad
 from imubench_pipeline.earth_rate.covariance import of_means
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 
 @dataclass(frozen=True)

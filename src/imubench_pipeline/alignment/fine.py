@@ -22,7 +22,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.alignment.attitude import corrected, cross_matrix, of_euler_angles
 from imubench_pipeline.alignment.coarse import coarse_alignment, mean_vectors
@@ -30,8 +29,7 @@ from imubench_pipeline.alignment.triad import Positions, Site, Triad
 from imubench_pipeline.calibration.observability import NotObservable, NotObservableError
 from imubench_pipeline.earth_rate.block_filter import BlockFilter
 from imubench_pipeline.earth_rate.states import block_states
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 UNKNOWN = 10.0
 """Standard deviation of each small angle at the start, rad: so much that it adds nothing."""

@@ -26,9 +26,8 @@ from imubench_pipeline.printed import Datasheet, QuantityDatasheet
 from imubench_pipeline.results import Quality, recommended_estimates
 from imubench_pipeline.sensor import QUANTITIES
 from imubench_pipeline.simulate import channel_rng
+from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si
-
-Row = Mapping[str, Any]
 
 TIMES = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 1800.0, 3600.0)
 """Of rest, s."""

@@ -7,15 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.alignment.attitude import rotation
+from imubench_pipeline.earth import EARTH_RATE, STANDARD_GRAVITY
 from imubench_pipeline.earth_rate.experiment import Blocks, Dwell, Experiment
-from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.units import STANDARD_GRAVITY
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _NEAREST_POLE = 1e-6
 """Least cosine of a latitude at which the Earth's rate points north."""

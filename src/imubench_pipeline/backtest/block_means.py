@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.phase import finite_mean
+from imubench_pipeline.typing import Array
 
-Array = NDArray[np.float64]
 Span = tuple[int, int]
 
 PRESENT = 0.9

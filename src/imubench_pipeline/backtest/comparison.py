@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.backtest.covariance import WindowCovariance
 from imubench_pipeline.backtest.prediction import Predicted
@@ -16,8 +15,8 @@ from imubench_pipeline.backtest.windows import Window, errors
 from imubench_pipeline.error_budget.budget import of_sensor
 from imubench_pipeline.error_budget.growth import Calibrated
 from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.typing import Array
 
-Array = NDArray[np.float64]
 Verdict = Literal["as predicted", "more than predicted", "less than predicted"]
 
 SHORTEST = 3

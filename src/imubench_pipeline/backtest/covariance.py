@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.backtest.windows import Errors, Window, correlated
 from imubench_pipeline.noise import (
@@ -28,8 +27,7 @@ from imubench_pipeline.noise import (
     Term,
     WhiteNoise,
 )
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 SPANS = 4
 """Lags, in lengths of a window, up to which windows are taken for correlated: beyond, the squares

@@ -8,15 +8,15 @@ from typing import Any
 from imubench_pipeline.backtest.block_means import block_means
 from imubench_pipeline.backtest.comparison import Comparison, DeadReckoning, compare
 from imubench_pipeline.backtest.windows import window
+from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.error_budget import draw_models, drawn_jointly
 from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.recording import ChannelLog
 from imubench_pipeline.requirements import DIMENSIONS, Error, Limit, Requirement
 from imubench_pipeline.sensor import quantity_of
 from imubench_pipeline.simulate import channel_rng
-from imubench_pipeline.units import SI_UNITS, STANDARD_GRAVITY, quantity_to_si
-
-Row = Mapping[str, Any]
+from imubench_pipeline.typing import Row
+from imubench_pipeline.units import SI_UNITS, quantity_to_si
 
 SURE = 0.01
 """Chance, for all rows of a recording together, below which its log contradicts its budget."""

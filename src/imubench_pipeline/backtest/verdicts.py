@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from collections.abc import Iterable, Iterator
 
 from imubench_pipeline.findings import Finding
-
-Row = Mapping[str, Any]
+from imubench_pipeline.typing import Row
 
 
 def words(row: Row) -> str:

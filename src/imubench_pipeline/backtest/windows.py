@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 BLOCKS = range(8, 25)
 """Blocks in the shorter part of a window. With 8 the windows, which begin a block apart, tell of

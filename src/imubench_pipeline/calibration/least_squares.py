@@ -15,7 +15,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 from scipy.stats import chi2, norm
 
@@ -23,8 +22,7 @@ from imubench_pipeline.calibration.observability import NotObservableError
 from imubench_pipeline.earth_rate.covariance import of_means
 from imubench_pipeline.earth_rate.experiment import Blocks, Experiment
 from imubench_pipeline.noise import NoiseModel
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _TOLERANCE = 1e-3
 """Relative loss of a standard error by longer blocks that is nothing."""

@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.calibration.declaration import AtRest, OnRateTable
 from imubench_pipeline.calibration.least_squares import half_width
@@ -20,10 +19,8 @@ from imubench_pipeline.calibration.still import bias_at_rest
 from imubench_pipeline.earth_rate.noise_source import NO_MODEL, NoiseSource
 from imubench_pipeline.recording import ChannelLog, on_grid
 from imubench_pipeline.results import Key
+from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si
-
-Array = NDArray[np.float64]
-Row = Mapping[str, Any]
 
 UNITS = {
     "bias": "rad/s",

@@ -16,9 +16,8 @@ from imubench_pipeline.recording import channel_logs, read_metadata
 from imubench_pipeline.results import Key, Quality
 from imubench_pipeline.sensor import Sensor
 from imubench_pipeline.simulated_recordings import SimulatedRecording
+from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si
-
-Row = Mapping[str, Any]
 
 
 def calibration_tables(

@@ -34,8 +34,7 @@ from imubench_pipeline.calibration.pointing import Pointing
 from imubench_pipeline.calibration.schedule import Schedule
 from imubench_pipeline.earth_rate.experiment import Blocks, Measured, block_means
 from imubench_pipeline.noise import NoiseModel
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _LEVEL = 1e-12
 """rad/s of the Earth's rate that may be open."""

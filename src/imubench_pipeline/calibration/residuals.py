@@ -18,8 +18,7 @@ from imubench_pipeline.calibration.rate_table import Calibration
 from imubench_pipeline.earth_rate.covariance import of_means
 from imubench_pipeline.earth_rate.experiment import Measured
 from imubench_pipeline.noise import NoiseModel
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 
 @dataclass(frozen=True)

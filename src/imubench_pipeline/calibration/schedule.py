@@ -11,12 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from imubench_pipeline.earth_rate.experiment import Blocks, Dwell, Experiment
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 
 @dataclass(frozen=True)

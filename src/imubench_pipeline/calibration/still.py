@@ -15,7 +15,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.calibration.least_squares import LeastSquares, block_length, half_width
 from imubench_pipeline.calibration.observability import NotObservable
@@ -23,8 +22,7 @@ from imubench_pipeline.calibration.pointing import Pointing
 from imubench_pipeline.earth_rate.experiment import Blocks, Dwell, Experiment, block_means
 from imubench_pipeline.earth_rate.kalman import RateFilter
 from imubench_pipeline.noise import NoiseModel
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _LEVEL = 1e-9
 """Part of the Earth's rate below which an axis sees nothing of the heading."""

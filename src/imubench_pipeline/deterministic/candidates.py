@@ -10,13 +10,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.deterministic.ordinates import Fit, Ordinates
 from imubench_pipeline.deterministic.regressors import Kind, Regressor
 from imubench_pipeline.deterministic.scores import FEWEST_CYCLES, Gain, Score, best_scores
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _HELD_OUT = 16
 """Lowest ordinates that a noise is carried on to, not fitted to."""

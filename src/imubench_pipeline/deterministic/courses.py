@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.deterministic.means import Means, means_of
 from imubench_pipeline.deterministic.ordinates import Fit, Ordinates
@@ -16,8 +15,7 @@ from imubench_pipeline.deterministic.regressors import Regressor
 from imubench_pipeline.deterministic.scores import FEWEST_CYCLES, Gain
 from imubench_pipeline.deterministic.search import Searched, again, search
 from imubench_pipeline.deterministic.uncertainty import covariance_of_sizes
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 Kind = Literal["bias_step", "warm_up_drift", "periodic_drift"]
 

@@ -8,14 +8,12 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.deterministic.means import Means
 from imubench_pipeline.deterministic.ordinates import Ordinates
 from imubench_pipeline.estimators.whittle import Maximum
 from imubench_pipeline.spectral_shapes import Shapes
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _FEWEST = 256
 """Blocks in a part that is halved."""

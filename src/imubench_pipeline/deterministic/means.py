@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.phase import split
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _MOST = 1 << 14
 """Blocks of a log, about: a step is placed to so many parts of it, and better where it is large."""

@@ -20,8 +20,7 @@ from imubench_pipeline.deterministic.means import Means
 from imubench_pipeline.deterministic.regressors import Regressor
 from imubench_pipeline.estimators.whittle import COARSE, Maximum, Terms, Whittle, whittle_of
 from imubench_pipeline.spectrum import Spectrum, bin_edges
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 NOISE = Terms("NFK", 1)
 """One model for all noise: it nests what a log without regressors may be, K among it."""

@@ -12,9 +12,8 @@ from typing import Literal
 
 import numpy as np
 import scipy.fft
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _ALIKE = 1e-9
 """Difference of two frequencies below which their beat is constant over any part."""

@@ -14,13 +14,11 @@ from functools import lru_cache
 
 import numpy as np
 import scipy.fft
-from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from imubench_pipeline.deterministic.ordinates import Fit, Ordinates
 from imubench_pipeline.deterministic.regressors import Kind, Regressor
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 FALSE_ALARM: dict[Kind, float] = {
     "step": 0.001,

@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.deterministic.candidates import (
     SAFETY,
@@ -26,8 +25,6 @@ from imubench_pipeline.deterministic.contest import Rival, anew_at_pauses, rival
 from imubench_pipeline.deterministic.ordinates import Fit, Ordinates
 from imubench_pipeline.deterministic.regressors import Kind, Regressor
 from imubench_pipeline.deterministic.scores import Gain
-
-Array = NDArray[np.float64]
 
 MOST = 16
 """Regressors that are taken; a log with more steps is one of telegraph noise."""

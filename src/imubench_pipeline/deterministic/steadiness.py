@@ -5,11 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.deterministic.means import Means
-
-Array = NDArray[np.float64]
 
 _SECTIONS = 16
 _FEWEST = 16

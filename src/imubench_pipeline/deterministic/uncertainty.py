@@ -8,11 +8,9 @@ it is. So errors are averaged over the walks that the log allows.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.deterministic.ordinates import Fit, Ordinates
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _WALKS = np.concatenate(([0.0], np.geomspace(0.03, 100.0, 18)))
 """K that are tried, as deviation at the lowest frequency over that of the other noise."""

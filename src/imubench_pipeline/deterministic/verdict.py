@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from scipy.special import ndtri
@@ -16,8 +15,7 @@ from imubench_pipeline.deterministic.search import MOST
 from imubench_pipeline.deterministic.steadiness import Steadiness, steadiness_of
 from imubench_pipeline.estimators.estimate import FAMILY, Estimate, JointDraws, Parameter, Status
 from imubench_pipeline.findings import Finding
-
-Row = Mapping[str, Any]
+from imubench_pipeline.typing import Row
 
 _HEAVY = 0.3
 """Excess kurtosis from which N is known less well than of normal samples."""

@@ -7,11 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.earth_rate.transients import Blocks, calm_means
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _WHITE = 16.0 / 6.0
 """Variance of a dwell's mean over that of its A-B-A difference / 4, where the noise is white."""

@@ -22,11 +22,9 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.earth_rate.states import BlockStates
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 
 class BlockFilter:

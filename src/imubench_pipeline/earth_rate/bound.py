@@ -15,15 +15,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 
 from imubench_pipeline.earth_rate.covariance import of_means
 from imubench_pipeline.earth_rate.experiment import Blocks, Experiment
 from imubench_pipeline.earth_rate.whitening import whitened
 from imubench_pipeline.noise import NoiseModel
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _TOLERANCE = 1e-3
 """Relative loss of the standard deviation by longer blocks that is nothing."""

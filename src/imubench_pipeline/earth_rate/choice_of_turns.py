@@ -6,12 +6,10 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import norm
 
 from imubench_pipeline.earth_rate.transients import CLEAR, Event
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 EDGE = 0.2
 """Part of a dwell at either end of a log in which a transient is handling, and no turn."""

@@ -7,18 +7,16 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.earth_rate.bound import block_length
 from imubench_pipeline.earth_rate.experiment import Blocks, Experiment, Measured, block_means
 from imubench_pipeline.earth_rate.kalman import RateFilter
 from imubench_pipeline.earth_rate.known_rate import track
 from imubench_pipeline.earth_rate.pairs import Differences, by_pairs, by_triples
 from imubench_pipeline.earth_rate.states import WIDE
-from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE
 from imubench_pipeline.noise import NoiseModel
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 METHODS = ("pairs", "triples", "filter", "smoother", "known_rate")
 """In the order in which they are shown; the last is given the rate, and cannot find it."""

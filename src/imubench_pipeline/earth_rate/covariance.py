@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.earth_rate.experiment import Blocks
 from imubench_pipeline.noise import (
@@ -23,8 +22,7 @@ from imubench_pipeline.noise import (
     Term,
     WhiteNoise,
 )
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 
 def of_means(model: NoiseModel, blocks: Blocks) -> Array:

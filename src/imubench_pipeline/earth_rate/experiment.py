@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.missing import samples_present
+from imubench_pipeline.typing import Array
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 _LEAST_PRESENT = 0.5

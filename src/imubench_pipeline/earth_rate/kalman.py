@@ -24,15 +24,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from imubench_pipeline.earth_rate.block_filter import BlockFilter, deviation, triangle
 from imubench_pipeline.earth_rate.experiment import Blocks
 from imubench_pipeline.earth_rate.states import WIDE, block_states
 from imubench_pipeline.noise import NoiseModel
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _NOTHING = 1e-12
 """Singular value of a predicted root, of unit rows, that is rounding alone."""

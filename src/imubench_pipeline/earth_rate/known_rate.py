@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.earth_rate.experiment import Experiment
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _START = 0.1
 """P_0 = 0.1 I of the paper; it prints no unit, here (rad/s)^2."""

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.earth_rate.prediction import Outlook
-from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE
 
 Row = dict[str, Any]
 

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 from numpy.linalg import LinAlgError
-from numpy.typing import NDArray
 
 from imubench_pipeline.config import EarthRateSettings
+from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.earth_rate.courses import (
     METHODS,
     Course,
@@ -28,13 +28,10 @@ from imubench_pipeline.earth_rate.noise_source import NO_MODEL, NoiseSource
 from imubench_pipeline.earth_rate.prediction import Outlook
 from imubench_pipeline.earth_rate.ranges import sigma_ranges
 from imubench_pipeline.earth_rate.turning import find_turning
-from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE
 from imubench_pipeline.recording import ChannelLog, on_grid
 from imubench_pipeline.results import Key
+from imubench_pipeline.typing import Array, Row
 from imubench_pipeline.units import quantity_to_si
-
-Array = NDArray[np.float64]
-Row = Mapping[str, Any]
 
 WHOLE = "whole"
 """Name of the part that is all of a recording."""

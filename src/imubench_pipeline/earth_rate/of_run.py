@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 from imubench_pipeline.config import EarthRateSettings
 from imubench_pipeline.earth_rate.columns import EARTH_RATE_TABLES
@@ -19,9 +18,8 @@ from imubench_pipeline.results import Key, Quality
 from imubench_pipeline.sensor import Sensor
 from imubench_pipeline.sensor_model.models import axis_model
 from imubench_pipeline.simulated_recordings import SimulatedRecording
+from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si
-
-Row = Mapping[str, Any]
 
 
 def earth_rate_tables(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _NEAR = 0.1
 """Part of the distance of the two positions within which a sensor is in one of them."""

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.earth_rate.bound import (
     MOST_BLOCKS,
     block_length,
@@ -18,10 +19,8 @@ from imubench_pipeline.earth_rate.bound import (
     sigma_of,
 )
 from imubench_pipeline.earth_rate.experiment import Experiment
-from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE
 from imubench_pipeline.noise import NoiseModel
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _SUMMED = 64
 """Dwells that are computed; the information of more grows by what the latter half of them add."""

@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
+from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.earth_rate.bound import block_length
 from imubench_pipeline.earth_rate.courses import white_sigma
 from imubench_pipeline.earth_rate.experiment import Experiment
 from imubench_pipeline.earth_rate.kalman import RateFilter
 from imubench_pipeline.earth_rate.pairs import by_pairs
-from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE
 from imubench_pipeline.noise import NoiseModel
 
 Row = dict[str, Any]

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.earth_rate.alternation import alternation, best_shift, between
 from imubench_pipeline.earth_rate.choice_of_turns import (
@@ -19,8 +18,7 @@ from imubench_pipeline.earth_rate.choice_of_turns import (
 )
 from imubench_pipeline.earth_rate.found import Turn
 from imubench_pipeline.earth_rate.transients import CLEAR, Blocks, Event
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _ENOUGH = 0.4
 """Part of the schedule's turns that must be seen, for what is seen to decide."""

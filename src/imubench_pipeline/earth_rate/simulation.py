@@ -11,15 +11,14 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from imubench_pipeline.earth_rate.experiment import Blocks, Experiment
 from imubench_pipeline.earth_rate.states import block_states
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.sensor_model.model import SensorModel
 from imubench_pipeline.sensor_model.simulation import simulate
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 PAPER_MODEL = NoiseModel(
     N=math.radians(0.0122), B=math.radians(0.0027), T_B=238.1, K=math.radians(6.8314e-5)

@@ -27,8 +27,7 @@ from imubench_pipeline.noise import (
     Term,
 )
 from imubench_pipeline.state_space import StateSpace, repeated
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 WIDE = 1.0
 """Standard deviation, rad/s, of what is not known at all: 14,000 times the Earth's rate."""

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from imubench_pipeline.noise import NoiseModel
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 BLOCK = 0.125
 """Length of a block in s: four to a turn of half a second, the quickest by hand."""

@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.earth_rate.alternation import alternation, contradiction
 from imubench_pipeline.earth_rate.choice_of_turns import EDGE
@@ -36,8 +35,7 @@ from imubench_pipeline.earth_rate.transients import (
     transients,
 )
 from imubench_pipeline.noise import NoiseModel
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 
 def find_turning(

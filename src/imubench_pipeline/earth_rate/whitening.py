@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from imubench_pipeline.earth_rate.experiment import Blocks
 from imubench_pipeline.earth_rate.states import block_states
 from imubench_pipeline.noise import NoiseModel
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 
 def whitened(model: NoiseModel, blocks: Blocks, columns: Array) -> Array:

@@ -1,8 +1,9 @@
 """What a noise model means for navigation: errors of dead reckoning, by what they come of."""
 
+from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.error_budget.budget import Levelled, Start, budget
 from imubench_pipeline.error_budget.growth import Calibrated, Uncalibrated
-from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE, Gyrocompass
+from imubench_pipeline.error_budget.gyrocompass import Gyrocompass
 from imubench_pipeline.error_budget.in_use import NO_FIGURES, NO_USE, Figure, Figures, Use
 from imubench_pipeline.error_budget.parts import Budget, Contribution, Missing, Quantity
 from imubench_pipeline.error_budget.uncertainty import (

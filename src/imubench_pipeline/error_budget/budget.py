@@ -25,6 +25,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import get_args
 
+from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.error_budget.growth import (
     Calibrated,
     SensorStart,
@@ -61,7 +62,6 @@ from imubench_pipeline.noise import (
     Term,
     WhiteNoise,
 )
-from imubench_pipeline.units import STANDARD_GRAVITY
 
 _GYRO_ORDER: dict[Quantity, int] = {"attitude": 0, "heading": 0, "velocity": 1, "position": 2}
 _ACCEL_ORDER: dict[Quantity, int] = {"velocity": 0, "position": 1}

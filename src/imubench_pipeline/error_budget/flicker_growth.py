@@ -22,9 +22,8 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _SERIES_FROM = 4.0
 """Windows so many times as long as the motion: the closed form cancels, the series does not."""

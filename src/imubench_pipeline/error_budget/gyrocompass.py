@@ -17,14 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
+from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.error_budget.budget import label
 from imubench_pipeline.error_budget.growth import mean_variance
 from imubench_pipeline.error_budget.in_use import BIASES, NAMES, STATED, Figures
 from imubench_pipeline.error_budget.parts import Budget, Contribution, Missing, of_figure
 from imubench_pipeline.noise import NoiseModel, Sinusoid, Term
-
-EARTH_RATE = 7.292115e-5
-"""w_ie, rad/s (WGS 84)."""
 
 _BIAS_LEFT_OUT = "turn-on bias of the gyro: left out; the heading is no better than this"
 

@@ -18,13 +18,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import Any
 
 from imubench_pipeline.comparable import Comparable, PrintedAxis
 from imubench_pipeline.error_budget.in_use import Cause, Figure
 from imubench_pipeline.printed import FIGURE_DIMENSIONS, Datasheet
-
-Row = Mapping[str, Any]
+from imubench_pipeline.typing import Row
 
 PRINTED: Mapping[Cause, str] = {
     "turn_on_bias": "offset",

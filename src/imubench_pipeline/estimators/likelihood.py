@@ -32,8 +32,8 @@ from imubench_pipeline.joint_cutoff import joined
 from imubench_pipeline.missing import block_means, divided, filled, slow_part
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.spectrum import Spectrum, spectra
+from imubench_pipeline.typing import Array
 
-Array = NDArray[np.float64]
 Span = tuple[int, int]
 
 _LEAST_SHARE = 0.05

@@ -26,9 +26,8 @@ from imubench_pipeline.estimators.curve_bias import (
 )
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.typing import Array
 from imubench_pipeline.variance_covariance import variance_covariance
-
-Array = NDArray[np.float64]
 
 _SIGMAS = 1.96
 """Half the width of a 95 % interval."""

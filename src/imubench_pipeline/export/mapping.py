@@ -35,7 +35,7 @@ from imubench_pipeline.noise import (
     WhiteNoise,
     bias_instability,
 )
-from imubench_pipeline.noise_terms import Array
+from imubench_pipeline.typing import Array
 
 _SHORTEST = 1 / 30
 """Shortest tau over the horizon at which a process is compared, and shortest T_B tried."""

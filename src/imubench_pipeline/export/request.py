@@ -12,6 +12,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from imubench_pipeline.allan import AllanCurve
+from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.export.choice import WORST, Choice, choose, devices_of
 from imubench_pipeline.export.imu import AxisNoise, ExportError, Imu, normal_gravity
 from imubench_pipeline.export.mapping import named
@@ -23,7 +24,6 @@ from imubench_pipeline.overbound import MOST_EXCESS, overbound
 from imubench_pipeline.results import draws
 from imubench_pipeline.smallest_model import FAMILIES, Family
 from imubench_pipeline.tables import read
-from imubench_pipeline.units import STANDARD_GRAVITY
 
 Tables = Mapping[str, pa.Table]
 

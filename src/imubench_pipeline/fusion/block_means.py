@@ -5,11 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.state_space import StateSpace, repeated
-
-Array = NDArray[np.float64]
 
 
 def of_block_means(space: StateSpace, size: int) -> StateSpace:

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _WHOLE = 1e-9
 """Relative distance of a ratio of rates from a whole number that is rounding alone."""

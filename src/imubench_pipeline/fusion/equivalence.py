@@ -9,16 +9,14 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from imubench_pipeline.error_budget.uncertainty import draw_models
 from imubench_pipeline.estimators.estimate import Estimate, JointDraws, Parameter
 from imubench_pipeline.fusion.board import divided
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.simulate import channel_rng
-
-Array = NDArray[np.float64]
-Row = Mapping[str, Any]
+from imubench_pipeline.typing import Array, Row
 
 _MATTERS = 0.1
 """Part of the Allan variance from which a parameter that is not known leaves no plain number."""

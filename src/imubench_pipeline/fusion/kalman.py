@@ -15,8 +15,7 @@ from imubench_pipeline.fusion.block_means import of_block_means
 from imubench_pipeline.fusion.board import Board, stochastic
 from imubench_pipeline.fusion.riccati import steady_covariance
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, bias_instability
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _LONGEST = 1e5
 """Tau in s up to which the filter follows flicker noise, where nothing else is asked."""

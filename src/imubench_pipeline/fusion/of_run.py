@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from functools import cache, partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -20,9 +19,8 @@ from imubench_pipeline.fusion.equivalence import (
     equivalence_rows,
 )
 from imubench_pipeline.results import draws, estimate_of
+from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si
-
-Row = Mapping[str, Any]
 
 NEEDED = ("recordings", "parameters", "allan_compensated", "temperature")
 """The tables of a run that it takes."""

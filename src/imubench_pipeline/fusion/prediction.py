@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from imubench_pipeline.error_budget.uncertainty import draw_models
 from imubench_pipeline.estimators.estimate import Estimate
@@ -14,8 +14,7 @@ from imubench_pipeline.fusion.board import Board
 from imubench_pipeline.fusion.quadrature import allan_of_spectrum
 from imubench_pipeline.fusion.weights import Constant, Weights
 from imubench_pipeline.noise import NoiseModel
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _SLOW = 1e-9
 """rad a sample; the frequency of a ramp, for a filter."""

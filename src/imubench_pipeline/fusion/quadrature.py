@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _POINTS = 16
 """Of Gauss and Legendre in a panel."""

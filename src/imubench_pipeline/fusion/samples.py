@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.fusion.board import Board
 from imubench_pipeline.fusion.kalman import KalmanFusion
 from imubench_pipeline.fusion.weights import Constant
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _BLOCK = 1 << 16
 """Fused samples that are brought to one rate at a time."""

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.fusion.board import Board, Parts
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _NEARLY = 1e-14
 """Variance of a perfect sensor over that of the poorest beside it."""

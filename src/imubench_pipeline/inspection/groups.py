@@ -9,6 +9,7 @@ from pathlib import PurePosixPath
 
 import numpy as np
 
+from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.inspection.clock import advances
 from imubench_pipeline.inspection.names import (
     DERIVED,
@@ -23,7 +24,7 @@ from imubench_pipeline.inspection.names import (
 from imubench_pipeline.readers.contents import Contents, HeldColumn, HeldTable
 from imubench_pipeline.readers.spellings import said, unit_of
 from imubench_pipeline.sensor import Reader
-from imubench_pipeline.units import STANDARD_GRAVITY, conversion
+from imubench_pipeline.units import conversion
 
 _AXES = "xyz"
 GRAVITIES: Mapping[str, float] = {"g": 1.0, "m/s^2": STANDARD_GRAVITY, "mg": 1000.0}

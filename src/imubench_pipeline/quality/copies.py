@@ -6,15 +6,13 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.quality import levels
 from imubench_pipeline.quality.excerpts import Excerpt, together
 from imubench_pipeline.quality.repeats import WINDOW, Stretch
 from imubench_pipeline.quality.summary import ColumnSummary
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _FEWEST = 64
 """Increments of a piece that must not be 0."""

@@ -17,8 +17,7 @@ from imubench_pipeline.findings import Finding
 from imubench_pipeline.quality.excerpts import PIECE, Excerpt
 from imubench_pipeline.quality.register import hidden_step
 from imubench_pipeline.quality.summary import ColumnSummary
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _SURE = 8.0
 """Standard deviations of a change that count."""

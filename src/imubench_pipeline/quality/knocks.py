@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.quality.blocks import Blocks
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _NEIGHBOURS = 16
 """Blocks on either side whose median tells what a block would be without a knock."""

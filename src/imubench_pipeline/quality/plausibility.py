@@ -12,12 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.quality.expected import Expected, expected
 from imubench_pipeline.quality.rates import implausible_rates
 from imubench_pipeline.quality.rotation import GravityTurn
 from imubench_pipeline.sensor import QUANTITIES, Sensor, quantity_of
-from imubench_pipeline.units import STANDARD_GRAVITY, conversion, from_si
+from imubench_pipeline.units import conversion, from_si
 
 Level = Mapping[str, Any]
 """Of a channel, as `imubench_pipeline.quality.levels.kept_level` returns it."""

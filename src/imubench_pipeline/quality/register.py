@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.quality.excerpts import Excerpt
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _PIECES = 4
 _FEWEST = 1000

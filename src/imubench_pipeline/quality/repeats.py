@@ -22,7 +22,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
+
 Words = NDArray[np.uint64]
 Numbers = NDArray[np.int64]
 

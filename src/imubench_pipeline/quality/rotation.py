@@ -7,11 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.quality.blocks import Blocks
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _QUARTERS = 4
 _FEWEST_BLOCKS = 8

@@ -10,11 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.quality.blocks import Blocks
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _PARTS = 20
 _FEWEST_BLOCKS = 8

@@ -10,13 +10,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from imubench_pipeline.quality.blocks import FIRST_SIZE, Blocks, Gathering
 from imubench_pipeline.quality.excerpts import Excerpt, Excerpts
 from imubench_pipeline.quality.repeats import Repeats
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 LARGEST = 1e75
 """SI. What is larger was never measured; its fourth power would overflow. It counts as infinite."""

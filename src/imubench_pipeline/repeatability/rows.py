@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
-from typing import Any
 
 from imubench_pipeline.comparable import repeatability_comparables
 from imubench_pipeline.datasheet import compare
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.pooled import turn_on_bias
 from imubench_pipeline.sensor import Sensor
-
-Row = Mapping[str, Any]
+from imubench_pipeline.typing import Row
 
 _OF_REPEATABILITY = (
     *("printed", "unit", "kind", "condition", "comparable"),

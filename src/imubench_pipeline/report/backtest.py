@@ -7,8 +7,7 @@ from typing import Any
 
 from imubench_pipeline.report.practical import System, duration_text, number_text, unit_of
 from imubench_pipeline.requirements import DIMENSIONS
-
-Row = Mapping[str, Any]
+from imubench_pipeline.typing import Row
 
 
 def backtest_lines(

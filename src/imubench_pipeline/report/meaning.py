@@ -17,8 +17,8 @@ from imubench_pipeline.report.practical import (
 from imubench_pipeline.report.words import evidence_words
 from imubench_pipeline.requirements import DIMENSIONS, Requirement
 from imubench_pipeline.suitability.conditions import parts_of
+from imubench_pipeline.typing import Row
 
-Row = Mapping[str, Any]
 Simulated = Mapping[tuple[str, str], bool]
 
 _NAMES = {

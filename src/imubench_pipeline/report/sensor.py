@@ -16,9 +16,10 @@ from imubench_pipeline.report.payload import FOREST, looks
 from imubench_pipeline.report.practical import limit_digits, symbol_text
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.start import summary
-from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView, Row
+from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView
 from imubench_pipeline.report.words import counted, verdict_words
 from imubench_pipeline.suitability.conditions import in_words
+from imubench_pipeline.typing import Row
 
 _MANY = 12
 """Recordings of a sensor beyond which its page leaves budgets and deltas to those of recordings."""

@@ -17,8 +17,9 @@ import pyarrow as pa
 
 from imubench_pipeline.report.palette import Appearance, sensor_appearances
 from imubench_pipeline.report.practical import System, first_choices, units_of_pages
-from imubench_pipeline.report.view import RecordingView, Row, recording_views
+from imubench_pipeline.report.view import RecordingView, recording_views
 from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
+from imubench_pipeline.typing import Row
 
 NAVIGATION = (
     ("index.html", "Comparison"),

@@ -12,7 +12,7 @@ from imubench_pipeline.report.meaning import rankings
 from imubench_pipeline.report.payload import FOREST, looks
 from imubench_pipeline.report.practical import duration_text
 from imubench_pipeline.report.site import Page, Site
-from imubench_pipeline.report.view import RecordingView, Row
+from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.report.words import (
     counted,
     listed_names,
@@ -21,6 +21,7 @@ from imubench_pipeline.report.words import (
     sentence,
 )
 from imubench_pipeline.suitability.conditions import in_words
+from imubench_pipeline.typing import Row
 
 _STEPS = 3
 """What is to do next that the start page names; the table has all."""

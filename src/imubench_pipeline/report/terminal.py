@@ -23,8 +23,8 @@ from imubench_pipeline.requirements import Requirement
 from imubench_pipeline.run_summary import left_out, one_line, rejections, serious
 from imubench_pipeline.sensor import quantity_of
 from imubench_pipeline.suitability.conditions import in_words
+from imubench_pipeline.typing import Row
 
-Row = Mapping[str, Any]
 About = Mapping[tuple[str, str], Row]
 """The row of the table ``recordings`` of each sensor and recording."""
 

@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property, partial
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -18,8 +17,8 @@ from imubench_pipeline.findings import LEFT_OUT
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.results import estimate_of
 from imubench_pipeline.schemas import BY_RECORDING
+from imubench_pipeline.typing import Row
 
-Row = Mapping[str, Any]
 Name = tuple[str, str]
 """Sensor and recording."""
 

@@ -15,9 +15,8 @@ from imubench_pipeline.report.practical import (
 )
 from imubench_pipeline.requirements import Requirement
 from imubench_pipeline.suitability.conditions import EXCLUDED, in_words
+from imubench_pipeline.typing import Row
 from imubench_pipeline.validation import Strict
-
-Row = Mapping[str, Any]
 
 _ROUGH = 0.3
 """Half of an interval over its value from which a percentage would hide its asymmetry."""

@@ -19,12 +19,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm, solve_continuous_lyapunov
 
 from imubench_pipeline.sensor_model.low_pass import LowPass
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _NODES = 14
 """Quadrature nodes of a step that is short beside all time constants."""

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from imubench_pipeline.noise_terms import GaussMarkov, bias_instability
-from imubench_pipeline.sensor_model.low_pass import Array
+from imubench_pipeline.typing import Array
 
 ABOVE = 30.0
 """How far above the cut-off frequency the density is followed: there, a filter of first order has

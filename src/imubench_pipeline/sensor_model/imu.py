@@ -10,11 +10,11 @@ import numpy as np
 
 from imubench_pipeline.readers.batch import TEMPERATURE
 from imubench_pipeline.sensor import CHANNELS, quantity_of
-from imubench_pipeline.sensor_model.low_pass import Array
 from imubench_pipeline.sensor_model.model import SensorModel
 from imubench_pipeline.sensor_model.profiles import Profile
 from imubench_pipeline.sensor_model.simulation import CHUNK, Signal, simulate_blocks
 from imubench_pipeline.simulate import channel_rng
+from imubench_pipeline.typing import Array
 
 BLOCK = 8 * CHUNK
 """Samples that `simulate_imu` gives at a time."""

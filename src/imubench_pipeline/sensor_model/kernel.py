@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 STARTED, INPUT, TEMPERATURE, LAG = range(4)
 """Places in the memory of a recursion: has it begun, and what it had at the sample before."""

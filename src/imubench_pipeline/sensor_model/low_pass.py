@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import block_diag
 
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _HIGHEST_ORDER = 10
 

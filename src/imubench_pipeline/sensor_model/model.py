@@ -34,7 +34,8 @@ from imubench_pipeline.noise_terms import (
     WhiteNoise,
 )
 from imubench_pipeline.sensor_model import flicker_band, spectra
-from imubench_pipeline.sensor_model.low_pass import Array, LowPass
+from imubench_pipeline.sensor_model.low_pass import LowPass
+from imubench_pipeline.typing import Array
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,7 +16,7 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 
-from imubench_pipeline.sensor_model.low_pass import Array
+from imubench_pipeline.typing import Array
 from imubench_pipeline.units import SI_UNITS, UnitError, conversion
 from imubench_pipeline.validation import ConfigError
 

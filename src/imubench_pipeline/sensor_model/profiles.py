@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from imubench_pipeline.sensor import QUANTITIES, quantity_of
-from imubench_pipeline.sensor_model.low_pass import Array
 from imubench_pipeline.sensor_model.profile_files import FileSeries
 from imubench_pipeline.sensor_model.profile_forms import (
     ConstantForm,
@@ -23,6 +22,7 @@ from imubench_pipeline.sensor_model.profile_forms import (
     Surroundings,
     WarmUpForm,
 )
+from imubench_pipeline.typing import Array
 from imubench_pipeline.units import difference_to_si, quantity_to_si
 
 

@@ -29,8 +29,8 @@ from imubench_pipeline.sensor_model.discretisation import (
     white_factor,
 )
 from imubench_pipeline.sensor_model.kernel import run
-from imubench_pipeline.sensor_model.low_pass import Array
 from imubench_pipeline.sensor_model.model import SensorModel, bank_for, sources_of
+from imubench_pipeline.typing import Array
 
 CHUNK = 1 << 14
 """Samples that are worked on at a time, whatever blocks are asked for: the last digit of a sample

@@ -18,7 +18,8 @@ from imubench_pipeline.sensor_model.discretisation import (
     white_factor,
 )
 from imubench_pipeline.sensor_model.flicker_band import mixture
-from imubench_pipeline.sensor_model.low_pass import Array, LowPass
+from imubench_pipeline.sensor_model.low_pass import LowPass
+from imubench_pipeline.typing import Array
 
 _CHUNK = 2048
 """Frequencies that are worked on at a time."""

@@ -17,9 +17,9 @@ import yaml
 from imubench_pipeline.readers.batch import TEMPERATURE
 from imubench_pipeline.recording import LogWriter
 from imubench_pipeline.sensor import QUANTITIES, ColumnSource, LogFormat, quantity_of
-from imubench_pipeline.sensor_model.low_pass import Array
 from imubench_pipeline.tables import replacing
 from imubench_pipeline.text_log import TextLog
+from imubench_pipeline.typing import Array
 from imubench_pipeline.units import SI_UNITS
 from imubench_pipeline.validation import ConfigError
 

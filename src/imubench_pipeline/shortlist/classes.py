@@ -6,12 +6,10 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 from imubench_pipeline.fitness import left_out
 from imubench_pipeline.sensor import quantity_of
-
-Row = Mapping[str, Any]
+from imubench_pipeline.typing import Row
 
 _TAKEN = {"N": "N", "B_curve": "B", "K": "K", "T_B": "T_B"}
 """Parameters of the estimates, and what stands for them here: B is that of the curve."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from imubench_pipeline.requirements import Requirement
 from imubench_pipeline.sensor import Sensor
@@ -13,8 +12,7 @@ from imubench_pipeline.shortlist.classes import measured_ranges
 from imubench_pipeline.shortlist.figures import printed_ranges
 from imubench_pipeline.shortlist.rows import shortlist_rows
 from imubench_pipeline.tables import read
-
-Row = Mapping[str, Any]
+from imubench_pipeline.typing import Row
 
 NEEDED = ("recordings", "parameters", "ranking")
 """The tables of a run that it reads."""

@@ -21,8 +21,7 @@ from imubench_pipeline.shortlist.classes import MeasuredRanges
 from imubench_pipeline.shortlist.columns import SHORTLIST
 from imubench_pipeline.shortlist.figures import End, Figures, figures_of
 from imubench_pipeline.suitability.abilities import Abilities, abilities, judge
-
-Row = Mapping[str, Any]
+from imubench_pipeline.typing import Row
 
 VERDICTS: Mapping[str, str] = {
     "cannot pass": "lacks what it must have, or fails even with the best that its datasheet allows",

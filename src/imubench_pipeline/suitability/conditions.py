@@ -13,13 +13,11 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from decimal import ROUND_DOWN, Decimal
-from typing import Any
 
 from imubench_pipeline.requirements import Must
 from imubench_pipeline.suitability.abilities import Abilities, judge
+from imubench_pipeline.typing import Row
 from imubench_pipeline.units import from_si
-
-Row = Mapping[str, Any]
 
 EXCLUDED = "excluded"
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _LONG = 3.0
 """Times that a path takes to cross a cell, from which its stay there is long."""

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.missing import block_means, filled, slow_part
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.thermal.path import TemperaturePath
 from imubench_pipeline.thermal.register import Span
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 
 def shifted(

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.estimators import likelihood
 from imubench_pipeline.estimators.estimate import Parameter
@@ -34,8 +33,7 @@ from imubench_pipeline.thermal.register import Span
 from imubench_pipeline.thermal.regression import Regression, Regressors
 from imubench_pipeline.thermal.result import ThermalFit
 from imubench_pipeline.thermal.uncertainty import Verdict, judge, shares
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _MOST_ROUNDS = 10
 _SETTLED = 0.02

@@ -12,11 +12,9 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.thermal.register import Readings
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _STEPS = 1.5
 """Least significant bits that a jump is at least."""

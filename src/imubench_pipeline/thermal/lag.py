@@ -6,11 +6,9 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from imubench_pipeline.thermal.path import TemperaturePath
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 
 @njit(cache=True)

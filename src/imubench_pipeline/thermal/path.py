@@ -27,8 +27,7 @@ from imubench_pipeline.thermal.dwells import dwells
 from imubench_pipeline.thermal.jumps import at_jumps
 from imubench_pipeline.thermal.path_kernels import drawn, propagate
 from imubench_pipeline.thermal.register import Readings, Span, readings
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 DRAWS = 24
 """Paths drawn from the distribution of what the register leaves open."""

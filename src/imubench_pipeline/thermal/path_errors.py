@@ -15,8 +15,7 @@ from imubench_pipeline.estimators.whittle import Terms, Whittle
 from imubench_pipeline.spectrum import Spectrum
 from imubench_pipeline.thermal.lag import lagged_path
 from imubench_pipeline.thermal.regression import Regression, Regressors
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _NEGLIGIBLE = 0.02
 """Part of the standard error of a bin that the errors add to it, up to which they are left."""

@@ -12,13 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.fft
-from numpy.typing import NDArray
 
 from imubench_pipeline.spectrum import BLOCK_BAND, Spectrum
 from imubench_pipeline.thermal.path import TemperaturePath
 from imubench_pipeline.thermal.register import Span
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 
 class BlockSeries:

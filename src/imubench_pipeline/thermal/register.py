@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.missing import samples_present
+from imubench_pipeline.typing import Array
 
-Array = NDArray[np.float64]
 Span = tuple[int, int]
 
 KNOTS = 8192

@@ -14,8 +14,7 @@ from imubench_pipeline.spectrum import Spectrum
 from imubench_pipeline.thermal.lag import lagged_path
 from imubench_pipeline.thermal.path import TemperaturePath
 from imubench_pipeline.thermal.products import Coefficients, Products
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _LAGS = 16
 _LONGEST = 1 / 20

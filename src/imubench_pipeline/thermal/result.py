@@ -5,15 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.thermal.effect import shifted
 from imubench_pipeline.thermal.path import TemperaturePath
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.model_choice import Candidate
@@ -20,8 +19,7 @@ from imubench_pipeline.estimators.posterior import sample
 from imubench_pipeline.estimators.whittle import Maximum, Whittle
 from imubench_pipeline.thermal.path_errors import path_errors
 from imubench_pipeline.thermal.regression import Regression, Regressors
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _DRAWS = 1_000
 _NOISES = 250

@@ -8,8 +8,8 @@ from typing import Any
 
 from imubench_pipeline.fitness import left_out
 from imubench_pipeline.sensor import quantity_of
+from imubench_pipeline.typing import Row
 
-Row = Mapping[str, Any]
 Key = tuple[str, str]  # sensor, recording
 
 _BACKTEST = ("requirement", "sensor", "recording", "channel", "error", "time")

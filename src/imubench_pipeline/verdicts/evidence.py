@@ -13,8 +13,9 @@ from collections.abc import Iterator
 from typing import Literal, get_args
 
 from imubench_pipeline.requirements import Requirement
+from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si
-from imubench_pipeline.verdicts.basis import Basis, Row
+from imubench_pipeline.verdicts.basis import Basis
 from imubench_pipeline.verdicts.sources import parameters_behind, quantity_behind
 from imubench_pipeline.verdicts.standing import Standing
 

@@ -9,7 +9,8 @@ from typing import Any
 from imubench_pipeline.requirements import Requirement
 from imubench_pipeline.suitability.abilities import Abilities
 from imubench_pipeline.suitability.conditions import Rests, once_calibrated
-from imubench_pipeline.verdicts.basis import Basis, Row
+from imubench_pipeline.typing import Row
+from imubench_pipeline.verdicts.basis import Basis
 from imubench_pipeline.verdicts.evidence import weaknesses
 from imubench_pipeline.verdicts.specimens import Spread, usual_spread
 from imubench_pipeline.verdicts.standing import Standing, deciding, limit_of, standings

@@ -27,13 +27,12 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from statistics import variance
-from typing import Any
 
 from scipy.special import stdtr, stdtrit
 
 from imubench_pipeline.pooled import Pool, bounded_exp, pool
+from imubench_pipeline.typing import Row
 
-Row = Mapping[str, Any]
 Limits = tuple[float, float, float]  # value, lower, upper
 
 _LEAST_TAKEN = 0.5

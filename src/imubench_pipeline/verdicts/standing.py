@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from imubench_pipeline.suitability.conditions import is_condition, named, parts_of
+from imubench_pipeline.typing import Row
 from imubench_pipeline.verdicts.specimens import Expected, Spread, expected
-
-Row = Mapping[str, Any]
 
 _SURE = 0.975
 """Chance from which a verdict is sure."""

@@ -15,12 +15,12 @@ from typing import Any
 
 from scipy.special import ndtr
 
-from imubench_pipeline.units import STANDARD_GRAVITY
+from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.typing import Row
 from imubench_pipeline.verdicts.basis import Basis
 from imubench_pipeline.verdicts.sources import quantity_behind
 from imubench_pipeline.verdicts.standing import Standing, deciding, limit_of, standings
 
-Row = Mapping[str, Any]
 Factors = Mapping[str, float]  # by quantity
 
 _MEANT = {
