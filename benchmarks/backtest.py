@@ -39,9 +39,10 @@ from imubench_pipeline.backtest.of_recording import backtest_rows
 from imubench_pipeline.backtest.verdicts import words
 from imubench_pipeline.config import ErrorBudgetSettings, EstimateSettings
 from imubench_pipeline.estimation import Estimation, estimate_channel
+from imubench_pipeline.keys import Key
 from imubench_pipeline.recording import LogWriter, channel_logs
 from imubench_pipeline.requirements import read_requirements
-from imubench_pipeline.results import Key, recommended_estimates
+from imubench_pipeline.rows import recommended_estimates
 from imubench_pipeline.tables import build, read, write
 
 Array = NDArray[np.float64]

@@ -43,9 +43,10 @@ from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.posterior import sample
 from imubench_pipeline.estimators.whittle import Terms, model_of, whittle_of
 from imubench_pipeline.expected_errors import AxisErrors, Question, error_rows, standard
+from imubench_pipeline.keys import Key
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recording import LogWriter, channel_logs
-from imubench_pipeline.results import Key, recommended_estimates
+from imubench_pipeline.rows import recommended_estimates
 from imubench_pipeline.spectrum import spectra
 from imubench_pipeline.tables import write
 from imubench_pipeline.units import quantity_to_si

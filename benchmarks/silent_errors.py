@@ -60,7 +60,7 @@ import pyarrow.parquet
 from scipy.stats import beta
 
 from imubench_pipeline.plan import Plan
-from imubench_pipeline.results import Quality
+from imubench_pipeline.quality_file import Quality
 from imubench_pipeline.tables import read
 from silent_cases import CASES, CLEAN, FILTERED, NOTHING, Log, Truth
 from workflow_steps import OneRecording

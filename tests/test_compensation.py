@@ -9,9 +9,11 @@ import pytest
 from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.config import EstimateSettings, Run, read_run
 from imubench_pipeline.estimation import Estimation, estimate_channel
+from imubench_pipeline.kept_curves import compensated_curves
+from imubench_pipeline.keys import Key
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recording import ChannelLog
-from imubench_pipeline.results import Key, compensated_curves, estimates
+from imubench_pipeline.rows import estimates
 from imubench_pipeline.simulate import simulate
 from imubench_pipeline.tables import build, write
 from imubench_pipeline.validation import ConfigError

@@ -15,8 +15,9 @@ import pytest
 
 from imubench_pipeline.ingest import ingest_as_planned
 from imubench_pipeline.plan import Plan
+from imubench_pipeline.quality.plausibility import implausible_of
+from imubench_pipeline.quality_file import Quality
 from imubench_pipeline.recording import channel_logs, log_paths
-from imubench_pipeline.results import Quality
 from tests.corpus import ENTRIES, Cut, Entry, Kept, Rejected
 
 LIMIT_S = 60
@@ -66,7 +67,7 @@ def ingested(plan: Plan, sensor: str, kept: Path) -> Quality:
     (key,) = (key for key in plan.recordings if key[0] == sensor)
     settings = plan.ingest_settings(*key)
     quality = ingest_as_planned(plan.recordings[key].path, settings, *key, kept)
-    quality.findings.extend(quality.implausible(plan.sensors[sensor]))
+    quality.findings.extend(implausible_of(quality, plan.sensors[sensor]))
     return quality
 
 

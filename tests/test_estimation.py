@@ -12,9 +12,10 @@ from imubench_pipeline.config import EstimateSettings, Method
 from imubench_pipeline.estimation import Estimation, estimate_channel
 from imubench_pipeline.estimators.curve_bias import averaging_times, of_model
 from imubench_pipeline.estimators.estimate import CURVE
+from imubench_pipeline.keys import Key
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recording import ChannelLog
-from imubench_pipeline.results import Key, estimates
+from imubench_pipeline.rows import estimates
 from imubench_pipeline.simulate import channel_rng, simulate
 from imubench_pipeline.tables import build, write
 from tests.kept import curve_of, kept

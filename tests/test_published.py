@@ -10,10 +10,11 @@ import pytest
 
 from imubench_pipeline.datasheet import bias_deltas, deltas
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.keys import Key
 from imubench_pipeline.measured import sensitivity
 from imubench_pipeline.printed import Datasheet
 from imubench_pipeline.published import published_rows
-from imubench_pipeline.results import Key, parameter_rows, truth_rows
+from imubench_pipeline.rows import parameter_rows, truth_rows
 from imubench_pipeline.tables import build
 
 DEGREE = math.pi / 180

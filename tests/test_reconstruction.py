@@ -8,10 +8,10 @@ import pytest
 from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.config import ReconstructionSettings
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.keys import Key
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.reconstruction import reconstruct
 from imubench_pipeline.recording import read_metadata
-from imubench_pipeline.results import Key
 from imubench_pipeline.simulate import simulate
 from imubench_pipeline.tables import build
 

@@ -12,9 +12,10 @@ from imubench_pipeline.estimators.likelihood import explaining
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.ingest import ingest_as_planned
 from imubench_pipeline.plan import Plan
+from imubench_pipeline.quality.plausibility import implausible_of
 from imubench_pipeline.quality.spectral import band_finding, line_findings
+from imubench_pipeline.quality_file import Quality
 from imubench_pipeline.recording import ChannelLog, static_logs
-from imubench_pipeline.results import Quality
 from imubench_pipeline.spectrum import spectra
 
 
@@ -32,7 +33,7 @@ def check(plan: Plan) -> Iterator[tuple[str, str, Quality]]:
         with tempfile.TemporaryDirectory(prefix="imubench.") as folder:
             settings = plan.ingest_settings(sensor, name)
             quality = ingest_as_planned(recording.path, settings, sensor, name, Path(folder))
-            quality.findings.extend(quality.implausible(plan.sensors.get(sensor)))
+            quality.findings.extend(implausible_of(quality, plan.sensors.get(sensor)))
             for channel, log in static_logs(Path(folder)).items():
                 for finding in spectral_findings(channel, log, plan.bandwidth(sensor, name)):
                     quality.findings.append(dict(finding.row(sensor, name)))

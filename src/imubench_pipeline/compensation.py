@@ -11,8 +11,9 @@ import numpy as np
 from imubench_pipeline.allan import AllanCurve, of_blocks
 from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate, Parameter
 from imubench_pipeline.estimators.likelihood import Likelihood
+from imubench_pipeline.keys import Key
 from imubench_pipeline.recording import ChannelLog
-from imubench_pipeline.results import Key, limit_rows
+from imubench_pipeline.rows import limit_rows
 from imubench_pipeline.sensor import quantity_of
 from imubench_pipeline.thermal.effect import shifted
 from imubench_pipeline.thermal.fit import fit_temperature

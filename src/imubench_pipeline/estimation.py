@@ -32,9 +32,10 @@ from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate, not_shown
 from imubench_pipeline.estimators.least_squares import UnfitCurveError
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.model_choice import disagreement
+from imubench_pipeline.keys import Key
 from imubench_pipeline.presence import presence
 from imubench_pipeline.recording import ChannelLog
-from imubench_pipeline.results import Key, allan_rows, draw_rows, parameter_rows
+from imubench_pipeline.rows import allan_rows, draw_rows, parameter_rows
 from imubench_pipeline.sensor import quantity_of
 from imubench_pipeline.simulate import channel_rng
 from imubench_pipeline.thermal.path import TemperaturePath, temperature_path

@@ -22,6 +22,7 @@ from imubench_pipeline.quality.copies import copied_channels
 from imubench_pipeline.quality.levels import kept_level
 from imubench_pipeline.quality.rotation import GravityTurn, gravity_turn
 from imubench_pipeline.quality.summary import ColumnSummary
+from imubench_pipeline.quality_file import Quality
 from imubench_pipeline.readers import (
     POSITION,
     TABLE_RATE,
@@ -31,7 +32,6 @@ from imubench_pipeline.readers import (
     read,
 )
 from imubench_pipeline.recording import channel_logs, log_paths
-from imubench_pipeline.results import Quality
 from imubench_pipeline.sensor import LogFormat, RecordingNotes, UsedPart
 from imubench_pipeline.tables import write_json
 

@@ -20,6 +20,7 @@ import pyarrow.parquet as pq
 from numba import njit
 from numpy.typing import NDArray
 
+from imubench_pipeline.keys import Key
 from imubench_pipeline.readers.batch import TEMPERATURE
 from imubench_pipeline.recording import (
     ChannelLog,
@@ -28,7 +29,6 @@ from imubench_pipeline.recording import (
     read_metadata,
     was_at_rest,
 )
-from imubench_pipeline.results import Key
 from imubench_pipeline.typing import Array
 
 Row = dict[str, Any]

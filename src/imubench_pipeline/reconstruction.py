@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.config import ReconstructionSettings
 from imubench_pipeline.estimators.estimate import Estimate
+from imubench_pipeline.keys import Key
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recording import LogWriter
-from imubench_pipeline.results import Key
 from imubench_pipeline.score import score
 from imubench_pipeline.simulate import (
     channel_rng,

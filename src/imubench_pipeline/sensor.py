@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -353,6 +354,11 @@ def read_sensors(folder: Path) -> dict[str, Sensor]:
         path.stem: parse(Sensor, read_yaml(path), str(path))
         for path in sorted(folder.glob("*.yaml"))
     }
+
+
+def sensors_of(catalogue: str) -> dict[str, Sensor]:
+    """Return the sensors as the plan wrote them."""
+    return {name: Sensor.model_validate(one) for name, one in json.loads(catalogue).items()}
 
 
 def merged_log(sensor: Sensor, notes: RecordingNotes, file: str) -> LogFormat:

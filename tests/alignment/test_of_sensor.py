@@ -15,8 +15,9 @@ from imubench_pipeline.alignment.triad import Site, Triad
 from imubench_pipeline.config import EarthRateSettings
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.keys import Key
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.results import Key, parameter_rows
+from imubench_pipeline.rows import parameter_rows
 from imubench_pipeline.tables import build, write
 from tests.earth_rate.recordings import put
 

@@ -11,9 +11,11 @@ import pyarrow as pa
 from imubench_pipeline.config import EarthRateSettings
 from imubench_pipeline.earth_rate.of_run import earth_rate_tables
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.keys import Key
 from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.quality_file import Quality
 from imubench_pipeline.recording import LogWriter
-from imubench_pipeline.results import Key, Quality, parameter_rows
+from imubench_pipeline.rows import parameter_rows
 from imubench_pipeline.tables import write, write_json
 from tests.earth_rate.runs import PAPER, RATE, turned
 

@@ -11,8 +11,9 @@ from imubench_pipeline.earth_rate.experiment import Experiment
 from imubench_pipeline.earth_rate.kalman import RateFilter
 from imubench_pipeline.earth_rate.ranges import sigma_ranges
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.keys import Key
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.results import Key, parameter_rows
+from imubench_pipeline.rows import parameter_rows
 from imubench_pipeline.tables import write
 from tests.earth_rate.recordings import put, put_at_rest, run, turned_log
 from tests.earth_rate.runs import PAPER

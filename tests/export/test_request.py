@@ -15,8 +15,9 @@ from imubench_pipeline.export.imu import ExportError
 from imubench_pipeline.export.of_run import exports
 from imubench_pipeline.export.request import Request, imu_of, load, made
 from imubench_pipeline.export.targets import TARGETS
+from imubench_pipeline.keys import Key
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.results import Key, allan_rows, draw_rows, parameter_rows
+from imubench_pipeline.rows import allan_rows, draw_rows, parameter_rows
 from imubench_pipeline.tables import build, write, write_arrow
 from imubench_pipeline.typing import Row
 from tests.export.sensors import ACCEL, GYRO

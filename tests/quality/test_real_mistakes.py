@@ -19,6 +19,7 @@ import pytest
 from imubench_pipeline.config import QualitySettings
 from imubench_pipeline.fitness import doubts, fitness
 from imubench_pipeline.ingest import ingest
+from imubench_pipeline.quality.plausibility import implausible_of
 from imubench_pipeline.sensor import CHANNELS, RecordingNotes, Sensor, read_sensors
 from imubench_pipeline.validation import parse
 from tests.conftest import PROJECT
@@ -61,7 +62,7 @@ def findings(path: Path, of: Sensor, folder: Path) -> Rows:
     """Return what is found of a log, by the ingest and beside the datasheet."""
     kept = ingest(path, of.log, RecordingNotes(), QualitySettings(), folder / "kept", NAMES)
     quality = kept.quality(NAMES)
-    return quality.findings + quality.implausible(of)
+    return quality.findings + implausible_of(quality, of)
 
 
 def unfit(found: Rows) -> dict[str, dict[str | None, float]]:

@@ -28,7 +28,7 @@ import yaml
 
 from imubench_pipeline.fitness import left_out
 from imubench_pipeline.plan import Plan
-from imubench_pipeline.results import Quality
+from imubench_pipeline.quality_file import Quality
 from imubench_pipeline.tables import read
 
 PROJECT = Path(__file__).parents[2]

@@ -14,13 +14,14 @@ from imubench_pipeline.drift import drift_rows
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.expected_errors import error_rows, of_requirement, standard
 from imubench_pipeline.fusion.of_run import fusion_rows
+from imubench_pipeline.keys import Key
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.pooled import pooled_rows
 from imubench_pipeline.recording import LogWriter
 from imubench_pipeline.report.publish import site_of
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.requirements import Requirement
-from imubench_pipeline.results import Key, parameter_rows
+from imubench_pipeline.rows import parameter_rows
 from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
 from imubench_pipeline.selection import ranked
 from imubench_pipeline.tables import build, write, write_arrow

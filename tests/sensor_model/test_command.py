@@ -13,9 +13,10 @@ from imubench_pipeline.cli import main
 from imubench_pipeline.config import QualitySettings
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.ingest import ingest
+from imubench_pipeline.keys import Key
 from imubench_pipeline.readers import read
 from imubench_pipeline.recording import channel_logs, read_metadata
-from imubench_pipeline.results import Key, parameter_rows
+from imubench_pipeline.rows import parameter_rows
 from imubench_pipeline.sensor import RecordingNotes, merged_log, read_sensors
 from imubench_pipeline.tables import write, write_arrow
 from imubench_pipeline.validation import parse, read_yaml

@@ -6,9 +6,10 @@ from pathlib import Path
 
 from imubench_pipeline.allan import cluster_sizes, of_blocks, of_phase
 from imubench_pipeline.config import AllanSettings
+from imubench_pipeline.keys import Key
 from imubench_pipeline.phase import integrate
 from imubench_pipeline.recording import static_logs
-from imubench_pipeline.results import Key, allan_rows
+from imubench_pipeline.rows import allan_rows
 from imubench_pipeline.tables import write
 from imubench_pipeline.typing import Row
 

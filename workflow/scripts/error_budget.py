@@ -11,7 +11,7 @@ from imubench_pipeline.expected_errors import error_rows, of_requirement, standa
 from imubench_pipeline.printed import Datasheet
 from imubench_pipeline.recording import static_logs
 from imubench_pipeline.requirements import Requirement
-from imubench_pipeline.results import recommended_estimates
+from imubench_pipeline.rows import recommended_estimates
 from imubench_pipeline.tables import read, write
 from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si

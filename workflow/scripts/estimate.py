@@ -5,8 +5,10 @@ from pathlib import Path
 
 from imubench_pipeline.config import EstimateSettings
 from imubench_pipeline.estimation import Estimation, estimate_channel
+from imubench_pipeline.kept_curves import curves
+from imubench_pipeline.keys import Key
+from imubench_pipeline.quality_file import Quality
 from imubench_pipeline.recording import static_logs
-from imubench_pipeline.results import Key, Quality, curves
 from imubench_pipeline.tables import write
 
 

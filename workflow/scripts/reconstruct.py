@@ -4,8 +4,11 @@ import json
 from pathlib import Path
 
 from imubench_pipeline.config import ReconstructionSettings
+from imubench_pipeline.kept_curves import compensated_curves, curves
+from imubench_pipeline.keys import Key
+from imubench_pipeline.quality_file import Quality
 from imubench_pipeline.reconstruction import reconstruct
-from imubench_pipeline.results import Key, Quality, compensated_curves, curves, estimates
+from imubench_pipeline.rows import estimates
 from imubench_pipeline.tables import write
 
 

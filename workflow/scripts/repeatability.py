@@ -5,7 +5,7 @@ from pathlib import Path
 
 from imubench_pipeline.config import DatasheetSettings
 from imubench_pipeline.repeatability.rows import repeatability_rows
-from imubench_pipeline.results import sensors_of
+from imubench_pipeline.sensor import sensors_of
 from imubench_pipeline.tables import build, read, write_arrow
 
 

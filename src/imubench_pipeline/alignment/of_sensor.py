@@ -23,7 +23,8 @@ from imubench_pipeline.earth_rate.needs import prediction_rows
 from imubench_pipeline.earth_rate.prediction import Outlook
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.printed import Datasheet, QuantityDatasheet
-from imubench_pipeline.results import Quality, recommended_estimates
+from imubench_pipeline.quality_file import Quality
+from imubench_pipeline.rows import recommended_estimates
 from imubench_pipeline.sensor import QUANTITIES
 from imubench_pipeline.simulate import channel_rng
 from imubench_pipeline.typing import Row

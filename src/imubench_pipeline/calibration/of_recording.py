@@ -17,8 +17,8 @@ from imubench_pipeline.calibration.residuals import residuals
 from imubench_pipeline.calibration.schedule import Schedule
 from imubench_pipeline.calibration.still import bias_at_rest
 from imubench_pipeline.earth_rate.noise_source import NO_MODEL, NoiseSource
+from imubench_pipeline.keys import Key
 from imubench_pipeline.recording import ChannelLog, on_grid
-from imubench_pipeline.results import Key
 from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si
 

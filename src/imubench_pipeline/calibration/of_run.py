@@ -12,8 +12,9 @@ from imubench_pipeline.calibration.columns import CALIBRATION_TABLES
 from imubench_pipeline.calibration.declaration import AtRest, OnRateTable
 from imubench_pipeline.calibration.of_recording import Given, at_rest, on_rate_table, unusable
 from imubench_pipeline.earth_rate.noise_source import from_printed, from_static
+from imubench_pipeline.keys import Key
+from imubench_pipeline.quality_file import Quality
 from imubench_pipeline.recording import channel_logs, read_metadata
-from imubench_pipeline.results import Key, Quality
 from imubench_pipeline.sensor import Sensor
 from imubench_pipeline.simulated_recordings import SimulatedRecording
 from imubench_pipeline.typing import Row

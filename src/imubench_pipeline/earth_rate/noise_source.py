@@ -14,7 +14,8 @@ from typing import Any
 
 from imubench_pipeline.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.results import Quality, estimates, recommended_estimates
+from imubench_pipeline.quality_file import Quality
+from imubench_pipeline.rows import estimates, recommended_estimates
 from imubench_pipeline.sensor import Sensor
 from imubench_pipeline.sensor_model.from_datasheet import from_datasheet
 from imubench_pipeline.simulate import channel_rng

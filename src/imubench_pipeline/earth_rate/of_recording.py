@@ -28,8 +28,8 @@ from imubench_pipeline.earth_rate.noise_source import NO_MODEL, NoiseSource
 from imubench_pipeline.earth_rate.prediction import Outlook
 from imubench_pipeline.earth_rate.ranges import sigma_ranges
 from imubench_pipeline.earth_rate.turning import find_turning
+from imubench_pipeline.keys import Key
 from imubench_pipeline.recording import ChannelLog, on_grid
-from imubench_pipeline.results import Key
 from imubench_pipeline.typing import Array, Row
 from imubench_pipeline.units import quantity_to_si
 

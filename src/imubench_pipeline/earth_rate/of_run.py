@@ -13,8 +13,9 @@ from imubench_pipeline.earth_rate.declaration import TwoPosition
 from imubench_pipeline.earth_rate.noise_source import from_printed, from_static
 from imubench_pipeline.earth_rate.of_recording import WHOLE, earth_rate_of, unusable
 from imubench_pipeline.earth_rate.published import Schedule, published_row
+from imubench_pipeline.keys import Key
+from imubench_pipeline.quality_file import Quality
 from imubench_pipeline.recording import channel_logs, read_metadata
-from imubench_pipeline.results import Key, Quality
 from imubench_pipeline.sensor import Sensor
 from imubench_pipeline.sensor_model.models import axis_model
 from imubench_pipeline.simulated_recordings import SimulatedRecording

@@ -21,7 +21,7 @@ from imubench_pipeline.export.temperature import TemperatureEffect, temperature_
 from imubench_pipeline.fitness import left_out
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.overbound import MOST_EXCESS, overbound
-from imubench_pipeline.results import draws
+from imubench_pipeline.rows import draws
 from imubench_pipeline.smallest_model import FAMILIES, Family
 from imubench_pipeline.tables import read
 

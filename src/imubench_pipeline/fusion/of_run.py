@@ -18,7 +18,7 @@ from imubench_pipeline.fusion.equivalence import (
     TemperaturePart,
     equivalence_rows,
 )
-from imubench_pipeline.results import draws, estimate_of
+from imubench_pipeline.rows import draws, estimate_of
 from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si
 

@@ -17,6 +17,7 @@ from imubench_pipeline.findings import Finding
 from imubench_pipeline.quality.expected import Expected, expected
 from imubench_pipeline.quality.rates import implausible_rates
 from imubench_pipeline.quality.rotation import GravityTurn
+from imubench_pipeline.quality_file import Quality
 from imubench_pipeline.sensor import QUANTITIES, Sensor, quantity_of
 from imubench_pipeline.units import conversion, from_si
 
@@ -85,6 +86,22 @@ def implausible(
         }
         found += [*_turning(means, of["gyro"])] or [*_tilting(means, gravity)]
     return found
+
+
+def implausible_of(quality: Quality, sensor: Sensor | None) -> list[dict[str, Any]]:
+    """Return the rows of findings on what can be of no sensor at rest in its unit.
+
+    Parameters
+    ----------
+    quality : Quality
+    sensor : Sensor or None
+        What the file of the sensor says; None: there is none.
+    """
+    about = quality.recording
+    turn = GravityTurn(**quality.gravity) if quality.gravity else None
+    static = about.get("kind", "static") == "static"
+    found = implausible(quality.channels, turn, sensor, static=static)
+    return [dict(finding.row(about["sensor"], about["recording"])) for finding in found]
 
 
 def mistakes(unit: str, quantity: str) -> Iterator[tuple[str, float]]:

@@ -15,7 +15,7 @@ from pandas.util import hash_pandas_object
 
 from imubench_pipeline.findings import LEFT_OUT
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.results import estimate_of
+from imubench_pipeline.rows import estimate_of
 from imubench_pipeline.schemas import BY_RECORDING
 from imubench_pipeline.typing import Row
 

@@ -10,7 +10,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from imubench_pipeline.results import estimate_of
+from imubench_pipeline.rows import estimate_of
 from imubench_pipeline.sensor import CHANNELS, quantity_of
 from imubench_pipeline.sensor_model.imu import ImuModel
 from imubench_pipeline.sensor_model.low_pass import LowPass

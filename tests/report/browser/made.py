@@ -26,6 +26,7 @@ from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.expected_errors import error_rows, of_requirement, standard
 from imubench_pipeline.findings import Finding
 from imubench_pipeline.fusion.of_run import NEEDED, fusion_rows
+from imubench_pipeline.keys import Key
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.overview import overview
 from imubench_pipeline.pooled import pooled_rows
@@ -34,7 +35,7 @@ from imubench_pipeline.report import publish as publishing
 from imubench_pipeline.report.publish import publish, site_of
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.requirements import Requirement
-from imubench_pipeline.results import Key, parameter_rows
+from imubench_pipeline.rows import parameter_rows
 from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
 from imubench_pipeline.selection import ranking_rows
 from imubench_pipeline.sensor import Sensor, quantity_of
