@@ -32,9 +32,9 @@ from imubench_pipeline.estimation import Estimation, estimate_channel
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.keys import Key
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.readers.batch import TEMPERATURE
 from imubench_pipeline.recording import ChannelLog, LogWriter, channel_logs
 from imubench_pipeline.rows import estimate_of
+from imubench_pipeline.sensor import TEMPERATURE
 from imubench_pipeline.sensor_model.imu import ImuModel, simulate_imu
 from imubench_pipeline.sensor_model.low_pass import LowPass
 from imubench_pipeline.sensor_model.model import SensorModel, TemperatureDrift

@@ -5,12 +5,13 @@ from pathlib import Path
 import pytest
 
 from imubench_pipeline.failures import (
+    Failure,
     failure_of,
     read_with_failures,
     with_failures,
     write_empty,
 )
-from imubench_pipeline.faults import TOLD, Failure, Faults
+from imubench_pipeline.faults import TOLD, Faults
 from imubench_pipeline.schemas import PARTS_OF, TABLES
 from imubench_pipeline.tables import build, read, write
 

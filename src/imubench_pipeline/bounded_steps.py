@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from imubench_pipeline.faults import Failure, Of
+from imubench_pipeline.failures import Failure
+from imubench_pipeline.faults import Of
 from imubench_pipeline.plan import Plan
 from imubench_pipeline.step_modules import OF_ALONE
 from imubench_pipeline.steps import StepError, Steps

@@ -234,8 +234,8 @@ def _check(given: argparse.Namespace) -> int:
 
 
 def _inspect(given: argparse.Namespace) -> int:
+    from imubench_pipeline.findings import RecordingError
     from imubench_pipeline.inspection import inspect
-    from imubench_pipeline.readers import RecordingError
 
     if isinstance(sys.stdout, io.TextIOWrapper):
         # Names in a log may be in any script, and sensor files are UTF-8.

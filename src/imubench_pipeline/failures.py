@@ -9,16 +9,18 @@ from __future__ import annotations
 
 import json
 from collections.abc import Container, Iterable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Literal
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from imubench_pipeline.faults import Failure
+from imubench_pipeline.findings import Finding
 from imubench_pipeline.schemas import TABLES
 from imubench_pipeline.tables import build, joined, read_part, schema, write_arrow
 
+Cause = Literal["error", "killed", "time"]
 QUALITY = "quality.json"
 _METADATA = b"imubench.failure"
 _BESIDE = ("earth_rotation", "calibration")
@@ -28,6 +30,38 @@ _NOT_JUDGED = {"fitness": None, "decides": False}
 
 _NAMED = ("recordings", "findings", "estimate_findings", "failures")
 """Tables that say why a recording is left out of the others."""
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A step that failed.
+
+    Attributes
+    ----------
+    sensor : str
+    recording : str or None
+        None: a step of the whole sensor.
+    step : str
+    cause : {"error", "killed", "time"}
+    reason : str
+        In one line.
+    """
+
+    sensor: str
+    recording: str | None
+    step: str
+    cause: Cause
+    reason: str
+
+    @property
+    def name(self) -> str:
+        """What is left out."""
+        return f"{self.sensor}/{self.recording}" if self.recording else self.sensor
+
+    def finding(self) -> Finding:
+        """Return the finding about the recording."""
+        detail = f"{self.reason}; the recording is left out, and tried again by the next run"
+        return Finding("failed", "fatal", detail, 1.0)
 
 
 def failure_of(path: Path) -> Failure | None:

@@ -6,62 +6,19 @@ import contextlib
 import json
 import os
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
-from imubench_pipeline.columns import text
-from imubench_pipeline.findings import Finding
+from imubench_pipeline.failures import Failure
 
-Cause = Literal["error", "killed", "time"]
 Of = tuple[str, str, str | None]
 """Step, sensor and recording; None: a step of the whole sensor."""
 
 TOLD = "IMUBENCH_FAILURES_TOLD"
 """The environment variable of a run whose caller looks itself for what is left out."""
 
-FAILURES = (
-    text("sensor", "name of the sensor file"),
-    text("recording", "that is left out; null: a step of the whole sensor", required=False),
-    text("step", "of the workflow, which failed"),
-    text("cause", "error, killed, or time: it ran past its time"),
-    text("reason", "in one line; the folder faults has the rest"),
-)
-"""Columns of the table ``failures``."""
-
 _FOLDER = "faults"
-
-
-@dataclass(frozen=True)
-class Failure:
-    """A step that failed.
-
-    Attributes
-    ----------
-    sensor : str
-    recording : str or None
-        None: a step of the whole sensor.
-    step : str
-    cause : {"error", "killed", "time"}
-    reason : str
-        In one line.
-    """
-
-    sensor: str
-    recording: str | None
-    step: str
-    cause: Cause
-    reason: str
-
-    @property
-    def name(self) -> str:
-        """What is left out."""
-        return f"{self.sensor}/{self.recording}" if self.recording else self.sensor
-
-    def finding(self) -> Finding:
-        """Return the finding about the recording."""
-        detail = f"{self.reason}; the recording is left out, and tried again by the next run"
-        return Finding("failed", "fatal", detail, 1.0)
 
 
 class Faults:

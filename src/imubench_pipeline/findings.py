@@ -1,4 +1,4 @@
-"""A finding: what is wrong with a recording, or worth knowing of it."""
+"""A finding: what is wrong with a recording, or worth knowing of it, or why it cannot be used."""
 
 from __future__ import annotations
 
@@ -10,6 +10,9 @@ LEFT_OUT = ("rejected", "failed")
 """Findings that a recording is left out, with the reason: they are listed by themselves."""
 
 Severity = Literal["note", "warning", "fatal"]
+
+
+_HALF_REASON = 700
 
 
 @dataclass(frozen=True)
@@ -43,3 +46,16 @@ class Finding:
     def row(self, sensor: str, recording: str) -> Mapping[str, Any]:
         """Return the row of the table ``findings``."""
         return {"sensor": sensor, "recording": recording, **asdict(self)}
+
+
+class RecordingError(ValueError):
+    """A recording that cannot be used; the text is the reason, with what to mend.
+
+    What a damaged file puts into it, such as a name of a million letters, is left out of the
+    middle.
+    """
+
+    def __init__(self, reason: str) -> None:
+        if len(reason) > 2 * _HALF_REASON:
+            reason = f"{reason[:_HALF_REASON]} [...] {reason[-_HALF_REASON:]}"
+        super().__init__(reason)

@@ -14,8 +14,8 @@ from typing import Any
 from imubench_pipeline import timebase
 from imubench_pipeline.assembly import assemble, counted, names_of
 from imubench_pipeline.config import QualitySettings
-from imubench_pipeline.faults import Failure
-from imubench_pipeline.findings import Finding
+from imubench_pipeline.failures import Failure
+from imubench_pipeline.findings import Finding, RecordingError
 from imubench_pipeline.parts import Part, leave_out_knocks, read_part
 from imubench_pipeline.quality.columns import column_findings
 from imubench_pipeline.quality.copies import copied_channels
@@ -23,16 +23,16 @@ from imubench_pipeline.quality.levels import kept_level
 from imubench_pipeline.quality.rotation import GravityTurn, gravity_turn
 from imubench_pipeline.quality.summary import ColumnSummary
 from imubench_pipeline.quality_file import Quality
-from imubench_pipeline.readers import (
+from imubench_pipeline.readers import log_files, read
+from imubench_pipeline.recording import channel_logs, log_paths
+from imubench_pipeline.sensor import (
     POSITION,
     TABLE_RATE,
     TEMPERATURE,
-    RecordingError,
-    log_files,
-    read,
+    LogFormat,
+    RecordingNotes,
+    UsedPart,
 )
-from imubench_pipeline.recording import channel_logs, log_paths
-from imubench_pipeline.sensor import LogFormat, RecordingNotes, UsedPart
 from imubench_pipeline.tables import write_json
 
 

@@ -10,8 +10,7 @@ import pyarrow as pa
 
 from imubench_pipeline.backtest import verdicts
 from imubench_pipeline.drift import drift_rows
-from imubench_pipeline.failures import read_with_failures, with_failures, without
-from imubench_pipeline.faults import Failure
+from imubench_pipeline.failures import Failure, read_with_failures, with_failures, without
 from imubench_pipeline.fitness import (
     doubts,
     judged,

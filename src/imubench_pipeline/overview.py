@@ -21,7 +21,6 @@ from numba import njit
 from numpy.typing import NDArray
 
 from imubench_pipeline.keys import Key
-from imubench_pipeline.readers.batch import TEMPERATURE
 from imubench_pipeline.recording import (
     ChannelLog,
     channel_logs,
@@ -29,6 +28,7 @@ from imubench_pipeline.recording import (
     read_metadata,
     was_at_rest,
 )
+from imubench_pipeline.sensor import TEMPERATURE
 from imubench_pipeline.typing import Array
 
 Row = dict[str, Any]

@@ -12,11 +12,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from imubench_pipeline.findings import Finding
+from imubench_pipeline.findings import Finding, RecordingError
 from imubench_pipeline.quality import levels
 from imubench_pipeline.quality.knocks import Knock, knocks, suspects
 from imubench_pipeline.quality.summary import ColumnSummary
-from imubench_pipeline.readers import Batch, LogFile, RecordingError
+from imubench_pipeline.readers import Batch, LogFile
 from imubench_pipeline.recording import LogWriter
 from imubench_pipeline.sensor import UsedPart
 

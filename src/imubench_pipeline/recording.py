@@ -20,7 +20,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from imubench_pipeline.readers.batch import POSITION, TABLE_RATE, TEMPERATURE
+from imubench_pipeline.sensor import POSITION, TABLE_RATE, TEMPERATURE
 from imubench_pipeline.typing import Array
 
 ROW_GROUP = 1 << 20

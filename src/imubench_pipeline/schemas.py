@@ -16,9 +16,9 @@ from imubench_pipeline.columns import text as _text
 from imubench_pipeline.deterministic.columns import DETERMINISTIC_TABLES
 from imubench_pipeline.earth_rate.columns import EARTH_RATE_TABLES
 from imubench_pipeline.estimators.columns import DRAWN_TABLES
-from imubench_pipeline.faults import FAILURES
-from imubench_pipeline.fitness import DOUBTS, JUDGED
 from imubench_pipeline.fusion.columns import FUSION_TABLES
+from imubench_pipeline.of_failures import FAILURES
+from imubench_pipeline.of_fitness import DOUBTS, JUDGED
 from imubench_pipeline.repeatability.columns import REPEATABILITY
 from imubench_pipeline.shortlist.columns import SHORTLIST
 from imubench_pipeline.suitability.columns import IN_USE

@@ -31,6 +31,15 @@ QUANTITIES: dict[str, str] = {"gyro": "angular_rate", "accel": "acceleration"}
 CHANNELS: tuple[str, ...] = tuple(f"{q}_{axis}" for q in QUANTITIES for axis in "xyz")
 """Every channel: one axis of one quantity."""
 
+TEMPERATURE = "temperature"
+"""Name of the temperature column of a recording."""
+
+POSITION = "position"
+"""Name of the column that says how a sensor that is turned stands."""
+
+TABLE_RATE = "table_rate"
+"""Name of the column with the rate of the table that a sensor stands on."""
+
 Kind = Literal["static", "two_position", "rate_table"]
 """What was done with a sensor during a recording."""
 

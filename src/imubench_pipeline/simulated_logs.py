@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.earth_rate.experiment import Experiment
 from imubench_pipeline.earth_rate.simulation import true_rate
-from imubench_pipeline.readers.batch import TEMPERATURE
-from imubench_pipeline.sensor import ColumnSource, LogFormat
+from imubench_pipeline.sensor import TEMPERATURE, ColumnSource, LogFormat
 from imubench_pipeline.sensor_model.imu import simulate_imu
 from imubench_pipeline.sensor_model.models import imu_model
 from imubench_pipeline.sensor_model.profiles import Profile, profiles_of

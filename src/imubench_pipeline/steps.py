@@ -22,7 +22,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from imubench_pipeline.faults import Cause
+from imubench_pipeline.failures import Cause
 
 BEGUN, DONE, FAILED, KILLED = b"b", b"d", b"f", b"k"
 """What is said of a step: that it begins, and how it ended. To the latter belongs JSON, after its

@@ -11,8 +11,8 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 from numpy.typing import DTypeLike, NDArray
 
-from imubench_pipeline.readers.batch import SECONDS, TEMPERATURE
-from imubench_pipeline.sensor import QUANTITIES, ColumnSource, LogFormat, quantity_of
+from imubench_pipeline.readers.batch import SECONDS
+from imubench_pipeline.sensor import QUANTITIES, TEMPERATURE, ColumnSource, LogFormat, quantity_of
 from imubench_pipeline.units import conversion
 from imubench_pipeline.validation import ConfigError
 

@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.config import QualitySettings
-from imubench_pipeline.findings import Finding
-from imubench_pipeline.readers.batch import RecordingError
+from imubench_pipeline.findings import Finding, RecordingError
 from imubench_pipeline.stamps import Stamps, Track, tracked, typical_interval
 
 _SHARED = 0.2

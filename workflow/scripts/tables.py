@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from imubench_pipeline.failures import read_with_failures, with_failures
-from imubench_pipeline.faults import Failure
+from imubench_pipeline.failures import Failure, read_with_failures, with_failures
 from imubench_pipeline.tables import write_arrow
 
 if __name__ == "__main__":

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.findings import RecordingError
 from imubench_pipeline.inspection.block import printable
 from imubench_pipeline.inspection.clock import typical_step
 from imubench_pipeline.inspection.draft import UNKNOWN, Draft
-from imubench_pipeline.readers import LogFile, RecordingError, read
+from imubench_pipeline.readers import LogFile, read
 from imubench_pipeline.sensor import CHANNELS, LogFormat, Sensor
 from imubench_pipeline.units import from_si
 from imubench_pipeline.validation import ConfigError, parse

@@ -10,8 +10,7 @@ from imubench_pipeline.findings import Finding
 from imubench_pipeline.quality import copies, held, joined, levels, stationarity
 from imubench_pipeline.quality.repeated_samples import repeats_beyond_chance
 from imubench_pipeline.quality.summary import LARGEST, ColumnSummary
-from imubench_pipeline.readers.batch import POSITION, TABLE_RATE, TEMPERATURE
-from imubench_pipeline.sensor import QUANTITIES, quantity_of
+from imubench_pipeline.sensor import POSITION, QUANTITIES, TABLE_RATE, TEMPERATURE, quantity_of
 from imubench_pipeline.units import SI_UNITS, from_si
 
 _USUAL = {"gyro": ("deg/s", "°/s"), "accel": ("mg", "mg")}

@@ -7,15 +7,8 @@ from importlib import import_module
 from itertools import islice
 from pathlib import Path
 
-from imubench_pipeline.readers.batch import (
-    POSITION,
-    TABLE_RATE,
-    TEMPERATURE,
-    Batch,
-    LogFile,
-    RecordingError,
-    stated_in,
-)
+from imubench_pipeline.findings import RecordingError
+from imubench_pipeline.readers.batch import Batch, LogFile, stated_in
 from imubench_pipeline.readers.compressed import (
     holds_text,
     is_archive,
@@ -24,7 +17,14 @@ from imubench_pipeline.readers.compressed import (
     visible,
 )
 from imubench_pipeline.readers.content import is_endless, is_ros_2_bag, reader_of
-from imubench_pipeline.sensor import ColumnSource, LogFormat, Reader
+from imubench_pipeline.sensor import (
+    POSITION,
+    TABLE_RATE,
+    TEMPERATURE,
+    ColumnSource,
+    LogFormat,
+    Reader,
+)
 
 _CLASSES: dict[Reader, tuple[str, str]] = {
     "csv": ("imubench_pipeline.readers.csv", "CsvFile"),

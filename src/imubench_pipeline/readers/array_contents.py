@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.readers import RecordingError, class_of
+from imubench_pipeline.findings import RecordingError
+from imubench_pipeline.readers import class_of
 from imubench_pipeline.readers.array_table import DATES, NUMBERS, Table
 from imubench_pipeline.readers.arrays import ArrayFile, check_not_empty, explained, numbers
 from imubench_pipeline.readers.contents import (

@@ -25,9 +25,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from imubench_pipeline.findings import RecordingError
 from imubench_pipeline.readers.array_table import DATES, NUMBERS, Column, Table, UnusableError
 from imubench_pipeline.readers.array_time import ArrayTime
-from imubench_pipeline.readers.batch import Batch, LogFile, RecordingError, stated_in
+from imubench_pipeline.readers.batch import Batch, LogFile, stated_in
 from imubench_pipeline.readers.stated_units import StatedUnit, stated
 
 _BLOCK_ROWS = 1 << 18

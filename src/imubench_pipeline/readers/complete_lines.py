@@ -6,8 +6,7 @@ import codecs
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
-from imubench_pipeline.findings import Finding
-from imubench_pipeline.readers.batch import RecordingError
+from imubench_pipeline.findings import Finding, RecordingError
 from imubench_pipeline.readers.compressed import open_bytes
 
 _SEEN = 1 << 16

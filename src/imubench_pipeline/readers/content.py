@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import closing
 from pathlib import Path
 
-from imubench_pipeline.readers.batch import RecordingError
+from imubench_pipeline.findings import RecordingError
 from imubench_pipeline.readers.compressed import is_member, members, open_bytes
 from imubench_pipeline.sensor import Reader
 

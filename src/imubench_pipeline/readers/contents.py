@@ -12,8 +12,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from imubench_pipeline.findings import RecordingError
 from imubench_pipeline.readers import log_files, only_log
-from imubench_pipeline.readers.batch import RecordingError
 from imubench_pipeline.readers.compressed import is_archive, is_member, members
 from imubench_pipeline.readers.content import content_of, is_ros_2_bag, reader_of
 from imubench_pipeline.sensor import LogFormat, Reader

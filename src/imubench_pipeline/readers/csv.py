@@ -10,8 +10,8 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 from numpy.typing import NDArray
 
-from imubench_pipeline.findings import Finding
-from imubench_pipeline.readers.batch import Batch, LogFile, RecordingError
+from imubench_pipeline.findings import Finding, RecordingError
+from imubench_pipeline.readers.batch import Batch, LogFile
 from imubench_pipeline.readers.complete_lines import CompleteLines, first_lines
 from imubench_pipeline.readers.text_cells import MISSING
 from imubench_pipeline.readers.text_layout import TextLayout, find_layout

@@ -21,8 +21,8 @@ from rosbags.rosbag2 import Reader
 from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
-from imubench_pipeline.findings import Finding
-from imubench_pipeline.readers.batch import Batch, LogFile, RecordingError
+from imubench_pipeline.findings import Finding, RecordingError
+from imubench_pipeline.readers.batch import Batch, LogFile
 from imubench_pipeline.readers.rosbag1 import Bag
 from imubench_pipeline.readers.rosbag_messages import LAYOUTS, Layout, figures_of
 from imubench_pipeline.readers.started import date_of

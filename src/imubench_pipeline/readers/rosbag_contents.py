@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from imubench_pipeline.readers.batch import RecordingError
+from imubench_pipeline.findings import RecordingError
 from imubench_pipeline.readers.contents import ROWS, HeldColumn, HeldTable, shown
 from imubench_pipeline.readers.rosbag import LOG_TIME, STAMP, Source, explained, opened
 from imubench_pipeline.readers.rosbag_messages import LAYOUTS, Layout, figures_of

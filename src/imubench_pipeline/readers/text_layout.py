@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from imubench_pipeline.readers.batch import RecordingError, stated_in
+from imubench_pipeline.findings import RecordingError
+from imubench_pipeline.readers.batch import stated_in
 from imubench_pipeline.readers.complete_lines import first_lines
 from imubench_pipeline.readers.text_cells import Decimal, are_figures, is_datum, is_number
 from imubench_pipeline.readers.text_header import are_units, completed, is_heading, likely_header

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.readers.batch import RecordingError
+from imubench_pipeline.findings import RecordingError
 
 _IN_NUMBERS = frozenset(b"0123456789+-.,;:|\t \"'eEnNaAiIfFtT/\r")
 _NO_COMMENT = rb"(?!#(?i:n/a|na|value!|num!|div/0!)[;,|\t ])"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
-from imubench_pipeline.readers.batch import RecordingError
+from imubench_pipeline.findings import RecordingError
 
 _MARKUP = (b"<!doctype", b"<html", b"<head", b"<?xml", b"<svg")
 _JSON = (b'{"', b"[{", b"[[", b"{'")

@@ -10,7 +10,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from imubench_pipeline.readers.batch import LogFile, RecordingError
+from imubench_pipeline.findings import RecordingError
+from imubench_pipeline.readers.batch import LogFile
 from imubench_pipeline.readers.started import date_of_stamp
 from imubench_pipeline.readers.text_cells import is_missing
 from imubench_pipeline.readers.text_layout import TextLayout

@@ -25,8 +25,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from imubench_pipeline.findings import Finding, Severity
-from imubench_pipeline.readers.batch import Batch, LogFile, RecordingError
+from imubench_pipeline.findings import Finding, RecordingError, Severity
+from imubench_pipeline.readers.batch import Batch, LogFile
 from imubench_pipeline.readers.ubx_frames import Frames
 from imubench_pipeline.readers.wrapping import WrapState, unwrapped
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from imubench_pipeline.readers.batch import RecordingError
+from imubench_pipeline.findings import RecordingError
 from imubench_pipeline.readers.contents import ROWS, HeldColumn, HeldTable, shown
 from imubench_pipeline.readers.ubx import COLUMNS, KINDS, RAW, TICK_MS, UNITS, Words
 from imubench_pipeline.readers.ubx_frames import Frames

@@ -36,8 +36,8 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from imubench_pipeline.findings import Finding, Severity
-from imubench_pipeline.readers.batch import SECONDS, Batch, LogFile, RecordingError
+from imubench_pipeline.findings import Finding, RecordingError, Severity
+from imubench_pipeline.readers.batch import SECONDS, Batch, LogFile
 from imubench_pipeline.readers.started import date_of
 from imubench_pipeline.readers.vectornav_sentences import (
     FIELDS,

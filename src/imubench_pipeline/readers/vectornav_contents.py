@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from imubench_pipeline.readers.batch import RecordingError
+from imubench_pipeline.findings import RecordingError
 from imubench_pipeline.readers.contents import FIRST, ROWS, HeldColumn, HeldTable, shown
 from imubench_pipeline.readers.text_cells import is_number
 from imubench_pipeline.readers.text_stamp_forms import stamps_of

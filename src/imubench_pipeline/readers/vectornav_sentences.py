@@ -14,8 +14,7 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 from numpy.typing import NDArray
 
-from imubench_pipeline.findings import Finding
-from imubench_pipeline.readers.batch import RecordingError
+from imubench_pipeline.findings import Finding, RecordingError
 from imubench_pipeline.readers.stream import BLOCK_BYTES, blocks
 
 _APPENDED = re.compile(rb"(?:,S[0-9A-Fa-f]{4})?(?:,T(\d{1,18}))?$")

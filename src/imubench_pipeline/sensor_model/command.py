@@ -75,7 +75,7 @@ def run(given: argparse.Namespace) -> int:
 
 def _run(given: argparse.Namespace) -> None:
     # Numerics are loaded for this command only: the others answer at once.
-    from imubench_pipeline.readers.batch import TEMPERATURE
+    from imubench_pipeline.sensor import TEMPERATURE
     from imubench_pipeline.sensor_model.imu import simulate_imu
     from imubench_pipeline.sensor_model.writing import (
         MARK,

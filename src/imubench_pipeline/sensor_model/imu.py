@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from imubench_pipeline.readers.batch import TEMPERATURE
-from imubench_pipeline.sensor import CHANNELS, quantity_of
+from imubench_pipeline.sensor import CHANNELS, TEMPERATURE, quantity_of
 from imubench_pipeline.sensor_model.model import SensorModel
 from imubench_pipeline.sensor_model.profiles import Profile
 from imubench_pipeline.sensor_model.simulation import CHUNK, Signal, simulate_blocks

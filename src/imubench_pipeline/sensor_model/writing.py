@@ -14,9 +14,8 @@ from typing import Any
 import pyarrow as pa
 import yaml
 
-from imubench_pipeline.readers.batch import TEMPERATURE
 from imubench_pipeline.recording import LogWriter
-from imubench_pipeline.sensor import QUANTITIES, ColumnSource, LogFormat, quantity_of
+from imubench_pipeline.sensor import QUANTITIES, TEMPERATURE, ColumnSource, LogFormat, quantity_of
 from imubench_pipeline.tables import replacing
 from imubench_pipeline.text_log import TextLog
 from imubench_pipeline.typing import Array
