@@ -16,12 +16,12 @@ import h5py
 import numpy as np
 import pytest
 
-from imubench_pipeline.config import QualitySettings
-from imubench_pipeline.fitness import doubts, fitness
-from imubench_pipeline.ingest import ingest
-from imubench_pipeline.quality.plausibility import implausible_of
-from imubench_pipeline.sensor import CHANNELS, RecordingNotes, Sensor, read_sensors
-from imubench_pipeline.validation import parse
+from imubench_pipeline.datasheets.plausibility import implausible_of
+from imubench_pipeline.recordings.fitness import doubts, fitness
+from imubench_pipeline.recordings.ingest import ingest
+from imubench_pipeline.settings.config import QualitySettings
+from imubench_pipeline.settings.sensor import CHANNELS, RecordingNotes, Sensor, read_sensors
+from imubench_pipeline.settings.validation import parse
 from tests.conftest import PROJECT
 
 NAMES = {"sensor": "s", "device": "d", "recording": "r", "kind": "static"}

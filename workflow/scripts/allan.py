@@ -5,12 +5,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from imubench_pipeline.allan import cluster_sizes, of_blocks, of_phase
-from imubench_pipeline.config import AllanSettings
-from imubench_pipeline.keys import Key
-from imubench_pipeline.phase import integrate
-from imubench_pipeline.recording import static_logs
-from imubench_pipeline.rows import allan_rows
+from imubench_pipeline.allan.phase import integrate
+from imubench_pipeline.estimators.rows import allan_rows
+from imubench_pipeline.recordings.recording import static_logs
+from imubench_pipeline.settings.config import AllanSettings
 from imubench_pipeline.tables import write
+from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Row
 
 

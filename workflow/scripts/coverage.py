@@ -3,8 +3,8 @@
 from dataclasses import asdict
 from pathlib import Path
 
-from imubench_pipeline.coverage import by_vendor, coverage
-from imubench_pipeline.sensor import sensors_of
+from imubench_pipeline.datasheets.coverage import by_vendor, coverage
+from imubench_pipeline.settings.sensor import sensors_of
 from imubench_pipeline.tables import build, write_arrow
 
 

@@ -5,13 +5,13 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 
-from imubench_pipeline.comparable import SENSITIVITY, comparables
-from imubench_pipeline.datasheet import bias_deltas, curve_rms, deltas
-from imubench_pipeline.kept_curves import curves
-from imubench_pipeline.measured import sensitivity
-from imubench_pipeline.printed import Datasheet
-from imubench_pipeline.quality_file import Quality
-from imubench_pipeline.rows import estimates
+from imubench_pipeline.datasheets.comparable import SENSITIVITY, comparables
+from imubench_pipeline.datasheets.deltas import bias_deltas, curve_rms, deltas
+from imubench_pipeline.datasheets.measured import sensitivity
+from imubench_pipeline.estimators.rows import estimates
+from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.settings.printed import Datasheet
+from imubench_pipeline.steps.kept_curves import curves
 from imubench_pipeline.tables import read, write
 from imubench_pipeline.typing import Row
 

@@ -4,14 +4,14 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 
-from imubench_pipeline.backtest.of_recording import backtest_rows
-from imubench_pipeline.config import ErrorBudgetSettings
-from imubench_pipeline.error_budget.printed_errors import in_use
-from imubench_pipeline.expected_errors import error_rows, of_requirement, standard
-from imubench_pipeline.printed import Datasheet
-from imubench_pipeline.recording import static_logs
-from imubench_pipeline.requirements import Requirement
-from imubench_pipeline.rows import recommended_estimates
+from imubench_pipeline.estimators.rows import recommended_estimates
+from imubench_pipeline.navigation.backtest.of_recording import backtest_rows
+from imubench_pipeline.navigation.error_budget.printed_errors import in_use
+from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement, standard
+from imubench_pipeline.recordings.recording import static_logs
+from imubench_pipeline.settings.config import ErrorBudgetSettings
+from imubench_pipeline.settings.printed import Datasheet
+from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.tables import read, write
 from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si

@@ -3,13 +3,13 @@
 import json
 from pathlib import Path
 
-from imubench_pipeline.config import EstimateSettings
-from imubench_pipeline.estimation import Estimation, estimate_channel
-from imubench_pipeline.kept_curves import curves
-from imubench_pipeline.keys import Key
-from imubench_pipeline.quality_file import Quality
-from imubench_pipeline.recording import static_logs
+from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.recordings.recording import static_logs
+from imubench_pipeline.settings.config import EstimateSettings
+from imubench_pipeline.steps.estimate import Estimation, estimate_channel
+from imubench_pipeline.steps.kept_curves import curves
 from imubench_pipeline.tables import write
+from imubench_pipeline.tables.keys import Key
 
 
 def estimation(

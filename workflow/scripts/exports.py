@@ -3,9 +3,9 @@
 import json
 from pathlib import Path
 
-from imubench_pipeline.config import ExportSettings
-from imubench_pipeline.export.of_run import exports
 from imubench_pipeline.export.request import load, recordings_of
+from imubench_pipeline.settings.config import ExportSettings
+from imubench_pipeline.steps.exports import exports
 from imubench_pipeline.tables import making, write_content
 
 

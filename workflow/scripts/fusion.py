@@ -4,8 +4,8 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
-from imubench_pipeline.config import FusionSettings
-from imubench_pipeline.fusion.of_run import NEEDED, fusion_rows
+from imubench_pipeline.settings.config import FusionSettings
+from imubench_pipeline.steps.fusion import NEEDED, fusion_rows
 from imubench_pipeline.tables import build, read, write_arrow
 
 

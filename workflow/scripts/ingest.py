@@ -3,8 +3,8 @@
 from dataclasses import asdict
 from pathlib import Path
 
-from imubench_pipeline.ingest import ingest_as_planned
-from imubench_pipeline.overview import overview
+from imubench_pipeline.recordings.ingest import ingest_as_planned
+from imubench_pipeline.recordings.overview import overview
 from imubench_pipeline.tables import write, write_json
 
 if __name__ == "__main__":

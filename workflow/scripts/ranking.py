@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pyarrow.compute as pc
 
-from imubench_pipeline.requirements import Requirement
-from imubench_pipeline.selection import ranked
+from imubench_pipeline.navigation.selection import ranked
+from imubench_pipeline.navigation.verdicts.basis import Basis
+from imubench_pipeline.navigation.verdicts.judgement import judgements
+from imubench_pipeline.navigation.verdicts.next_steps import next_step_rows
+from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.tables import build, read, write_arrow
-from imubench_pipeline.verdicts.basis import Basis
-from imubench_pipeline.verdicts.judgement import judgements
-from imubench_pipeline.verdicts.next_steps import next_step_rows
 
 
 def main(tables: dict[str, Path], settings: str, outputs: list[Path]) -> None:

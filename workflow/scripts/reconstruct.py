@@ -3,13 +3,13 @@
 import json
 from pathlib import Path
 
-from imubench_pipeline.config import ReconstructionSettings
-from imubench_pipeline.kept_curves import compensated_curves, curves
-from imubench_pipeline.keys import Key
-from imubench_pipeline.quality_file import Quality
-from imubench_pipeline.reconstruction import reconstruct
-from imubench_pipeline.rows import estimates
+from imubench_pipeline.estimators.rows import estimates
+from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.settings.config import ReconstructionSettings
+from imubench_pipeline.steps.kept_curves import compensated_curves, curves
+from imubench_pipeline.steps.reconstruct import reconstruct
 from imubench_pipeline.tables import write
+from imubench_pipeline.tables.keys import Key
 
 
 def main(inputs: list[Path], outputs: list[Path], settings: ReconstructionSettings) -> None:

@@ -3,9 +3,9 @@
 import json
 from pathlib import Path
 
-from imubench_pipeline.config import DatasheetSettings
-from imubench_pipeline.repeatability.rows import repeatability_rows
-from imubench_pipeline.sensor import sensors_of
+from imubench_pipeline.navigation.repeatability import repeatability_rows
+from imubench_pipeline.settings.config import DatasheetSettings
+from imubench_pipeline.settings.sensor import sensors_of
 from imubench_pipeline.tables import build, read, write_arrow
 
 

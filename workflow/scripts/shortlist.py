@@ -3,9 +3,9 @@
 import json
 from pathlib import Path
 
-from imubench_pipeline.requirements import Requirement
-from imubench_pipeline.sensor import sensors_of
-from imubench_pipeline.shortlist.of_run import NEEDED, rows_of_run
+from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.settings.sensor import sensors_of
+from imubench_pipeline.steps.shortlist import NEEDED, rows_of_run
 from imubench_pipeline.tables import build, write_arrow
 
 

@@ -3,9 +3,9 @@
 import json
 from pathlib import Path
 
-from imubench_pipeline.sensor import LogFormat
-from imubench_pipeline.simulated_logs import write_simulated
-from imubench_pipeline.simulated_recordings import SimulatedRecording
+from imubench_pipeline.settings.sensor import LogFormat
+from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
+from imubench_pipeline.steps.simulate import write_simulated
 from imubench_pipeline.tables import making
 
 

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from imubench_pipeline.failures import Failure, read_with_failures, with_failures
 from imubench_pipeline.tables import write_arrow
+from imubench_pipeline.tables.failures import Failure, read_with_failures, with_failures
 
 if __name__ == "__main__":
     joined, failures = {}, dict[Failure, None]()

@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from imubench_pipeline.cutoff import Cutoff
+from imubench_pipeline.estimators.cutoff import Cutoff
 from imubench_pipeline.estimators.estimate import CURVE, Estimate, Parameter, Status
 from imubench_pipeline.estimators.frame import Frame
 from imubench_pipeline.estimators.model_choice import Candidate
-from imubench_pipeline.spectrum import Spectrum
+from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.typing import Array
 
 _WORSE = 6.0

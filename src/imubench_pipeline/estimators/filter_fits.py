@@ -11,9 +11,9 @@ from scipy.optimize import brentq, minimize_scalar
 
 from imubench_pipeline.estimators.goodness import goodness
 from imubench_pipeline.estimators.low_pass import BOXCAR, Filter, Kind
+from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle import COARSE, Behind, Terms, Whittle, whittle_of
 from imubench_pipeline.estimators.whittle_kernels import best_powers
-from imubench_pipeline.spectrum import Spectrum
 from imubench_pipeline.typing import Array
 
 _POINTS = 6

@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from imubench_pipeline.estimators.spectrum import SINGLE, WIDTH, Spectrum
 from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.spectrum import SINGLE, WIDTH, Spectrum
 from imubench_pipeline.typing import Array
 
 NOT_IDENTIFIED = 0.3

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from imubench_pipeline.sensor_model.low_pass import LowPass
+from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.typing import Array
 
 Kind = Literal["analogue", "bilinear", "boxcar"]

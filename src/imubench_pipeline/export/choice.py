@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.estimators.rows import estimate_of
 from imubench_pipeline.export.imu import AxisNoise, ExportError
 from imubench_pipeline.export.temperature import AXES
-from imubench_pipeline.rows import estimate_of
 from imubench_pipeline.typing import Row
 
 Key = tuple[str, str]  # recording, channel

@@ -11,9 +11,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.findings import Finding
 from imubench_pipeline.readers.stated_units import StatedUnit, contradictions
-from imubench_pipeline.sensor import (
+from imubench_pipeline.settings.sensor import (
     CHANNELS,
     POSITION,
     QUANTITIES,
@@ -23,6 +22,7 @@ from imubench_pipeline.sensor import (
     LogFormat,
     quantity_of,
 )
+from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.units import conversion
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from imubench_pipeline.recording import log_paths, read_metadata
+from imubench_pipeline.recordings.recording import log_paths, read_metadata
 from imubench_pipeline.report import thermal
 from imubench_pipeline.report.backtest import backtest_lines
 from imubench_pipeline.report.calibration import at_rest

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from imubench_pipeline.navigation.suitability.conditions import in_words
 from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.datasheets import coverage_tables, deltas_of_sensors
 from imubench_pipeline.report.glossary import term
@@ -20,7 +21,6 @@ from imubench_pipeline.report.words import (
     requirement_words,
     sentence,
 )
-from imubench_pipeline.suitability.conditions import in_words
 from imubench_pipeline.typing import Row
 
 _STEPS = 3

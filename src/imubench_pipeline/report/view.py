@@ -13,10 +13,10 @@ import pyarrow as pa
 from numpy.typing import NDArray
 from pandas.util import hash_pandas_object
 
-from imubench_pipeline.findings import LEFT_OUT
+from imubench_pipeline.estimators.rows import estimate_of
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.rows import estimate_of
-from imubench_pipeline.schemas import BY_RECORDING
+from imubench_pipeline.tables.findings import LEFT_OUT
+from imubench_pipeline.tables.schemas import BY_RECORDING
 from imubench_pipeline.typing import Row
 
 Name = tuple[str, str]
