@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from functools import partial
@@ -25,7 +26,8 @@ from imubench_pipeline.estimators.model_choice import disagreement
 from imubench_pipeline.estimators.rows import allan_rows, draw_rows, parameter_rows
 from imubench_pipeline.estimators.thermal.path import TemperaturePath, temperature_path
 from imubench_pipeline.noise.simulate import channel_rng
-from imubench_pipeline.recordings.recording import ChannelLog
+from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.recordings.recording import ChannelLog, static_logs
 from imubench_pipeline.settings.config import EstimateSettings
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.steps.compensation import (
@@ -38,6 +40,7 @@ from imubench_pipeline.steps.compensation import (
     temperature_of,
     temperature_rows,
 )
+from imubench_pipeline.steps.kept_curves import curves
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si
@@ -243,3 +246,17 @@ def _spectrum_rows(key: Key, found: Likelihood) -> Iterator[Row]:
                 "used": bool(found.used[i]),
             }
         )
+
+
+def estimation(
+    quality: Path, curve: Path, sensor: str, recording: str, settings: str
+) -> Estimation:
+    """Return the rows that the channels leave; none of a rejected recording."""
+    given = json.loads(settings)
+    found = Estimation()
+    measured = curves(curve, Quality.read(quality))
+    for channel, log in static_logs(quality.parent).items():
+        key = Key(sensor, recording, channel)
+        how = EstimateSettings.model_validate(given["estimate"])
+        estimate_channel(key, log, measured[channel], how, given["bandwidth"], found)
+    return found

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
 from imubench_pipeline.export.imu import ExportError
-from imubench_pipeline.export.request import Request, Tables, made
+from imubench_pipeline.export.request import Request, Tables, load, made, recordings_of
 from imubench_pipeline.export.targets import TARGETS
 from imubench_pipeline.settings.config import ExportSettings
+from imubench_pipeline.tables import making, write_content
 from imubench_pipeline.units import quantity_to_si
 
 NOT_MADE = "not_made.txt"
@@ -55,3 +57,11 @@ def exports(
             yield Path(sensor, target, TARGETS[target].file_name), content
         if refused:
             yield Path(sensor, NOT_MADE), "\n".join(refused) + "\n"
+
+
+def write_exports(tables: Path, settings: str, folder: Path) -> None:
+    """Write a folder a sensor, with a file a program; all appear together."""
+    how = ExportSettings.model_validate(json.loads(settings))
+    with making(folder) as made:
+        for place, content in exports(load(tables), how, recordings_of(tables)):
+            write_content(content, made / place)

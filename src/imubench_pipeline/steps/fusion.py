@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
 from functools import cache, partial
 from pathlib import Path
@@ -19,6 +20,7 @@ from imubench_pipeline.navigation.fusion.equivalence import (
 )
 from imubench_pipeline.recordings.fitness import left_out, with_doubts
 from imubench_pipeline.settings.config import FusionSettings
+from imubench_pipeline.tables import build, read, write_arrow
 from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si
 
@@ -132,3 +134,15 @@ def fusion_rows(
     )
     pairs = ("sensor", "recording"), ("other", "other_recording")
     return with_doubts(rows, tables["recordings"].to_pylist(), pairs)
+
+
+def write_fusion(
+    inputs: Mapping[str, str], joint: list[Path], settings: str, outputs: list[Path]
+) -> None:
+    """Write the table ``fusion``, as Parquet and CSV; ``joint``: tables ``draws`` of recordings."""
+    how = FusionSettings.model_validate(json.loads(settings))
+    tables = {name: read(name, [Path(inputs[name])]) for name in NEEDED}
+    of_recording = {(path.parts[-3], path.parts[-2]): path for path in joint}
+    table = build("fusion", fusion_rows(tables, how, of_recording))
+    for output in outputs:
+        write_arrow(table, output)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.estimators.estimate import Estimate
+from imubench_pipeline.estimators.rows import estimates
 from imubench_pipeline.estimators.score import score
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import (
@@ -21,9 +22,11 @@ from imubench_pipeline.noise.simulate import (
     reconstructed_variance,
     simulate_blocks,
 )
+from imubench_pipeline.recordings.quality_file import Quality
 from imubench_pipeline.recordings.recording import LogWriter
 from imubench_pipeline.settings.config import ReconstructionSettings
-from imubench_pipeline.tables import replacing
+from imubench_pipeline.steps.kept_curves import compensated_curves, curves
+from imubench_pipeline.tables import replacing, write
 from imubench_pipeline.tables.keys import Key
 
 
@@ -100,3 +103,23 @@ def _keep(
         for block in simulate_blocks(model, rate, samples, rng):
             log.write({"simulated": block})
         log.finish({"simulated": True, "rate": rate, "rows": samples, "model": asdict(model)})
+
+
+def write_reconstruction(
+    inputs: list[Path], outputs: list[Path], settings: ReconstructionSettings
+) -> None:
+    """Write the tables ``reconstruction`` and ``scores`` of a recording."""
+    quality, allan, parameters, compensated = inputs
+    about = Quality.read(quality)
+    measured = curves(allan, about)
+    left = compensated_curves(compensated, measured)
+    found = []
+    for channel, by_method in estimates(parameters).items():
+        key = Key(about.recording["sensor"], about.recording["recording"], channel)
+        rate = about.channels[channel]["rate"]
+        for estimate in by_method:
+            series = quality.parent / "series" / f"{channel}.{estimate.method}.parquet"
+            curve = (left if estimate.method == "compensated" else measured)[channel]
+            found.append(reconstruct(key, estimate, curve, rate, settings, series))
+    write("reconstruction", [row for result in found for row in result.curve_rows], outputs[0])
+    write("scores", [result.score_row for result in found], outputs[1])

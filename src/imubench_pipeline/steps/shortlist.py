@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -10,8 +11,8 @@ from imubench_pipeline.navigation.shortlist.classes import measured_ranges
 from imubench_pipeline.navigation.shortlist.figures import printed_ranges
 from imubench_pipeline.navigation.shortlist.rows import shortlist_rows
 from imubench_pipeline.settings.requirements import Requirement
-from imubench_pipeline.settings.sensor import Sensor
-from imubench_pipeline.tables import read
+from imubench_pipeline.settings.sensor import Sensor, sensors_of
+from imubench_pipeline.tables import build, read, write_arrow
 from imubench_pipeline.typing import Row
 
 NEEDED = ("recordings", "parameters", "ranking")
@@ -44,3 +45,14 @@ def rows_of_run(
     measured = measured_ranges(found.get("parameters", []), recordings, classes)
     ranges = replace(measured, printed=printed_ranges(sensors))
     yield from shortlist_rows(requirements, sensors, ranges, found.get("ranking", []), recordings)
+
+
+def write_shortlist(
+    tables: dict[str, Path], settings: str, catalogue: str, outputs: list[Path]
+) -> None:
+    """Write the table ``shortlist``, as Parquet and CSV."""
+    asked = json.loads(settings)["requirements"]
+    requirements = {name: Requirement.model_validate(one) for name, one in asked.items()}
+    table = build("shortlist", rows_of_run(requirements, sensors_of(catalogue), tables))
+    for output in outputs:
+        write_arrow(table, output)

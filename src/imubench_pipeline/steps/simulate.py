@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -22,6 +23,7 @@ from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.simulate.imu import simulate_imu
 from imubench_pipeline.simulate.models import imu_model
 from imubench_pipeline.simulate.profiles import Profile, profiles_of
+from imubench_pipeline.tables import making
 from imubench_pipeline.units import quantity_to_si
 
 
@@ -142,3 +144,11 @@ def _turned(
     before = np.full(round(turns.seconds("start") * rate), true[0])
     after = np.full(samples, true[-1])
     return _Samples(np.concatenate([before, true, after])[:samples], rate)
+
+
+def write_recording(settings: str, folder: Path) -> None:
+    """Write the recording into ``folder``, which appears when it is complete."""
+    given = json.loads(settings)
+    recording = SimulatedRecording.model_validate(given["recording"])
+    with making(folder) as made:
+        write_simulated(recording, LogFormat.model_validate(given["log"]), made)
