@@ -26,7 +26,7 @@ from imubench_pipeline.recordings.quality.knocks import suspects
 from imubench_pipeline.recordings.quality.levels import kept_level, quantisation
 from imubench_pipeline.recordings.quality.rotation import gravity_turn
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
-from imubench_pipeline.settings.config import QualitySettings
+from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.tables.findings import Finding
 
 GYROS = (

@@ -23,7 +23,7 @@ import pyarrow.parquet as pq
 
 from imubench_pipeline.recordings.ingest import ingest
 from imubench_pipeline.recordings.recording import ROW_GROUP
-from imubench_pipeline.settings.config import QualitySettings
+from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import LogFormat, RecordingNotes
 from resident import peak_memory
 

@@ -19,7 +19,7 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from imubench_pipeline.recordings.quality.repeated_samples import repeats_beyond_chance
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
-from imubench_pipeline.settings.config import QualitySettings
+from imubench_pipeline.settings.quality import QualitySettings
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from imubench_pipeline.recordings import overview as module
 from imubench_pipeline.recordings.ingest import ingest
 from imubench_pipeline.recordings.overview import MOST_BINS, Overview, bin_edges, overview
 from imubench_pipeline.recordings.recording import ROW_GROUP, LogWriter, log_paths
-from imubench_pipeline.settings.config import QualitySettings
+from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import LogFormat, RecordingNotes
 
 RATE = 50.0

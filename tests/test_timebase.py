@@ -3,7 +3,7 @@ import pytest
 
 from imubench_pipeline.readers import RecordingError
 from imubench_pipeline.recordings.timebase import TimeBase, from_stamps, positions, without_stamps
-from imubench_pipeline.settings.config import QualitySettings
+from imubench_pipeline.settings.quality import QualitySettings
 
 SETTINGS = QualitySettings()
 

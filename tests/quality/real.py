@@ -11,7 +11,7 @@ import pyarrow.csv as pacsv
 from imubench_pipeline.recordings.quality.columns import column_findings
 from imubench_pipeline.recordings.quality.copies import copied_channels
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
-from imubench_pipeline.settings.config import QualitySettings
+from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.tables.findings import Finding
 
 Log = dict[str, np.ndarray]

@@ -8,7 +8,7 @@ from imubench_pipeline.noise.simulate import simulate
 from imubench_pipeline.recordings.fitness import UNFIT
 from imubench_pipeline.recordings.quality.columns import column_findings
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
-from imubench_pipeline.settings.config import QualitySettings
+from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.tables.findings import Finding
 
 RATE = 100.0

@@ -11,7 +11,7 @@ from imubench_pipeline.recordings.quality.knocks import knocks, suspects
 from imubench_pipeline.recordings.quality.levels import quantisation
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
 from imubench_pipeline.recordings.recording import channel_logs
-from imubench_pipeline.settings.config import QualitySettings
+from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import LogFormat, RecordingNotes
 from tests.quality.real import adis16405
 

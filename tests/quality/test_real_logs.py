@@ -8,7 +8,7 @@ import yaml
 
 from imubench_pipeline.recordings.fitness import doubts, fitness
 from imubench_pipeline.recordings.ingest import ingest
-from imubench_pipeline.settings.config import QualitySettings
+from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import LogFormat, RecordingNotes
 from imubench_pipeline.tables.findings import Finding
 from tests.conftest import PROJECT

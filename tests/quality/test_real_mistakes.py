@@ -19,7 +19,7 @@ import pytest
 from imubench_pipeline.datasheets.plausibility import implausible_of
 from imubench_pipeline.recordings.fitness import doubts, fitness
 from imubench_pipeline.recordings.ingest import ingest
-from imubench_pipeline.settings.config import QualitySettings
+from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import CHANNELS, RecordingNotes, Sensor, read_sensors
 from imubench_pipeline.settings.validation import parse
 from tests.conftest import PROJECT

@@ -15,7 +15,7 @@ from imubench_pipeline.readers import read
 from imubench_pipeline.recordings.ingest import ingest
 from imubench_pipeline.recordings.recording import channel_logs, read_metadata
 from imubench_pipeline.run.cli import main
-from imubench_pipeline.settings.config import QualitySettings
+from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import RecordingNotes, merged_log, read_sensors
 from imubench_pipeline.settings.validation import parse, read_yaml
 from imubench_pipeline.tables import write, write_arrow

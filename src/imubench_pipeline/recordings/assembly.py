@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from imubench_pipeline.recordings import timebase
 from imubench_pipeline.recordings.parts import Part
 from imubench_pipeline.recordings.recording import LogWriter
-from imubench_pipeline.settings.config import QualitySettings
+from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import quantity_of
 
 

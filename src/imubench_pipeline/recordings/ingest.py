@@ -22,7 +22,7 @@ from imubench_pipeline.recordings.quality.rotation import GravityTurn, gravity_t
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
 from imubench_pipeline.recordings.quality_file import Quality
 from imubench_pipeline.recordings.recording import channel_logs, log_paths
-from imubench_pipeline.settings.config import QualitySettings
+from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import (
     POSITION,
     TABLE_RATE,

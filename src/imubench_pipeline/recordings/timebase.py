@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.recordings.stamps import Stamps, Track, tracked, typical_interval
-from imubench_pipeline.settings.config import QualitySettings
+from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.tables.findings import Finding, RecordingError
 
 _SHARED = 0.2

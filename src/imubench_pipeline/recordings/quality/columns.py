@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from imubench_pipeline.recordings.quality import copies, held, joined, levels, stationarity
 from imubench_pipeline.recordings.quality.repeated_samples import repeats_beyond_chance
 from imubench_pipeline.recordings.quality.summary import LARGEST, ColumnSummary
-from imubench_pipeline.settings.config import QualitySettings
+from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import (
     POSITION,
     QUANTITIES,
