@@ -11,9 +11,9 @@ import pytest
 from imubench_pipeline.datasheets.deltas import bias_deltas, deltas
 from imubench_pipeline.datasheets.measured import sensitivity
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.estimators.rows import parameter_rows, truth_rows
+from imubench_pipeline.estimators.rows import parameter_rows
 from imubench_pipeline.settings.printed import Datasheet
-from imubench_pipeline.steps.published import published_rows
+from imubench_pipeline.steps.published import published_rows, truth_rows
 from imubench_pipeline.tables import build
 from imubench_pipeline.tables.keys import Key
 
