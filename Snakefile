@@ -5,10 +5,10 @@ import gc
 import os
 from itertools import chain
 
-from imubench_pipeline.bounded_steps import BoundedSteps
-from imubench_pipeline.plan import Plan
-from imubench_pipeline.resources import asked, time_limits
-from imubench_pipeline.schemas import (
+from imubench_pipeline.run.bounded_steps import BoundedSteps
+from imubench_pipeline.run.plan import Plan
+from imubench_pipeline.run.resources import asked, time_limits
+from imubench_pipeline.tables.schemas import (
     CALIBRATED,
     COMPARED,
     OF_ONE_RECORDING,
@@ -17,9 +17,9 @@ from imubench_pipeline.schemas import (
     TABLES,
     TURNED,
 )
-from imubench_pipeline.step_modules import STEPS
-from imubench_pipeline.steps import Steps
-from imubench_pipeline.validation import ConfigError
+from imubench_pipeline.run.step_modules import STEPS
+from imubench_pipeline.run.processes import Steps
+from imubench_pipeline.settings.validation import ConfigError
 
 
 configfile: "config/config.yaml"
@@ -558,14 +558,14 @@ if workflow.remote_exec:
 
 
 onstart:
-    from imubench_pipeline.progress import follow
+    from imubench_pipeline.run.progress import follow
 
     follow()
 
 
 # Tables are read at the end of a run alone: a run should begin at once.
 onsuccess:
-    from imubench_pipeline.run_summary import summary
+    from imubench_pipeline.report.run_summary import summary
 
     print(summary(plan.run.results))
     if left_out := plan.faults.left_out():
@@ -574,6 +574,6 @@ onsuccess:
 
 onerror:
     import sys
-    from imubench_pipeline.run_summary import failure
+    from imubench_pipeline.report.run_summary import failure
 
     print(failure(log, plan.run.results), file=sys.stderr)

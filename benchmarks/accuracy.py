@@ -30,10 +30,10 @@ from imubench_pipeline.estimators.frame import frame_of
 from imubench_pipeline.estimators.identifiability import bounds_of
 from imubench_pipeline.estimators.likelihood import fit_spectrum
 from imubench_pipeline.estimators.model_choice import PAPERS
+from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.estimators.whittle import whittle_of
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.simulate import simulate
-from imubench_pipeline.spectrum import spectra
+from imubench_pipeline.noise.simulate import simulate
 from peers import PEERS
 
 

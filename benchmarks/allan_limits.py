@@ -24,9 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.allan import allan_variance
-from imubench_pipeline.curve_limits import with_fitted_limits
+from imubench_pipeline.allan.presence import presence
+from imubench_pipeline.estimators.curve_limits import with_fitted_limits
 from imubench_pipeline.estimators.likelihood import fit
-from imubench_pipeline.presence import presence
 
 Array = NDArray[np.float64]
 Rng = np.random.Generator

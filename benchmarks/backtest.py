@@ -35,14 +35,15 @@ from numpy.typing import NDArray
 
 import simulators
 from imubench_pipeline.allan import cluster_sizes, of_blocks
-from imubench_pipeline.backtest.of_recording import backtest_rows
-from imubench_pipeline.backtest.verdicts import words
-from imubench_pipeline.config import ErrorBudgetSettings, EstimateSettings
-from imubench_pipeline.estimation import Estimation, estimate_channel
-from imubench_pipeline.recording import LogWriter, channel_logs
-from imubench_pipeline.requirements import read_requirements
-from imubench_pipeline.results import Key, recommended_estimates
+from imubench_pipeline.estimators.rows import recommended_estimates
+from imubench_pipeline.navigation.backtest.of_recording import backtest_rows
+from imubench_pipeline.navigation.backtest.verdicts import words
+from imubench_pipeline.recordings.recording import LogWriter, channel_logs
+from imubench_pipeline.settings.config import ErrorBudgetSettings, EstimateSettings
+from imubench_pipeline.settings.requirements import read_requirements
+from imubench_pipeline.steps.estimate import Estimation, estimate_channel
 from imubench_pipeline.tables import build, read, write
+from imubench_pipeline.tables.keys import Key
 
 Array = NDArray[np.float64]
 Row = Mapping[str, Any]

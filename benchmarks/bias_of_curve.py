@@ -24,8 +24,8 @@ from imubench_pipeline.estimators.curve_bias import averaging_times, of_model
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.frame import frame_of
 from imubench_pipeline.estimators.likelihood import fit_spectrum
+from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.spectrum import spectra
 from simulators import gauss_markov, random_walk, white
 
 

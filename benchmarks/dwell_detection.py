@@ -30,10 +30,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.earth_rate.found import FoundBy, Turning
-from imubench_pipeline.earth_rate.turning import find_turning
+from imubench_pipeline.experiments.earth_rate.found import FoundBy, Turning
+from imubench_pipeline.experiments.earth_rate.turning import find_turning
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.simulate import simulate
+from imubench_pipeline.noise.simulate import simulate
 
 Array = NDArray[np.float64]
 

@@ -22,13 +22,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from imubench_pipeline.earth_rate.bound import block_length, cramer_rao
-from imubench_pipeline.earth_rate.experiment import Experiment
-from imubench_pipeline.earth_rate.kalman import Filtered, RateFilter
-from imubench_pipeline.earth_rate.known_rate import track
-from imubench_pipeline.earth_rate.pairs import by_pairs, by_triples
-from imubench_pipeline.earth_rate.prediction import Outlook
-from imubench_pipeline.earth_rate.simulation import (
+from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.experiments.earth_rate.bound import block_length, cramer_rao
+from imubench_pipeline.experiments.earth_rate.experiment import Experiment
+from imubench_pipeline.experiments.earth_rate.kalman import Filtered, RateFilter
+from imubench_pipeline.experiments.earth_rate.known_rate import track
+from imubench_pipeline.experiments.earth_rate.pairs import by_pairs, by_triples
+from imubench_pipeline.experiments.earth_rate.prediction import Outlook
+from imubench_pipeline.experiments.earth_rate.simulation import (
     ASSUMED_LATITUDE,
     ASSUMED_TURNING,
     PAPER_MINUTES,
@@ -39,9 +40,8 @@ from imubench_pipeline.earth_rate.simulation import (
     simulate_log,
     simulate_runs,
 )
-from imubench_pipeline.error_budget import EARTH_RATE
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.sensor_model.model import SensorModel
+from imubench_pipeline.simulate.model import SensorModel
 
 Array = NDArray[np.float64]
 

@@ -24,10 +24,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
-from imubench_pipeline.error_budget import Levelled, Quantity, Start, budget
+from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.navigation.error_budget import Levelled, Quantity, Start, budget
 from imubench_pipeline.noise import NoiseModel, Sinusoid
-from imubench_pipeline.simulate import simulate
-from imubench_pipeline.units import STANDARD_GRAVITY
+from imubench_pipeline.noise.simulate import simulate
 
 Array = NDArray[np.float64]
 

@@ -23,11 +23,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.error_budget import NO_FIGURES, Figure, Start, Use, budget
-from imubench_pipeline.error_budget.in_use import Cause
-from imubench_pipeline.error_budget.parts import Quantity
+from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.navigation.error_budget import NO_FIGURES, Figure, Start, Use, budget
+from imubench_pipeline.navigation.error_budget.in_use import Cause
+from imubench_pipeline.navigation.error_budget.parts import Quantity
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.units import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
 

@@ -17,17 +17,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from imubench_pipeline.config import QualitySettings
-from imubench_pipeline.findings import Finding
+from imubench_pipeline.datasheets.plausibility import implausible
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.quality.columns import column_findings
-from imubench_pipeline.quality.copies import copied_channels
-from imubench_pipeline.quality.knocks import suspects
-from imubench_pipeline.quality.levels import kept_level, quantisation
-from imubench_pipeline.quality.plausibility import implausible
-from imubench_pipeline.quality.rotation import gravity_turn
-from imubench_pipeline.quality.summary import ColumnSummary
-from imubench_pipeline.simulate import simulate
+from imubench_pipeline.noise.simulate import simulate
+from imubench_pipeline.recordings.quality.columns import column_findings
+from imubench_pipeline.recordings.quality.copies import copied_channels
+from imubench_pipeline.recordings.quality.knocks import suspects
+from imubench_pipeline.recordings.quality.levels import kept_level, quantisation
+from imubench_pipeline.recordings.quality.rotation import gravity_turn
+from imubench_pipeline.recordings.quality.summary import ColumnSummary
+from imubench_pipeline.settings.quality import QualitySettings
+from imubench_pipeline.tables.findings import Finding
 
 GYROS = (
     NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7),

@@ -22,7 +22,7 @@ from bands import bounds_over, highest, what_is_cut
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.simulate import simulate
+from imubench_pipeline.noise.simulate import simulate
 
 Array = NDArray[np.float64]
 Change = Callable[[Array, np.random.Generator], Array]

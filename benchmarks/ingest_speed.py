@@ -21,10 +21,10 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 
-from imubench_pipeline.config import QualitySettings
-from imubench_pipeline.ingest import ingest
-from imubench_pipeline.recording import ROW_GROUP
-from imubench_pipeline.sensor import LogFormat, RecordingNotes
+from imubench_pipeline.recordings.ingest import ingest
+from imubench_pipeline.recordings.recording import ROW_GROUP
+from imubench_pipeline.settings.quality import QualitySettings
+from imubench_pipeline.settings.sensor import LogFormat, RecordingNotes
 from resident import peak_memory
 
 RATE = 100.0

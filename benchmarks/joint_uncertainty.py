@@ -36,18 +36,19 @@ from scipy.signal import lfilter
 from scipy.stats import binomtest
 
 from imubench_pipeline.allan import cluster_sizes, of_blocks
-from imubench_pipeline.config import ErrorBudgetSettings, EstimateSettings
-from imubench_pipeline.estimation import Estimation, estimate_channel
 from imubench_pipeline.estimators.draws import joint_draws
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.posterior import sample
+from imubench_pipeline.estimators.rows import recommended_estimates
+from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.estimators.whittle import Terms, model_of, whittle_of
-from imubench_pipeline.expected_errors import AxisErrors, Question, error_rows, standard
+from imubench_pipeline.navigation.expected_errors import AxisErrors, Question, error_rows, standard
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.recording import LogWriter, channel_logs
-from imubench_pipeline.results import Key, recommended_estimates
-from imubench_pipeline.spectrum import spectra
+from imubench_pipeline.recordings.recording import LogWriter, channel_logs
+from imubench_pipeline.settings.config import ErrorBudgetSettings, EstimateSettings
+from imubench_pipeline.steps.estimate import Estimation, estimate_channel
 from imubench_pipeline.tables import write
+from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.units import quantity_to_si
 
 Array = NDArray[np.float64]

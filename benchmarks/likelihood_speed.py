@@ -17,10 +17,10 @@ import scipy.fft
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.estimators.model_choice import PAPERS, compare
 from imubench_pipeline.estimators.posterior import sample
+from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.estimators.whittle import whittle_of
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.simulate import simulate
-from imubench_pipeline.spectrum import spectra
+from imubench_pipeline.noise.simulate import simulate
 
 RATE = 100.0
 Result = TypeVar("Result")

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.frame import frame_of
 from imubench_pipeline.estimators.lines import Line
+from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.noise import NoiseModel, Sinusoid
-from imubench_pipeline.simulate import simulate
-from imubench_pipeline.spectrum import spectra
+from imubench_pipeline.noise.simulate import simulate
 
 RATE = 100.0
 SAMPLES = 720_000

@@ -22,8 +22,8 @@ import pyarrow.csv
 import yaml
 
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.simulate import channel_rng, simulate
-from imubench_pipeline.steps import COSTS
+from imubench_pipeline.noise.simulate import channel_rng, simulate
+from imubench_pipeline.run.processes import COSTS
 
 PROJECT = Path(__file__).parents[1]
 RATE = 100.0

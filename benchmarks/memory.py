@@ -20,7 +20,7 @@ import pyarrow.csv as pacsv
 import yaml
 
 from imubench_pipeline.allan import of_blocks
-from imubench_pipeline.recording import ROW_GROUP, ChannelLog, LogWriter
+from imubench_pipeline.recordings.recording import ROW_GROUP, ChannelLog, LogWriter
 from resident import peak_memory
 
 PROJECT = Path(__file__).parents[1]

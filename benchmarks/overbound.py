@@ -31,13 +31,13 @@ from scipy.linalg import block_diag
 
 from bands import highest, what_is_cut
 from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes
-from imubench_pipeline.error_budget import draw_models
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.export.growth import growth
+from imubench_pipeline.export.overbound import overbound, simultaneous_upper
+from imubench_pipeline.export.smallest_model import Family
+from imubench_pipeline.navigation.error_budget import draw_models
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.overbound import overbound, simultaneous_upper
-from imubench_pipeline.simulate import simulate
-from imubench_pipeline.smallest_model import Family
+from imubench_pipeline.noise.simulate import simulate
 from model_choice import fractional_noise
 
 Array = NDArray[np.float64]

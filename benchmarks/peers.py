@@ -8,7 +8,7 @@ Conventions
 -----------
 `Peer.printed` gives the figures of the program, in SI (degrees are made radians, nothing else).
 `Peer.estimate` gives them for comparison with the parameters of
-`imubench_pipeline.noise.NoiseModel`, where flicker noise or a Gauss-Markov process stands at
+`imubench_pipeline.noise.model.NoiseModel`, where flicker noise or a Gauss-Markov process stands at
 sqrt(2 ln 2 / pi) B = 0.664 B at its plateau or peak: a program that prints the minimum of a curve
 as bias instability has its figure divided by 0.664. Nothing else is converted. In particular N is
 compared as published, also where it is a deviation per sample published as a density.
@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.noise import FLOOR, NoiseModel
-from imubench_pipeline.simulate import simulate
+from imubench_pipeline.noise.simulate import simulate
 
 Array = NDArray[np.float64]
 Estimate = dict[str, float | None]

@@ -15,11 +15,11 @@ import zlib
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.config import QualitySettings
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.quality.repeated_samples import repeats_beyond_chance
-from imubench_pipeline.quality.summary import ColumnSummary
-from imubench_pipeline.simulate import simulate
+from imubench_pipeline.noise.simulate import simulate
+from imubench_pipeline.recordings.quality.repeated_samples import repeats_beyond_chance
+from imubench_pipeline.recordings.quality.summary import ColumnSummary
+from imubench_pipeline.settings.quality import QualitySettings
 
 Array = NDArray[np.float64]
 

@@ -24,11 +24,11 @@ import numpy as np
 import pyarrow as pa
 import yaml
 
-from imubench_pipeline.drift import drift_rows
+from imubench_pipeline.navigation.drift import drift_rows
 from imubench_pipeline.report.publish import publish, site_of
 from imubench_pipeline.report.static_figures.of_run import draw_comparison
-from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
 from imubench_pipeline.tables import build, read
+from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from resident import peak_memory
 
 PROJECT = Path(__file__).parents[1]

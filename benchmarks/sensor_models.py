@@ -27,17 +27,18 @@ from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 from imubench_pipeline.allan import AllanCurve, cluster_sizes, of_blocks
-from imubench_pipeline.config import EstimateSettings
-from imubench_pipeline.estimation import Estimation, estimate_channel
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.estimators.rows import estimate_of
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.readers.batch import TEMPERATURE
-from imubench_pipeline.recording import ChannelLog, LogWriter, channel_logs
-from imubench_pipeline.results import Key, estimate_of
-from imubench_pipeline.sensor_model.imu import ImuModel, simulate_imu
-from imubench_pipeline.sensor_model.low_pass import LowPass
-from imubench_pipeline.sensor_model.model import SensorModel, TemperatureDrift
-from imubench_pipeline.sensor_model.profiles import DayCycle, Profile, Steps, Sum, WarmUp
+from imubench_pipeline.noise.low_pass import LowPass
+from imubench_pipeline.recordings.recording import ChannelLog, LogWriter, channel_logs
+from imubench_pipeline.settings.config import EstimateSettings
+from imubench_pipeline.settings.sensor import TEMPERATURE
+from imubench_pipeline.simulate.imu import ImuModel, simulate_imu
+from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift
+from imubench_pipeline.simulate.profiles import DayCycle, Profile, Steps, Sum, WarmUp
+from imubench_pipeline.steps.estimate import Estimation, estimate_channel
+from imubench_pipeline.tables.keys import Key
 from temperature import behind, bounds
 
 Array = NDArray[np.float64]

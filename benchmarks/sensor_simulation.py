@@ -16,7 +16,7 @@ from typing import Any
 
 import yaml
 
-from imubench_pipeline.cli import main as imubench
+from imubench_pipeline.run.cli import main as imubench
 from resident import peak_memory
 
 _LOW_PASS = {"cutoff": "60 Hz", "order": 1}

@@ -14,7 +14,7 @@ import allantools
 import numpy as np
 
 from imubench_pipeline.allan import cluster_sizes, of_blocks, of_phase
-from imubench_pipeline.phase import integrate
+from imubench_pipeline.allan.phase import integrate
 
 
 def seconds(work: Callable[[], object]) -> float:

@@ -38,9 +38,9 @@ from scipy.fft import dct, dst
 from scipy.signal import lfilter
 from scipy.special import logsumexp
 
-from imubench_pipeline.deterministic.courses import Courses, find_courses
-from imubench_pipeline.deterministic.verdict import verdict_of
 from imubench_pipeline.estimators import likelihood
+from imubench_pipeline.estimators.deterministic.courses import Courses, find_courses
+from imubench_pipeline.estimators.deterministic.verdict import verdict_of
 
 Array = NDArray[np.float64]
 Rng = np.random.Generator

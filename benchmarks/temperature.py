@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from imubench_pipeline.allan import allan_variance
+from imubench_pipeline.estimators.thermal.fit import fit_temperature
+from imubench_pipeline.estimators.thermal.path import temperature_path
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.simulate import simulate
-from imubench_pipeline.thermal.fit import fit_temperature
-from imubench_pipeline.thermal.path import temperature_path
+from imubench_pipeline.noise.simulate import simulate
 
 Array = NDArray[np.float64]
 

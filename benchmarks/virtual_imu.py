@@ -17,13 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.allan import allan_variance, cluster_sizes
-from imubench_pipeline.fusion.board import Board, Shared
-from imubench_pipeline.fusion.kalman import KalmanFusion
-from imubench_pipeline.fusion.prediction import fused_allan
-from imubench_pipeline.fusion.samples import fuse
-from imubench_pipeline.fusion.weights import ByFrequency, Constant, best_constant, equal
+from imubench_pipeline.navigation.fusion.board import Board, Shared
+from imubench_pipeline.navigation.fusion.kalman import KalmanFusion
+from imubench_pipeline.navigation.fusion.prediction import fused_allan
+from imubench_pipeline.navigation.fusion.samples import fuse
+from imubench_pipeline.navigation.fusion.weights import ByFrequency, Constant, best_constant, equal
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.simulate import simulate
+from imubench_pipeline.noise.simulate import simulate
 
 RATE = 100.0
 SHOWN = (0.01, 0.1, 1.0, 10.0, 100.0)

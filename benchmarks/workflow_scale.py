@@ -28,9 +28,9 @@ from typing import Any
 import numpy as np
 import yaml
 
-from imubench_pipeline.plan import Plan
-from imubench_pipeline.steps import COSTS
-from imubench_pipeline.validation import read_yaml
+from imubench_pipeline.run.plan import Plan
+from imubench_pipeline.run.processes import COSTS
+from imubench_pipeline.settings.validation import read_yaml
 
 PROJECT = Path(__file__).parents[1]
 SENSORS = 20

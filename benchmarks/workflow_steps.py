@@ -15,8 +15,8 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from imubench_pipeline import schemas
-from imubench_pipeline.plan import Plan
+from imubench_pipeline.run.plan import Plan
+from imubench_pipeline.tables import schemas
 
 PROJECT = Path(__file__).parents[1]
 

@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 
 from imubench_pipeline.allan import AllanCurve, of_blocks
-from imubench_pipeline.recording import ChannelLog, LogWriter, channel_logs
+from imubench_pipeline.recordings.recording import ChannelLog, LogWriter, channel_logs
 
 _ROWS = 7001  # of a block: no divisor of anything
 

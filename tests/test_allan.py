@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from imubench_pipeline.allan import allan_variance, cluster_sizes, of_phase
-from imubench_pipeline.phase import integrate
+from imubench_pipeline.allan.phase import integrate
 
 
 def by_definition(samples: np.ndarray, n: int) -> float:

@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 import yaml
 
-from imubench_pipeline.conversions import noise_bandwidth, noise_of_rms, sidedness_of
-from imubench_pipeline.printed import FIGURE_DIMENSIONS, PrintedFigure
-from imubench_pipeline.sensor import QUANTITIES, Sensor, read_sensors
-from imubench_pipeline.suspicion import suspicious_datasheets
+from imubench_pipeline.datasheets.suspicion import suspicious_datasheets
+from imubench_pipeline.settings.conversions import noise_bandwidth, noise_of_rms, sidedness_of
+from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, PrintedFigure
+from imubench_pipeline.settings.sensor import QUANTITIES, Sensor, read_sensors
 from imubench_pipeline.units import to_si
 from tests.conftest import PROJECT
 

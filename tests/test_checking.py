@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import yaml
 
-from imubench_pipeline.cli import main
 from imubench_pipeline.noise import NoiseModel, Sinusoid
-from imubench_pipeline.simulate import simulate
+from imubench_pipeline.noise.simulate import simulate
+from imubench_pipeline.run.cli import main
 
 RATE = 100.0
 GYRO = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7)

@@ -8,7 +8,7 @@ import jsonschema
 import pytest
 import yaml
 
-from imubench_pipeline.cli import SCHEMAS, main
+from imubench_pipeline.run.cli import SCHEMAS, main
 from tests.conftest import PROJECT
 
 
@@ -99,7 +99,7 @@ def test_inspect_refuses_what_is_no_log(
 @pytest.mark.parametrize("command", ["inspect", "schema"])
 def test_a_reader_that_goes_away_is_no_fault(tmp_path: Path, command: str) -> None:
     given = {"inspect": logged(tmp_path, COMPLETE), "schema": "run"}[command]
-    code = "import sys; from imubench_pipeline.cli import main; sys.exit(main(sys.argv[1:]))"
+    code = "import sys; from imubench_pipeline.run.cli import main; sys.exit(main(sys.argv[1:]))"
     reading, writing = os.pipe()
     os.close(reading)
     done = subprocess.run(

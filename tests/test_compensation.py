@@ -7,14 +7,16 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.allan import allan_variance
-from imubench_pipeline.config import EstimateSettings, Run, read_run
-from imubench_pipeline.estimation import Estimation, estimate_channel
+from imubench_pipeline.estimators.rows import estimates
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.recording import ChannelLog
-from imubench_pipeline.results import Key, compensated_curves, estimates
-from imubench_pipeline.simulate import simulate
+from imubench_pipeline.noise.simulate import simulate
+from imubench_pipeline.recordings.recording import ChannelLog
+from imubench_pipeline.settings.config import EstimateSettings, Run, read_run
+from imubench_pipeline.settings.validation import ConfigError
+from imubench_pipeline.steps.estimate import Estimation, estimate_channel
+from imubench_pipeline.steps.kept_curves import compensated_curves
 from imubench_pipeline.tables import build, write
-from imubench_pipeline.validation import ConfigError
+from imubench_pipeline.tables.keys import Key
 from tests.kept import curve_of, kept
 
 pytestmark = pytest.mark.xdist_group("test_compensation")  # its logs are made once

@@ -3,7 +3,7 @@ import pytest
 from allantools.ci import edf_greenhall
 
 from imubench_pipeline.allan import allan_variance
-from imubench_pipeline.confidence import deviation_limits, equivalent_degrees, noise_exponent
+from imubench_pipeline.allan.confidence import deviation_limits, equivalent_degrees, noise_exponent
 
 
 @pytest.mark.parametrize("exponent", [2, 1, 0, -1, -2])

@@ -7,15 +7,10 @@ import pytest
 import yaml
 from snakemake.cli import parse_config
 
-from imubench_pipeline.config import Run, given_beside, read_run
-from imubench_pipeline.sensor import (
-    RecordingNotes,
-    Sensor,
-    merged_log,
-    read_sensors,
-)
-from imubench_pipeline.simulated_recordings import read_simulated
-from imubench_pipeline.validation import ConfigError, parse, read_yaml
+from imubench_pipeline.settings.config import Run, given_beside, read_run
+from imubench_pipeline.settings.sensor import RecordingNotes, Sensor, merged_log, read_sensors
+from imubench_pipeline.settings.simulated_recordings import read_simulated
+from imubench_pipeline.settings.validation import ConfigError, parse, read_yaml
 from tests.conftest import PROJECT
 
 SENSOR: dict[str, Any] = {

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imubench_pipeline.conversions import (
+from imubench_pipeline.settings.conversions import (
     Sidedness,
     noise_at,
     noise_bandwidth,

@@ -13,10 +13,11 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from imubench_pipeline.ingest import ingest_as_planned
-from imubench_pipeline.plan import Plan
-from imubench_pipeline.recording import channel_logs, log_paths
-from imubench_pipeline.results import Quality
+from imubench_pipeline.datasheets.plausibility import implausible_of
+from imubench_pipeline.recordings.ingest import ingest_as_planned
+from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.recordings.recording import channel_logs, log_paths
+from imubench_pipeline.run.plan import Plan
 from tests.corpus import ENTRIES, Cut, Entry, Kept, Rejected
 
 LIMIT_S = 60
@@ -26,7 +27,7 @@ GOOD = "csv"
 CHECK = """
 import sys
 from pathlib import Path
-from imubench_pipeline.cli import main
+from imubench_pipeline.run.cli import main
 
 status = main(sys.argv[1:])
 peak = Path("/proc/self/status").read_text().partition("VmHWM:")[2].split()[0]
@@ -66,7 +67,7 @@ def ingested(plan: Plan, sensor: str, kept: Path) -> Quality:
     (key,) = (key for key in plan.recordings if key[0] == sensor)
     settings = plan.ingest_settings(*key)
     quality = ingest_as_planned(plan.recordings[key].path, settings, *key, kept)
-    quality.findings.extend(quality.implausible(plan.sensors[sensor]))
+    quality.findings.extend(implausible_of(quality, plan.sensors[sensor]))
     return quality
 
 

@@ -1,8 +1,8 @@
 import pytest
 
-from imubench_pipeline.coverage import Coverage, by_vendor, coverage
-from imubench_pipeline.sensor import QUANTITIES, Sensor, read_sensors
-from imubench_pipeline.validation import parse
+from imubench_pipeline.datasheets.coverage import Coverage, by_vendor, coverage
+from imubench_pipeline.settings.sensor import QUANTITIES, Sensor, read_sensors
+from imubench_pipeline.settings.validation import parse
 from tests.conftest import PROJECT
 from tests.test_configuration import SENSOR
 

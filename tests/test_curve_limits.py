@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.allan import FITTED, POWER_LAW, AllanCurve, allan_variance
-from imubench_pipeline.curve_limits import with_fitted_limits
+from imubench_pipeline.allan.presence import presence
+from imubench_pipeline.estimators.curve_limits import with_fitted_limits
 from imubench_pipeline.estimators.likelihood import Likelihood, fit
-from imubench_pipeline.presence import presence
-from imubench_pipeline.spectral_degrees import degrees_of_model
+from imubench_pipeline.noise.spectral_degrees import degrees_of_model
 
 
 def gauss_markov(samples: int, time: float, rng: np.random.Generator) -> np.ndarray:

@@ -6,13 +6,13 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.signal import butter, lfilter, sosfilt
 
-from imubench_pipeline.cutoff import find_cutoff
+from imubench_pipeline.estimators.cutoff import find_cutoff
+from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
-from imubench_pipeline.sensor_model.low_pass import LowPass
-from imubench_pipeline.sensor_model.model import SensorModel
-from imubench_pipeline.sensor_model.simulation import simulate as simulate_sensor
-from imubench_pipeline.simulate import simulate
-from imubench_pipeline.spectrum import spectra
+from imubench_pipeline.noise.low_pass import LowPass
+from imubench_pipeline.noise.simulate import simulate
+from imubench_pipeline.simulate.model import SensorModel
+from imubench_pipeline.simulate.simulation import simulate as simulate_sensor
 
 
 def first_order(N, cutoff, rate, samples, rng):

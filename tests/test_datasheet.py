@@ -8,15 +8,15 @@ import pytest
 import yaml
 
 from imubench_pipeline.allan import AllanCurve
-from imubench_pipeline.comparable import comparables
-from imubench_pipeline.datasheet import VERDICTS, Delta, bias_deltas, curve_rms, deltas
+from imubench_pipeline.datasheets.comparable import comparables
+from imubench_pipeline.datasheets.deltas import VERDICTS, Delta, bias_deltas, curve_rms, deltas
+from imubench_pipeline.datasheets.measured import fixed_bias, sensitivity
 from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators.curve_bias import of_model
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.measured import fixed_bias, sensitivity
 from imubench_pipeline.noise import FLOOR, NoiseModel
-from imubench_pipeline.printed import Datasheet
-from imubench_pipeline.sensor import read_sensors
+from imubench_pipeline.settings.printed import Datasheet
+from imubench_pipeline.settings.sensor import read_sensors
 from tests.conftest import PROJECT
 
 DEG = math.pi / 180

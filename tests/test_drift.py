@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from imubench_pipeline.drift import COLUMNS, LEVEL, drift_rows, order_of, series_of
+from imubench_pipeline.navigation.drift import COLUMNS, LEVEL, drift_rows, order_of, series_of
 
 Z = 1.959963984540054
 AXES = tuple(f"{quantity}_{axis}" for quantity in ("gyro", "accel") for axis in "xyz")

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import simpson, solve_ivp
 
-from imubench_pipeline.error_budget import (
-    EARTH_RATE,
+from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.navigation.error_budget import (
     Budget,
     Calibrated,
     Contribution,
@@ -26,7 +27,6 @@ from imubench_pipeline.error_budget import (
     interval,
     time_until,
 )
-from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
 
 Array = NDArray[np.float64]

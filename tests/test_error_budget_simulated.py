@@ -8,8 +8,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
-from imubench_pipeline.error_budget import (
-    EARTH_RATE,
+from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.navigation.error_budget import (
     Calibrated,
     Gyrocompass,
     Levelled,
@@ -18,7 +18,6 @@ from imubench_pipeline.error_budget import (
     Uncalibrated,
     budget,
 )
-from imubench_pipeline.error_budget.growth import SensorStart, variance
 from imubench_pipeline.noise import (
     Flicker,
     GaussMarkov,
@@ -30,7 +29,8 @@ from imubench_pipeline.noise import (
     Term,
     WhiteNoise,
 )
-from imubench_pipeline.simulate import simulate
+from imubench_pipeline.noise.growth import SensorStart, variance
+from imubench_pipeline.noise.simulate import simulate
 
 Array = NDArray[np.float64]
 

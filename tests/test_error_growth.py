@@ -12,8 +12,7 @@ from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 from scipy.integrate import dblquad
 
-from imubench_pipeline.error_budget import Calibrated, Uncalibrated
-from imubench_pipeline.error_budget.growth import SensorStart, mean_variance, variance
+from imubench_pipeline.navigation.error_budget import Calibrated, Uncalibrated
 from imubench_pipeline.noise import (
     Flicker,
     GaussMarkov,
@@ -24,6 +23,7 @@ from imubench_pipeline.noise import (
     Term,
     WhiteNoise,
 )
+from imubench_pipeline.noise.growth import SensorStart, mean_variance, variance
 
 Array = NDArray[np.float64]
 

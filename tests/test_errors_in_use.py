@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from imubench_pipeline.error_budget import (
+from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.navigation.error_budget import (
     Contribution,
     Figure,
     Gyrocompass,
@@ -19,19 +20,18 @@ from imubench_pipeline.error_budget import (
     budget,
     time_until,
 )
-from imubench_pipeline.error_budget.growth import Calibrated, Uncalibrated
-from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE
-from imubench_pipeline.error_budget.in_use import (
+from imubench_pipeline.navigation.error_budget.in_use import (
     Cause,
     levers,
     of_pulse,
     of_rise,
     of_squared_rise,
 )
-from imubench_pipeline.error_budget.parts import Quantity
-from imubench_pipeline.error_budget.printed_errors import PRINTED, in_use, of_datasheet
+from imubench_pipeline.navigation.error_budget.parts import Quantity
+from imubench_pipeline.navigation.error_budget.printed_errors import PRINTED, in_use, of_datasheet
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.printed import IN_USE, Datasheet
+from imubench_pipeline.noise.growth import Calibrated, Uncalibrated
+from imubench_pipeline.settings.printed import IN_USE, Datasheet
 
 G = 9.80665
 DEGREE = math.pi / 180

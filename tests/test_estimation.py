@@ -7,16 +7,17 @@ import pytest
 from scipy.signal import lfilter
 
 from imubench_pipeline.allan import allan_variance
-from imubench_pipeline.compensation import resolution_of
-from imubench_pipeline.config import EstimateSettings, Method
-from imubench_pipeline.estimation import Estimation, estimate_channel
 from imubench_pipeline.estimators.curve_bias import averaging_times, of_model
 from imubench_pipeline.estimators.estimate import CURVE
+from imubench_pipeline.estimators.rows import estimates
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.recording import ChannelLog
-from imubench_pipeline.results import Key, estimates
-from imubench_pipeline.simulate import channel_rng, simulate
+from imubench_pipeline.noise.simulate import channel_rng, simulate
+from imubench_pipeline.recordings.recording import ChannelLog
+from imubench_pipeline.settings.config import EstimateSettings, Method
+from imubench_pipeline.steps.compensation import resolution_of
+from imubench_pipeline.steps.estimate import Estimation, estimate_channel
 from imubench_pipeline.tables import build, write
+from imubench_pipeline.tables.keys import Key
 from tests.kept import curve_of, kept
 
 pytestmark = pytest.mark.xdist_group("test_estimation")  # its logs are made once

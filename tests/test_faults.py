@@ -4,15 +4,16 @@ from pathlib import Path
 
 import pytest
 
-from imubench_pipeline.failures import (
+from imubench_pipeline.run.faults import TOLD, Faults
+from imubench_pipeline.tables import build, read, write
+from imubench_pipeline.tables.failures import (
+    Failure,
     failure_of,
     read_with_failures,
     with_failures,
     write_empty,
 )
-from imubench_pipeline.faults import TOLD, Failure, Faults
-from imubench_pipeline.schemas import PARTS_OF, TABLES
-from imubench_pipeline.tables import build, read, write
+from imubench_pipeline.tables.schemas import PARTS_OF, TABLES
 
 FAILURE = Failure("s", "a", "estimate", "error", "the step estimate failed: ValueError: no")
 OF = ("estimate", "s", "a")

@@ -5,7 +5,9 @@ from typing import Any
 import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.fitness import (
+from imubench_pipeline.navigation.pooled import pooled_rows
+from imubench_pipeline.navigation.selection import ranking_rows
+from imubench_pipeline.recordings.fitness import (
     UNFIT,
     doubts,
     fitness,
@@ -15,9 +17,7 @@ from imubench_pipeline.fitness import (
     with_doubts,
     with_doubts_of_all,
 )
-from imubench_pipeline.pooled import pooled_rows
-from imubench_pipeline.requirements import Requirement
-from imubench_pipeline.selection import ranking_rows
+from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.tables import build
 from tests.test_selection import errors_of
 

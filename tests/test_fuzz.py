@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.readers import RecordingError, read
-from imubench_pipeline.sensor import LogFormat
+from imubench_pipeline.settings.sensor import LogFormat
 from tests.fuzz import target
 from tests.fuzz.__main__ import main
 from tests.fuzz.inputs import FAULT, READERS, Input, seeds

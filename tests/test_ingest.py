@@ -5,11 +5,11 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from imubench_pipeline.config import QualitySettings
-from imubench_pipeline.ingest import Ingested, ingest
 from imubench_pipeline.readers import RecordingError
-from imubench_pipeline.recording import channel_logs, log_paths, read_metadata
-from imubench_pipeline.sensor import LogFormat, RecordingNotes
+from imubench_pipeline.recordings.ingest import Ingested, ingest
+from imubench_pipeline.recordings.recording import channel_logs, log_paths, read_metadata
+from imubench_pipeline.settings.quality import QualitySettings
+from imubench_pipeline.settings.sensor import LogFormat, RecordingNotes
 
 XY = {"gyro_x": {"column": "wx", "unit": "rad/s"}, "gyro_y": {"column": "wy", "unit": "rad/s"}}
 TIME = {"column": "t", "unit": "s"}

@@ -8,13 +8,13 @@ from scipy.signal import butter, lfilter, sosfilt
 
 from imubench_pipeline.estimators.filter_fits import highest_cutoff
 from imubench_pipeline.estimators.frame import frame_of
+from imubench_pipeline.estimators.joint_cutoff import refined
 from imubench_pipeline.estimators.likelihood import Likelihood, fit
 from imubench_pipeline.estimators.low_pass import Filter
 from imubench_pipeline.estimators.model_choice import PAPERS, compare
-from imubench_pipeline.joint_cutoff import refined
+from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.simulate import simulate
-from imubench_pipeline.spectrum import spectra
+from imubench_pipeline.noise.simulate import simulate
 
 RATE = 100.0
 SAMPLES = 150_000

@@ -2,11 +2,18 @@ import numpy as np
 import pytest
 from scipy.linalg import solveh_banded
 
-from imubench_pipeline.missing import BLOCK, BlockMeans, block_means, divided, filled, slow_part
+from imubench_pipeline.estimators.missing import (
+    BLOCK,
+    BlockMeans,
+    block_means,
+    divided,
+    filled,
+    slow_part,
+)
+from imubench_pipeline.estimators.spectral_shapes import Shapes
+from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.simulate import simulate
-from imubench_pipeline.spectral_shapes import Shapes
-from imubench_pipeline.spectrum import spectra
+from imubench_pipeline.noise.simulate import simulate
 
 RATE = 50.0
 MODEL = NoiseModel(N=1e-3, B=1.5e-3, T_B=30.0, K=3e-4)

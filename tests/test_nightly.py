@@ -13,10 +13,10 @@ import psutil
 import pytest
 import yaml
 
-from imubench_pipeline.nightly import recovery
-from imubench_pipeline.nightly.lock import Lock, TakenError, read_note
-from imubench_pipeline.nightly.night import Night
-from imubench_pipeline.nightly.settling import (
+from imubench_pipeline.run.nightly import recovery
+from imubench_pipeline.run.nightly.lock import Lock, TakenError, read_note
+from imubench_pipeline.run.nightly.night import Night
+from imubench_pipeline.run.nightly.settling import (
     Skip,
     complete_name,
     look,
@@ -24,11 +24,11 @@ from imubench_pipeline.nightly.settling import (
     settled,
     unsettled,
 )
-from imubench_pipeline.nightly.state import State, load_tables, read_state, state_of
-from imubench_pipeline.nightly.summary import STATUS, Summary, compared, in_words
-from imubench_pipeline.plan import Plan
+from imubench_pipeline.run.nightly.state import State, load_tables, read_state, state_of
+from imubench_pipeline.run.nightly.summary import STATUS, Summary, compared, in_words
+from imubench_pipeline.run.plan import Plan
+from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables import replacing, write
-from imubench_pipeline.validation import ConfigError
 from tests.test_configuration import SENSOR
 
 NOW = datetime(2026, 10, 20, 1, 30, tzinfo=UTC)
@@ -59,7 +59,7 @@ def test_a_run_may_wait_for_the_one_before(tmp_path: Path) -> None:
 HOLDER = """
 import subprocess, sys
 from pathlib import Path
-from imubench_pipeline.nightly.lock import Lock
+from imubench_pipeline.run.nightly.lock import Lock
 lock = Lock(Path(sys.argv[1]))
 lock.acquire()
 child = subprocess.Popen(["sleep", "600"], pass_fds=[lock.descriptor])
@@ -217,7 +217,7 @@ def test_logs_as_they_were_need_no_second_look(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     waited: list[float] = []
-    monkeypatch.setattr("imubench_pipeline.nightly.settling.time.sleep", waited.append)
+    monkeypatch.setattr("imubench_pipeline.run.nightly.settling.time.sleep", waited.append)
     put(tmp_path, "a.csv")
     found, _ = settled(tmp_path, 300.0, {})
     assert waited == [10.0]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes, of_blocks
-from imubench_pipeline.octave import SECTION, STEPS, octave_sizes
+from imubench_pipeline.allan.octave import SECTION, STEPS, octave_sizes
 
 
 def standard_error(curve: AllanCurve) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.allan import allan_variance
-from imubench_pipeline.confidence import deviation_limits, equivalent_degrees
+from imubench_pipeline.allan.confidence import deviation_limits, equivalent_degrees
 
 
 def test_adis16405_by_an_independent_program(shared: Path) -> None:

@@ -8,11 +8,11 @@ from scipy.optimize import brentq
 
 from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes
 from imubench_pipeline.export.growth import growth
+from imubench_pipeline.export.overbound import Overbound, limits_of, overbound, simultaneous_upper
+from imubench_pipeline.export.smallest_model import FAMILIES, Family, smallest
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
-from imubench_pipeline.noise_terms import Array
-from imubench_pipeline.overbound import Overbound, limits_of, overbound, simultaneous_upper
-from imubench_pipeline.simulate import simulate
-from imubench_pipeline.smallest_model import FAMILIES, Family, smallest
+from imubench_pipeline.noise.simulate import simulate
+from imubench_pipeline.typing import Array
 
 GYRO = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7)
 RATE = 5.0

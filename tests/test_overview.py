@@ -9,12 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from imubench_pipeline import overview as module
-from imubench_pipeline.config import QualitySettings
-from imubench_pipeline.ingest import ingest
-from imubench_pipeline.overview import MOST_BINS, Overview, bin_edges, overview
-from imubench_pipeline.recording import ROW_GROUP, LogWriter, log_paths
-from imubench_pipeline.sensor import LogFormat, RecordingNotes
+from imubench_pipeline.recordings import overview as module
+from imubench_pipeline.recordings.ingest import ingest
+from imubench_pipeline.recordings.overview import MOST_BINS, Overview, bin_edges, overview
+from imubench_pipeline.recordings.recording import ROW_GROUP, LogWriter, log_paths
+from imubench_pipeline.settings.quality import QualitySettings
+from imubench_pipeline.settings.sensor import LogFormat, RecordingNotes
 
 RATE = 50.0
 Columns = Mapping[str, np.ndarray]

@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import curve_fit, least_squares
 
 from imubench_pipeline.noise import FLOOR, NoiseModel
-from imubench_pipeline.simulate import simulate
+from imubench_pipeline.noise.simulate import simulate
 
 PATH = Path(__file__).parents[1] / "benchmarks" / "peers.py"
 SPEC = importlib.util.spec_from_file_location("peers", PATH)

@@ -6,11 +6,11 @@ from typing import Any
 import pytest
 import yaml
 
-from imubench_pipeline.plan import STEPS, Plan
 from imubench_pipeline.report.publish import pages, site_of
-from imubench_pipeline.schemas import TABLES
+from imubench_pipeline.run.plan import STEPS, Plan
+from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables import build
-from imubench_pipeline.validation import ConfigError
+from imubench_pipeline.tables.schemas import TABLES
 from tests.conftest import PROJECT
 from tests.test_configuration import SENSOR
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import f_oneway
 
-from imubench_pipeline.pooled import COLUMNS, Pool, pool, pooled_rows, turn_on_bias
+from imubench_pipeline.navigation.pooled import COLUMNS, Pool, pool, pooled_rows, turn_on_bias
 
 Z = 1.959963984540054
 

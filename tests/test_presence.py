@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from imubench_pipeline.presence import presence
+from imubench_pipeline.allan.presence import presence
 
 
 def expected(

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from imubench_pipeline.printed import FIGURE_DIMENSIONS, Datasheet, QuantityDatasheet
-from imubench_pipeline.sensor import Sensor
-from imubench_pipeline.validation import ConfigError, parse
+from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, Datasheet, QuantityDatasheet
+from imubench_pipeline.settings.sensor import Sensor
+from imubench_pipeline.settings.validation import ConfigError, parse
 from tests.test_configuration import SENSOR, with_change
 
 DENSITY = {"value": 0.01, "unit": "deg/s/sqrt(Hz)"}

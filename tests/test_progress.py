@@ -19,7 +19,7 @@ rule ingest:
     output: "{recording}.done"
     script: "ingest.py"
 onstart:
-    from imubench_pipeline.progress import follow
+    from imubench_pipeline.run.progress import follow
     follow()
 onsuccess:
     print("the summary")
@@ -120,7 +120,7 @@ def test_a_pipe_gets_the_lines_of_snakemake(folder: Path) -> None:
 
 
 def test_another_logger_is_left_alone() -> None:
-    from imubench_pipeline.progress import follow
+    from imubench_pipeline.run.progress import follow
 
     logger = logging.getLogger("snakemake.logging")
     before = list(logger.handlers)

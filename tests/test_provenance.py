@@ -3,8 +3,8 @@ from pathlib import Path
 
 import pytest
 
-from imubench_pipeline import provenance
-from imubench_pipeline.provenance import source_digest
+from imubench_pipeline.tables import provenance
+from imubench_pipeline.tables.provenance import source_digest
 
 
 @pytest.fixture

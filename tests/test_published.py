@@ -8,13 +8,14 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from imubench_pipeline.datasheet import bias_deltas, deltas
+from imubench_pipeline.datasheets.deltas import bias_deltas, deltas
+from imubench_pipeline.datasheets.measured import sensitivity
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.measured import sensitivity
-from imubench_pipeline.printed import Datasheet
-from imubench_pipeline.published import published_rows
-from imubench_pipeline.results import Key, parameter_rows, truth_rows
+from imubench_pipeline.estimators.rows import parameter_rows
+from imubench_pipeline.settings.printed import Datasheet
+from imubench_pipeline.steps.published import published_rows, truth_rows
 from imubench_pipeline.tables import build
+from imubench_pipeline.tables.keys import Key
 
 DEGREE = math.pi / 180
 KEY = Key("imu", "sim_board", "gyro_x")

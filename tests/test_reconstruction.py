@@ -6,14 +6,14 @@ import pyarrow.parquet as pq
 import pytest
 
 from imubench_pipeline.allan import allan_variance
-from imubench_pipeline.config import ReconstructionSettings
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.reconstruction import reconstruct
-from imubench_pipeline.recording import read_metadata
-from imubench_pipeline.results import Key
-from imubench_pipeline.simulate import simulate
+from imubench_pipeline.noise.simulate import simulate
+from imubench_pipeline.recordings.recording import read_metadata
+from imubench_pipeline.settings.config import ReconstructionSettings
+from imubench_pipeline.steps.reconstruct import reconstruct
 from imubench_pipeline.tables import build
+from imubench_pipeline.tables.keys import Key
 
 MODEL = NoiseModel(N=1e-3, B=2e-3, T_B=10.0, K=1e-4)
 KEY = Key("s", "r", "gyro_x")

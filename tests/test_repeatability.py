@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from imubench_pipeline.repeatability.rows import repeatability_rows
-from imubench_pipeline.sensor import Sensor
+from imubench_pipeline.navigation.repeatability import repeatability_rows
+from imubench_pipeline.settings.sensor import Sensor
+from imubench_pipeline.settings.validation import parse
 from imubench_pipeline.tables import build
-from imubench_pipeline.validation import parse
 from tests.test_configuration import SENSOR
 
 HOUR = math.pi / 180 / 3600

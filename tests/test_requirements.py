@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import yaml
 
-from imubench_pipeline.requirements import Requirement, read_requirements
-from imubench_pipeline.validation import ConfigError
+from imubench_pipeline.settings.requirements import Requirement, read_requirements
+from imubench_pipeline.settings.validation import ConfigError
 
 from .conftest import PROJECT
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from imubench_pipeline.run_summary import failure, leaders, one_line, summary, warnings
+from imubench_pipeline.report.run_summary import failure, leaders, one_line, summary, warnings
 from imubench_pipeline.tables import write
 
 
@@ -112,7 +112,7 @@ def test_a_line_is_one_line_and_no_command_to_the_terminal() -> None:
 
 WORKFLOW = """
 from pathlib import Path
-from imubench_pipeline.run_summary import failure
+from imubench_pipeline.report.run_summary import failure
 
 rule all:
     input: "results/recordings/s/r/allan.parquet", "results/tables/ranking.parquet"

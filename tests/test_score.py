@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from imubench_pipeline.score import score
+from imubench_pipeline.estimators.score import score
 
 
 def test_scores_by_hand() -> None:

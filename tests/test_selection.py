@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.expected_errors import error_rows, of_requirement, standard
-from imubench_pipeline.requirements import Requirement
-from imubench_pipeline.selection import ranking_rows
+from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement, standard
+from imubench_pipeline.navigation.selection import ranking_rows
+from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.tables import build
 
 DEGREE = math.pi / 180

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from rich.cells import cell_len
 
-from imubench_pipeline import show
+from imubench_pipeline.report import show
 from imubench_pipeline.tables import write
 
 DEGREE = 3.141592653589793 / 180
@@ -271,6 +271,6 @@ def test_a_reader_that_has_gone_is_seen_by_the_caller(
 
 
 def test_other_commands_do_not_wait_for_what_draws() -> None:
-    code = "import sys, imubench_pipeline.show as s; sys.exit(sum(n in sys.modules for n in %r))"
+    code = "import sys, imubench_pipeline.report.show; sys.exit(sum(n in sys.modules for n in %r))"
     names = ("rich", "pyarrow", "numpy", "imubench_pipeline.units")
     assert subprocess.run([sys.executable, "-c", code % (names,)], check=False).returncode == 0

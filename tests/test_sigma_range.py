@@ -6,13 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chi2, norm
 
-from imubench_pipeline.calibration.least_squares import LeastSquares
-from imubench_pipeline.earth_rate.experiment import Experiment
-from imubench_pipeline.earth_rate.kalman import RateFilter
-from imubench_pipeline.error_budget import draw_models
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.experiments.calibration.least_squares import LeastSquares
+from imubench_pipeline.experiments.earth_rate.experiment import Experiment
+from imubench_pipeline.experiments.earth_rate.kalman import RateFilter
+from imubench_pipeline.navigation.error_budget import draw_models
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.sigma_range import drawn_from_covariance, sigma_range
+from imubench_pipeline.noise.sigma_range import drawn_from_covariance, sigma_range
 
 RUN = Experiment.regular(dwell=10.0, turning=2.0, dwells=6, rate=4.0, latitude=0.3)
 MODEL = NoiseModel(N=1e-3, B=2e-4, T_B=20.0, K=1e-5)

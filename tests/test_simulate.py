@@ -3,7 +3,7 @@ import pytest
 
 from imubench_pipeline.allan import cluster_sizes
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
-from imubench_pipeline.simulate import (
+from imubench_pipeline.noise.simulate import (
     block_sums,
     channel_rng,
     ensemble,
@@ -11,7 +11,7 @@ from imubench_pipeline.simulate import (
     simulate,
     simulate_blocks,
 )
-from imubench_pipeline.variance_covariance import variance_covariance
+from imubench_pipeline.noise.variance_covariance import variance_covariance
 
 MODEL = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=20.0, K=8.2e-6)
 RATE = 10.0

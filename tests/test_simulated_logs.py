@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.readers import read
-from imubench_pipeline.sensor import LogFormat, read_sensors
-from imubench_pipeline.simulated_logs import write_simulated
-from imubench_pipeline.simulated_recordings import SimulatedRecording, read_simulated
+from imubench_pipeline.settings.sensor import LogFormat, read_sensors
+from imubench_pipeline.settings.simulated_recordings import SimulatedRecording, read_simulated
+from imubench_pipeline.steps.simulate import write_simulated
 from tests.conftest import PROJECT
 
 RECORDING = SimulatedRecording.model_validate(

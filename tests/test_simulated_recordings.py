@@ -8,21 +8,21 @@ import numpy as np
 import pytest
 import yaml
 
-from imubench_pipeline.plan import Plan
 from imubench_pipeline.readers import read
-from imubench_pipeline.sensor import LogFormat, Sensor, read_sensors
-from imubench_pipeline.sensor_model.profile_forms import DayCycleForm
-from imubench_pipeline.sensor_model.truth import figures_of
-from imubench_pipeline.simulated_logs import write_simulated
-from imubench_pipeline.simulated_recordings import (
+from imubench_pipeline.run.plan import Plan
+from imubench_pipeline.settings.profile_forms import DayCycleForm
+from imubench_pipeline.settings.sensor import LogFormat, Sensor, read_sensors
+from imubench_pipeline.settings.simulated_recordings import (
     SimulatedRecording,
     ToSimulate,
     layout,
     profile_files,
     read_simulated,
 )
+from imubench_pipeline.settings.validation import ConfigError, parse
+from imubench_pipeline.simulate.truth import figures_of
+from imubench_pipeline.steps.simulate import write_simulated
 from imubench_pipeline.units import quantity_to_si
-from imubench_pipeline.validation import ConfigError, parse
 from tests.conftest import PROJECT
 from tests.test_configuration import SENSOR
 

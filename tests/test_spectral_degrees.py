@@ -3,10 +3,10 @@ import pytest
 from scipy.stats import chi2
 
 from imubench_pipeline.allan import cluster_sizes
-from imubench_pipeline.confidence import equivalent_degrees
+from imubench_pipeline.allan.confidence import equivalent_degrees
+from imubench_pipeline.allan.presence import presence
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
-from imubench_pipeline.presence import presence
-from imubench_pipeline.spectral_degrees import degrees_of_model
+from imubench_pipeline.noise.spectral_degrees import degrees_of_model
 from tests.test_variance_covariance import SHORT_LOG, exact, sample_covariance
 
 SAMPLES = 900

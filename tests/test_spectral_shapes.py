@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 import scipy.fft
 
-from imubench_pipeline.flicker import bank
-from imubench_pipeline.spectral_shapes import Shapes
-from imubench_pipeline.spectrum import SINGLE, Spectrum, spectra
+from imubench_pipeline.estimators.spectral_shapes import Shapes
+from imubench_pipeline.estimators.spectrum import SINGLE, Spectrum, spectra
+from imubench_pipeline.noise.flicker import bank
 
 RATE = 10.0
 CASES = ((1, 800), (8, 160))

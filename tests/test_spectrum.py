@@ -6,9 +6,9 @@ import pytest
 import scipy.fft
 from scipy import stats
 
+from imubench_pipeline.estimators.spectrum import SINGLE, LineSpectrum, Spectrum, spectra
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.simulate import simulate
-from imubench_pipeline.spectrum import SINGLE, LineSpectrum, Spectrum, spectra
+from imubench_pipeline.noise.simulate import simulate
 
 RATE = 50.0
 LONG = 1 << 19

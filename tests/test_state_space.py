@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from imubench_pipeline.state_space import repeated
+from imubench_pipeline.noise.state_space import repeated
 
 
 @pytest.mark.parametrize("times", [0, 1, 2, 7, 64, 100])

@@ -12,7 +12,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from imubench_pipeline.steps import StepError, Steps
+from imubench_pipeline.run.processes import StepError, Steps
 
 
 @pytest.fixture
@@ -158,7 +158,7 @@ else:
 RUN_BOTH = """
 import sys, threading
 from pathlib import Path
-from imubench_pipeline.steps import Steps
+from imubench_pipeline.run.processes import Steps
 folder = Path(sys.argv[1])
 steps = Steps(folder)
 threading.Thread(target=steps.run, args=("wait", [], [folder / "out"], [], [])).start()

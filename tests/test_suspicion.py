@@ -4,15 +4,15 @@ from pathlib import Path
 import pytest
 import yaml
 
-from imubench_pipeline.sensor import Sensor, read_sensors
-from imubench_pipeline.suspicion import (
+from imubench_pipeline.datasheets.suspicion import (
     Usual,
     printed_figures,
     suspicious,
     suspicious_datasheets,
     usual_figures,
 )
-from imubench_pipeline.validation import parse
+from imubench_pipeline.settings.sensor import Sensor, read_sensors
+from imubench_pipeline.settings.validation import parse
 from tests.conftest import PROJECT
 from tests.test_configuration import SENSOR
 

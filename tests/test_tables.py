@@ -4,7 +4,6 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
 from imubench_pipeline.tables import (
     TableError,
     build,
@@ -16,6 +15,7 @@ from imubench_pipeline.tables import (
     write_content,
     write_json,
 )
+from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 
 SCORE = {"sensor": "s", "recording": "r", "channel": "gyro_x", "method": "curve", "rms": 1.0}
 

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from imubench_pipeline.config import QualitySettings
 from imubench_pipeline.readers import RecordingError
-from imubench_pipeline.timebase import TimeBase, from_stamps, positions, without_stamps
+from imubench_pipeline.recordings.timebase import TimeBase, from_stamps, positions, without_stamps
+from imubench_pipeline.settings.quality import QualitySettings
 
 SETTINGS = QualitySettings()
 

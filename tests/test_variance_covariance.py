@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.allan import allan_variance, cluster_sizes
-from imubench_pipeline.confidence import equivalent_degrees
+from imubench_pipeline.allan.confidence import equivalent_degrees
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.simulate import channel_rng, simulate
-from imubench_pipeline.variance_covariance import variance_covariance
+from imubench_pipeline.noise.simulate import channel_rng, simulate
+from imubench_pipeline.noise.variance_covariance import variance_covariance
 
 MTI_7 = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7)
 

@@ -16,9 +16,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import pint
 
-STANDARD_GRAVITY = 9.80665
-"""m/s² in one g."""
-
 SI_UNITS: dict[str, str] = {
     "angular_rate": "rad/s",
     "acceleration": "m/s^2",

@@ -5,12 +5,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imubench_pipeline.alignment.attitude import euler_angles, matrix
-from imubench_pipeline.alignment.coarse import coarse_accuracy, coarse_alignment, mean_vectors
-from imubench_pipeline.alignment.simulation import simulate_triad, true_means
-from imubench_pipeline.alignment.triad import Positions, Site, Triad
-from imubench_pipeline.earth_rate.experiment import Dwell, Experiment
-from imubench_pipeline.error_budget import EARTH_RATE
+from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.experiments.alignment.attitude import euler_angles, matrix
+from imubench_pipeline.experiments.alignment.coarse import (
+    coarse_accuracy,
+    coarse_alignment,
+    mean_vectors,
+)
+from imubench_pipeline.experiments.alignment.simulation import simulate_triad, true_means
+from imubench_pipeline.experiments.alignment.triad import Positions, Site, Triad
+from imubench_pipeline.experiments.earth_rate.experiment import Dwell, Experiment
 from imubench_pipeline.noise import NoiseModel
 from tests.alignment.triads import ALIKE, ATTITUDE, ONE, POSITIONS, SITE, TWO, UNLIKE
 

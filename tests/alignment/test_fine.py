@@ -5,18 +5,22 @@ import pytest
 from scipy.linalg import block_diag
 from scipy.stats import chi2
 
-from imubench_pipeline.alignment.attitude import cross_matrix, euler_angles, matrix
-from imubench_pipeline.alignment.coarse import coarse_accuracy, coarse_alignment, mean_vectors
-from imubench_pipeline.alignment.fine import UNKNOWN, FineAlignment, align
-from imubench_pipeline.alignment.simulation import simulate_triad, true_means
-from imubench_pipeline.alignment.triad import Positions, Triad
-from imubench_pipeline.calibration.observability import NotObservableError
-from imubench_pipeline.earth_rate.experiment import Dwell, Experiment, block_means
-from imubench_pipeline.earth_rate.simulation import PAPER_MODEL
-from imubench_pipeline.error_budget import EARTH_RATE
+from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.experiments.alignment.attitude import cross_matrix, euler_angles, matrix
+from imubench_pipeline.experiments.alignment.coarse import (
+    coarse_accuracy,
+    coarse_alignment,
+    mean_vectors,
+)
+from imubench_pipeline.experiments.alignment.fine import UNKNOWN, FineAlignment, align
+from imubench_pipeline.experiments.alignment.simulation import simulate_triad, true_means
+from imubench_pipeline.experiments.alignment.triad import Positions, Triad
+from imubench_pipeline.experiments.calibration.observability import NotObservableError
+from imubench_pipeline.experiments.earth_rate.experiment import Dwell, Experiment, block_means
+from imubench_pipeline.experiments.earth_rate.simulation import PAPER_MODEL
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.sensor_model.model import SensorModel
-from imubench_pipeline.sensor_model.simulation import simulate
+from imubench_pipeline.simulate.model import SensorModel
+from imubench_pipeline.simulate.simulation import simulate
 from tests.alignment.triads import (
     ACCELEROMETER,
     ALIKE,

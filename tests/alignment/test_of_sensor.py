@@ -8,16 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from imubench_pipeline.alignment.accuracy import accuracies
-from imubench_pipeline.alignment.fine import OPEN
-from imubench_pipeline.alignment.of_sensor import TIMES, noise_at_rest, outlook_tables
-from imubench_pipeline.alignment.triad import Site, Triad
-from imubench_pipeline.config import EarthRateSettings
-from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE
+from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.estimators.rows import parameter_rows
+from imubench_pipeline.experiments.alignment.accuracy import accuracies
+from imubench_pipeline.experiments.alignment.fine import OPEN
+from imubench_pipeline.experiments.alignment.triad import Site, Triad
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.results import Key, parameter_rows
+from imubench_pipeline.settings.config import EarthRateSettings
+from imubench_pipeline.steps.outlook import TIMES, noise_at_rest, outlook_tables
 from imubench_pipeline.tables import build, write
+from imubench_pipeline.tables.keys import Key
 from tests.earth_rate.recordings import put
 
 SITE = Site(latitude=math.radians(45.0))

@@ -3,10 +3,10 @@ import math
 import numpy as np
 import pytest
 
-from imubench_pipeline.backtest.covariance import WindowCovariance, block_covariance
-from imubench_pipeline.backtest.windows import Errors, Window, errors, window
-from imubench_pipeline.error_budget import Calibrated
-from imubench_pipeline.error_budget.budget import of_sensor
+from imubench_pipeline.navigation.backtest.covariance import WindowCovariance, block_covariance
+from imubench_pipeline.navigation.backtest.windows import Errors, Window, errors, window
+from imubench_pipeline.navigation.error_budget import Calibrated
+from imubench_pipeline.navigation.error_budget.budget import of_sensor
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, RandomWalk, Sinusoid
 
 

@@ -7,15 +7,15 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from imubench_pipeline.backtest.of_recording import backtest_rows
-from imubench_pipeline.backtest.verdicts import findings, words
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.likelihood import fit
-from imubench_pipeline.expected_errors import error_rows, of_requirement
-from imubench_pipeline.fitness import doubts, judged
-from imubench_pipeline.recording import ChannelLog, LogWriter, channel_logs
-from imubench_pipeline.requirements import Requirement
-from imubench_pipeline.selection import ranking_rows
+from imubench_pipeline.navigation.backtest.of_recording import backtest_rows
+from imubench_pipeline.navigation.backtest.verdicts import findings, words
+from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement
+from imubench_pipeline.navigation.selection import ranking_rows
+from imubench_pipeline.recordings.fitness import doubts, judged
+from imubench_pipeline.recordings.recording import ChannelLog, LogWriter, channel_logs
+from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.tables import build
 
 RATE, SAMPLES, N = 5.0, 40_000, 1e-4

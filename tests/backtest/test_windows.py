@@ -3,8 +3,8 @@ import math
 import numpy as np
 import pytest
 
-from imubench_pipeline.backtest.block_means import block_means
-from imubench_pipeline.backtest.windows import Window, errors, window
+from imubench_pipeline.navigation.backtest.block_means import block_means
+from imubench_pipeline.navigation.backtest.windows import Window, errors, window
 
 RATE = 10.0
 

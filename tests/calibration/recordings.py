@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from imubench_pipeline.calibration.of_run import calibration_tables
-from imubench_pipeline.config import EarthRateSettings
-from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE
+from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.simulate import simulate
+from imubench_pipeline.noise.simulate import simulate
+from imubench_pipeline.settings.config import EarthRateSettings
+from imubench_pipeline.steps.calibration import calibration_tables
 from tests.earth_rate.recordings import SENSOR
 from tests.earth_rate.runs import PAPER, RATE
 

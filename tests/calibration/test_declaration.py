@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 import yaml
 
-from imubench_pipeline.calibration.declaration import AtRest, OnRateTable
-from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE
-from imubench_pipeline.plan import Plan
-from imubench_pipeline.validation import ConfigError, parse
+from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.run.plan import Plan
+from imubench_pipeline.settings.known_rates import AtRest, OnRateTable
+from imubench_pipeline.settings.validation import ConfigError, parse
 from tests.calibration.recordings import STEPS, UP
 from tests.earth_rate.recordings import SENSOR
 

@@ -3,14 +3,14 @@ import math
 import numpy as np
 import pytest
 
-from imubench_pipeline.calibration.observability import NotObservableError
-from imubench_pipeline.calibration.pointing import Pointing
-from imubench_pipeline.calibration.rate_table import RateTable, calibrate
-from imubench_pipeline.calibration.schedule import Schedule
-from imubench_pipeline.earth_rate.simulation import simulate_runs
+from imubench_pipeline.experiments.calibration.observability import NotObservableError
+from imubench_pipeline.experiments.calibration.rate_table import RateTable, calibrate
+from imubench_pipeline.experiments.calibration.schedule import Schedule
+from imubench_pipeline.experiments.earth_rate.simulation import simulate_runs
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.sensor_model.model import SensorModel
-from imubench_pipeline.sensor_model.simulation import simulate
+from imubench_pipeline.settings.pointing import Pointing
+from imubench_pipeline.simulate.model import SensorModel
+from imubench_pipeline.simulate.simulation import simulate
 
 RATES = (0.0, 0.5, -0.5, 1.0, -1.0, 0.0, 0.25)
 STEPS = [(30.0 * i + 5.0, 30.0 * i + 30.0, rate) for i, rate in enumerate(RATES)]

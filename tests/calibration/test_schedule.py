@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from imubench_pipeline.calibration.schedule import Schedule
-from imubench_pipeline.earth_rate.experiment import Dwell
+from imubench_pipeline.experiments.calibration.schedule import Schedule
+from imubench_pipeline.experiments.earth_rate.experiment import Dwell
 
 
 def table(rate, steps, ramp):

@@ -3,14 +3,14 @@ import math
 import numpy as np
 import pytest
 
-from imubench_pipeline.calibration.pointing import Pointing
-from imubench_pipeline.calibration.still import StillRun, bias_at_rest, not_observable
-from imubench_pipeline.earth_rate.experiment import Dwell, Experiment
-from imubench_pipeline.earth_rate.simulation import PAPER_MODEL, simulate_runs
-from imubench_pipeline.error_budget import EARTH_RATE
+from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.experiments.calibration.still import StillRun, bias_at_rest, not_observable
+from imubench_pipeline.experiments.earth_rate.experiment import Dwell, Experiment
+from imubench_pipeline.experiments.earth_rate.simulation import PAPER_MODEL, simulate_runs
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.sensor_model.model import SensorModel
-from imubench_pipeline.sensor_model.simulation import simulate
+from imubench_pipeline.settings.pointing import Pointing
+from imubench_pipeline.simulate.model import SensorModel
+from imubench_pipeline.simulate.simulation import simulate
 from tests.earth_rate.brute import MODELS, of_blocks
 
 RUN = Experiment((Dwell(0, 240, 1),), 4.0, 0.0)

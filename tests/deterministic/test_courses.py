@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from imubench_pipeline.deterministic.courses import Courses, find_courses
+from imubench_pipeline.estimators.deterministic.courses import Courses, find_courses
 from tests.deterministic.logs import RATE, SIGMA, K, static_log, times
 
 Array = NDArray[np.float64]

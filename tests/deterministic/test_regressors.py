@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.fft
 
-from imubench_pipeline.deterministic.regressors import Regressor
+from imubench_pipeline.estimators.deterministic.regressors import Regressor
 
 EVERY = [
     Regressor("step", 0, 20.25),

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from imubench_pipeline.deterministic.means import means_of
-from imubench_pipeline.deterministic.ordinates import Ordinates
-from imubench_pipeline.deterministic.regressors import Regressor
-from imubench_pipeline.deterministic.scores import Gain, best_scores
+from imubench_pipeline.estimators.deterministic.means import means_of
+from imubench_pipeline.estimators.deterministic.ordinates import Ordinates
+from imubench_pipeline.estimators.deterministic.regressors import Regressor
+from imubench_pipeline.estimators.deterministic.scores import Gain, best_scores
 from tests.deterministic.logs import RATE, SIGMA, static_log, times
 
 

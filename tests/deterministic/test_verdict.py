@@ -3,10 +3,14 @@
 import numpy as np
 import pytest
 
-from imubench_pipeline.deterministic.courses import find_courses
-from imubench_pipeline.deterministic.verdict import Verdict, deterministic_rows, verdict_of
+from imubench_pipeline.estimators.deterministic.courses import find_courses
+from imubench_pipeline.estimators.deterministic.verdict import (
+    Verdict,
+    deterministic_rows,
+    verdict_of,
+)
 from imubench_pipeline.estimators.estimate import FAMILY, Estimate, JointDraws, Parameter, Status
-from imubench_pipeline.schemas import TABLES
+from imubench_pipeline.tables.schemas import TABLES
 from tests.deterministic.logs import RATE, SIGMA, K, N, static_log, times
 
 

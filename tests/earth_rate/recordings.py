@@ -8,13 +8,15 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from imubench_pipeline.config import EarthRateSettings
-from imubench_pipeline.earth_rate.of_run import earth_rate_tables
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.estimators.rows import parameter_rows
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.recording import LogWriter
-from imubench_pipeline.results import Key, Quality, parameter_rows
+from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.recordings.recording import LogWriter
+from imubench_pipeline.settings.config import EarthRateSettings
+from imubench_pipeline.steps.earth_rotation import earth_rate_tables
 from imubench_pipeline.tables import write, write_json
+from imubench_pipeline.tables.keys import Key
 from tests.earth_rate.runs import PAPER, RATE, turned
 
 SENSOR: dict[str, Any] = {

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.simulate import simulate
+from imubench_pipeline.noise.simulate import simulate
 
 DEGREE = math.pi / 180.0
 RATE = 32.0

@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 import yaml
 
-from imubench_pipeline.earth_rate.declaration import TwoPosition
-from imubench_pipeline.ingest import ingest_as_planned
-from imubench_pipeline.plan import Plan
-from imubench_pipeline.recording import channel_logs, static_logs
-from imubench_pipeline.validation import ConfigError, parse
+from imubench_pipeline.recordings.ingest import ingest_as_planned
+from imubench_pipeline.recordings.recording import channel_logs, static_logs
+from imubench_pipeline.run.plan import Plan
+from imubench_pipeline.settings.two_position import TwoPosition
+from imubench_pipeline.settings.validation import ConfigError, parse
 from tests.earth_rate.recordings import SENSOR
 
 GOOD: dict[str, Any] = {"latitude": "45 deg", "dwell": "30 s"}

@@ -3,11 +3,11 @@ import math
 import numpy as np
 import pytest
 
-from imubench_pipeline.earth_rate.known_rate import track
-from imubench_pipeline.earth_rate.simulation import PAPER_MODEL, paper_run, simulate_log
-from imubench_pipeline.error_budget import EARTH_RATE
+from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.experiments.earth_rate.known_rate import track
+from imubench_pipeline.experiments.earth_rate.simulation import PAPER_MODEL, paper_run, simulate_log
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.sensor_model.model import SensorModel
+from imubench_pipeline.simulate.model import SensorModel
 
 DESIGN = paper_run(12.0)
 

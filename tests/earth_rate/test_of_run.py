@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from imubench_pipeline.earth_rate.columns import EARTH_RATE_TABLES
-from imubench_pipeline.earth_rate.noise_source import from_static
 from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.steps.noise_source import from_static
 from imubench_pipeline.tables import build
+from imubench_pipeline.tables.of_earth_rate import EARTH_RATE_TABLES
 from tests.earth_rate.recordings import (
     EVERY_30,
     PRINTED,

@@ -5,14 +5,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from imubench_pipeline.earth_rate.bound import block_length, cramer_rao, information
-from imubench_pipeline.earth_rate.experiment import Experiment
-from imubench_pipeline.earth_rate.kalman import RateFilter
-from imubench_pipeline.earth_rate.needs import prediction_rows
-from imubench_pipeline.earth_rate.pairs import by_pairs
-from imubench_pipeline.earth_rate.prediction import Outlook
-from imubench_pipeline.earth_rate.simulation import PAPER_MODEL, paper_run
-from imubench_pipeline.error_budget import EARTH_RATE, Gyrocompass
+from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.experiments.earth_rate.bound import block_length, cramer_rao, information
+from imubench_pipeline.experiments.earth_rate.experiment import Experiment
+from imubench_pipeline.experiments.earth_rate.kalman import RateFilter
+from imubench_pipeline.experiments.earth_rate.needs import prediction_rows
+from imubench_pipeline.experiments.earth_rate.pairs import by_pairs
+from imubench_pipeline.experiments.earth_rate.prediction import Outlook
+from imubench_pipeline.experiments.earth_rate.simulation import PAPER_MODEL, paper_run
+from imubench_pipeline.navigation.error_budget import Gyrocompass
 from imubench_pipeline.noise import NoiseModel
 from tests.earth_rate.brute import MODELS
 from tests.earth_rate.test_experiment import experiments

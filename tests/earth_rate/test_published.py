@@ -4,16 +4,16 @@ import math
 
 import pytest
 
-from imubench_pipeline.earth_rate.courses import thinned
-from imubench_pipeline.earth_rate.published import Schedule, allowed, published_row
-from imubench_pipeline.earth_rate.simulation import (
+from imubench_pipeline.experiments.earth_rate.courses import thinned
+from imubench_pipeline.experiments.earth_rate.published import Schedule, allowed, published_row
+from imubench_pipeline.experiments.earth_rate.simulation import (
     ASSUMED_LATITUDE,
     ASSUMED_TURNING,
     PAPER_MODEL,
     PAPER_PERIOD,
     PAPER_RATE,
 )
-from imubench_pipeline.plan import Plan
+from imubench_pipeline.run.plan import Plan
 
 PAPER = Schedule(PAPER_PERIOD, ASSUMED_TURNING, PAPER_RATE, ASSUMED_LATITUDE)
 

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 import yaml
 
-from imubench_pipeline.earth_rate.of_run import earth_rate_tables
-from imubench_pipeline.earth_rate.turning import find_turning
-from imubench_pipeline.ingest import ingest_as_planned
-from imubench_pipeline.plan import Plan
-from imubench_pipeline.recording import channel_logs
-from imubench_pipeline.sensor import LogFormat
-from imubench_pipeline.simulated_logs import write_simulated
-from imubench_pipeline.simulated_recordings import SimulatedRecording
-from imubench_pipeline.validation import ConfigError
+from imubench_pipeline.experiments.earth_rate.turning import find_turning
+from imubench_pipeline.recordings.ingest import ingest_as_planned
+from imubench_pipeline.recordings.recording import channel_logs
+from imubench_pipeline.run.plan import Plan
+from imubench_pipeline.settings.sensor import LogFormat
+from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
+from imubench_pipeline.settings.validation import ConfigError
+from imubench_pipeline.steps.earth_rotation import earth_rate_tables
+from imubench_pipeline.steps.simulate import write_simulated
 from tests.earth_rate.recordings import PRINTED, SENSOR
 
 TURNS: dict[str, Any] = {

@@ -3,9 +3,9 @@ import math
 import numpy as np
 import pytest
 
-from imubench_pipeline.earth_rate.experiment import Dwell, Experiment, block_means
-from imubench_pipeline.earth_rate.kalman import RateFilter
-from imubench_pipeline.earth_rate.simulation import (
+from imubench_pipeline.experiments.earth_rate.experiment import Dwell, Experiment, block_means
+from imubench_pipeline.experiments.earth_rate.kalman import RateFilter
+from imubench_pipeline.experiments.earth_rate.simulation import (
     PAPER_MINUTES,
     PAPER_MODEL,
     PAPER_RATE,
@@ -14,9 +14,9 @@ from imubench_pipeline.earth_rate.simulation import (
     simulate_runs,
 )
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.sensor_model.model import SensorModel
+from imubench_pipeline.settings.validation import read_yaml
+from imubench_pipeline.simulate.model import SensorModel
 from imubench_pipeline.units import quantity_to_si
-from imubench_pipeline.validation import read_yaml
 from tests.conftest import PROJECT
 from tests.earth_rate.brute import MODELS, of_blocks
 

@@ -4,10 +4,10 @@ from scipy import signal
 
 from imubench_pipeline.estimators.band import Band, find_band
 from imubench_pipeline.estimators.lines import find, without_lines
+from imubench_pipeline.estimators.spectrum import Spectrum, spectra
 from imubench_pipeline.estimators.whittle import Terms, whittle_of
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.simulate import simulate
-from imubench_pipeline.spectrum import Spectrum, spectra
+from imubench_pipeline.noise.simulate import simulate
 
 RATE = 100.0
 NYQUIST = 50.0

@@ -6,8 +6,8 @@ import pytest
 from imubench_pipeline.estimators.carried_lines import MOST, STRONGEST, carried, joined_finding
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.lines import Line
+from imubench_pipeline.estimators.spectral_findings import line_findings
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.quality.spectral import line_findings
 
 
 def comb(number: int, kind: str = "sinusoid") -> list[Line]:

@@ -4,7 +4,7 @@ import pytest
 from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.estimators.curve import read
 from imubench_pipeline.noise import FLOOR, PEAK_TAU, NoiseModel
-from imubench_pipeline.simulate import simulate
+from imubench_pipeline.noise.simulate import simulate
 from tests.estimators.test_least_squares import MTI_7, noiseless, value
 
 

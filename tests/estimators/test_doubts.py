@@ -7,7 +7,7 @@ from imubench_pipeline.estimators.doubts import doubting
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.simulate import simulate
+from imubench_pipeline.noise.simulate import simulate
 
 RATE, SAMPLES = 10.0, 40_000
 

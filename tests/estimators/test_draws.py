@@ -3,7 +3,6 @@ import math
 import numpy as np
 import pytest
 
-from imubench_pipeline.error_budget import Start, budget, draw_models
 from imubench_pipeline.estimators.draws import drawn_share, joint_draws
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.goodness import Goodness
@@ -11,8 +10,9 @@ from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.whittle import Maximum, Terms
+from imubench_pipeline.navigation.error_budget import Start, budget, draw_models
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.simulate import simulate
+from imubench_pipeline.noise.simulate import simulate
 
 LONGEST = 1000.0
 

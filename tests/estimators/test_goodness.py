@@ -5,10 +5,10 @@ import pytest
 from scipy import optimize, stats
 
 from imubench_pipeline.estimators.goodness import DOUBT, Goodness, goodness
+from imubench_pipeline.estimators.spectrum import Spectrum, spectra
 from imubench_pipeline.estimators.whittle import Terms, whittle_of
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.simulate import simulate
-from imubench_pipeline.spectrum import Spectrum, spectra
+from imubench_pipeline.noise.simulate import simulate
 
 RATE = 50.0
 BINS = np.concatenate((np.ones(64), np.rint(np.geomspace(2, 2000, 140))))

@@ -5,7 +5,7 @@ import pytest
 
 from imubench_pipeline.estimators.likelihood import Likelihood, fit
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.simulate import simulate
+from imubench_pipeline.noise.simulate import simulate
 
 RATE = 10.0
 SAMPLES = 72_000

@@ -9,10 +9,10 @@ from scipy import optimize
 from scipy.integrate import quad
 
 from imubench_pipeline.estimators.identifiability import NOT_IDENTIFIED, bounds_of
+from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.estimators.whittle import Maximum, Terms, whittle_of
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.simulate import block_sums, simulate
-from imubench_pipeline.spectrum import spectra
+from imubench_pipeline.noise.simulate import block_sums, simulate
 from tests.estimators.test_least_squares import C102, MTI_7
 
 H = 10.0

@@ -7,12 +7,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes
-from imubench_pipeline.confidence import equivalent_degrees
+from imubench_pipeline.allan.confidence import equivalent_degrees
 from imubench_pipeline.estimators.curve import read
 from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.estimators.least_squares import UnfitCurveError, fit
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.simulate import channel_rng, ensemble, simulate
+from imubench_pipeline.noise.simulate import channel_rng, ensemble, simulate
 
 MTI_7 = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7)
 C102 = NoiseModel(N=1.1e-3, B=7.2e-4, T_B=148.9, K=2.0e-5)

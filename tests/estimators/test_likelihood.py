@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 from imubench_pipeline.estimators.estimate import CURVE, FAMILY, Parameter
 from imubench_pipeline.estimators.likelihood import Likelihood, fit, fit_blocks
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
-from imubench_pipeline.simulate import channel_rng, simulate
+from imubench_pipeline.noise.simulate import channel_rng, simulate
 
 RATE = 5.0
 SAMPLES = 180_000

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes
-from imubench_pipeline.confidence import equivalent_degrees
+from imubench_pipeline.allan.confidence import equivalent_degrees
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.least_squares import fit
 from imubench_pipeline.estimators.limits import Errors, fit_errors, with_limits
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.simulate import channel_rng, simulate
+from imubench_pipeline.noise.simulate import channel_rng, simulate
 
 SENSOR = {"N": 1.0, "B": 0.3, "T_B": 50.0, "K": 3e-3}
 WALK = {"N": 1.0, "K": 1e-2}

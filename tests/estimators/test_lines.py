@@ -6,10 +6,10 @@ from scipy import signal, stats
 
 from imubench_pipeline.estimators.likelihood import model_of
 from imubench_pipeline.estimators.lines import FALSE_ALARM, Line, find, without_lines
+from imubench_pipeline.estimators.spectrum import LineSpectrum, Spectrum, spectra
 from imubench_pipeline.estimators.whittle import Terms, whittle_of
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.simulate import simulate
-from imubench_pipeline.spectrum import LineSpectrum, Spectrum, spectra
+from imubench_pipeline.noise.simulate import simulate
 
 RATE = 100.0
 N = 1e-3

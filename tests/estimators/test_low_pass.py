@@ -4,7 +4,7 @@ from scipy.integrate import quad
 from scipy.signal import butter, freqz, sosfreqz
 
 from imubench_pipeline.estimators.low_pass import Filter
-from imubench_pipeline.spectrum import spectra
+from imubench_pipeline.estimators.spectrum import spectra
 
 RATE = 50.0
 FREQUENCY = np.array([0.01, 0.7, 3.0, 11.0, 19.0, 24.0])

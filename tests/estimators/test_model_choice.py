@@ -17,10 +17,10 @@ from imubench_pipeline.estimators.model_choice import (
     disagreement,
     rescored,
 )
+from imubench_pipeline.estimators.spectrum import Spectrum, spectra
 from imubench_pipeline.estimators.whittle import Maximum, Terms, whittle_of
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.simulate import simulate
-from imubench_pipeline.spectrum import Spectrum, spectra
+from imubench_pipeline.noise.simulate import simulate
 
 RATE = 50.0
 N = 1e-3

@@ -5,10 +5,10 @@ from scipy.interpolate import PchipInterpolator
 
 from imubench_pipeline.estimators import posterior as posteriors
 from imubench_pipeline.estimators.posterior import DRAWS, sample
+from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.estimators.whittle import SHAPES, Maximum, Terms, Whittle, whittle_of
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
-from imubench_pipeline.simulate import simulate
-from imubench_pipeline.spectrum import spectra
+from imubench_pipeline.noise.simulate import simulate
 from tests.estimators.test_least_squares import MTI_7
 
 RATE = 10.0

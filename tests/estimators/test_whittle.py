@@ -6,11 +6,11 @@ import pytest
 import scipy.fft
 from scipy import optimize, stats
 
+from imubench_pipeline.estimators.spectral_shapes import Shapes
+from imubench_pipeline.estimators.spectrum import SINGLE, Spectrum, spectra
 from imubench_pipeline.estimators.whittle import SHAPES, Maximum, Terms, Whittle, whittle_of
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
-from imubench_pipeline.simulate import simulate
-from imubench_pipeline.spectral_shapes import Shapes
-from imubench_pipeline.spectrum import SINGLE, Spectrum, spectra
+from imubench_pipeline.noise.simulate import simulate
 
 RATE = 10.0
 

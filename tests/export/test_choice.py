@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.estimators.rows import parameter_rows
 from imubench_pipeline.export.choice import choose, parameter_notes
 from imubench_pipeline.export.imu import ExportError
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.results import Key, parameter_rows
+from imubench_pipeline.tables.keys import Key
 
 
 def estimate(method: str = "likelihood", **values: float | Parameter | None) -> Estimate:

@@ -8,16 +8,18 @@ import pytest
 import yaml
 
 from imubench_pipeline.allan import AllanCurve, cluster_sizes
-from imubench_pipeline.cli import main
-from imubench_pipeline.config import ExportSettings
 from imubench_pipeline.estimators.estimate import Estimate, JointDraws, Parameter
+from imubench_pipeline.estimators.rows import allan_rows, draw_rows, parameter_rows
 from imubench_pipeline.export.imu import ExportError
-from imubench_pipeline.export.of_run import exports
 from imubench_pipeline.export.request import Request, imu_of, load, made
 from imubench_pipeline.export.targets import TARGETS
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.results import Key, Row, allan_rows, draw_rows, parameter_rows
+from imubench_pipeline.run.cli import main
+from imubench_pipeline.settings.config import ExportSettings
+from imubench_pipeline.steps.exports import exports
 from imubench_pipeline.tables import build, write, write_arrow
+from imubench_pipeline.tables.keys import Key
+from imubench_pipeline.typing import Row
 from tests.export.sensors import ACCEL, GYRO
 
 CHANNELS = {

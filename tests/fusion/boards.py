@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.fusion.board import Board
+from imubench_pipeline.navigation.fusion.board import Board
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.simulate import simulate
+from imubench_pipeline.noise.simulate import simulate
 
 SMOOTH = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7)
 FLICKER = NoiseModel(N=2e-4, B=3e-5, K=2e-6)

@@ -4,18 +4,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from imubench_pipeline.config import FusionSettings
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.fusion.board import Board
-from imubench_pipeline.fusion.equivalence import (
+from imubench_pipeline.navigation.fusion.board import Board
+from imubench_pipeline.navigation.fusion.equivalence import (
     Candidate,
     TemperaturePart,
     equivalence_rows,
     number_needed,
 )
-from imubench_pipeline.fusion.of_run import fusion_rows
-from imubench_pipeline.fusion.prediction import fused_allan
-from imubench_pipeline.fusion.weights import equal
+from imubench_pipeline.navigation.fusion.prediction import fused_allan
+from imubench_pipeline.navigation.fusion.weights import equal
+from imubench_pipeline.settings.config import FusionSettings
+from imubench_pipeline.steps.fusion import fusion_rows
 from imubench_pipeline.tables import build
 from tests.fusion.boards import FLICKER
 from tests.report.tables import joined, recording_rows, rejected_rows

@@ -15,7 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from imubench_pipeline.sensor import LogFormat
+from imubench_pipeline.settings.sensor import LogFormat
 from tests.corpus import arrays, bags, exports, packed, scientific, stamps, streams, text
 from tests.corpus.entry import Entry, Kept, archive, kept
 from tests.readers.test_rosbag import KINDS

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from imubench_pipeline.readers import LogFile, RecordingError, read
-from imubench_pipeline.sensor import LogFormat
+from imubench_pipeline.settings.sensor import LogFormat
 
 _SHORTEST_REASON = 10
 _QUOTED = re.compile(r"'[^']*'|\"[^\"]*\"|found [^;]*")

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import imubench_pipeline.readers
-from imubench_pipeline.sensor import LogFormat
+from imubench_pipeline.settings.sensor import LogFormat
 from tests.fuzz.arcs import Arc, Arcs
 from tests.fuzz.inputs import Input
 from tests.fuzz.mutations import mutated

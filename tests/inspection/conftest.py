@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from imubench_pipeline.sensor import CHANNELS
+from imubench_pipeline.settings.sensor import CHANNELS
 from tests.inspection.drafts import ROWS, Columns
 
 

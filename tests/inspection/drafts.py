@@ -10,10 +10,10 @@ import numpy as np
 import scipy.io
 import yaml
 
-from imubench_pipeline.inspection import Inspection, inspect
 from imubench_pipeline.readers import read
-from imubench_pipeline.sensor import Sensor
-from imubench_pipeline.validation import parse
+from imubench_pipeline.readers.inspection import Inspection, inspect
+from imubench_pipeline.settings.sensor import Sensor
+from imubench_pipeline.settings.validation import parse
 
 DEG, G = np.pi / 180, 9.80665
 ROWS = 400

@@ -13,8 +13,8 @@ import pyarrow.feather
 import pyarrow.parquet as pq
 import pytest
 
-from imubench_pipeline.inspection import inspect
-from imubench_pipeline.sensor import CHANNELS
+from imubench_pipeline.readers.inspection import inspect
+from imubench_pipeline.settings.sensor import CHANNELS
 from tests.inspection.drafts import (
     DEG,
     ROWS,

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 import yaml
 
-from imubench_pipeline.inspection import inspect
-from imubench_pipeline.readers.vectornav_sentences import FIELDS
-from imubench_pipeline.sensor import CHANNELS, Sensor
-from imubench_pipeline.validation import parse
+from imubench_pipeline.readers.inspection import inspect
+from imubench_pipeline.readers.vectornav.sentences import FIELDS
+from imubench_pipeline.settings.sensor import CHANNELS, Sensor
+from imubench_pipeline.settings.validation import parse
 from tests.inspection.drafts import (
     NAMED,
     ROWS,

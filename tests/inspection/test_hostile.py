@@ -19,8 +19,8 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imubench_pipeline.inspection import inspect
 from imubench_pipeline.readers import RecordingError
+from imubench_pipeline.readers.inspection import inspect
 from tests.inspection.drafts import (
     NAMED,
     WRITERS,
@@ -103,7 +103,7 @@ def test_hostile_names(tmp_path: Path) -> None:
 @given(st.text(max_size=60))
 @examples(150)
 def test_any_name(name: str) -> None:
-    from imubench_pipeline.inspection.names import meaning
+    from imubench_pipeline.readers.inspection.names import meaning
     from imubench_pipeline.readers.spellings import divided
 
     meaning(name)
@@ -153,7 +153,7 @@ def test_a_long_log_is_not_read_to_its_end(tmp_path: Path, si: Columns) -> None:
             file.write(body)
     code = (
         "import sys, time; from pathlib import Path; "
-        "from imubench_pipeline.inspection import inspect; "
+        "from imubench_pipeline.readers.inspection import inspect; "
         "inspect(Path(sys.argv[1])); status = Path('/proc/self/status').read_text(); "
         "print(status.partition('VmHWM:')[2].split()[0], time.process_time())"
     )

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from imubench_pipeline.inspection.names import DERIVED, PLAIN, WEAK, WITHOUT_GRAVITY, meaning
+from imubench_pipeline.readers.inspection.names import (
+    DERIVED,
+    PLAIN,
+    WEAK,
+    WITHOUT_GRAVITY,
+    meaning,
+)
 from imubench_pipeline.readers.spellings import unit_of
 from imubench_pipeline.units import UnitError, conversion
 

@@ -15,9 +15,9 @@ import pytest
 import yaml
 import zstandard
 
-from imubench_pipeline.inspection import inspect
-from imubench_pipeline.sensor import CHANNELS
-from imubench_pipeline.validation import ConfigError
+from imubench_pipeline.readers.inspection import inspect
+from imubench_pipeline.settings.sensor import CHANNELS
+from imubench_pipeline.settings.validation import ConfigError
 from tests.inspection.drafts import (
     DEG,
     NAMED,

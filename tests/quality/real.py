@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pyarrow.csv as pacsv
 
-from imubench_pipeline.config import QualitySettings
-from imubench_pipeline.findings import Finding
-from imubench_pipeline.quality.columns import column_findings
-from imubench_pipeline.quality.copies import copied_channels
-from imubench_pipeline.quality.summary import ColumnSummary
+from imubench_pipeline.recordings.quality.columns import column_findings
+from imubench_pipeline.recordings.quality.copies import copied_channels
+from imubench_pipeline.recordings.quality.summary import ColumnSummary
+from imubench_pipeline.settings.quality import QualitySettings
+from imubench_pipeline.tables.findings import Finding
 
 Log = dict[str, np.ndarray]
 

@@ -3,13 +3,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from imubench_pipeline.config import QualitySettings
-from imubench_pipeline.findings import Finding
-from imubench_pipeline.fitness import UNFIT
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.quality.columns import column_findings
-from imubench_pipeline.quality.summary import ColumnSummary
-from imubench_pipeline.simulate import simulate
+from imubench_pipeline.noise.simulate import simulate
+from imubench_pipeline.recordings.fitness import UNFIT
+from imubench_pipeline.recordings.quality.columns import column_findings
+from imubench_pipeline.recordings.quality.summary import ColumnSummary
+from imubench_pipeline.settings.quality import QualitySettings
+from imubench_pipeline.tables.findings import Finding
 
 RATE = 100.0
 GYRO = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imubench_pipeline.quality.repeats import WINDOW, Repeats
+from imubench_pipeline.recordings.quality.repeats import WINDOW, Repeats
 from tests.quality.real import adis16405, findings, warnings
 
 

@@ -3,16 +3,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from imubench_pipeline.config import QualitySettings
 from imubench_pipeline.estimators.likelihood import fit
-from imubench_pipeline.ingest import ingest
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.quality.knocks import knocks, suspects
-from imubench_pipeline.quality.levels import quantisation
-from imubench_pipeline.quality.summary import ColumnSummary
-from imubench_pipeline.recording import channel_logs
-from imubench_pipeline.sensor import LogFormat, RecordingNotes
-from imubench_pipeline.simulate import simulate
+from imubench_pipeline.noise.simulate import simulate
+from imubench_pipeline.recordings.ingest import ingest
+from imubench_pipeline.recordings.quality.knocks import knocks, suspects
+from imubench_pipeline.recordings.quality.levels import quantisation
+from imubench_pipeline.recordings.quality.summary import ColumnSummary
+from imubench_pipeline.recordings.recording import channel_logs
+from imubench_pipeline.settings.quality import QualitySettings
+from imubench_pipeline.settings.sensor import LogFormat, RecordingNotes
 from tests.quality.real import adis16405
 
 RATE = 50.0

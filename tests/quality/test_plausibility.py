@@ -6,17 +6,18 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from imubench_pipeline.findings import Finding
+from imubench_pipeline.datasheets.plausibility import implausible
+from imubench_pipeline.datasheets.rates import implausible_rates
+from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.quality.levels import density_of, kept_level
-from imubench_pipeline.quality.plausibility import implausible
-from imubench_pipeline.quality.rates import implausible_rates
-from imubench_pipeline.quality.rotation import gravity_turn
-from imubench_pipeline.quality.summary import ColumnSummary
-from imubench_pipeline.sensor import Sensor
-from imubench_pipeline.simulate import simulate
-from imubench_pipeline.units import STANDARD_GRAVITY, conversion
-from imubench_pipeline.validation import parse
+from imubench_pipeline.noise.simulate import simulate
+from imubench_pipeline.recordings.quality.levels import density_of, kept_level
+from imubench_pipeline.recordings.quality.rotation import gravity_turn
+from imubench_pipeline.recordings.quality.summary import ColumnSummary
+from imubench_pipeline.settings.sensor import Sensor
+from imubench_pipeline.settings.validation import parse
+from imubench_pipeline.tables.findings import Finding
+from imubench_pipeline.units import conversion
 from tests.test_configuration import SENSOR
 
 RATE = 100.0

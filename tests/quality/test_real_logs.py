@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 import yaml
 
-from imubench_pipeline.config import QualitySettings
-from imubench_pipeline.findings import Finding
-from imubench_pipeline.fitness import doubts, fitness
-from imubench_pipeline.ingest import ingest
-from imubench_pipeline.sensor import LogFormat, RecordingNotes
+from imubench_pipeline.recordings.fitness import doubts, fitness
+from imubench_pipeline.recordings.ingest import ingest
+from imubench_pipeline.settings.quality import QualitySettings
+from imubench_pipeline.settings.sensor import LogFormat, RecordingNotes
+from imubench_pipeline.tables.findings import Finding
 from tests.conftest import PROJECT
 
 LINES = 20_000

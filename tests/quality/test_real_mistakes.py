@@ -16,11 +16,12 @@ import h5py
 import numpy as np
 import pytest
 
-from imubench_pipeline.config import QualitySettings
-from imubench_pipeline.fitness import doubts, fitness
-from imubench_pipeline.ingest import ingest
-from imubench_pipeline.sensor import CHANNELS, RecordingNotes, Sensor, read_sensors
-from imubench_pipeline.validation import parse
+from imubench_pipeline.datasheets.plausibility import implausible_of
+from imubench_pipeline.recordings.fitness import doubts, fitness
+from imubench_pipeline.recordings.ingest import ingest
+from imubench_pipeline.settings.quality import QualitySettings
+from imubench_pipeline.settings.sensor import CHANNELS, RecordingNotes, Sensor, read_sensors
+from imubench_pipeline.settings.validation import parse
 from tests.conftest import PROJECT
 
 NAMES = {"sensor": "s", "device": "d", "recording": "r", "kind": "static"}
@@ -61,7 +62,7 @@ def findings(path: Path, of: Sensor, folder: Path) -> Rows:
     """Return what is found of a log, by the ingest and beside the datasheet."""
     kept = ingest(path, of.log, RecordingNotes(), QualitySettings(), folder / "kept", NAMES)
     quality = kept.quality(NAMES)
-    return quality.findings + quality.implausible(of)
+    return quality.findings + implausible_of(quality, of)
 
 
 def unfit(found: Rows) -> dict[str, dict[str | None, float]]:

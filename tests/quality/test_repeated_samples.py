@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from imubench_pipeline.quality.repeated_samples import _parts, repeats_beyond_chance
-from imubench_pipeline.quality.summary import ColumnSummary
+from imubench_pipeline.recordings.quality.repeated_samples import _parts, repeats_beyond_chance
+from imubench_pipeline.recordings.quality.summary import ColumnSummary
 
 
 def beyond(log: np.ndarray) -> float:

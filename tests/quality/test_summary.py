@@ -4,9 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from imubench_pipeline.quality import blocks as of_blocks
-from imubench_pipeline.quality.blocks import FIRST_SIZE
-from imubench_pipeline.quality.summary import ColumnSummary
+from imubench_pipeline.recordings.quality import blocks as of_blocks
+from imubench_pipeline.recordings.quality.blocks import FIRST_SIZE
+from imubench_pipeline.recordings.quality.summary import ColumnSummary
 
 VALUES = st.sampled_from([-1.0, 0.0, 0.5, 2.0, np.nan, np.inf, -np.inf, 1e300, -1e76])
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import strategies as st
 
 from imubench_pipeline.readers import LogFile, RecordingError, read
-from imubench_pipeline.sensor import LogFormat
+from imubench_pipeline.settings.sensor import LogFormat
 
 FIRST = np.datetime64("2024-05-01T10:00:00.000000001", "ns")
 STEP = 10_000_000

@@ -10,8 +10,8 @@ import pyarrow.parquet as pq
 import pytest
 from hypothesis import given, settings
 
-from imubench_pipeline.readers import arrays
-from imubench_pipeline.sensor import LogFormat
+from imubench_pipeline.readers.arrays import file as arrays
+from imubench_pipeline.settings.sensor import LogFormat
 from tests.readers.array_files import (
     FIRST,
     STEP,

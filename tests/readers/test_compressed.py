@@ -16,8 +16,8 @@ import zstandard
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from imubench_pipeline.drop_zone import _stem
 from imubench_pipeline.readers import RecordingError, compressed, log_files, read
+from imubench_pipeline.recordings.drop_zone import _stem
 from tests.readers.text_logs import columns, log_format, written
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.readers import RecordingError, read
-from imubench_pipeline.sensor import LogFormat
+from imubench_pipeline.settings.sensor import LogFormat
 from tests.readers import text_logs
 from tests.readers.text_logs import columns, written
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from imubench_pipeline.readers import arrays, hdf5
-from imubench_pipeline.sensor import LogFormat
+from imubench_pipeline.readers.arrays import file as arrays
+from imubench_pipeline.readers.arrays import hdf5
+from imubench_pipeline.settings.sensor import LogFormat
 from tests.readers.array_files import (
     FIRST,
     STEP,

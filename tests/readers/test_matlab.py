@@ -10,8 +10,9 @@ import scipy.io
 import scipy.sparse
 from hypothesis import given, settings
 
-from imubench_pipeline.readers import RecordingError, arrays
-from imubench_pipeline.sensor import LogFormat
+from imubench_pipeline.readers import RecordingError
+from imubench_pipeline.readers.arrays import file as arrays
+from imubench_pipeline.settings.sensor import LogFormat
 from tests.readers.array_files import (
     FIRST,
     STEP,

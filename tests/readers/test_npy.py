@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from imubench_pipeline.readers import arrays
+from imubench_pipeline.readers.arrays import file as arrays
 from tests.readers.array_files import (
     FIRST,
     STEP,

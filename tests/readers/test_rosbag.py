@@ -18,9 +18,9 @@ from rosbags.typesys import Stores, get_typestore
 
 from imubench_pipeline.readers import RecordingError, read
 from imubench_pipeline.readers.batch import LogFile
-from imubench_pipeline.readers.rosbag import RosbagFile
-from imubench_pipeline.readers.rosbag1 import Bag
-from imubench_pipeline.sensor import LogFormat
+from imubench_pipeline.readers.rosbag.file import RosbagFile
+from imubench_pipeline.readers.rosbag.version_1 import Bag
+from imubench_pipeline.settings.sensor import LogFormat
 from tests.readers.damage import examples
 
 IMU, TEMPERATURE = "sensor_msgs/msg/Imu", "sensor_msgs/msg/Temperature"

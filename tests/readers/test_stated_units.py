@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from imubench_pipeline.readers import read
-from imubench_pipeline.sensor import LogFormat
+from imubench_pipeline.settings.sensor import LogFormat
 from tests.readers import test_rosbag, test_ubx, test_vectornav
 
 GYRO = {"unit": "deg/s"}

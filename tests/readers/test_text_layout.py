@@ -9,8 +9,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from imubench_pipeline.readers import RecordingError
-from imubench_pipeline.sensor import LogFormat
-from imubench_pipeline.validation import ConfigError, parse
+from imubench_pipeline.settings.sensor import LogFormat
+from imubench_pipeline.settings.validation import ConfigError, parse
 from tests.readers.text_logs import PLACED, TWO, columns, log_format, written
 
 GYRO, ACCEL = [1.0, 2.0, -3.0], [0.5, 0.25, 1e-3]

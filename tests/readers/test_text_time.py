@@ -10,8 +10,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from imubench_pipeline.readers import RecordingError, read
-from imubench_pipeline.sensor import LogFormat
-from imubench_pipeline.validation import ConfigError, parse
+from imubench_pipeline.settings.sensor import LogFormat
+from imubench_pipeline.settings.validation import ConfigError, parse
 from tests.readers.text_logs import TWO, columns, log_format, written
 
 ISO = {"column": "t", "format": "iso8601"}

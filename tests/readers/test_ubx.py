@@ -13,7 +13,7 @@ from pyubx2 import GET, UBXMessage, UBXReader
 
 from imubench_pipeline.readers import RecordingError, read
 from imubench_pipeline.readers.batch import LogFile
-from imubench_pipeline.sensor import LogFormat
+from imubench_pipeline.settings.sensor import LogFormat
 from tests.readers.damage import Damage, damaged, damages, examples
 
 DEG = np.pi / 180

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 from imubench_pipeline.readers import RecordingError, read
 from imubench_pipeline.readers.batch import LogFile
-from imubench_pipeline.readers.vectornav import VectorNavFile
-from imubench_pipeline.readers.vectornav_sentences import FIELDS, right_checksums
-from imubench_pipeline.sensor import LogFormat
+from imubench_pipeline.readers.vectornav.file import VectorNavFile
+from imubench_pipeline.readers.vectornav.sentences import FIELDS, right_checksums
+from imubench_pipeline.settings.sensor import LogFormat
 from tests.readers.damage import Damage, damaged, damages, examples
 
 UNITS = {"gyro": "rad/s", "accel": "m/s^2"}

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from imubench_pipeline.readers import read
-from imubench_pipeline.sensor import LogFormat
+from imubench_pipeline.settings.sensor import LogFormat
 
 TWO = {
     "gyro_x": {"column": "wx", "unit": "rad/s"},

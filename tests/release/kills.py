@@ -302,7 +302,7 @@ def _processes(root: int) -> dict[str, list[psutil.Process]]:
                 words = process.cmdline()
                 if process.ppid() in serving:
                     kind = "step"
-                elif "imubench_pipeline.step_server" in words:
+                elif "imubench_pipeline.run.step_server" in words:
                     kind = "step server"
                     serving.add(process.pid)
                 else:

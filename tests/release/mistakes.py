@@ -26,9 +26,9 @@ import pyarrow as pa
 import pyarrow.csv
 import yaml
 
-from imubench_pipeline.fitness import left_out
-from imubench_pipeline.plan import Plan
-from imubench_pipeline.results import Quality
+from imubench_pipeline.recordings.fitness import left_out
+from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.tables import read
 
 PROJECT = Path(__file__).parents[2]

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
-from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
+from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 
 VOID = {"meta", "link", "br", "img", "input", "hr", "wbr", "col"}
 BLOCKS = {"p", "ul", "ol", "dl", "div", "table", "section", "figure", "header", "footer", "main",

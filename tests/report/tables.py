@@ -9,24 +9,25 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from imubench_pipeline.config import FusionSettings
-from imubench_pipeline.drift import drift_rows
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.expected_errors import error_rows, of_requirement, standard
-from imubench_pipeline.fusion.of_run import fusion_rows
+from imubench_pipeline.estimators.rows import parameter_rows
+from imubench_pipeline.navigation.drift import drift_rows
+from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement, standard
+from imubench_pipeline.navigation.pooled import pooled_rows
+from imubench_pipeline.navigation.selection import ranked
+from imubench_pipeline.navigation.verdicts.basis import Basis
+from imubench_pipeline.navigation.verdicts.judgement import judgements
+from imubench_pipeline.navigation.verdicts.next_steps import next_step_rows
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.pooled import pooled_rows
-from imubench_pipeline.recording import LogWriter
+from imubench_pipeline.recordings.recording import LogWriter
 from imubench_pipeline.report.publish import site_of
 from imubench_pipeline.report.site import Site
-from imubench_pipeline.requirements import Requirement
-from imubench_pipeline.results import Key, parameter_rows
-from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
-from imubench_pipeline.selection import ranked
+from imubench_pipeline.settings.config import FusionSettings
+from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.steps.fusion import fusion_rows
 from imubench_pipeline.tables import build, write, write_arrow
-from imubench_pipeline.verdicts.basis import Basis
-from imubench_pipeline.verdicts.judgement import judgements
-from imubench_pipeline.verdicts.next_steps import next_step_rows
+from imubench_pipeline.tables.keys import Key
+from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 
 Row = dict[str, Any]
 Rows = dict[str, list[Row]]

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from imubench_pipeline.cli import main
 from imubench_pipeline.report.publish import publish
 from imubench_pipeline.report.static_figures import of_run
+from imubench_pipeline.run.cli import main
 from tests.report.pages import Read
 from tests.report.tables import joined, put_samples, put_tables, recording_rows, rejected_rows, site
 
@@ -96,7 +96,7 @@ def test_all_pages_in_one_file_are_the_same_from_every_process(
     assert main(["report", str(results), "--one-file", str(one)]) == 0
     out, err = said(capsys)
     assert re.fullmatch(rf"{re.escape(str(one))}: [0-9.]+ MB\n", out) and err == ""
-    code = "import sys; from imubench_pipeline.cli import main; sys.exit(main(sys.argv[1:]))"
+    code = "import sys; from imubench_pipeline.run.cli import main; sys.exit(main(sys.argv[1:]))"
     command = [sys.executable, "-c", code, "report", str(results), "--one-file", str(other)]
     subprocess.run(command, check=True, env=os.environ | {"PYTHONHASHSEED": "7"})
     assert one.read_bytes() == other.read_bytes()

@@ -16,18 +16,21 @@ import pytest
 import yaml
 from scipy.optimize import minimize_scalar
 
-from imubench_pipeline import coverage, datasheet, findings, pooled
-from imubench_pipeline.backtest import comparison
-from imubench_pipeline.error_budget import Gyrocompass, Start, budget
+from imubench_pipeline.datasheets import coverage
+from imubench_pipeline.datasheets import deltas as datasheet
 from imubench_pipeline.estimators import estimate, lines
 from imubench_pipeline.estimators.identifiability import bounds_of
+from imubench_pipeline.navigation import pooled
+from imubench_pipeline.navigation.backtest import comparison
+from imubench_pipeline.navigation.error_budget import Gyrocompass, Start, budget
+from imubench_pipeline.navigation.shortlist import rows as shortlist
+from imubench_pipeline.navigation.suitability import conditions
 from imubench_pipeline.noise import FLOOR, GaussMarkov, NoiseModel
 from imubench_pipeline.report import glossary as module
 from imubench_pipeline.report.glossary import UnknownTermError, glossary, term
-from imubench_pipeline.shortlist import rows as shortlist
-from imubench_pipeline.suitability import conditions
+from imubench_pipeline.settings.validation import ConfigError
+from imubench_pipeline.tables import findings
 from imubench_pipeline.units import from_si, to_si
-from imubench_pipeline.validation import ConfigError
 from tests.conftest import PROJECT
 
 SOURCE = PROJECT / "src/imubench_pipeline"
@@ -257,9 +260,9 @@ def values_in_tables() -> Iterator[tuple[str, str]]:
         *get_args(comparison.Verdict),
     ]:
         yield verdict, "verdict"
-    for verdict in strings_in("verdicts/standing.py", "verdict"):
+    for verdict in strings_in("navigation/verdicts/standing.py", "verdict"):
         yield verdict, "verdict"
-    for verdict in strings_in("verdicts/judgement.py", "_outside"):
+    for verdict in strings_in("navigation/verdicts/judgement.py", "_outside"):
         if "price class" in verdict:
             yield verdict, "verdict"
     for verdict in (conditions.EXCLUDED, *conditions.CONDITIONAL.values()):

@@ -4,10 +4,10 @@ from typing import Any
 import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.expected_errors import error_rows, of_requirement, standard
+from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement, standard
+from imubench_pipeline.navigation.selection import ranking_rows
 from imubench_pipeline.report.meaning import budget_tables, budget_words, rankings
-from imubench_pipeline.requirements import Requirement
-from imubench_pipeline.selection import ranking_rows
+from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.tables import build
 from tests.report.tables import ROBOT
 

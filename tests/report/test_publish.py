@@ -17,8 +17,8 @@ from imubench_pipeline.report import publish as publishing
 from imubench_pipeline.report import site as site_module
 from imubench_pipeline.report.publish import one_file, pages, publish, published
 from imubench_pipeline.report.site import Site
-from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
 from imubench_pipeline.tables import build
+from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from tests.report.pages import Read, lost_links, read_pages
 from tests.report.tables import (
     KNOWN,

@@ -15,6 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.estimators.rows import parameter_rows
 from imubench_pipeline.noise import FLOOR, PEAK_TAU, NoiseModel
 from imubench_pipeline.report.practical import page_unit
 from imubench_pipeline.report.static_figures.command import add_arguments, run
@@ -28,9 +29,9 @@ from imubench_pipeline.report.static_figures.spectrum import spectrum_figure
 from imubench_pipeline.report.static_figures.terms import terms_figure
 from imubench_pipeline.report.static_figures.theory import CHARACTERISTIC, theory_figure
 from imubench_pipeline.report.view import ChannelView, recording_views
-from imubench_pipeline.results import Key, parameter_rows
-from imubench_pipeline.schemas import TABLES
 from imubench_pipeline.tables import build, write
+from imubench_pipeline.tables.keys import Key
+from imubench_pipeline.tables.schemas import TABLES
 
 DEGREE = math.pi / 180
 HOUR = DEGREE / 3600  # of a degree an hour

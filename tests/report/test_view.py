@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from imubench_pipeline.report.view import ChannelView, RecordingView, recording_views
-from imubench_pipeline.schemas import TABLES
 from imubench_pipeline.tables import build, read, write_arrow
+from imubench_pipeline.tables.schemas import TABLES
 from tests.report.tables import (
     MODEL,
     TAU,

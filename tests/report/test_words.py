@@ -17,7 +17,7 @@ from imubench_pipeline.report.words import (
     untold,
     verdict_words,
 )
-from imubench_pipeline.requirements import Requirement
+from imubench_pipeline.settings.requirements import Requirement
 
 UNIT = PageUnit("°/h", 2.0)
 HOUR = 3600.0

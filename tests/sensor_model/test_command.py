@@ -9,16 +9,17 @@ import pytest
 import yaml
 
 from imubench_pipeline.allan import allan_variance
-from imubench_pipeline.cli import main
-from imubench_pipeline.config import QualitySettings
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.ingest import ingest
+from imubench_pipeline.estimators.rows import parameter_rows
 from imubench_pipeline.readers import read
-from imubench_pipeline.recording import channel_logs, read_metadata
-from imubench_pipeline.results import Key, parameter_rows
-from imubench_pipeline.sensor import RecordingNotes, merged_log, read_sensors
+from imubench_pipeline.recordings.ingest import ingest
+from imubench_pipeline.recordings.recording import channel_logs, read_metadata
+from imubench_pipeline.run.cli import main
+from imubench_pipeline.settings.quality import QualitySettings
+from imubench_pipeline.settings.sensor import RecordingNotes, merged_log, read_sensors
+from imubench_pipeline.settings.validation import parse, read_yaml
 from imubench_pipeline.tables import write, write_arrow
-from imubench_pipeline.validation import parse, read_yaml
+from imubench_pipeline.tables.keys import Key
 from tests.conftest import PROJECT
 from tests.report.tables import HOUR, joined, recording_rows
 
@@ -281,7 +282,7 @@ def test_a_log_of_every_sensor_file_is_read(tmp_path: Path) -> None:
 def test_nothing_is_left_of_a_log_that_could_not_be_finished(
     tmp_path: Path, monkeypatch, capsys
 ) -> None:
-    from imubench_pipeline.recording import LogWriter
+    from imubench_pipeline.recordings.recording import LogWriter
 
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")

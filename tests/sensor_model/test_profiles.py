@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imubench_pipeline.sensor_model.profile_files import FileSeries
-from imubench_pipeline.sensor_model.profile_forms import Surroundings
-from imubench_pipeline.sensor_model.profiles import profiles_of
+from imubench_pipeline.settings.profile_forms import Surroundings
+from imubench_pipeline.settings.validation import ConfigError, parse
+from imubench_pipeline.simulate.profile_files import FileSeries
+from imubench_pipeline.simulate.profiles import profiles_of
 from imubench_pipeline.units import UnitError, difference_to_si
-from imubench_pipeline.validation import ConfigError, parse
 
 
 def profiles(settings: dict, folder: Path = Path()):

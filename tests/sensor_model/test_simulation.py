@@ -6,11 +6,11 @@ from scipy import signal
 from scipy.stats import chi2
 
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
-from imubench_pipeline.sensor_model.imu import BLOCK, ImuModel, simulate_imu
-from imubench_pipeline.sensor_model.low_pass import LowPass
-from imubench_pipeline.sensor_model.model import SensorModel, TemperatureDrift
-from imubench_pipeline.sensor_model.profiles import Constant, DayCycle, Profile, WarmUp
-from imubench_pipeline.sensor_model.simulation import CHUNK, simulate, simulate_blocks
+from imubench_pipeline.noise.low_pass import LowPass
+from imubench_pipeline.simulate.imu import BLOCK, ImuModel, simulate_imu
+from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift
+from imubench_pipeline.simulate.profiles import Constant, DayCycle, Profile, WarmUp
+from imubench_pipeline.simulate.simulation import CHUNK, simulate, simulate_blocks
 from tests.sensor_model import theory
 
 pytestmark = pytest.mark.xdist_group("test_simulation")  # its logs are made once

@@ -7,16 +7,12 @@ from hypothesis import strategies as st
 from mpmath import mp, mpf, workdps
 
 from imubench_pipeline.noise import NoiseModel, RandomWalk, Sinusoid, WhiteNoise
-from imubench_pipeline.noise_terms import Flicker, GaussMarkov
-from imubench_pipeline.sensor_model.discretisation import (
-    filter_transition,
-    slow_sources,
-    white_factor,
-)
-from imubench_pipeline.sensor_model.flicker_band import bank, ripple
-from imubench_pipeline.sensor_model.low_pass import LowPass
-from imubench_pipeline.sensor_model.model import SensorModel, bank_for, sources_of
-from imubench_pipeline.sensor_model.spectra import allan_variance as closed_form
+from imubench_pipeline.noise.low_pass import LowPass
+from imubench_pipeline.noise.terms import Flicker, GaussMarkov
+from imubench_pipeline.simulate.discretisation import filter_transition, slow_sources, white_factor
+from imubench_pipeline.simulate.flicker_band import bank, ripple
+from imubench_pipeline.simulate.model import SensorModel, bank_for, sources_of
+from imubench_pipeline.simulate.spectra import allan_variance as closed_form
 from tests.sensor_model import theory
 
 RATE = 100.0

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from imubench_pipeline.cli import main
+from imubench_pipeline.run.cli import main
 from imubench_pipeline.tables import build, write_arrow
 
 ASKED = """

@@ -5,15 +5,15 @@ from typing import Any
 
 import pytest
 
-from imubench_pipeline.error_budget.growth import Uncalibrated, variance
+from imubench_pipeline.navigation.shortlist.classes import MeasuredRanges, measured_ranges
+from imubench_pipeline.navigation.shortlist.figures import printed_ranges
+from imubench_pipeline.navigation.shortlist.rows import VERDICTS, shortlist_rows
 from imubench_pipeline.noise import FLOOR, Flicker, GaussMarkov
-from imubench_pipeline.requirements import Requirement
-from imubench_pipeline.sensor import Sensor, read_sensors
-from imubench_pipeline.shortlist.classes import MeasuredRanges, measured_ranges
-from imubench_pipeline.shortlist.figures import printed_ranges
-from imubench_pipeline.shortlist.rows import VERDICTS, shortlist_rows
+from imubench_pipeline.noise.growth import Uncalibrated, variance
+from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.settings.sensor import Sensor, read_sensors
+from imubench_pipeline.settings.validation import parse
 from imubench_pipeline.tables import build
-from imubench_pipeline.validation import parse
 from tests.conftest import PROJECT
 from tests.test_configuration import SENSOR
 

@@ -3,8 +3,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from imubench_pipeline.plan import STEPS, Plan
-from imubench_pipeline.resources import Extent, asked, resources_of, size_as_text
+from imubench_pipeline.run.plan import STEPS, Plan
+from imubench_pipeline.run.resources import Extent, asked, resources_of, size_as_text
 from tests.conftest import PROJECT
 from tests.workflow.project import put_log, put_sensor
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from imubench_pipeline.resources import Extent, resources_of
+from imubench_pipeline.run.resources import Extent, resources_of
 from tests.workflow.project import Project, linked, put_log, put_sensor
 from tests.workflow.test_workflow import STEPS_OF_A_RECORDING
 

@@ -4,9 +4,9 @@ from typing import Any
 
 import pytest
 
-from imubench_pipeline.requirements import Must
-from imubench_pipeline.sensor import CHANNELS, Sensor
-from imubench_pipeline.suitability.abilities import abilities, judge
+from imubench_pipeline.navigation.suitability.abilities import abilities, judge
+from imubench_pipeline.settings.requirements import Must
+from imubench_pipeline.settings.sensor import CHANNELS, Sensor
 
 FIGURES = {
     "full_scale": {"value": [125, 250], "unit": "deg/s", "kind": "choices"},

@@ -4,13 +4,13 @@ from typing import Any
 
 import pytest
 
-from imubench_pipeline.error_budget.printed_errors import in_use
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.expected_errors import error_rows, of_requirement
-from imubench_pipeline.printed import Datasheet
-from imubench_pipeline.requirements import Requirement
-from imubench_pipeline.selection import ranking_rows
-from imubench_pipeline.suitability.conditions import in_words
+from imubench_pipeline.navigation.error_budget.printed_errors import in_use
+from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement
+from imubench_pipeline.navigation.selection import ranking_rows
+from imubench_pipeline.navigation.suitability.conditions import in_words
+from imubench_pipeline.settings.printed import Datasheet
+from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.tables import build
 
 CHANNELS = ("gyro_x", "accel_x")

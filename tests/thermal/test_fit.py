@@ -6,13 +6,13 @@ import pytest
 from scipy.linalg import toeplitz
 
 from imubench_pipeline.allan import allan_variance
+from imubench_pipeline.estimators.spectrum import block_of, spectra
+from imubench_pipeline.estimators.thermal.fit import fit_temperature
+from imubench_pipeline.estimators.thermal.path import temperature_path
+from imubench_pipeline.estimators.thermal.products import BlockSeries, Coefficients
+from imubench_pipeline.estimators.thermal.regression import Regressors
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.simulate import simulate
-from imubench_pipeline.spectrum import block_of, spectra
-from imubench_pipeline.thermal.fit import fit_temperature
-from imubench_pipeline.thermal.path import temperature_path
-from imubench_pipeline.thermal.products import BlockSeries, Coefficients
-from imubench_pipeline.thermal.regression import Regressors
+from imubench_pipeline.noise.simulate import simulate
 
 RATE = 5.0
 SAMPLES = 90_000
@@ -167,7 +167,7 @@ def test_a_constant_temperature_is_refused_before_holes_are_filled_again(monkeyp
     def never(*_):
         raise AssertionError("a joint fit")
 
-    monkeypatch.setattr("imubench_pipeline.thermal.fit._Fit.settle", never)
+    monkeypatch.setattr("imubench_pipeline.estimators.thermal.fit._Fit.settle", never)
     fit = fitted(log, np.full(SAMPLES, 21.0), holes=True)
     assert "changes" in fit.sensitivity.reason
     assert fit.bias.lower < 3e-3 < fit.bias.upper

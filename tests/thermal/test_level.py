@@ -1,8 +1,8 @@
 import pytest
 
 from imubench_pipeline.estimators.estimate import Parameter
+from imubench_pipeline.estimators.thermal.level import with_likely_walk
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.thermal.level import with_likely_walk
 
 
 def test_a_walk_that_does_not_show_is_as_strong_as_it_may_be():

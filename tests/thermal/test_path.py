@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from imubench_pipeline.thermal.path import temperature_path
-from imubench_pipeline.thermal.path_kernels import cell_moments
-from imubench_pipeline.thermal.register import KNOTS, readings, step_of
+from imubench_pipeline.estimators.thermal.path import temperature_path
+from imubench_pipeline.estimators.thermal.path_kernels import cell_moments
+from imubench_pipeline.estimators.thermal.register import KNOTS, readings, step_of
 
 SAMPLES = 60_000
 TIME = np.arange(SAMPLES) / SAMPLES

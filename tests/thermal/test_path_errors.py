@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from imubench_pipeline.estimators.spectrum import spectra
+from imubench_pipeline.estimators.thermal.path_errors import without_errors
 from imubench_pipeline.estimators.whittle import Terms, whittle_of
-from imubench_pipeline.spectrum import spectra
-from imubench_pipeline.thermal.path_errors import without_errors
 
 RATE, N, K = 1.0, 1e-3, 1e-5
 

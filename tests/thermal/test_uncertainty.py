@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from imubench_pipeline.thermal.uncertainty import told_lag
+from imubench_pipeline.estimators.thermal.uncertainty import told_lag
 
 
 def posterior(rng, best, spread=10.0):

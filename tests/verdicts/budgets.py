@@ -3,13 +3,13 @@
 from typing import Any
 
 from imubench_pipeline.estimators.estimate import Estimate
-from imubench_pipeline.expected_errors import error_rows, of_requirement
-from imubench_pipeline.requirements import Requirement
-from imubench_pipeline.selection import ranked
+from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement
+from imubench_pipeline.navigation.selection import ranked
+from imubench_pipeline.navigation.verdicts.basis import Basis
+from imubench_pipeline.navigation.verdicts.judgement import judgements
+from imubench_pipeline.navigation.verdicts.next_steps import next_step_rows
+from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.tables import build
-from imubench_pipeline.verdicts.basis import Basis
-from imubench_pipeline.verdicts.judgement import judgements
-from imubench_pipeline.verdicts.next_steps import next_step_rows
 from tests.test_selection import white
 
 Rows = list[dict[str, Any]]

@@ -4,8 +4,8 @@ import pytest
 from scipy import stats
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.verdicts.next_steps import specimens_needed
-from imubench_pipeline.verdicts.specimens import Expected, Spread
+from imubench_pipeline.navigation.verdicts.next_steps import specimens_needed
+from imubench_pipeline.navigation.verdicts.specimens import Expected, Spread
 from tests.verdicts.budgets import HEADING, about, doubt, gyro, judge, requirement, three_axes
 
 FACTOR = 1 / math.degrees(1.0)

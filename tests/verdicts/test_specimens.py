@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from imubench_pipeline.verdicts.specimens import Spread, expected, usual_spread
+from imubench_pipeline.navigation.verdicts.specimens import Spread, expected, usual_spread
 from tests.verdicts.budgets import HEADING, about, gyro, judge
 
 

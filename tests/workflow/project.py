@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 import yaml
 
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.simulate import simulate
+from imubench_pipeline.noise.simulate import simulate
 from tests.conftest import PROJECT
 
 CHANNELS = {
@@ -49,7 +49,7 @@ class Project:
 
     def nightly_command(self, *flags: str, cores: int = 2) -> list[str]:
         """`imubench nightly`, which takes logs as they are."""
-        command = "import sys; from imubench_pipeline.cli import main; sys.exit(main())"
+        command = "import sys; from imubench_pipeline.run.cli import main; sys.exit(main())"
         return [sys.executable, "-c", command, "nightly", "--project", str(self.place),
                 f"-c{cores}", "--settle", "0", *flags, "--config", *self.config()]  # fmt: skip
 

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.simulate import simulate
+from imubench_pipeline.noise.simulate import simulate
 from tests.calibration.recordings import BIAS, SCALE, STEPS, UP, on_table
 from tests.earth_rate.runs import turned
 from tests.workflow.project import Job, Project, linked

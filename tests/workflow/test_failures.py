@@ -66,13 +66,13 @@ def faulty(project: Project, tmp_path_factory: pytest.TempPathFactory) -> dict[s
     package = Path(imubench_pipeline.__file__).parent
     copy = place / package.name
     shutil.copytree(package, copy)  # with what numba has compiled
-    put_fault(copy / "estimation.py", "estimates: dict[str, Estimate] = {}", FAULTS)
+    put_fault(copy / "steps/estimate.py", "estimates: dict[str, Estimate] = {}", FAULTS)
     names = (
         'names = {"sensor": sensor, "device": notes.device or recording, "recording": recording}'
     )
-    put_fault(copy / "ingest.py", names, IN_INGEST)
+    put_fault(copy / "recordings/ingest.py", names, IN_INGEST)
     rows = 'rows: dict[str, list[Row]] = {"alignment": [], "earth_rate_prediction": []}'
-    put_fault(copy / "alignment/of_sensor.py", rows, IN_OUTLOOK)
+    put_fault(copy / "steps/outlook.py", rows, IN_OUTLOOK)
     project.environment = os.environ | {"PYTHONPATH": str(place)}
     settings = project.settings.copy()
     project.settings.pop()

@@ -232,12 +232,12 @@ def test_edits_of_titles_run_the_report(project: Project) -> None:
 
 
 def test_an_edit_of_a_reader_runs_every_log(project: Project, code: Path) -> None:
-    replace(code / "readers/csv.py", '"""', '"""Again. ')
+    replace(code / "readers/text/csv.py", '"""', '"""Again. ')
     assert project.job_list() == steps_of(*ALL)
 
 
 def test_an_edit_of_the_overbound_runs_the_exports(project: Project, code: Path) -> None:
-    replace(code / "overbound.py", '"""', '"""Again. ')
+    replace(code / "export/overbound.py", '"""', '"""Again. ')
     assert project.job_list() == {("exports", "")}
 
 

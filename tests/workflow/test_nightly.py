@@ -24,7 +24,7 @@ pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("workflow")]
 
 ENTRY = """
 import argparse, sys
-from imubench_pipeline.nightly import command
+from imubench_pipeline.run.nightly import command
 parser = argparse.ArgumentParser()
 command.add_arguments(parser)
 sys.exit(command.run(parser.parse_args()))

@@ -1,29 +1,11 @@
 """Compute the Allan variance of every channel of a recording."""
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
-from imubench_pipeline.allan import cluster_sizes, of_blocks, of_phase
-from imubench_pipeline.config import AllanSettings
-from imubench_pipeline.phase import integrate
-from imubench_pipeline.recording import static_logs
-from imubench_pipeline.results import Key, Row, allan_rows
+from imubench_pipeline.settings.config import AllanSettings
+from imubench_pipeline.steps.allan import curves
 from imubench_pipeline.tables import write
-
-
-def curves(folder: Path, sensor: str, recording: str, settings: AllanSettings) -> Iterator[Row]:
-    """Yield the rows of the table ``allan``; none of a rejected recording."""
-    for channel, log in static_logs(folder).items():
-        sizes = cluster_sizes(log.grid, per_decade=settings.per_decade, longest=settings.longest)
-        blocks, holes, segments = log.blocks(), log.holes, log.segments
-        if settings.overlap == "octave":
-            curve = of_blocks(blocks, log.grid, log.rate, sizes, holes=holes, segments=segments)
-        else:
-            phase = integrate(blocks, log.grid, holes=holes, segments=segments)
-            curve = of_phase(phase, log.rate, sizes)
-        yield from allan_rows(Key(sensor, recording, channel), curve)
-
 
 if __name__ == "__main__":
     names = snakemake.wildcards

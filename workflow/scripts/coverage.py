@@ -1,23 +1,8 @@
 """Say what vendors publish of the sensors of the catalogue."""
 
-from dataclasses import asdict
 from pathlib import Path
 
-from imubench_pipeline.coverage import by_vendor, coverage
-from imubench_pipeline.results import sensors_of
-from imubench_pipeline.tables import build, write_arrow
-
-
-def main(catalogue: str, outputs: list[Path]) -> None:
-    """Write the tables ``coverage`` and ``coverage_by_vendor``, as Parquet and CSV."""
-    found = coverage(sensors_of(catalogue))
-    tables = {
-        "coverage": build("coverage", map(asdict, found)),
-        "coverage_by_vendor": build("coverage_by_vendor", map(asdict, by_vendor(found))),
-    }
-    for output in outputs:
-        write_arrow(tables[output.stem], output)
-
+from imubench_pipeline.steps.coverage import write_coverage
 
 if __name__ == "__main__":
-    main(snakemake.params.catalogue, [Path(path) for path in snakemake.output])
+    write_coverage(snakemake.params.catalogue, [Path(path) for path in snakemake.output])

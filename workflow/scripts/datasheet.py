@@ -1,58 +1,9 @@
 """Compare the estimates of a recording, and its fixed bias, with its sensor's datasheet."""
 
-import json
-from collections.abc import Iterator
-from dataclasses import asdict
 from pathlib import Path
 
-from imubench_pipeline.comparable import SENSITIVITY, comparables
-from imubench_pipeline.datasheet import bias_deltas, curve_rms, deltas
-from imubench_pipeline.measured import sensitivity
-from imubench_pipeline.printed import Datasheet
-from imubench_pipeline.results import Quality, Row, curves, estimates
-from imubench_pipeline.tables import read, write
-
-
-def rows(folder: Path, sensor: str, recording: str, settings: str) -> Iterator[Row]:
-    """Yield the rows of the table ``datasheet``; none of a rejected recording."""
-    quality = Quality.read(folder / "quality.json")
-    measured = curves(folder / "allan.parquet", quality)
-    temperatures = [quality.recording.get(f"temperature_{end}") for end in ("min", "max")]
-    thermal = read("temperature", [folder / "temperature.parquet"]).to_pylist()
-    biases = read("fixed_bias", [folder / "fixed_bias.parquet"]).to_pylist()
-    means = {row["channel"]: row["value"] for row in biases}
-    given = json.loads(settings)
-    datasheet, tolerance = Datasheet.model_validate(given["datasheet"]), given["tolerance"]
-    for channel, by_method in estimates(folder / "parameters.parquet").items():
-        tau = measured[channel].up_to(given["longest"])
-        names = {"sensor": sensor, "recording": recording, "channel": channel}
-        for estimate in by_method:
-            for delta in deltas(datasheet, channel, estimate, tau, tolerance):
-                yield names | {"method": estimate.method} | asdict(delta)
-        own = [row for row in thermal if row["channel"] == channel]
-        for delta in bias_deltas(
-            datasheet, channel, means, tolerance, sensitivity(own, *temperatures)
-        ):
-            method = "temperature" if delta.statistic == SENSITIVITY else "mean"
-            yield names | {"method": method} | asdict(delta)
-
-
-def curve_rows(folder: Path, sensor: str, recording: str, settings: str) -> Iterator[Row]:
-    """Yield the rows of the table ``datasheet_curve``; none where a datasheet has no line."""
-    measured = curves(folder / "allan.parquet", Quality.read(folder / "quality.json"))
-    datasheet = Datasheet.model_validate(json.loads(settings)["datasheet"])
-    for channel, curve in measured.items():
-        names = {"sensor": sensor, "recording": recording, "channel": channel}
-        printed = list(comparables(datasheet, channel))
-        for found in curve_rms(printed, curve.tau, curve.deviation):
-            yield names | {
-                "sidedness": found.noise.sidedness if found.noise else None,
-                "N": found.noise.value if found.noise else None,
-                "floor": found.floor.value if found.floor else None,
-                "rms": found.rms,
-                "rms_log10": found.rms_log10,
-            }
-
+from imubench_pipeline.steps.datasheet import curve_rows, rows
+from imubench_pipeline.tables import write
 
 if __name__ == "__main__":
     names = snakemake.wildcards

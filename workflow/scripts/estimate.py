@@ -1,28 +1,9 @@
 """Estimate the noise parameters of every channel by every method."""
 
-import json
 from pathlib import Path
 
-from imubench_pipeline.config import EstimateSettings
-from imubench_pipeline.estimation import Estimation, estimate_channel
-from imubench_pipeline.recording import static_logs
-from imubench_pipeline.results import Key, Quality, curves
+from imubench_pipeline.steps.estimate import estimation
 from imubench_pipeline.tables import write
-
-
-def estimation(
-    quality: Path, curve: Path, sensor: str, recording: str, settings: str
-) -> Estimation:
-    """Return the rows that the channels leave; none of a rejected recording."""
-    given = json.loads(settings)
-    found = Estimation()
-    measured = curves(curve, Quality.read(quality))
-    for channel, log in static_logs(quality.parent).items():
-        key = Key(sensor, recording, channel)
-        how = EstimateSettings.model_validate(given["estimate"])
-        estimate_channel(key, log, measured[channel], how, given["bandwidth"], found)
-    return found
-
 
 if __name__ == "__main__":
     names = snakemake.wildcards

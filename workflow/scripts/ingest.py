@@ -1,23 +1,14 @@
 """Read a recording into Parquet; one that cannot be used is recorded as rejected."""
 
-from dataclasses import asdict
 from pathlib import Path
 
-from imubench_pipeline.ingest import ingest_as_planned
-from imubench_pipeline.overview import overview
-from imubench_pipeline.tables import write, write_json
+from imubench_pipeline.steps.ingest import write_recording
 
 if __name__ == "__main__":
-    names, outputs = snakemake.wildcards, snakemake.output
-    folder = Path(outputs.quality).parent
-    quality = ingest_as_planned(
+    write_recording(
         Path(snakemake.params.source),
         snakemake.params.settings,
-        names.sensor,
-        names.recording,
-        folder,
+        snakemake.wildcards.sensor,
+        snakemake.wildcards.recording,
+        {name: Path(path) for name, path in snakemake.output.items()},
     )
-    seen = overview(folder, names.sensor, names.recording)
-    write("envelope", seen.envelope, Path(outputs.envelope))
-    write("histogram", seen.histogram, Path(outputs.histogram))
-    write_json(asdict(quality), Path(outputs.quality))

@@ -1,29 +1,11 @@
 """Compare the fixed biases of each device from one turn-on to the next with its datasheet."""
 
-import json
 from pathlib import Path
 
-from imubench_pipeline.config import DatasheetSettings
-from imubench_pipeline.repeatability.rows import repeatability_rows
-from imubench_pipeline.results import sensors_of
-from imubench_pipeline.tables import build, read, write_arrow
-
-
-def main(
-    biases: Path, recordings: Path, settings: str, catalogue: str, outputs: list[Path]
-) -> None:
-    """Write the table ``repeatability``, as Parquet and CSV."""
-    how = DatasheetSettings.model_validate(json.loads(settings))
-    fixed = read("fixed_bias", [biases]).to_pylist()
-    about = read("recordings", [recordings]).to_pylist()
-    found = repeatability_rows(fixed, about, sensors_of(catalogue), how.tolerance)
-    table = build("repeatability", found)
-    for output in outputs:
-        write_arrow(table, output)
-
+from imubench_pipeline.steps.repeatability import write_repeatability
 
 if __name__ == "__main__":
-    main(
+    write_repeatability(
         Path(snakemake.input.biases),
         Path(snakemake.input.recordings),
         snakemake.params.settings,

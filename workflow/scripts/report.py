@@ -2,19 +2,10 @@
 
 from pathlib import Path
 
-from imubench_pipeline.report.publish import publish, site_of
-from imubench_pipeline.tables import read
-
-
-def main(tables: list[Path], settings: str, start_page: Path) -> None:
-    """Write the report; its start page is the last to appear."""
-    folder = start_page.parent
-    site = site_of({path.stem: read(path.stem, [path]) for path in tables}, settings, folder.parent)
-    publish(site, folder)
-
+from imubench_pipeline.steps.report import write_report
 
 if __name__ == "__main__":
-    main(
+    write_report(
         [Path(path) for path in snakemake.input.tables],
         snakemake.params.settings,
         Path(snakemake.output[0]),

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from imubench_pipeline.results import joined_tables
+from imubench_pipeline.steps.sensor_tables import joined_tables
 from imubench_pipeline.tables import write_arrow
 
 if __name__ == "__main__":

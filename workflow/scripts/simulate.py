@@ -1,21 +1,8 @@
 """Write a simulated recording, in the layout of its sensor's logs."""
 
-import json
 from pathlib import Path
 
-from imubench_pipeline.sensor import LogFormat
-from imubench_pipeline.simulated_logs import write_simulated
-from imubench_pipeline.simulated_recordings import SimulatedRecording
-from imubench_pipeline.tables import making
-
-
-def main(settings: str, folder: Path) -> None:
-    """Write the recording into ``folder``, which appears when it is complete."""
-    given = json.loads(settings)
-    recording = SimulatedRecording.model_validate(given["recording"])
-    with making(folder) as made:
-        write_simulated(recording, LogFormat.model_validate(given["log"]), made)
-
+from imubench_pipeline.steps.simulate import write_recording
 
 if __name__ == "__main__":
-    main(snakemake.params.settings, Path(snakemake.output[0]))
+    write_recording(snakemake.params.settings, Path(snakemake.output[0]))

@@ -2,15 +2,11 @@
 
 from pathlib import Path
 
-from imubench_pipeline.failures import read_with_failures, with_failures
-from imubench_pipeline.faults import Failure
+from imubench_pipeline.steps.tables import tables_of_all
 from imubench_pipeline.tables import write_arrow
 
 if __name__ == "__main__":
-    joined, failures = {}, dict[Failure, None]()
-    for name, paths in snakemake.input.items():
-        joined[name], failed = read_with_failures(name, [Path(path) for path in paths])
-        failures |= dict.fromkeys(failed)
-    joined = with_failures(joined, list(failures))
+    parts = {name: [Path(path) for path in paths] for name, paths in snakemake.input.items()}
+    joined = tables_of_all(parts)
     for output in map(Path, snakemake.output):
         write_arrow(joined[output.stem], output)

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.findings import Finding
+from imubench_pipeline.tables.findings import Finding
 
 _READ = 1.25
 """Factor beyond the limits of the likelihood that a value without limits may lie."""

@@ -8,10 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle import COARSE, Maximum, Terms, Whittle, whittle_of
-from imubench_pipeline.spectrum import Spectrum
-
-Array = NDArray[np.float64]
 
 _DEFAULT = 1 / 20
 """Part of the rate below which filters are expected to be flat."""

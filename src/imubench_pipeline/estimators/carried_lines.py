@@ -19,7 +19,7 @@ import numpy as np
 
 from imubench_pipeline.estimators.estimate import SI_UNITS, Parameter
 from imubench_pipeline.estimators.lines import Line
-from imubench_pipeline.findings import Finding
+from imubench_pipeline.tables.findings import Finding
 
 STRONGEST = 12
 """Lines that are carried as they are where there are too many."""

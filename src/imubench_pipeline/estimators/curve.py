@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.estimators.estimate import Estimate, Parameter, not_shown
 from imubench_pipeline.noise import FLOOR, PEAK_TAU
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _WINDOW = 0.5
 """Decades of tau over which a local slope is taken."""

@@ -27,9 +27,8 @@ from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.whittle import Terms
 from imubench_pipeline.noise import FLOOR, PEAK_TAU, GaussMarkov, NoiseModel
-from imubench_pipeline.noise_terms import gauss_markov_shape
-
-Array = NDArray[np.float64]
+from imubench_pipeline.noise.terms import gauss_markov_shape
+from imubench_pipeline.typing import Array
 
 LONGEST = 1 / 9
 """Part of the log up to which a curve is taken to be shown."""

@@ -7,15 +7,13 @@ from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from imubench_pipeline.cutoff import Cutoff
+from imubench_pipeline.estimators.cutoff import Cutoff
 from imubench_pipeline.estimators.estimate import CURVE, Estimate, Parameter, Status
 from imubench_pipeline.estimators.frame import Frame
 from imubench_pipeline.estimators.model_choice import Candidate
-from imubench_pipeline.spectrum import Spectrum
-
-Array = NDArray[np.float64]
+from imubench_pipeline.estimators.spectrum import Spectrum
+from imubench_pipeline.typing import Array
 
 _WORSE = 6.0
 """BIC by which the papers' model must be the worse for the data to be against it."""

@@ -12,7 +12,6 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.estimate import FAMILY, JointDraws
 from imubench_pipeline.estimators.model_choice import (
@@ -23,8 +22,7 @@ from imubench_pipeline.estimators.model_choice import (
 )
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.whittle import Terms
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 NUMBER = 200
 """Draws that are kept of an estimate."""

@@ -6,12 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 Status = Literal["ok", "doubtful", "not_shown", "at_bound", "not_identified", "absent"]
 

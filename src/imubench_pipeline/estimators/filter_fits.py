@@ -7,16 +7,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
 from imubench_pipeline.estimators.goodness import goodness
 from imubench_pipeline.estimators.low_pass import BOXCAR, Filter, Kind
+from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle import COARSE, Behind, Terms, Whittle, whittle_of
 from imubench_pipeline.estimators.whittle_kernels import best_powers
-from imubench_pipeline.spectrum import Spectrum
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _POINTS = 6
 """Frequencies of a bin over which a density is averaged."""

@@ -1,7 +1,7 @@
 """What of a spectrum is fitted, and behind what: lines apart, the sensor's low-pass, the band.
 
 Noise alone and noise behind a low-pass are decided together, by likelihood over the whole spectrum
-(`imubench_pipeline.cutoff`). Frequencies are left out only where neither explains them.
+(`imubench_pipeline.estimators.cutoff`). Frequencies are left out only where neither explains them.
 """
 
 from __future__ import annotations
@@ -13,12 +13,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.cutoff import Cutoff, find_cutoff
 from imubench_pipeline.estimators.band import Band, find_band
+from imubench_pipeline.estimators.cutoff import Cutoff, find_cutoff
 from imubench_pipeline.estimators.filter_fits import PROCESSES, UNFOLDED
+from imubench_pipeline.estimators.joint_cutoff import refined
 from imubench_pipeline.estimators.lines import Line, find, without_lines
 from imubench_pipeline.estimators.model_choice import Candidate, rescored
 from imubench_pipeline.estimators.posterior import Posterior
+from imubench_pipeline.estimators.spectrum import LineSpectrum, Spectrum
 from imubench_pipeline.estimators.whittle import (
     COARSE,
     SHAPES,
@@ -27,8 +29,6 @@ from imubench_pipeline.estimators.whittle import (
     model_of,
     whittle_of,
 )
-from imubench_pipeline.joint_cutoff import refined
-from imubench_pipeline.spectrum import LineSpectrum, Spectrum
 
 Mask = NDArray[np.bool_]
 
@@ -218,7 +218,7 @@ def frame_of(
     ----------
     spectrum : Spectrum
     line_spectra : sequence of LineSpectrum
-        As `imubench_pipeline.spectrum.spectra` gives them.
+        As `imubench_pipeline.estimators.spectrum.spectra` gives them.
     band : float, optional
         Highest frequency to use, Hz; by default all are used, behind the low-pass that shows.
     bandwidth : float, optional

@@ -6,10 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import erfc, polygamma, psi
 
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 DOUBT = 1e-3
 """Chance below which a fit is called poor."""

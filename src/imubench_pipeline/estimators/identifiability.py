@@ -6,13 +6,11 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from imubench_pipeline.estimators.spectrum import SINGLE, WIDTH, Spectrum
 from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.spectrum import SINGLE, WIDTH, Spectrum
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 NOT_IDENTIFIED = 0.3
 """Relative standard deviation beyond which a B is not given as a number."""

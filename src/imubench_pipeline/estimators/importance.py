@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 from scipy.stats import qmc
 
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _FREEDOM = 5
 _KEPT = 0.15

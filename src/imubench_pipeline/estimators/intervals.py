@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.band import Band
 from imubench_pipeline.estimators.estimate import FAMILY, Estimate, Parameter
@@ -23,8 +22,7 @@ from imubench_pipeline.estimators.identifiability import (
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _AT_BOUND = 0.985
 _WIDTH_OF_INTERVAL = 3.92

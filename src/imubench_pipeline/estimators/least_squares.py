@@ -24,8 +24,7 @@ from imubench_pipeline.noise import (
     gauss_markov_shape,
     sampled_gauss_markov_shape,
 )
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _FEWEST_POINTS = 4
 _BEYOND_FILTERS = 16

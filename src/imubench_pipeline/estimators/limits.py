@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.allan import AllanCurve
-from imubench_pipeline.confidence import equivalent_degrees
+from imubench_pipeline.allan.confidence import equivalent_degrees
 from imubench_pipeline.estimators.curve_bias import (
     averaging_times,
     lowest_parameters,
@@ -26,9 +26,8 @@ from imubench_pipeline.estimators.curve_bias import (
 )
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.variance_covariance import variance_covariance
-
-Array = NDArray[np.float64]
+from imubench_pipeline.noise.variance_covariance import variance_covariance
+from imubench_pipeline.typing import Array
 
 _SIGMAS = 1.96
 """Half the width of a 95 % interval."""

@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.special import betainc, gammainccinv
 
+from imubench_pipeline.estimators.spectrum import LineSpectrum, Spectrum
 from imubench_pipeline.noise import NoiseModel, Sinusoid
-from imubench_pipeline.spectrum import LineSpectrum, Spectrum
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 FALSE_ALARM = 0.005
 """Chance that a channel without lines shows one."""

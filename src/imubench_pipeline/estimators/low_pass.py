@@ -18,12 +18,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from imubench_pipeline.sensor_model.low_pass import LowPass
-
-Array = NDArray[np.float64]
+from imubench_pipeline.noise.low_pass import LowPass
+from imubench_pipeline.typing import Array
 
 Kind = Literal["analogue", "bilinear", "boxcar"]
 

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.posterior_kernels import log_posterior
 from imubench_pipeline.estimators.whittle_kernels import Bins, ShapeTable
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _BURN_IN = 4_000
 _ADAPT_EVERY = 250

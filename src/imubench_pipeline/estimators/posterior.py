@@ -14,15 +14,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.importance import Mixture, adapted
 from imubench_pipeline.estimators.metropolis import chain
 from imubench_pipeline.estimators.posterior_kernels import log_posteriors, mode_at
 from imubench_pipeline.estimators.whittle import Maximum, Whittle
 from imubench_pipeline.estimators.whittle_kernels import Bins, ShapeTable, shape_at
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 DRAWS = 20_000
 """Draws that are kept, unless fewer are asked for."""

@@ -11,11 +11,9 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.whittle_kernels import Bins, ShapeTable, cost_of, shape_at
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _MOST_STEPS = 40
 _TOLERANCE = 1e-3

@@ -15,6 +15,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from imubench_pipeline.estimators.spectral_shapes import Shapes
+from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle_kernels import (
     Bins,
     ShapeTable,
@@ -24,10 +26,7 @@ from imubench_pipeline.estimators.whittle_kernels import (
     two_processes,
 )
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
-from imubench_pipeline.spectral_shapes import Shapes
-from imubench_pipeline.spectrum import Spectrum
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 SHAPES = 192
 """Correlation times at which the shape of a Gauss-Markov process is tabulated."""

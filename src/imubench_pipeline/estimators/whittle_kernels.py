@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _SCAN_STEP = 4
 _PAIR_STEP = 12

@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.estimators.rows import estimate_of
 from imubench_pipeline.export.imu import AxisNoise, ExportError
 from imubench_pipeline.export.temperature import AXES
-from imubench_pipeline.results import estimate_of
+from imubench_pipeline.typing import Row
 
-Row = Mapping[str, Any]
 Key = tuple[str, str]  # recording, channel
 
 WORST, MEDIAN = "worst", "median"

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, RandomWalk, Term, WhiteNoise
-from imubench_pipeline.noise_terms import Array
+from imubench_pipeline.typing import Array
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 

@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.export.temperature import TemperatureEffect
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
-from imubench_pipeline.units import STANDARD_GRAVITY
 
 
 class ExportError(ValueError):

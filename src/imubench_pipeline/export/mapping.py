@@ -13,7 +13,7 @@ the horizon, and at most below it, stands in the file. For a horizon of 60 s and
 Allan deviation of the MTi-7's gyro is off by -8 % at 30 s and +22 % at 120 s, that of the C102's
 accelerometer by -4 and +13 %, that of flicker noise, of which no random walk is a likeness, by -26
 and +40 %. A model that errs to the safe side at every tau is that of
-`imubench_pipeline.overbound`.
+`imubench_pipeline.export.overbound`.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from imubench_pipeline.noise import (
     WhiteNoise,
     bias_instability,
 )
-from imubench_pipeline.noise_terms import Array
+from imubench_pipeline.typing import Array
 
 _SHORTEST = 1 / 30
 """Shortest tau over the horizon at which a process is compared, and shortest T_B tried."""

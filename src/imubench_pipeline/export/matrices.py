@@ -37,7 +37,7 @@ from imubench_pipeline.noise import (
     Term,
     WhiteNoise,
 )
-from imubench_pipeline.noise_terms import Array
+from imubench_pipeline.typing import Array
 
 FOLLOWED = 4.0
 """Tau over the horizon up to which flicker noise is followed."""

@@ -12,18 +12,18 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from imubench_pipeline.allan import AllanCurve
+from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.estimators.rows import draws
 from imubench_pipeline.export.choice import WORST, Choice, choose, devices_of
 from imubench_pipeline.export.imu import AxisNoise, ExportError, Imu, normal_gravity
 from imubench_pipeline.export.mapping import named
+from imubench_pipeline.export.overbound import MOST_EXCESS, overbound
+from imubench_pipeline.export.smallest_model import FAMILIES, Family
 from imubench_pipeline.export.targets import TARGETS
 from imubench_pipeline.export.temperature import TemperatureEffect, temperature_effect
-from imubench_pipeline.fitness import left_out
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.overbound import MOST_EXCESS, overbound
-from imubench_pipeline.results import draws
-from imubench_pipeline.smallest_model import FAMILIES, Family
+from imubench_pipeline.recordings.fitness import left_out
 from imubench_pipeline.tables import read
-from imubench_pipeline.units import STANDARD_GRAVITY
 
 Tables = Mapping[str, pa.Table]
 

@@ -1,7 +1,7 @@
 """Python that needs NumPy alone: the matrices of the noise at any rate, and a prediction.
 
 Held are white noise, Gauss-Markov processes, a random walk, and flicker noise as a bank of
-Gauss-Markov processes (`imubench_pipeline.flicker`) from the period of the samples to four times
+Gauss-Markov processes (`noise.flicker`) from the period of the samples to four times
 the horizon. Ramps, lines and quantization noise are not.
 """
 

@@ -18,7 +18,7 @@ from imubench_pipeline.export import (
     vins_fusion,
 )
 from imubench_pipeline.export.imu import Imu
-from imubench_pipeline.smallest_model import Family
+from imubench_pipeline.export.smallest_model import Family
 
 
 @dataclass(frozen=True)

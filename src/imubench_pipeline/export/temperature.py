@@ -2,7 +2,7 @@
 
     bias(T) - bias(T_0) = s (T - T_0) + q (T - T_0)^2,
 
-as `imubench_pipeline.thermal` fits it to one recording of one device. A correction that is wrong is
+as `estimators.thermal` fits it to one recording of one device. A correction that is wrong is
 worse than none, and no program here has a lag: an axis is left out, with the reason, unless the log
 tells s well enough for these uses.
 """
@@ -11,9 +11,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
-Row = Mapping[str, Any]
+from imubench_pipeline.typing import Row
 
 AXES = "xyz"
 

@@ -7,15 +7,7 @@ from importlib import import_module
 from itertools import islice
 from pathlib import Path
 
-from imubench_pipeline.readers.batch import (
-    POSITION,
-    TABLE_RATE,
-    TEMPERATURE,
-    Batch,
-    LogFile,
-    RecordingError,
-    stated_in,
-)
+from imubench_pipeline.readers.batch import Batch, LogFile, stated_in
 from imubench_pipeline.readers.compressed import (
     holds_text,
     is_archive,
@@ -24,17 +16,25 @@ from imubench_pipeline.readers.compressed import (
     visible,
 )
 from imubench_pipeline.readers.content import is_endless, is_ros_2_bag, reader_of
-from imubench_pipeline.sensor import ColumnSource, LogFormat, Reader
+from imubench_pipeline.settings.sensor import (
+    POSITION,
+    TABLE_RATE,
+    TEMPERATURE,
+    ColumnSource,
+    LogFormat,
+    Reader,
+)
+from imubench_pipeline.tables.findings import RecordingError
 
 _CLASSES: dict[Reader, tuple[str, str]] = {
-    "csv": ("imubench_pipeline.readers.csv", "CsvFile"),
-    "vectornav": ("imubench_pipeline.readers.vectornav", "VectorNavFile"),
-    "ubx": ("imubench_pipeline.readers.ubx", "UbxFile"),
-    "rosbag": ("imubench_pipeline.readers.rosbag", "RosbagFile"),
-    "matlab": ("imubench_pipeline.readers.matlab", "MatlabFile"),
-    "numpy": ("imubench_pipeline.readers.npy", "NumpyFile"),
-    "arrow": ("imubench_pipeline.readers.arrow", "ArrowFile"),
-    "hdf5": ("imubench_pipeline.readers.hdf5", "Hdf5File"),
+    "csv": ("imubench_pipeline.readers.text.csv", "CsvFile"),
+    "vectornav": ("imubench_pipeline.readers.vectornav.file", "VectorNavFile"),
+    "ubx": ("imubench_pipeline.readers.ubx.file", "UbxFile"),
+    "rosbag": ("imubench_pipeline.readers.rosbag.file", "RosbagFile"),
+    "matlab": ("imubench_pipeline.readers.arrays.matlab", "MatlabFile"),
+    "numpy": ("imubench_pipeline.readers.arrays.npy", "NumpyFile"),
+    "arrow": ("imubench_pipeline.readers.arrays.arrow", "ArrowFile"),
+    "hdf5": ("imubench_pipeline.readers.arrays.hdf5", "Hdf5File"),
 }
 """Module and class of each reader: only those that a run needs are imported."""
 

@@ -11,24 +11,22 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.findings import Finding
 from imubench_pipeline.readers.stated_units import StatedUnit, contradictions
-from imubench_pipeline.sensor import CHANNELS, QUANTITIES, ColumnSource, LogFormat, quantity_of
+from imubench_pipeline.settings.sensor import (
+    CHANNELS,
+    POSITION,
+    QUANTITIES,
+    TABLE_RATE,
+    TEMPERATURE,
+    ColumnSource,
+    LogFormat,
+    quantity_of,
+)
+from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.units import conversion
-
-TEMPERATURE = "temperature"
-"""Name of the temperature column of a recording."""
-
-POSITION = "position"
-"""Name of the column that says how a sensor that is turned stands."""
-
-TABLE_RATE = "table_rate"
-"""Name of the column with the rate of the table that a sensor stands on."""
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Seconds in a unit of time stamps."""
-
-_HALF_REASON = 700
 
 
 def stated_in(key: str) -> str:
@@ -40,19 +38,6 @@ def stated_in(key: str) -> str:
     """
     notes = "the notes beside the log or " if key == POSITION else ""
     return f"{notes}the sensor file"
-
-
-class RecordingError(ValueError):
-    """A recording that cannot be used; the text is the reason, with what to mend.
-
-    What a damaged file puts into it, such as a name of a million letters, is left out of the
-    middle.
-    """
-
-    def __init__(self, reason: str) -> None:
-        if len(reason) > 2 * _HALF_REASON:
-            reason = f"{reason[:_HALF_REASON]} [...] {reason[-_HALF_REASON:]}"
-        super().__init__(reason)
 
 
 @dataclass(frozen=True)

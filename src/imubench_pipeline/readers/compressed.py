@@ -16,7 +16,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import IO, Any
 
-from imubench_pipeline.readers.batch import RecordingError
+from imubench_pipeline.tables.findings import RecordingError
 
 _FED = 1 << 11
 """Bytes of zstd data decompressed at a time: they may stand for 32768 times as many."""

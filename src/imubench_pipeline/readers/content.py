@@ -5,9 +5,9 @@ from __future__ import annotations
 from contextlib import closing
 from pathlib import Path
 
-from imubench_pipeline.readers.batch import RecordingError
 from imubench_pipeline.readers.compressed import is_member, members, open_bytes
-from imubench_pipeline.sensor import Reader
+from imubench_pipeline.settings.sensor import Reader
+from imubench_pipeline.tables.findings import RecordingError
 
 _SEEN = 1 << 16
 _BEGINS: tuple[tuple[bytes, Reader], ...] = (

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.readers import log_files, only_log
-from imubench_pipeline.readers.batch import RecordingError
 from imubench_pipeline.readers.compressed import is_archive, is_member, members
 from imubench_pipeline.readers.content import content_of, is_ros_2_bag, reader_of
-from imubench_pipeline.sensor import LogFormat, Reader
+from imubench_pipeline.settings.sensor import LogFormat, Reader
+from imubench_pipeline.tables.findings import RecordingError
 
 Kind = Literal["number", "date", "text", "other"]
 
@@ -37,14 +37,14 @@ NOTHING_STATED = LogFormat.model_validate(
 """The format of a log of which nothing is known; what it has to have says nothing."""
 
 _HELD: dict[Reader, str] = {
-    "csv": "text_contents",
-    "vectornav": "vectornav_contents",
-    "ubx": "ubx_contents",
-    "rosbag": "rosbag_contents",
-    "matlab": "array_contents",
-    "numpy": "array_contents",
-    "arrow": "array_contents",
-    "hdf5": "array_contents",
+    "csv": "text.contents",
+    "vectornav": "vectornav.contents",
+    "ubx": "ubx.contents",
+    "rosbag": "rosbag.contents",
+    "matlab": "arrays.contents",
+    "numpy": "arrays.contents",
+    "arrow": "arrays.contents",
+    "hdf5": "arrays.contents",
 }
 """The module that looks into the files of each reader."""
 

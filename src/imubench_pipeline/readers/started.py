@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from imubench_pipeline.readers.batch import SECONDS
-from imubench_pipeline.sensor import TimeSource
+from imubench_pipeline.settings.sensor import TimeSource
 
 _YEAR_2001 = 978_307_200 * 10**9
 _YEAR_2100 = 4_102_444_800 * 10**9

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from imubench_pipeline.findings import Finding
 from imubench_pipeline.readers.spellings import divided, unit_of
-from imubench_pipeline.sensor import CHANNELS, QUANTITIES, ColumnSource, quantity_of
+from imubench_pipeline.settings.sensor import CHANNELS, QUANTITIES, ColumnSource, quantity_of
+from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.units import conversion
 
 _OTHER = 1.5

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
-from imubench_pipeline.findings import Finding
 from imubench_pipeline.readers.compressed import open_bytes
+from imubench_pipeline.tables.findings import Finding
 
 BLOCK_BYTES = 1 << 20
 

@@ -11,8 +11,8 @@ import numpy as np
 from imubench_pipeline.report.payload import Arrays
 from imubench_pipeline.report.practical import duration_text, number_text, page_unit
 from imubench_pipeline.report.site import Site
-from imubench_pipeline.report.view import Row
 from imubench_pipeline.report.words import sentence
+from imubench_pipeline.typing import Row
 
 _SHOWN = (60.0, 600.0, 3600.0)
 """Times of the table, s; the figure has more."""

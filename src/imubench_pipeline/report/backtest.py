@@ -6,9 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from imubench_pipeline.report.practical import System, duration_text, number_text, unit_of
-from imubench_pipeline.requirements import DIMENSIONS
-
-Row = Mapping[str, Any]
+from imubench_pipeline.settings.requirements import DIMENSIONS
+from imubench_pipeline.typing import Row
 
 
 def backtest_lines(

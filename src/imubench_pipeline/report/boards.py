@@ -9,7 +9,8 @@ from imubench_pipeline.report import thermal
 from imubench_pipeline.report.payload import Arrays, channel_payload, looks
 from imubench_pipeline.report.practical import limit_digits, number_text
 from imubench_pipeline.report.site import Page, Site
-from imubench_pipeline.report.view import ChannelView, RecordingView, Row
+from imubench_pipeline.report.view import ChannelView, RecordingView
+from imubench_pipeline.typing import Row
 
 _UNIT = {"bias": "signal"}
 """Unit of the page of a parameter, where it has another name."""

@@ -13,8 +13,9 @@ from imubench_pipeline.report.practical import (
     page_unit,
 )
 from imubench_pipeline.report.site import Site
-from imubench_pipeline.report.view import RecordingView, Row
+from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.report.words import noise_words, sentence
+from imubench_pipeline.typing import Row
 
 WORDS = {
     "bias": "bias at the start",

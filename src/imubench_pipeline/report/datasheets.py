@@ -8,8 +8,9 @@ from statistics import median
 from typing import Any
 
 from imubench_pipeline.report.practical import System, page_unit
-from imubench_pipeline.report.view import ChannelView, RecordingView, Row
-from imubench_pipeline.sensor import quantity_of
+from imubench_pipeline.report.view import ChannelView, RecordingView
+from imubench_pipeline.settings.sensor import quantity_of
+from imubench_pipeline.typing import Row
 
 _STATISTIC_NAMES = {
     "N": "N",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE
+from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.report.alignment import alignments
 from imubench_pipeline.report.calibration import of_all
 from imubench_pipeline.report.payload import Arrays
@@ -19,8 +19,9 @@ from imubench_pipeline.report.turned import (
     prediction_payload,
     published_lines,
 )
-from imubench_pipeline.report.view import RecordingView, Row
+from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.report.words import counted
+from imubench_pipeline.typing import Row
 
 
 def earth_rate_page(site: Site) -> Page:

@@ -8,7 +8,8 @@ from typing import Any
 
 from imubench_pipeline.report.practical import number_text
 from imubench_pipeline.report.site import Page, Site
-from imubench_pipeline.report.view import QUANTITY_NAMES, Row
+from imubench_pipeline.report.view import QUANTITY_NAMES
+from imubench_pipeline.typing import Row
 
 _PARAMETERS = {"N": "white noise", "B": "bias instability", "K": "random walk", "R": "ramp"}
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from pydantic import RootModel
 
-from imubench_pipeline.validation import ConfigError, Strict, parse, read_yaml
+from imubench_pipeline.settings.validation import ConfigError, Strict, parse, read_yaml
 
 _FILE = Path(__file__).with_name("glossary.yaml")
 

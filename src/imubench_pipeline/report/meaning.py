@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
+from imubench_pipeline.navigation.suitability.conditions import parts_of
 from imubench_pipeline.report.backtest import standing_text
 from imubench_pipeline.report.practical import (
     PageUnit,
@@ -15,10 +16,9 @@ from imubench_pipeline.report.practical import (
     unit_of,
 )
 from imubench_pipeline.report.words import evidence_words
-from imubench_pipeline.requirements import DIMENSIONS, Requirement
-from imubench_pipeline.suitability.conditions import parts_of
+from imubench_pipeline.settings.requirements import DIMENSIONS, Requirement
+from imubench_pipeline.typing import Row
 
-Row = Mapping[str, Any]
 Simulated = Mapping[tuple[str, str], bool]
 
 _NAMES = {

@@ -7,8 +7,9 @@ from typing import Any
 
 from imubench_pipeline.estimators.estimate import PARAMETERS, SHOWN
 from imubench_pipeline.report.practical import System, limit_digits, page_unit
-from imubench_pipeline.report.view import ChannelView, Row
+from imubench_pipeline.report.view import ChannelView
 from imubench_pipeline.report.words import model_text, untold
+from imubench_pipeline.typing import Row
 
 
 def shown_symbols(channel: ChannelView) -> list[str]:

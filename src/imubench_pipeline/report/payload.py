@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from imubench_pipeline.estimators.estimate import COMPARED
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.report.palette import Appearance, method_appearance
-from imubench_pipeline.report.view import METHOD_NAMES, ChannelView, Row
+from imubench_pipeline.report.view import METHOD_NAMES, ChannelView
+from imubench_pipeline.typing import Row
 
 FOREST = (*COMPARED, "B", "T_B")
 """The parameters that are drawn across sensors."""

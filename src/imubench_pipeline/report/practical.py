@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Context, Decimal
 from typing import Any, Literal
 
-from imubench_pipeline.sensor import QUANTITIES
+from imubench_pipeline.settings.sensor import QUANTITIES
 from imubench_pipeline.units import conversion
 
 System = Literal["practical", "si"]

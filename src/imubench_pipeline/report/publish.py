@@ -13,7 +13,6 @@ import jinja2
 import pyarrow as pa
 from plotly.offline import get_plotlyjs
 
-from imubench_pipeline.provenance import source_digest
 from imubench_pipeline.report.boards import boards_page
 from imubench_pipeline.report.earth_rate import earth_rate_page
 from imubench_pipeline.report.fusion import fusion_page
@@ -30,8 +29,9 @@ from imubench_pipeline.report.static_figures.files import figure_text
 from imubench_pipeline.report.static_figures.theory import theory_figure
 from imubench_pipeline.report.turned import turned_page
 from imubench_pipeline.report.view import RecordingView
-from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
 from imubench_pipeline.tables import read, write_content
+from imubench_pipeline.tables.provenance import source_digest
+from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 
 _KEYS = "pages.json"
 _SETTINGS = "settings.json"
@@ -243,7 +243,7 @@ def site_of(tables: Mapping[str, pa.Table], settings: str, results: Path) -> Sit
     ----------
     tables : mapping of str to pyarrow.Table
     settings : str
-        As `imubench_pipeline.plan.Plan.report_settings` gives them.
+        As `imubench_pipeline.run.plan.Plan.report_settings` gives them.
     results : Path
     """
     return Site(tables, json.loads(settings), results, source_digest("report.publish"))

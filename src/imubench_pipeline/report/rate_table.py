@@ -19,8 +19,9 @@ from imubench_pipeline.report.payload import Arrays
 from imubench_pipeline.report.practical import duration_text, number_text
 from imubench_pipeline.report.recording import metadata_of, page_of, provenance
 from imubench_pipeline.report.site import Page, Site
-from imubench_pipeline.report.view import RecordingView, Row
+from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.report.words import counted, noise_words
+from imubench_pipeline.typing import Row
 
 
 def table_page(site: Site, view: RecordingView) -> Page:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from imubench_pipeline.recording import log_paths, read_metadata
+from imubench_pipeline.recordings.recording import log_paths, read_metadata
 from imubench_pipeline.report import thermal
 from imubench_pipeline.report.backtest import backtest_lines
 from imubench_pipeline.report.calibration import at_rest
@@ -23,9 +23,10 @@ from imubench_pipeline.report.practical import (
     symbol_text,
 )
 from imubench_pipeline.report.site import Page, Site
-from imubench_pipeline.report.view import ChannelView, RecordingView, Row
+from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.report.words import counted, model_text, precision, sentence, started_text
 from imubench_pipeline.tables import read
+from imubench_pipeline.typing import Row
 
 _EXACT = 1e-9
 """Relative error of a rate that is not worth a word."""

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from imubench_pipeline.drift import LEVEL
+from imubench_pipeline.navigation.drift import LEVEL
+from imubench_pipeline.navigation.suitability.conditions import in_words
 from imubench_pipeline.report.backtest import standing_text
 from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.datasheets import delta_rows, repeatability_lines
@@ -16,9 +17,9 @@ from imubench_pipeline.report.payload import FOREST, looks
 from imubench_pipeline.report.practical import limit_digits, symbol_text
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.start import summary
-from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView, Row
+from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView
 from imubench_pipeline.report.words import counted, verdict_words
-from imubench_pipeline.suitability.conditions import in_words
+from imubench_pipeline.typing import Row
 
 _MANY = 12
 """Recordings of a sensor beyond which its page leaves budgets and deltas to those of recordings."""
@@ -141,7 +142,7 @@ def _device(site: Site, own: Sequence[RecordingView], rows: Sequence[Row]) -> di
     sensor, device = own[0].sensor, own[0].row["device"]
     named = {(view.sensor, view.name) for view in own}
     rows = [row for row in rows if (row["sensor"], row["recording"]) in named]
-    # As `imubench_pipeline.drift.order_of` has it: stamps that are all the same tell no order.
+    # As `navigation.drift.order_of` has it: stamps that are all the same tell no order.
     stamps = {row["started"] for row in rows}
     dated = None not in stamps and len(stamps) > 1
     trends: dict[str, list[dict[str, Any]]] = {}

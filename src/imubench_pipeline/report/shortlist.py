@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from imubench_pipeline.report.practical import number_text
 from imubench_pipeline.report.site import Page, Site
-
-Row = Mapping[str, Any]
+from imubench_pipeline.typing import Row
 
 
 def shortlist_page(site: Site) -> Page:

@@ -17,8 +17,9 @@ import pyarrow as pa
 
 from imubench_pipeline.report.palette import Appearance, sensor_appearances
 from imubench_pipeline.report.practical import System, first_choices, units_of_pages
-from imubench_pipeline.report.view import RecordingView, Row, recording_views
-from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
+from imubench_pipeline.report.view import RecordingView, recording_views
+from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
+from imubench_pipeline.typing import Row
 
 NAVIGATION = (
     ("index.html", "Comparison"),
@@ -72,7 +73,7 @@ class Site:
     tables : mapping of str to pyarrow.Table
         All joined tables.
     settings : mapping
-        As `imubench_pipeline.plan.Plan.report_settings` gives them.
+        As `imubench_pipeline.run.plan.Plan.report_settings` gives them.
     results : Path
         Folder of the results, for what is kept of each recording alone.
     code : str

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from imubench_pipeline.navigation.suitability.conditions import in_words
 from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.datasheets import coverage_tables, deltas_of_sensors
 from imubench_pipeline.report.glossary import term
@@ -12,7 +13,7 @@ from imubench_pipeline.report.meaning import rankings
 from imubench_pipeline.report.payload import FOREST, looks
 from imubench_pipeline.report.practical import duration_text
 from imubench_pipeline.report.site import Page, Site
-from imubench_pipeline.report.view import RecordingView, Row
+from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.report.words import (
     counted,
     listed_names,
@@ -20,7 +21,7 @@ from imubench_pipeline.report.words import (
     requirement_words,
     sentence,
 )
-from imubench_pipeline.suitability.conditions import in_words
+from imubench_pipeline.typing import Row
 
 _STEPS = 3
 """What is to do next that the start page names; the table has all."""

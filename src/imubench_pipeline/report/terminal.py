@@ -10,6 +10,7 @@ from rich.console import RenderableType
 from rich.text import Text
 
 from imubench_pipeline.estimators.estimate import PARAMETERS, SHOWN
+from imubench_pipeline.navigation.suitability.conditions import in_words
 from imubench_pipeline.report.meaning import rankings
 from imubench_pipeline.report.practical import (
     PageUnit,
@@ -18,13 +19,12 @@ from imubench_pipeline.report.practical import (
     page_unit,
     symbol_text,
 )
+from imubench_pipeline.report.run_summary import left_out, one_line, rejections, serious
 from imubench_pipeline.report.terminal_table import fitting
-from imubench_pipeline.requirements import Requirement
-from imubench_pipeline.run_summary import left_out, one_line, rejections, serious
-from imubench_pipeline.sensor import quantity_of
-from imubench_pipeline.suitability.conditions import in_words
+from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.settings.sensor import quantity_of
+from imubench_pipeline.typing import Row
 
-Row = Mapping[str, Any]
 About = Mapping[tuple[str, str], Row]
 """The row of the table ``recordings`` of each sensor and recording."""
 

@@ -13,8 +13,9 @@ from imubench_pipeline.report.practical import (
     number_text,
     page_unit,
 )
-from imubench_pipeline.report.view import ChannelView, Row
+from imubench_pipeline.report.view import ChannelView
 from imubench_pipeline.report.words import sentence
+from imubench_pipeline.typing import Row
 
 _TEMPERATURE = (
     ("sensitivity", "temperature_sensitivity", "sensitivity"),

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from imubench_pipeline.error_budget.gyrocompass import EARTH_RATE
+from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.report.payload import Arrays, samples_payload
 from imubench_pipeline.report.practical import (
     System,
@@ -20,9 +20,10 @@ from imubench_pipeline.report.practical import (
 )
 from imubench_pipeline.report.recording import metadata_of, page_of, provenance
 from imubench_pipeline.report.site import Page, Site
-from imubench_pipeline.report.view import RecordingView, Row
+from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.report.words import counted, noise_words, sentence
 from imubench_pipeline.tables import read
+from imubench_pipeline.typing import Row
 
 METHOD_TERMS = {
     "pairs": "by_pairs",

@@ -7,19 +7,18 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property, partial
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 from pandas.util import hash_pandas_object
 
-from imubench_pipeline.findings import LEFT_OUT
+from imubench_pipeline.estimators.rows import estimate_of
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.results import estimate_of
-from imubench_pipeline.schemas import BY_RECORDING
+from imubench_pipeline.tables.findings import LEFT_OUT
+from imubench_pipeline.tables.schemas import BY_RECORDING
+from imubench_pipeline.typing import Row
 
-Row = Mapping[str, Any]
 Name = tuple[str, str]
 """Sensor and recording."""
 

@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from imubench_pipeline.navigation.suitability.conditions import EXCLUDED, in_words
 from imubench_pipeline.report.practical import (
     PageUnit,
     duration_text,
@@ -13,11 +14,9 @@ from imubench_pipeline.report.practical import (
     number_text,
     symbol_text,
 )
-from imubench_pipeline.requirements import Requirement
-from imubench_pipeline.suitability.conditions import EXCLUDED, in_words
-from imubench_pipeline.validation import Strict
-
-Row = Mapping[str, Any]
+from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.settings.validation import Strict
+from imubench_pipeline.typing import Row
 
 _ROUGH = 0.3
 """Half of an interval over its value from which a percentage would hide its asymmetry."""

@@ -16,30 +16,31 @@ from unittest import mock
 import numpy as np
 import pyarrow as pa
 
-from imubench_pipeline.comparable import comparables
-from imubench_pipeline.config import FusionSettings, Run
-from imubench_pipeline.coverage import by_vendor, coverage
-from imubench_pipeline.datasheet import bias_deltas, curve_rms, deltas
-from imubench_pipeline.drift import drift_rows
+from imubench_pipeline.datasheets.comparable import comparables
+from imubench_pipeline.datasheets.coverage import by_vendor, coverage
+from imubench_pipeline.datasheets.deltas import bias_deltas, curve_rms, deltas
 from imubench_pipeline.estimators.curve_bias import averaging_times, of_model
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.expected_errors import error_rows, of_requirement, standard
-from imubench_pipeline.findings import Finding
-from imubench_pipeline.fusion.of_run import NEEDED, fusion_rows
+from imubench_pipeline.estimators.rows import parameter_rows
+from imubench_pipeline.navigation.drift import drift_rows
+from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement, standard
+from imubench_pipeline.navigation.pooled import pooled_rows
+from imubench_pipeline.navigation.selection import ranking_rows
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.overview import overview
-from imubench_pipeline.pooled import pooled_rows
-from imubench_pipeline.recording import LogWriter
+from imubench_pipeline.noise.simulate import channel_rng, simulate
+from imubench_pipeline.recordings.overview import overview
+from imubench_pipeline.recordings.recording import LogWriter
 from imubench_pipeline.report import publish as publishing
 from imubench_pipeline.report.publish import publish, site_of
 from imubench_pipeline.report.site import Site
-from imubench_pipeline.requirements import Requirement
-from imubench_pipeline.results import Key, parameter_rows
-from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
-from imubench_pipeline.selection import ranking_rows
-from imubench_pipeline.sensor import Sensor, quantity_of
-from imubench_pipeline.simulate import channel_rng, simulate
+from imubench_pipeline.settings.config import FusionSettings, Run
+from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.settings.sensor import Sensor, quantity_of
+from imubench_pipeline.steps.fusion import NEEDED, fusion_rows
 from imubench_pipeline.tables import build, write
+from imubench_pipeline.tables.findings import Finding
+from imubench_pipeline.tables.keys import Key
+from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 
 Rows = dict[str, list[Mapping[str, Any]]]
 

@@ -14,7 +14,7 @@ from imubench_pipeline.report.payload import FOREST
 from imubench_pipeline.report.publish import publish
 from imubench_pipeline.report.static_figures.files import cross_figures
 from imubench_pipeline.report.view import recording_views
-from imubench_pipeline.schemas import OF_ONE_RECORDING, TABLES
+from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from tests.report.browser import made
 from tests.report.browser.made import Report
 from tests.report.browser.reader import TOO_WIDE, Open, Reader

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from imubench_pipeline.schemas import TABLES
 from imubench_pipeline.tables import read
+from imubench_pipeline.tables.schemas import TABLES
 
 if TYPE_CHECKING:
     from imubench_pipeline.report.static_figures.files import Make

@@ -11,7 +11,8 @@ from imubench_pipeline.report.practical import System
 from imubench_pipeline.report.static_figures.curves import channel_axes, draw_measured, finish
 from imubench_pipeline.report.static_figures.style import line_look, style
 from imubench_pipeline.report.static_figures.terms import TERM_LOOKS
-from imubench_pipeline.report.view import METHOD_NAMES, ChannelView, Row
+from imubench_pipeline.report.view import METHOD_NAMES, ChannelView
+from imubench_pipeline.typing import Row
 
 _NAMES = {"N": "$N$", "adev_minimum": "bias instability", "K": "$K$"}
 _DASHES = ((0, (4, 2)), (0, (1, 1.4)), (0, (5, 1.5, 1, 1.5)), (0, (8, 2)))

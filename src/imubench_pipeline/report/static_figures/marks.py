@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from imubench_pipeline.report.view import ChannelView, Row
+from imubench_pipeline.report.view import ChannelView
+from imubench_pipeline.typing import Row
 
 Kind = Literal["estimate", "not identified", "limit"]
 

@@ -10,8 +10,8 @@ import pyarrow as pa
 from imubench_pipeline.report.practical import System
 from imubench_pipeline.report.static_figures.files import cross_figures, save
 from imubench_pipeline.report.view import recording_views
-from imubench_pipeline.schemas import BY_RECORDING
 from imubench_pipeline.tables import schema
+from imubench_pipeline.tables.schemas import BY_RECORDING
 
 
 def draw_comparison(tables: Mapping[str, pa.Table], system: System, folder: Path) -> None:

@@ -1,0 +1,196 @@
+"""How sure an Allan variance is: its noise type, degrees of freedom and chi-squared limits."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaincinv, ndtri
+
+from imubench_pipeline.allan.quadratic_forms import LOWER_TAIL
+
+_FEWEST_CLUSTERS = 30
+_MOST_CLUSTERS = 1 << 12
+_ALL_LAGS = 2048
+_TOWARDS_TAIL = 1.4
+
+
+def noise_exponent(
+    theta: NDArray[np.float64], present: NDArray[np.integer[Any]] | None, n: int
+) -> int | None:
+    """Tell the noise type from the lag-1 autocorrelation of adjacent cluster means.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (m + 1,)
+        Cumulative sums of the samples at the edges of m adjacent clusters.
+    present : ndarray of int, shape (m + 1,), or None
+        Cumulative counts of the samples present at the same edges; None: all are.
+    n : int
+        Samples in a cluster.
+
+    Returns
+    -------
+    int or None
+        Exponent from 2 to -2 (see `imubench_pipeline.allan.variance.AllanCurve`); None where fewer
+        than 30 clusters are left.
+
+    References
+    ----------
+    W. Riley and C. Greenhall, "Power law noise identification using the lag 1
+    autocorrelation", EFTF 2004.
+    """
+    theta = theta[: _MOST_CLUSTERS + 1]
+    if present is None:
+        means = np.diff(theta) / n
+    else:
+        counts = np.diff(present[: _MOST_CLUSTERS + 1])
+        enough = counts >= 0.9 * n
+        means = np.where(enough, np.diff(theta) / np.maximum(counts, 1), np.nan)
+    good = np.isfinite(means)
+    if good.sum() < _FEWEST_CLUSTERS:
+        return None
+    # A missing mean is 0 after the line is taken out, and its products are not counted.
+    series = np.where(good, _without_line(means, good), 0.0)
+    for differenced in range(3):
+        correlation = _lag_one(series, good)
+        if correlation is None:
+            return None
+        delta = correlation / (1.0 + correlation)
+        if delta < 0.25 or differenced == 2:
+            exponent = round(-2.0 * (delta + differenced))
+            return int(np.clip(exponent, -2, 2))
+        good = good[1:] & good[:-1]
+        series = np.where(good, np.diff(series), 0.0)
+    raise AssertionError("the loop returns at its last turn")
+
+
+def _without_line(values: NDArray[np.float64], good: NDArray[np.bool_]) -> NDArray[np.float64]:
+    time = np.arange(len(values), dtype=np.float64)
+    time -= time[good].mean()
+    level = values[good].mean()
+    slope = (time[good] @ (values[good] - level)) / (time[good] @ time[good])
+    return np.asarray(values - level - slope * time)
+
+
+def _lag_one(values: NDArray[np.float64], good: NDArray[np.bool_]) -> float | None:
+    pairs = int(np.count_nonzero(good[1:] & good[:-1]))
+    number = int(np.count_nonzero(good))
+    if pairs < _FEWEST_CLUSTERS - 3:
+        return None
+    centred = np.where(good, values - values.sum() / number, 0.0)
+    power = float(centred @ centred) / number
+    if not power > 0:
+        return None
+    return max(float(centred[1:] @ centred[:-1]) / pairs / power, -0.999)
+
+
+@lru_cache(maxsize=4096)
+def equivalent_degrees(exponent: int, n: int, terms: int) -> float:
+    """Return the equivalent degrees of freedom of a fully overlapping Allan variance.
+
+    edf = M / (1 + 2 sum_k (1 - k/M) r_k^2) with r_k the autocorrelation, at lag k, of the
+    second differences of power-law noise, and M their number.
+
+    Parameters
+    ----------
+    exponent : int
+        Noise type, 2 to -2.
+    n : int
+        Samples in a cluster.
+    terms : int
+        M, the differences in the sum: L - 2n + 1.
+
+    References
+    ----------
+    C. Greenhall and W. Riley, "Uncertainty of stability variances based on finite
+    differences", PTTI 2003 (there with tables in place of the long sums).
+    """
+    lags = _lags(n, min(terms - 1, 3 * n))
+    if not len(lags):
+        return 1.0
+    at_zero = _second_difference(np.zeros(1), exponent, n)[0]
+    correlation = _second_difference(lags.astype(np.float64), exponent, n) / at_zero
+    weighted = (1.0 - lags / terms) * correlation**2
+    return float(terms / (1.0 + 2.0 * _sum_of_all(lags, weighted)))
+
+
+def _lags(n: int, longest: int) -> NDArray[np.int64]:
+    """Return lags from 1 to ``longest``: all of them, or crowded where the correlation bends."""
+    if longest <= _ALL_LAGS:
+        return np.arange(1, longest + 1, dtype=np.int64)
+    near = np.unique(np.rint(np.geomspace(1, n / 2 + 1, 160)).astype(np.int64))
+    offsets = np.concatenate((-near[::-1], [0], near))
+    lags = np.unique(np.concatenate([centre * n + offsets for centre in range(4)]))
+    return np.union1d(lags[(lags >= 1) & (lags <= longest)], [longest])
+
+
+def _sum_of_all(lags: NDArray[np.int64], values: NDArray[np.float64]) -> float:
+    """Sum over every whole lag of a function given at some, linear in between."""
+    between = np.diff(lags) * (values[1:] + values[:-1]) / 2.0
+    return float(between.sum() + (values[0] + values[-1]) / 2.0)
+
+
+def _second_difference(lags: NDArray[np.float64], exponent: int, n: int) -> NDArray[np.float64]:
+    """Return the autocovariance of theta_{i+2n} - 2 theta_{i+n} + theta_i, to a factor."""
+    total = np.zeros(len(lags))
+    for shift, weight in ((-2, 1.0), (-1, -4.0), (0, 6.0), (1, -4.0), (2, 1.0)):
+        total += weight * _phase_covariance(np.abs(lags + shift * n), exponent, n)
+    return total
+
+
+def _phase_covariance(lags: NDArray[np.float64], exponent: int, n: int) -> NDArray[np.float64]:
+    """Return the generalised autocovariance of the phase of power-law noise, to a factor."""
+    t = lags / n
+    if exponent == 2:  # white phase
+        return np.asarray(lags == 0, dtype=np.float64)
+    if exponent == 1:  # flicker phase, sampled: averaged over one sampling interval
+        far = lags > 1000.0
+        k = np.where(far, 1.0, lags)
+        near = -(_square_log(k + 1) + _square_log(np.abs(k - 1)) - 2 * _square_log(k))
+        return np.where(far, -2.0 * np.log(np.where(far, lags, 1.0)) - 3.0, near)
+    if exponent == 0:
+        return -t
+    if exponent == -1:
+        return _square_log(t)
+    return np.asarray(t**3)
+
+
+def _square_log(t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return t^2 ln t, 0 at 0."""
+    return np.asarray(t**2 * np.log(np.where(t > 0, t, 1.0)))
+
+
+def deviation_limits(
+    deviation: NDArray[np.float64],
+    edf: NDArray[np.float64],
+    confidence: float,
+    edf_upper: NDArray[np.float64] | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the chi-squared limits of an Allan deviation.
+
+    Parameters
+    ----------
+    deviation, edf : ndarray, shape (m,)
+    confidence : float
+        Such as 0.95: half of the rest lies beyond each limit.
+    edf_upper : ndarray, shape (m,), optional
+        Degrees of freedom of the upper limit at 95 %; by default ``edf``. Where few differences
+        remain, an Allan variance is less often far too small than a chi-squared variate of its
+        variance (`imubench_pipeline.allan.quadratic_forms`).
+
+    Notes
+    -----
+    At another confidence the degrees of the upper limit lie between: (z / 1.96)^1.4 of the way
+    from ``edf`` to ``edf_upper``, z being the normal quantile. That is so for white, flicker,
+    random walk and Gauss-Markov noise alike, to 0.4 % in the coverage of 68 % limits.
+    """
+    tail = (1.0 - confidence) / 2.0
+    below = edf
+    if edf_upper is not None:
+        below = edf + (edf_upper - edf) * (-ndtri(tail) / -ndtri(LOWER_TAIL)) ** _TOWARDS_TAIL
+    high = 2.0 * gammaincinv(edf / 2.0, 1.0 - tail)
+    low = 2.0 * gammaincinv(below / 2.0, tail)
+    return deviation * np.sqrt(edf / high), deviation * np.sqrt(below / low)

@@ -1,0 +1,381 @@
+"""The multi-octave Allan variance: one pass over the log for every tau, in bounded memory.
+
+Clusters of n samples need not start at every sample: starts n/48 apart, or closer, cost no
+measurable efficiency. So the phase is decimated as n grows, and the work is O(L). Inside a
+section of the log that fits the cache the phase is decimated up to `DECIMATION`; longer clusters
+are taken from the phase of the whole log at that stride.
+"""
+
+from __future__ import annotations
+
+from queue import SimpleQueue
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from imubench_pipeline.allan.full_overlap import enough_present, full_sums
+from imubench_pipeline.allan.phase import (
+    Phase,
+    accumulate,
+    accumulate_present,
+    finite_mean,
+    integrate,
+    sum_present,
+    sum_sizes,
+)
+from imubench_pipeline.allan.threads import in_threads
+from imubench_pipeline.typing import Array
+
+Integers = NDArray[np.int64]
+Samples = NDArray[np.floating[Any]]
+
+Grid = tuple[Integers, Integers, Integers]
+"""Ascending sizes of short clusters, their levels, and the samples that must be there."""
+
+Room = tuple[Array, Array, Integers]
+"""Arrays that a thread uses again and again."""
+
+STEPS = 48
+"""Starts of clusters within a cluster's length, at least."""
+
+DECIMATION = 64
+"""Stride of the phase that is kept of the whole log."""
+
+SECTION = 1 << 16
+"""Samples that are summed together: their phase fits the L2 cache."""
+
+FIRST = 1 << 17
+"""Samples at the beginning whose phase is kept whole: it tells the noise type of short clusters."""
+
+SHORTEST = 1 << 16
+"""Samples of a log that is worth a decimation; the clusters of a shorter one overlap fully."""
+
+_LEVELS = 6  # strides 1, 2 ... 32 inside a section
+_REACH = 4 * STEPS  # points of any stride that the two longest clusters span
+_AHEAD = _REACH * DECIMATION // 2
+_LANES = 4  # parts of a section whose phases are interleaved
+_INNER = 1 << 11  # starts whose clusters of all sizes are summed while they are in the L1 cache
+
+
+def octave_sizes(sizes: Integers) -> Integers:
+    """Round cluster sizes to multiples of the stride of their octave (by 1 % at most)."""
+    stride = np.left_shift(1, _level(sizes))
+    return np.unique(np.rint(sizes / stride).astype(np.int64) * stride)
+
+
+def _level(sizes: Integers) -> Integers:
+    return np.maximum(0, np.floor(np.log2(sizes / STEPS) + 1e-12)).astype(np.int64)
+
+
+class OctaveSums:
+    """Sums of squared differences of cluster means of one segment of a log.
+
+    Parameters
+    ----------
+    sizes : ndarray of int, shape (m,)
+        n of each tau, as `octave_sizes` gives them.
+    samples : int
+        Length of the segment.
+    holes : bool
+        Samples may be missing (NaN).
+    threads : int
+        The sums have the same bits for any number.
+
+    Attributes
+    ----------
+    first : Phase
+        Cumulative sums of the first samples.
+    theta : ndarray
+        Cumulative sum of the samples less a constant, every `DECIMATION` samples.
+    present : ndarray of int, or None
+        Cumulative number of samples present at the same points; None: all are.
+    """
+
+    def __init__(self, sizes: Integers, samples: int, *, holes: bool, threads: int = 1) -> None:
+        self._sizes, self._holes, self._threads = sizes, holes, max(1, threads)
+        self._short = _level(sizes) < _LEVELS
+        short = sizes[self._short]
+        self._grid = (short, _level(short), enough_present(short))
+        self._sums = np.zeros((4, len(short)))
+        # The end of the log is a point of the grid only if it falls on it.
+        points = samples // DECIMATION + 1
+        self.theta = np.zeros(points)
+        self.present = np.zeros(points, dtype=np.int64) if holes else None
+        self._filled = 0
+        self._at, self._present_at = 0.0, 0
+        self._begin: list[Samples] = []
+        self._bias = 0.0
+        self._rest: Samples = np.empty(0, dtype=np.float32)
+        self._rooms: SimpleQueue[Room] = SimpleQueue()
+        for _ in range(self._threads):
+            self._rooms.put(_room(holes))
+        self.received = 0
+
+    def push(self, block: Samples) -> None:
+        """Take the next samples, in SI; NaN where one is missing."""
+        block = np.ascontiguousarray(block)
+        if self.received < FIRST:
+            self._begin.append(block[: FIRST - self.received].copy())
+        self.received += len(block)
+        rest = self._rest
+        ready = max(0, (len(rest) + len(block) - _AHEAD) // SECTION)
+        used = ready * SECTION - len(rest)
+        if ready:
+            # Only sections that begin in the rest are copied, with the samples they need.
+            heads = min(ready, -(-len(rest) // SECTION))
+            head = np.concatenate((rest, block[: heads * SECTION + _AHEAD - len(rest)]))
+            body = block[heads * SECTION - len(rest) :] if ready > heads else block[:0]
+            self._sum(head, heads, body, ready)
+        self._rest = block[used:].copy() if used >= 0 else np.concatenate((rest[used:], block))
+
+    def finish(self) -> None:
+        """Sum up what is left."""
+        sections = -(-len(self._rest) // SECTION)
+        if sections:
+            self._sum(self._rest, sections, self._rest[:0], sections)
+        self._rest = self._rest[:0]
+        if self._filled < len(self.theta):
+            self.theta[self._filled] = self._at
+            if self.present is not None:
+                self.present[self._filled] = self._present_at
+        if not np.isfinite(self._at):
+            raise ValueError(
+                "a sample is infinite"
+                if self._holes
+                else "a sample is missing or infinite, but holes=False"
+            )
+        self.first = integrate(self._begin, sum(map(len, self._begin)), holes=self._holes)
+
+    @property
+    def results(self) -> list[NDArray[Any]]:
+        """Sum of squares, sum of mean inverse counts, differences, and the most there could be."""
+        phase = Phase(self.theta, self.present, ((0, len(self.theta) - 1),))
+        steps = self._sizes[~self._short] // DECIMATION
+        long = full_sums(phase, steps, self._threads, stride=DECIMATION)
+        return [
+            np.concatenate((of_short.astype(of_long.dtype), of_long))
+            for of_short, of_long in zip(self._sums, long, strict=True)
+        ]
+
+    def _sum(self, head: Samples, heads: int, body: Samples, sections: int) -> None:
+        """Sum the short clusters that begin in complete sections, and keep the decimated phase.
+
+        The first sections are those of ``head``, the others follow in ``body``.
+        """
+        if not self._filled:
+            self._bias = finite_mean((head if heads else body)[:SECTION])
+        # Of one type, whatever the blocks were: the kernel is compiled once.
+        head, body = head.view(), body.astype(head.dtype, copy=False).view()
+        head.flags.writeable = body.flags.writeable = False
+        arguments = (head, heads, body, self._bias, self._holes, self._grid)
+
+        def work(low: int, high: int) -> tuple[NDArray[Any], ...]:
+            room = self._rooms.get()
+            try:
+                return _sections(low, high, *arguments, room)
+            finally:
+                self._rooms.put(room)
+
+        sums, totals, edges, counts = in_threads(work, sections, self._threads)
+        for row in sums:
+            self._sums += row  # one by one: the order must not depend on the blocks
+        # What begins in the last section may be less than a section, at the end of the log.
+        kept = len(head) if heads == sections else sections * SECTION
+        points = -(-min(sections * SECTION, kept) // DECIMATION)
+        filled = slice(self._filled, self._filled + points)
+        before = np.cumsum(np.concatenate(([self._at], totals)))
+        edges += before[:-1, None]
+        self.theta[filled] = edges.reshape(-1)[:points]
+        self._at = float(before[-1])
+        if self.present is not None:
+            present = np.cumsum(np.concatenate(([self._present_at], counts[:, -1])))
+            counts += present[:-1, None]
+            self.present[filled] = counts[:, :-1].reshape(-1)[:points]
+            self._present_at = int(present[-1])
+        self._filled += points
+
+
+def _room(holes: bool) -> Room:
+    """Return room for the phase of a section, of what follows it, and for counts."""
+    points = SECTION + _AHEAD + 1
+    phase = np.empty(points + 8)
+    # It begins a cache line: a load that lies across two takes twice the time.
+    start = -phase.ctypes.data % 64 // 8
+    return (
+        phase[start : start + points],
+        np.empty(_AHEAD + 1),
+        np.empty(points if holes else 0, dtype=np.int64),
+    )
+
+
+@njit(cache=True, nogil=True)
+def _sections(
+    low: int,
+    high: int,
+    head: Samples,
+    heads: int,
+    body: Samples,
+    bias: float,
+    holes: bool,
+    grid: Grid,
+    room: Room,
+) -> tuple[Array, Array, Array, Integers]:
+    """Sum the clusters that begin in sections ``low`` to ``high``.
+
+    Returns
+    -------
+    sums : ndarray, shape (sections, 4, sizes)
+        As `OctaveSums.results`.
+    totals : ndarray, shape (sections,)
+        Sum of the samples less the bias.
+    edges : ndarray, shape (sections, SECTION / DECIMATION)
+        Cumulative sums within the section.
+    counts : ndarray of int
+        Cumulative numbers of samples present at the edges, and of the section; empty: all are.
+    """
+    theta, tail, present = room
+    points = SECTION // DECIMATION
+    sums = np.zeros((high - low, 4, grid[0].size))
+    totals = np.zeros(high - low)
+    edges = np.zeros((high - low, points))
+    counts = np.zeros((high - low, points + 1 if holes else 0), dtype=np.int64)
+    for section in range(high - low):
+        begin = (low + section) * SECTION
+        source = head
+        if low + section >= heads:
+            begin -= heads * SECTION
+            source = body
+        samples = source[begin : min(begin + SECTION + _AHEAD, source.size)]
+        own = min(SECTION, samples.size)
+        kept = (own + DECIMATION - 1) // DECIMATION
+        if samples.size == SECTION + _AHEAD:
+            offsets = _phase_in_lanes(samples, bias, theta, tail)
+            totals[section] = offsets[-1]
+            whole = np.isfinite(offsets[-1] + tail[_AHEAD])
+            if whole:
+                _lanes(offsets, theta, tail, grid, sums[section], edges[section])
+        else:
+            theta[0] = 0.0
+            accumulate(samples, bias, theta)
+            totals[section] = theta[own]
+            whole = np.isfinite(theta[samples.size])
+            if whole:
+                _one_lane(own, samples.size + 1, theta, grid, sums[section])
+                edges[section, :kept] = theta[:kept]
+        if holes and whole:
+            counts[section] = np.arange(points + 1) * DECIMATION
+            counts[section, points] = own
+        elif holes:
+            theta[0] = 0.0
+            present[0] = 0
+            accumulate_present(samples, bias, theta, present)
+            totals[section] = theta[own]
+            counts[section, points] = present[own]
+            _with_holes(own, samples.size + 1, theta, present, grid, sums[section])
+            edges[section, :kept] = theta[:kept]
+            counts[section, :kept] = present[:kept]
+    return sums, totals, edges, counts
+
+
+@njit(cache=True, nogil=True)
+def _phase_in_lanes(samples: Samples, bias: float, theta: Array, tail: Array) -> Array:
+    """Sum up a section in four lanes, interleaved, and what follows it; return where each begins.
+
+    One sum alone would wait for each addition; and of interleaved lanes the loads that sum
+    differences are aligned, for any size.
+    """
+    rows = SECTION // _LANES
+    # Slices first, of one length: the loop then has no check left.
+    first, second = samples[:rows], samples[rows : 2 * rows]
+    third, fourth = samples[2 * rows : 3 * rows], samples[3 * rows : 4 * rows]
+    a = b = c = d = 0.0
+    for i in range(rows):
+        theta[_LANES * i] = a
+        theta[_LANES * i + 1] = b
+        theta[_LANES * i + 2] = c
+        theta[_LANES * i + 3] = d
+        a += first[i] - bias
+        b += second[i] - bias
+        c += third[i] - bias
+        d += fourth[i] - bias
+    tail[0] = 0.0
+    accumulate(samples[SECTION:], bias, tail)
+    return np.array([0.0, a, a + b, a + b + c, a + b + c + d])
+
+
+@njit(cache=True, nogil=True)
+def _lanes(
+    offsets: Array, theta: Array, tail: Array, grid: Grid, sums: Array, edges: Array
+) -> None:
+    """Sum the clusters that begin in a section in lanes, and decimate its phase."""
+    rows = SECTION // _LANES
+    lengths = np.diff(offsets)
+    for level in range(_LEVELS):
+        # A lane goes on where the next one begins.
+        for i in range(_REACH):
+            for lane in range(_LANES - 1):
+                theta[(rows + i) * _LANES + lane] = lengths[lane] + theta[i * _LANES + lane + 1]
+            theta[(rows + i) * _LANES + _LANES - 1] = lengths[_LANES - 1] + tail[i]
+        _sum_level(theta, _LANES, _LANES * rows, _LANES * (rows + _REACH), level, grid, sums)
+        rows //= 2
+        for i in range(rows):
+            for lane in range(_LANES):
+                theta[i * _LANES + lane] = theta[2 * i * _LANES + lane]
+        for i in range((_REACH << (_LEVELS - 1 - level)) // 2):
+            tail[i] = tail[2 * i]
+    for lane in range(_LANES):
+        for i in range(rows):
+            edges[lane * rows + i] = offsets[lane] + theta[i * _LANES + lane]
+
+
+@njit(cache=True, nogil=True)
+def _one_lane(own: int, points: int, theta: Array, grid: Grid, sums: Array) -> None:
+    """Sum the clusters that begin in a section at the end of the log, and decimate its phase."""
+    for level in range(_LEVELS):
+        starts = (own + (1 << level) - 1) >> level
+        _sum_level(theta, 1, starts, points, level, grid, sums)
+        points = (points + 1) // 2
+        for i in range(points):
+            theta[i] = theta[2 * i]
+
+
+@njit(cache=True, nogil=True)
+def _sum_level(
+    theta: Array, lanes: int, starts: int, points: int, level: int, grid: Grid, sums: Array
+) -> None:
+    """Sum the differences of the clusters whose starts are one stride apart, over all lanes."""
+    sizes, levels, _ = grid
+    low, high = int(np.searchsorted(levels, level)), int(np.searchsorted(levels, level + 1))
+    steps = (sizes[low:high] >> level) * lanes
+    for block in range(0, starts, _INNER):
+        stop = min(block + _INNER, starts)
+        sum_sizes(theta[:points], block, stop, steps, sums[0, low:high])
+    for j in range(low, high):
+        most = max(0, min(starts, points - 2 * (sizes[j] >> level) * lanes))
+        sums[0, j] /= sizes[j] * sizes[j]
+        sums[1, j] = most / sizes[j]
+        sums[2, j] = most
+        sums[3, j] = most
+
+
+@njit(cache=True, nogil=True)
+def _with_holes(
+    own: int, points: int, theta: Array, present: Integers, grid: Grid, sums: Array
+) -> None:
+    """Sum the clusters that begin in a section where samples are missing; decimate its phase."""
+    sizes, levels, enough = grid
+    for level in range(_LEVELS):
+        starts = (own + (1 << level) - 1) >> level
+        for j in range(sizes.size):
+            if levels[j] == level:
+                m = sizes[j] >> level
+                most = max(0, min(starts, points - 2 * m))
+                found = sum_present(theta, present, m, enough[j], 0, most)
+                sums[0, j], sums[1, j], sums[2, j] = found[0], found[1], float(found[2])
+                sums[3, j] = most
+        points = (points + 1) // 2
+        for i in range(points):
+            theta[i] = theta[2 * i]
+            present[i] = present[2 * i]

@@ -1,0 +1,111 @@
+"""Which samples of a log are there, at two resolutions and in bounded memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.allan.full_overlap import PRESENT
+
+Counts = NDArray[np.int64]
+
+_POINTS = 1 << 15
+_FEWEST_CLUSTERS = 16
+_STEPS = 32
+
+
+@dataclass(frozen=True)
+class Presence:
+    """Cumulative numbers of samples present.
+
+    Attributes
+    ----------
+    samples : int
+        L, the points of the grid.
+    segments : tuple of (int, int)
+        Grid points that begin and end each segment.
+    first : ndarray of int
+        Samples present before each of the first points.
+    stride : int
+    coarse : ndarray of int
+        Samples present before every ``stride``-th point of the log.
+    """
+
+    samples: int
+    segments: tuple[tuple[int, int], ...]
+    first: Counts
+    stride: int
+    coarse: Counts
+
+    def differences(self, n: int) -> tuple[NDArray[np.bool_], int] | None:
+        """Tell which differences of two adjacent cluster means of n samples there are.
+
+        Parameters
+        ----------
+        n : int
+
+        Returns
+        -------
+        (ndarray of bool, int) or None
+            For differences that begin a stride apart, and the stride; of the whole log, or of
+            its beginning where that has clusters enough. None: neither is fine enough.
+        """
+        if n >= _STEPS // 2 * self.stride:
+            counts, base = self.coarse, self.stride
+        elif len(self.first) - 1 >= min(2 * _FEWEST_CLUSTERS * n, self.samples):
+            counts, base = self.first, 1
+        else:
+            return None
+        size = round(n / base)
+        begin = np.arange(0, len(counts) - 2 * size, max(1, size // _STEPS))
+        if not len(begin):
+            return np.zeros(0, dtype=np.bool_), base
+        enough = PRESENT * size * base - 1e-9
+        there = np.ones(len(begin), dtype=np.bool_)
+        for cluster in (begin, begin + size):
+            there &= counts[cluster + size] - counts[cluster] >= enough
+        if len(self.segments) > 1:
+            ends = np.array([stop for _, stop in self.segments])
+            starts = np.array([start for start, _ in self.segments])
+            points = begin * base
+            which = np.minimum(np.searchsorted(ends, points, side="right"), len(ends) - 1)
+            there &= (points >= starts[which]) & (points + 2 * size * base <= ends[which])
+        return there, base * max(1, size // _STEPS)
+
+
+def presence(
+    blocks: Iterable[NDArray[np.floating[Any]]],
+    samples: int,
+    segments: Sequence[tuple[int, int]] | None = None,
+) -> Presence:
+    """Count the samples that are present.
+
+    Parameters
+    ----------
+    blocks : iterable of ndarray
+        The log in order; NaN where a sample is missing.
+    samples : int
+        L, the length of all blocks together.
+    segments : sequence of (int, int), optional
+        Grid points that begin and end each segment; one segment by default.
+    """
+    stride = 1
+    while samples // stride > _POINTS:
+        stride *= 2
+    first = np.zeros(min(samples, 2 * _POINTS) + 1, dtype=np.int64)
+    coarse = np.zeros(samples // stride + 1, dtype=np.int64)
+    reached = total = 0
+    for block in blocks:
+        counts = total + np.cumsum(np.isfinite(block), dtype=np.int64)
+        stop = reached + len(block)
+        points = np.arange(reached // stride + 1, min(stop // stride, len(coarse) - 1) + 1)
+        coarse[points] = counts[points * stride - reached - 1]
+        if reached + 1 < len(first):
+            part = counts[: len(first) - 1 - reached]
+            first[reached + 1 : reached + 1 + len(part)] = part
+        reached, total = stop, int(counts[-1]) if len(counts) else total
+    return Presence(samples, tuple(segments or ((0, samples),)), first, stride, coarse)

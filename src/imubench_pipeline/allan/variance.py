@@ -1,0 +1,359 @@
+"""The Allan variance: grid of cluster sizes, kernels over holes and segments.
+
+With theta the cumulative sum of the samples (L + 1 points, starting at 0) the fully
+overlapping Allan variance at n samples a cluster is
+
+    sigma^2(n T) = sum_{i=0}^{L-2n} (theta_{i+2n} - 2 theta_{i+n} + theta_i)^2 / (2 n^2 (L-2n+1))
+
+(IEEE Std 952; L - 2n + 1 terms, as in allantools' ``oadev``.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from itertools import groupby
+from operator import itemgetter
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from imubench_pipeline.allan.confidence import deviation_limits, equivalent_degrees, noise_exponent
+from imubench_pipeline.allan.full_overlap import full_sums
+from imubench_pipeline.allan.octave import DECIMATION, SHORTEST, OctaveSums, octave_sizes
+from imubench_pipeline.allan.phase import Phase, integrate, split
+from imubench_pipeline.allan.threads import read_ahead
+
+_MANY_CLUSTERS = 100
+_FEW_STEPS = 2  # strides in a cluster: for shorter ones the noise type needs every sample
+
+POWER_LAW = "power law"
+FITTED = "fitted spectrum"
+"""What degrees of freedom come from."""
+
+Edges = Callable[[int], tuple[NDArray[np.float64], NDArray[Any] | None, int]]
+"""Cumulative sums and counts at the edges of adjacent clusters of about a size, and the size."""
+
+
+@dataclass(frozen=True)
+class AllanCurve:
+    """An Allan variance over tau.
+
+    Attributes
+    ----------
+    tau : ndarray, shape (m,)
+        Cluster length in s: ``cluster_size / rate`` of the cluster size really used.
+    cluster_size : ndarray of int, shape (m,)
+        n, samples in a cluster.
+    variance : ndarray, shape (m,)
+        Allan variance in the squared unit of the samples.
+    edf : ndarray, shape (m,)
+        Equivalent degrees of freedom of each variance.
+    samples : int
+        L, samples in the log; by default twice the largest cluster.
+    exponent : ndarray of int, shape (m,)
+        Noise type at each tau: the power of frequency, 2 to -2, in the spectrum of fractional
+        frequency (0: white noise of the samples, -1: flicker, -2: random walk). By default 0.
+    averaged : ndarray, shape (m,)
+        Samples that a cluster really averages: n, by default, or fewer (their harmonic mean)
+        where samples are missing. The variance of white noise goes with 1 / averaged.
+    edf_upper : ndarray, shape (m,)
+        Those of the upper limit, which are more where few clusters remain. By default ``edf``.
+    edf_source : sequence of str
+        Where they come from at each tau: the identified power law, or the fitted spectrum.
+    share : ndarray, shape (m,)
+        Part of the differences that missing samples leave. By default 1.
+    """
+
+    tau: NDArray[np.float64]
+    cluster_size: NDArray[np.int64]
+    variance: NDArray[np.float64]
+    edf: NDArray[np.float64]
+    samples: int = 0
+    exponent: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    averaged: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    edf_upper: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    edf_source: Sequence[str] = ()
+    share: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+
+    def __post_init__(self) -> None:
+        # The class is frozen: defaults that follow from other fields go this way.
+        if not self.samples:
+            object.__setattr__(self, "samples", 2 * int(np.max(self.cluster_size)))
+        if not len(self.exponent):
+            object.__setattr__(self, "exponent", np.zeros(len(self.tau), dtype=np.int64))
+        if not len(self.averaged):
+            object.__setattr__(self, "averaged", np.asarray(self.cluster_size, dtype=np.float64))
+        if not len(self.edf_upper):
+            object.__setattr__(self, "edf_upper", self.edf)
+        if not self.edf_source:
+            object.__setattr__(self, "edf_source", (POWER_LAW,) * len(self.tau))
+        if not len(self.share):
+            object.__setattr__(self, "share", np.ones(len(self.tau)))
+
+    @property
+    def deviation(self) -> NDArray[np.float64]:
+        """Allan deviation in the unit of the samples, shape (m,)."""
+        return np.sqrt(self.variance)
+
+    def up_to(self, part: float) -> NDArray[np.float64]:
+        """Return the tau up to a part of the log, s."""
+        return self.tau[self.cluster_size <= part * self.samples]
+
+    def limits(self, confidence: float = 0.95) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the lower and upper confidence limits of the deviation, shapes (m,)."""
+        return deviation_limits(self.deviation, self.edf, confidence, self.edf_upper)
+
+
+def cluster_sizes(samples: int, *, per_decade: int = 10, longest: float = 0.5) -> NDArray[np.int64]:
+    """Return log-spaced cluster sizes, whole and distinct.
+
+    Parameters
+    ----------
+    samples : int
+        L.
+    per_decade : int
+        Sizes per decade, where whole numbers allow.
+    longest : float
+        The largest size as a part of the log, at most 1/2.
+    """
+    largest = int(samples * min(longest, 0.5) * (1 + 1e-12))
+    if largest < 1:
+        return np.empty(0, dtype=np.int64)
+    exponents = np.arange(int(np.log10(largest) * per_decade + 1e-9) + 1) / per_decade
+    sizes = np.rint(10.0**exponents).astype(np.int64)
+    return np.unique(sizes[sizes <= largest])
+
+
+def allan_variance(
+    samples: ArrayLike,
+    rate: float,
+    *,
+    cluster_sizes: ArrayLike | None = None,
+    overlap: Literal["full", "octave"] = "full",
+    valid: ArrayLike | None = None,
+    segments: Sequence[tuple[int, int]] | None = None,
+) -> AllanCurve:
+    """Return the overlapping Allan variance of a log.
+
+    Parameters
+    ----------
+    samples : array_like, shape (L,)
+        The log on its uniform grid, in rad/s or m/s². NaN marks a missing sample.
+    rate : float
+        Sampling rate, Hz.
+    cluster_sizes : array_like of int, optional
+        n of each tau; by default `cluster_sizes` of the length.
+    overlap : {"full", "octave"}
+        Use every cluster of every size; or clusters that start 1/48 of their length apart, or
+        closer, which is as sure and many times faster (sizes are then rounded by up to 1 %,
+        see `imubench_pipeline.allan.octave.octave_sizes`).
+    valid : array_like of bool, shape (L,), optional
+        False where the sample is missing.
+    segments : sequence of (int, int), optional
+        First and one-past-last sample of each segment; no difference spans two.
+
+    Returns
+    -------
+    AllanCurve
+        At the sizes for which the log has at least one difference.
+
+    Raises
+    ------
+    ValueError
+        If the log is not one-dimensional, the rate not positive, a size not positive, or the
+        segments do not lie in the log one after the other.
+
+    References
+    ----------
+    IEEE Std 952-2020; limits: C. Greenhall and W. Riley, "Uncertainty of stability
+    variances based on finite differences", PTTI 2003.
+    """
+    values = np.asarray(samples, dtype=np.float64)
+    if values.ndim != 1 or len(values) < 2:
+        raise ValueError(f"samples have shape {values.shape}, expected one dimension of 2 or more")
+    if overlap not in ("full", "octave"):
+        raise ValueError(f"overlap {overlap!r} is not known, expected 'full' or 'octave'")
+    if valid is not None:
+        mask = np.asarray(valid, dtype=bool)
+        if mask.shape != values.shape:
+            raise ValueError(f"valid has shape {mask.shape}, expected {values.shape}")
+        values = np.where(mask, values, np.nan)
+    holes = not bool(np.isfinite(values).all())
+    if overlap == "octave":
+        return of_blocks([values], len(values), rate, cluster_sizes, holes=holes, segments=segments)
+    return of_phase(
+        integrate([values], len(values), holes=holes, segments=segments), rate, cluster_sizes
+    )
+
+
+def of_blocks(
+    blocks: Iterable[NDArray[np.floating[Any]]],
+    samples: int,
+    rate: float,
+    sizes: ArrayLike | None = None,
+    *,
+    holes: bool,
+    segments: Sequence[tuple[int, int]] | None = None,
+    threads: int = 1,
+) -> AllanCurve:
+    """Return the multi-octave Allan variance of a log that comes in blocks.
+
+    One pass, in memory that grows with L/64 only. The result has the same bits for any number of
+    threads and any blocks.
+
+    Parameters
+    ----------
+    blocks : iterable of ndarray
+        The log in order, in SI; NaN where a sample is missing. Blocks of float32 are not copied.
+    samples : int
+        L, the length of all blocks together.
+    rate : float
+        Hz.
+    sizes : array_like of int, optional
+        n of each tau, rounded to the stride of their octave.
+    holes : bool
+        Samples may be missing.
+    segments : sequence of (int, int), optional
+        First and one-past-last sample of each; one segment by default.
+    threads : int
+        With more than one, the next block is made while the last is summed.
+
+    Raises
+    ------
+    ValueError
+        As `allan_variance`.
+    """
+    spans = tuple(segments) if segments else ((0, samples),)
+    wanted = _checked(rate, sizes, samples, spans)
+    wanted = octave_sizes(wanted)
+    if samples < SHORTEST:
+        phase = integrate(blocks, samples, holes=holes, segments=spans)
+        return of_phase(phase, rate, wanted, threads=threads)
+    longest: OctaveSums | None = None
+    sums: list[NDArray[Any]] = []
+    done = 0
+    if threads > 1:
+        blocks = read_ahead(blocks)
+    for number, group in groupby(split(blocks, spans), key=itemgetter(0)):
+        start, stop = spans[number]
+        part = OctaveSums(wanted, stop - start, holes=holes, threads=threads)
+        for _, block in group:
+            part.push(block if block.dtype == np.float32 else np.asarray(block, np.float64))
+        if part.received != stop - start:
+            break
+        part.finish()
+        sums = [a + b for a, b in zip(sums, part.results, strict=True)] if sums else part.results
+        if longest is None or part.received > longest.received:
+            longest = part
+        done += 1
+    if longest is None or done < len(spans):
+        raise ValueError(f"the blocks end before sample {spans[done][1]}")
+    first = longest.first
+
+    def edges(n: int) -> tuple[NDArray[np.float64], NDArray[Any] | None, int]:
+        if n < _FEW_STEPS * DECIMATION:
+            return first.theta[::n], None if first.present is None else first.present[::n], n
+        # The noise type is the same at the nearest multiple of the stride.
+        step = round(n / DECIMATION)
+        held = longest.present
+        return longest.theta[::step], None if held is None else held[::step], step * DECIMATION
+
+    return _curve(rate, wanted, samples, spans, sums, edges)
+
+
+def of_phase(
+    phase: Phase, rate: float, sizes: ArrayLike | None = None, *, threads: int = 1
+) -> AllanCurve:
+    """Return the fully overlapping Allan variance of cumulative sums (see `allan_variance`).
+
+    The result has the same bits for any number of threads.
+    """
+    wanted = _checked(rate, sizes, phase.samples, phase.segments)
+    start, stop = max(phase.segments, key=lambda segment: segment[1] - segment[0])
+
+    def edges(n: int) -> tuple[NDArray[np.float64], NDArray[Any] | None, int]:
+        held = phase.present
+        return (
+            phase.theta[start : stop + 1 : n],
+            None if held is None else held[start : stop + 1 : n],
+            n,
+        )
+
+    sums = full_sums(phase, wanted, threads)
+    return _curve(rate, wanted, phase.samples, phase.segments, sums, edges)
+
+
+def _checked(
+    rate: float, sizes: ArrayLike | None, samples: int, segments: Sequence[tuple[int, int]]
+) -> NDArray[np.int64]:
+    """Check the arguments that all kernels share, and return the sizes."""
+    if not rate > 0:
+        raise ValueError(f"the rate is {rate}, expected a frequency above zero")
+    reached = 0
+    for start, stop in segments:
+        if not reached <= start < stop <= samples:
+            raise ValueError(
+                f"segment ({start}, {stop}) does not lie in the {samples} samples, after the one "
+                "before it"
+            )
+        reached = stop
+    wanted = cluster_sizes(samples) if sizes is None else np.asarray(sizes, dtype=np.int64)
+    if wanted.ndim != 1 or (wanted < 1).any():
+        raise ValueError("cluster sizes must be whole numbers from 1 in one dimension")
+    return wanted
+
+
+def _curve(
+    rate: float,
+    sizes: NDArray[np.int64],
+    samples: int,
+    segments: Sequence[tuple[int, int]],
+    sums: Sequence[NDArray[Any]],
+    edges: Edges,
+) -> AllanCurve:
+    """Make the curve of the sums over differences of means (see `full_sums`)."""
+    shown = sums[2] > 0
+    n = sizes[shown]
+    total, thinned, terms, possible = (column[shown] for column in sums)
+    exponent = np.array(_exponents(edges, n), dtype=np.int64)
+    edf = np.array(
+        [
+            _degrees(segments, int(alpha), int(size)) * done / most
+            for alpha, size, done, most in zip(exponent, n, terms, possible, strict=True)
+        ]
+    )
+    return AllanCurve(
+        tau=n / rate,
+        cluster_size=n,
+        variance=total / (2.0 * terms),
+        edf=np.maximum(edf, 1.0),
+        exponent=exponent,
+        samples=samples,
+        averaged=terms / thinned,
+        share=terms / possible,
+    )
+
+
+def _exponents(edges: Edges, sizes: NDArray[np.int64]) -> list[int]:
+    """Return the noise type at each size; where too few clusters are left, the last one told.
+
+    With few clusters white noise often looks blue: then no bluer type than before is believed.
+    """
+    exponents: list[int] = []
+    for n in sizes:
+        theta, held, size = edges(int(n))
+        found = noise_exponent(theta, held, size)
+        before = exponents[-1] if exponents else 0
+        if found is None:
+            found = before
+        elif len(theta) <= _MANY_CLUSTERS:
+            found = min(found, max(before, 0))
+        exponents.append(found)
+    return exponents
+
+
+def _degrees(segments: Sequence[tuple[int, int]], exponent: int, n: int) -> float:
+    terms = [stop - start - 2 * n + 1 for start, stop in segments]
+    return sum(equivalent_degrees(exponent, n, term) for term in terms if term > 0)

@@ -1,0 +1,1 @@
+"""Printed figures in comparable terms, and beside what was measured."""

@@ -1,0 +1,299 @@
+"""Figures as printed -> SI, in the convention of the estimate that they are compared with.
+
+Three conventions ruin such a comparison. A printed noise density is mostly one-sided, and N is
+that density over √2; where the datasheet does not say, both readings are given. A printed bias
+instability is the minimum of the curve of Allan deviation, that is 0.664 B where the curve has a
+plateau. A coefficient of temperature, a total over a range of temperature and an rms while it
+changes are three quantities. A log at rest whose temperature varies shows the first: it is the
+sensitivity that `imubench_pipeline.estimators.thermal` fits. The other two no such log shows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from imubench_pipeline.settings.conversions import (
+    Sidedness,
+    noise_bandwidth,
+    noise_of_density,
+    noise_of_power_density,
+    noise_of_rms,
+)
+from imubench_pipeline.settings.printed import (
+    FIGURE_DIMENSIONS,
+    Datasheet,
+    PrintedFigure,
+    QuantityDatasheet,
+)
+from imubench_pipeline.units import dimension_of, to_si
+
+_READINGS: dict[str, tuple[Sidedness, ...]] = {
+    "one-sided": ("one-sided",),
+    "two-sided": ("two-sided",),
+    "unknown": ("one-sided", "two-sided"),
+}
+
+_NO_BANDWIDTH = "an rms without its bandwidth says nothing of the density"
+_NOT_OF_ONE_LOG = {
+    "bias_repeatability": "a spread between runs: the table repeatability",
+    "drift": "the document does not say what drift is meant",
+    "temperature_total": "a total over the range of the datasheet; a log has its own",
+    "temperature_rms": "an rms over the temperature's course of the datasheet; a log has its own",
+}
+
+
+SENSITIVITY = "sensitivity"
+"""The statistic of a printed coefficient of temperature."""
+
+
+@dataclass(frozen=True)
+class Comparable:
+    """A printed figure in SI, in the convention of the estimate that it is compared with.
+
+    Attributes
+    ----------
+    quantity, statistic : str
+        What is printed, and what of an estimate it is compared with.
+    figure : PrintedFigure or None
+        None: not published, or not looked up.
+    sidedness : str or None
+        Of a noise density, as this reading takes it.
+    value : float or None
+        SI; None where nothing is published, or it cannot be compared. Of a range, its worse end.
+    reason : str or None
+        How it was read, or why there is nothing to read.
+    printed : float or None
+        As printed for the axis.
+    least : float or None
+        The better end of a printed range.
+    lower, upper : float or None
+        The least and the largest figure that the vendor prints of it, such as typ and max.
+    obstacle : str or None
+        Why it cannot be compared with a static log.
+    tau : float or None
+        Averaging time of a printed Allan deviation, s.
+    looked_up : bool
+        False: the sensor file does not say whether the vendor publishes it.
+    """
+
+    quantity: str
+    statistic: str
+    figure: PrintedFigure | None
+    sidedness: str | None = None
+    value: float | None = None
+    reason: str | None = None
+    printed: float | None = None
+    least: float | None = None
+    lower: float | None = None
+    upper: float | None = None
+    obstacle: str | None = None
+    tau: float | None = None
+    looked_up: bool = True
+
+
+@dataclass(frozen=True)
+class PrintedAxis:
+    """What a datasheet says of one axis of a quantity.
+
+    Attributes
+    ----------
+    sheet : QuantityDatasheet
+    options : sequence of str
+        Grades, ranges and modes that the logged sensors have.
+    quantity, axis : str
+        ``gyro`` or ``accel``; ``x``, ``y`` or ``z``.
+    """
+
+    sheet: QuantityDatasheet
+    options: Sequence[str]
+    quantity: str
+    axis: str
+
+    @classmethod
+    def of(cls, datasheet: Datasheet, channel: str) -> PrintedAxis:
+        """Return what a datasheet says of a channel, such as ``gyro_x``."""
+        quantity, axis = channel.split("_")
+        sheet = getattr(datasheet, quantity) or QuantityDatasheet()
+        return cls(sheet, datasheet.options, quantity, axis)
+
+    def si(self, name: str) -> Callable[[float, PrintedFigure], float]:
+        """Return the conversion of a figure that is compared as it is."""
+        (dimension,) = FIGURE_DIMENSIONS[self.quantity][name]
+        return lambda value, figure: to_si(value, figure.unit or "", dimension)
+
+    def read(
+        self,
+        name: str,
+        like: Comparable,
+        convert: Callable[[float, PrintedFigure], float],
+        figures: Sequence[PrintedFigure] | None = None,
+    ) -> list[Comparable]:
+        """Return what is printed of a name for the axis, in the form of ``like``.
+
+        Figures of options that the logged sensors do not have are there only if nothing else is.
+        """
+        listed = [
+            figure
+            for figure in (self.sheet.printed(name) if figures is None else figures)
+            if figure.kind != "choices" and figure.on_axis(self.axis) is not None
+        ]
+        logged = [f for f in listed if f.option is None or f.option in self.options]
+        rows = [self._row(name, figure, like, convert) for figure in logged or listed]
+        return [_with_interval(row, rows) for row in rows]
+
+    def _row(
+        self,
+        name: str,
+        figure: PrintedFigure,
+        like: Comparable,
+        convert: Callable[[float, PrintedFigure], float],
+    ) -> Comparable:
+        printed = figure.on_axis(self.axis)
+        ends = printed if isinstance(printed, tuple) else (printed or 0.0,)
+        row = replace(
+            like,
+            figure=figure,
+            printed=max(ends, key=lambda end: (abs(end), end)),
+            obstacle=like.obstacle or self._obstacle(name, figure),
+            tau=figure.tau_s,
+        )
+        if row.obstacle is not None:
+            return row
+        values = [convert(end, figure) for end in ends]
+        least = min(values) if len(values) > 1 else None
+        return replace(row, value=max(map(abs, values)), least=least)
+
+    def _obstacle(self, name: str, figure: PrintedFigure) -> str | None:
+        if figure.option is not None and figure.option not in self.options:
+            logged = ", ".join(self.options)
+            which = f"that is logged has: {logged}" if logged else "file does not say what it has"
+            return f"printed for the option {figure.option}; the sensor {which} ('options')"
+        if figure.kind == "min":
+            return "a least value is printed"
+        if name == "rms_noise" and figure.bandwidth is None:
+            return _NO_BANDWIDTH
+        if name == "allan_deviation" and figure.tau is None:
+            return "an Allan deviation without its averaging time"
+        return None
+
+    def unpublished(self, like: Comparable, *names: str) -> Comparable:
+        """Return the row of what has no figure."""
+        known = any(self.sheet.looked_up(name) for name in names)
+        said = "the vendor does not publish it" if known else "the sensor file does not say"
+        return replace(like, reason=said, looked_up=known)
+
+
+def _with_interval(row: Comparable, rows: Sequence[Comparable]) -> Comparable:
+    """Return a row with the least and the largest figure of the rows of its option."""
+    option = row.figure.option if row.figure else None
+    values = [
+        value
+        for other in rows
+        if other.figure is not None and other.figure.option == option and row.value is not None
+        for value in (other.least, other.value)
+        if value is not None
+    ]
+    return replace(row, lower=min(values), upper=max(values)) if values else row
+
+
+def comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
+    """Yield what a datasheet says of N, bias instability, K and T_B of a channel.
+
+    Yields
+    ------
+    Comparable
+        In SI; without a figure where none is published, or nobody looked it up.
+    """
+    axis = PrintedAxis.of(datasheet, channel)
+    noise = [*_densities(axis), *_random_walks(axis), *_rms(axis)]
+    names = ("noise_density", "random_walk", "rms_noise")
+    yield from noise or [axis.unpublished(Comparable("N", "N", None), *names)]
+    for name, quantity, statistic, reason in (
+        ("bias_instability", "bias_instability", "adev_minimum", "minimum of the curve"),
+        ("bias_instability", "bias_instability", "plateau", "the plateau alone: 0.664 B"),
+        ("rate_random_walk", "K", "K", None),
+        ("correlation_time", "T_B", "T_B", None),
+    ):
+        like = Comparable(quantity, statistic, None, reason=reason)
+        yield from axis.read(name, like, axis.si(name)) or [axis.unpublished(like, name)]
+    like = Comparable("allan_deviation", "adev", None, reason="the curve at that averaging time")
+    yield from axis.read("allan_deviation", like, axis.si("allan_deviation"))
+
+
+def bias_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
+    """Yield what a datasheet says of the fixed bias of a channel, and of how it changes.
+
+    Yields
+    ------
+    Comparable
+        In SI; the offset always, the others where they are published: the coefficient of
+        temperature to be compared with the sensitivity, the rest with the obstacle.
+    """
+    axis = PrintedAxis.of(datasheet, channel)
+    like = Comparable("offset", "mean", None)
+    offsets = axis.read("offset", like, axis.si("offset"))
+    yield from offsets or [axis.unpublished(like, "offset")]
+    name = "temperature_coefficient"
+    yield from axis.read(name, Comparable(name, SENSITIVITY, None), axis.si(name))
+    for name, obstacle in _NOT_OF_ONE_LOG.items():
+        like = Comparable(name, "mean", None, obstacle=obstacle)
+        yield from axis.read(name, like, axis.si(name))
+
+
+def repeatability_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
+    """Yield what a datasheet says of how a bias differs from one turn-on to the next.
+
+    Yields
+    ------
+    Comparable
+        In SI, to be compared with a standard deviation; nothing where none is published.
+    """
+    axis, name = PrintedAxis.of(datasheet, channel), "bias_repeatability"
+    yield from axis.read(name, Comparable(name, "spread", None), axis.si(name))
+
+
+def _densities(axis: PrintedAxis) -> Iterator[Comparable]:
+    dimensions = FIGURE_DIMENSIONS[axis.quantity]["noise_density"]
+    figures = axis.sheet.printed("noise_density")
+    for stated in dict.fromkeys(figure.sidedness for figure in figures):
+        for sidedness in _READINGS[stated]:
+
+            def convert(value: float, figure: PrintedFigure, side: Sidedness = sidedness) -> float:
+                unit = figure.unit or ""
+                dimension = dimension_of(unit, dimensions)
+                density = to_si(value, unit, dimension)
+                if dimension == dimensions[0]:
+                    return noise_of_density(density, side)
+                return noise_of_power_density(density, side)
+
+            assumed = ", assumed: the datasheet does not say" * (stated == "unknown")
+            halved = " / sqrt(2)" * (sidedness == "one-sided")
+            reason = f"{sidedness} density{assumed}; N is the density{halved}"
+            yield from axis.read(
+                "noise_density",
+                Comparable("N", "N", None, sidedness, reason=reason),
+                convert,
+                [figure for figure in figures if figure.sidedness == stated],
+            )
+
+
+def _random_walks(axis: PrintedAxis) -> list[Comparable]:
+    like = Comparable("N", "N", None, reason="random walk as printed is N")
+    return axis.read("random_walk", like, axis.si("random_walk"))
+
+
+def _rms(axis: PrintedAxis) -> list[Comparable]:
+    si = axis.si("rms_noise")
+
+    def convert(value: float, figure: PrintedFigure) -> float:
+        bandwidth = noise_bandwidth(figure.bandwidth_hz or 0.0, figure.filter)
+        return noise_of_rms(si(value, figure), bandwidth)
+
+    like = Comparable("N", "N", None, "one-sided", reason="rms; N is rms / sqrt(2 bandwidth)")
+    return [
+        replace(row, reason=f"{row.reason}, {row.figure.bandwidth} ({row.figure.filter})")
+        if row.figure and row.value is not None
+        else row
+        for row in axis.read("rms_noise", like, convert)
+    ]

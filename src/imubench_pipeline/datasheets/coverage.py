@@ -1,0 +1,181 @@
+"""What vendors publish of their sensors, and what they leave to the user to measure."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from imubench_pipeline.settings.printed import PrintedFigure, QuantityDatasheet
+from imubench_pipeline.settings.sensor import QUANTITIES, Sensor
+
+Published = Literal["yes", "no", "other convention", "not looked up"]
+
+_FIGURES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "N": (("noise_density", "random_walk"), ("rms_noise",)),
+    "B": (("bias_instability",), ("allan_deviation", "drift")),
+    "K": (("rate_random_walk",), ()),
+    "T_B": (("correlation_time",), ()),
+    "temperature_coefficient": (
+        ("temperature_coefficient",),
+        ("temperature_total", "temperature_rms"),
+    ),
+    "offset": (("offset",), ("bias_repeatability",)),
+}
+"""Figures that a filter needs, with the keys that give them, plainly and in another convention."""
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """Whether a vendor publishes one figure of one sensor.
+
+    Attributes
+    ----------
+    sensor, vendor, model : str
+    quantity : str
+        ``gyro`` or ``accel``.
+    figure : str
+        ``N``, ``B``, ``K``, ``T_B``, ``temperature_coefficient`` or ``offset``.
+    published : str
+        ``yes``; ``other convention``: something akin, such as an rms for N or a total over
+        temperature for the coefficient; ``no``: looked up (null), and not published; ``not looked
+        up``: the sensor file does not say, so that it counts neither way.
+    as_printed : str or None
+        Every figure of it, with its unit and kind.
+    document : str or None
+        With its revision.
+    source : str or None
+        ``primary`` or ``secondary``, of the figures or else of the datasheet.
+    """
+
+    sensor: str
+    vendor: str
+    model: str
+    quantity: str
+    figure: str
+    published: Published
+    as_printed: str | None
+    document: str | None
+    source: str | None
+
+
+@dataclass(frozen=True)
+class VendorCoverage:
+    """Of how many sensors a vendor publishes a figure."""
+
+    vendor: str
+    quantity: str
+    figure: str
+    sensors: int
+    yes: int
+    other_convention: int
+    no: int
+    not_looked_up: int
+
+
+def coverage(sensors: Mapping[str, Sensor]) -> list[Coverage]:
+    """Return what the vendors of a catalogue publish.
+
+    Parameters
+    ----------
+    sensors : mapping of str to Sensor
+        By name of the sensor file.
+
+    Returns
+    -------
+    list of Coverage
+        One a sensor, quantity that it has, and figure, in the order of the sensors.
+    """
+    return [
+        _row(name, sensor, quantity, figure)
+        for name, sensor in sensors.items()
+        for quantity in QUANTITIES
+        if getattr(sensor.datasheet, quantity) is not None
+        for figure in _FIGURES
+    ]
+
+
+def by_vendor(rows: Iterable[Coverage]) -> list[VendorCoverage]:
+    """Count the rows of `coverage` by vendor, quantity and figure, in the order of the vendors.
+
+    Parameters
+    ----------
+    rows : iterable of Coverage
+
+    Returns
+    -------
+    list of VendorCoverage
+    """
+    counts: dict[tuple[str, str, str], Counter[str]] = {}
+    for row in rows:
+        key = (row.vendor, row.quantity, row.figure)
+        counts.setdefault(key, Counter())[row.published] += 1
+    return [
+        VendorCoverage(
+            *key,
+            sensors=count.total(),
+            yes=count["yes"],
+            other_convention=count["other convention"],
+            no=count["no"],
+            not_looked_up=count["not looked up"],
+        )
+        for key, count in sorted(counts.items(), key=lambda item: _place(*item[0]))
+    ]
+
+
+def _place(vendor: str, quantity: str, figure: str) -> tuple[str, int, int]:
+    return vendor.lower(), list(QUANTITIES).index(quantity), list(_FIGURES).index(figure)
+
+
+def _row(name: str, sensor: Sensor, quantity: str, figure: str) -> Coverage:
+    datasheet = sensor.datasheet
+    sheet: QuantityDatasheet = getattr(datasheet, quantity)
+    plain, akin = _FIGURES[figure]
+    printed = [each for key in (*plain, *akin) for each in sheet.printed(key)]
+    revision = f", revision {datasheet.revision}" if datasheet.revision else ""
+    sources = dict.fromkeys(each.source or datasheet.source or "" for each in printed)
+    return Coverage(
+        sensor=name,
+        vendor=sensor.vendor,
+        model=sensor.model,
+        quantity=quantity,
+        figure=figure,
+        published=_published(sheet, plain, akin),
+        as_printed="; ".join(map(_as_printed, printed)) or None,
+        document=f"{datasheet.document}{revision}" if datasheet.document else None,
+        source=" and ".join(filter(None, sources)) or datasheet.source,
+    )
+
+
+def _published(
+    sheet: QuantityDatasheet, plain: tuple[str, ...], akin: tuple[str, ...]
+) -> Published:
+    if any(each.kind != "derived" for key in plain for each in sheet.printed(key)):
+        return "yes"
+    if any(sheet.printed(key) for key in (*plain, *akin)):
+        return "other convention"
+    return "no" if any(sheet.looked_up(key) for key in plain) else "not looked up"
+
+
+def _as_printed(figure: PrintedFigure) -> str:
+    return " ".join(filter(None, (" ".join(_numbers(figure)), figure.unit, *_qualified(figure))))
+
+
+def _numbers(figure: PrintedFigure) -> Iterator[str]:
+    if isinstance(figure.value, dict):
+        yield ", ".join(f"{axes} {value:g}" for axes, value in figure.value.items())
+    elif isinstance(figure.value, tuple):
+        yield (" to " if figure.kind == "range" else ", ").join(f"{v:g}" for v in figure.value)
+    elif figure.value is not None:
+        yield f"{figure.value:g}"
+
+
+def _qualified(figure: PrintedFigure) -> Iterator[str]:
+    yield figure.kind
+    if figure.option:
+        yield f"({figure.option})"
+    if figure.bandwidth:
+        yield f"over {figure.bandwidth}"
+    if figure.tau:
+        yield f"at {figure.tau}"

@@ -1,0 +1,299 @@
+"""The deltas between what is measured and what vendors print.
+
+A verdict needs the whole 95 % interval of what is measured: ``worse than typ`` says that all of
+it lies beyond the printed figure and the tolerance. Where it reaches over a border the verdict is
+``not sure``, and the reason says what the interval leaves open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.datasheets.comparable import (
+    SENSITIVITY,
+    Comparable,
+    bias_comparables,
+    comparables,
+)
+from imubench_pipeline.datasheets.measured import NO_READINGS, fixed_bias, measured
+from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.settings.printed import Datasheet
+
+VERDICTS: dict[str, str] = {
+    "better than typ": "below a typical figure and the tolerance, or below a printed range",
+    "as printed": "at a typical figure, within the tolerance; within a maximum or a range",
+    "worse than typ": "above a typical figure and the tolerance",
+    "worse than max": "above a maximum, or above a range",
+    "not sure": "the 95 % interval reaches over a border between these",
+    "not published": "the datasheet was looked up, and prints no figure",
+    "not looked up": "nobody looked up whether a figure is printed",
+    "not measured": "the log does not tell the value",
+    "not comparable (condition)": "the figure holds for what this log does not have",
+}
+"""What a verdict says."""
+
+_TYPICAL = ("typ", "1sigma", "derived")
+
+
+@dataclass(frozen=True)
+class Delta:
+    """One printed figure against one estimate, as a row of the table ``datasheet``."""
+
+    quantity: str
+    statistic: str
+    printed: float | None
+    unit: str | None
+    kind: str | None
+    condition: str | None
+    sidedness: str | None
+    comparable: float | None
+    comparable_lower: float | None
+    comparable_upper: float | None
+    measured: float | None
+    lower: float | None
+    upper: float | None
+    delta: float | None
+    delta_lower: float | None
+    delta_upper: float | None
+    verdict: str
+    reason: str | None
+
+
+def deltas(
+    datasheet: Datasheet,
+    channel: str,
+    estimate: Estimate,
+    tau: NDArray[np.float64],
+    tolerance: float,
+) -> Iterator[Delta]:
+    """Compare an estimate with what a datasheet prints.
+
+    Parameters
+    ----------
+    datasheet : Datasheet
+    channel : str
+    estimate : Estimate
+        In SI.
+    tau : ndarray, shape (m,)
+        Where the log shows the curve well enough for its minimum, s.
+    tolerance : float
+        Relative difference that still counts as printed.
+
+    Yields
+    ------
+    Delta
+        One a printed figure and reading of it; K and T_B are mostly not published.
+    """
+    for entry in comparables(datasheet, channel):
+        yield compare(entry, measured(entry, estimate, tau), tolerance)
+
+
+def bias_deltas(
+    datasheet: Datasheet,
+    channel: str,
+    means: Mapping[str, float],
+    tolerance: float,
+    sensitivity: Parameter | None = None,
+) -> Iterator[Delta]:
+    """Compare the fixed bias of a recording, and how temperature moves it, with what is printed.
+
+    Parameters
+    ----------
+    datasheet : Datasheet
+    channel : str
+    means : mapping of str to float
+        Mean of every channel of the recording, rad/s or m/s².
+    tolerance : float
+        Relative difference that still counts as printed.
+    sensitivity : Parameter, optional
+        Size of the fitted sensitivity to temperature (`datasheets.measured.sensitivity`);
+        None: the log has no readings of the temperature.
+
+    Yields
+    ------
+    Delta
+        The offset; the coefficient of temperature, where one is printed; and what is printed of
+        repeatability and temperature that one log cannot be compared with.
+    """
+    bias = fixed_bias(channel, means)
+    for entry in bias_comparables(datasheet, channel):
+        if entry.statistic == SENSITIVITY:
+            yield compare(entry, sensitivity or NO_READINGS, tolerance)
+        elif entry.quantity != "offset":
+            yield compare(entry, Parameter(None), tolerance)
+        elif bias.value is None and entry.figure:
+            hidden = replace(entry, value=None, lower=None, upper=None, obstacle=bias.reason)
+            yield compare(hidden, bias, tolerance)
+        else:
+            yield compare(entry, bias, tolerance)
+
+
+def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
+    """Compare a printed figure with what was measured.
+
+    Parameters
+    ----------
+    entry : Comparable
+    parameter : Parameter
+        What was measured of it, SI; without limits, its value alone decides.
+    tolerance : float
+        Relative difference from a typical figure that still counts as printed.
+
+    Returns
+    -------
+    Delta
+        ``delta`` is measured / comparable - 1; ``delta_lower`` and ``delta_upper`` are the least
+        and the largest that the interval of the measurement and that of the printed figures
+        allow.
+    """
+    figure = entry.figure
+    value, lower, upper = parameter.value, parameter.lower, parameter.upper
+    row = Delta(
+        quantity=entry.quantity,
+        statistic=entry.statistic,
+        printed=entry.printed,
+        unit=figure.unit if figure else None,
+        kind=figure.kind if figure else None,
+        condition=figure.condition if figure else None,
+        sidedness=entry.sidedness,
+        comparable=entry.value,
+        comparable_lower=entry.lower,
+        comparable_upper=entry.upper,
+        measured=value,
+        lower=lower,
+        upper=upper,
+        delta=None,
+        delta_lower=None,
+        delta_upper=None,
+        verdict="not published" if entry.looked_up else "not looked up",
+        reason=entry.reason,
+    )
+    if figure is None:
+        return row
+    if entry.value is None:
+        return replace(row, verdict="not comparable (condition)", reason=entry.obstacle)
+    if value is None:
+        verdict, reason = _without_a_value(entry, parameter, tolerance)
+        return replace(row, verdict=verdict, reason=reason)
+    row = replace(
+        row,
+        delta=_relative(value, entry.value),
+        delta_lower=_relative(lower, entry.upper),
+        delta_upper=_relative(upper, entry.lower),
+    )
+    low, high = (value, value) if lower is None or upper is None else (lower, upper)
+    least, largest = (_place(entry, end, tolerance) for end in (low, high))
+    reasons = [entry.reason, parameter.reason]
+    if least != largest:
+        reasons.append(f"the 95 % interval reaches from {least!r} to {largest!r}")
+    said = "; ".join(reason for reason in reasons if reason)
+    return replace(row, verdict=least if least == largest else "not sure", reason=said or None)
+
+
+def _without_a_value(entry: Comparable, parameter: Parameter, tolerance: float) -> tuple[str, str]:
+    """Return verdict and reason where the log gives limits alone, or nothing."""
+    reason = f"{parameter.status.replace('_', ' ')}: {parameter.reason}"
+    if parameter.upper is not None:
+        least = _place(entry, parameter.lower or 0.0, tolerance)
+        if least == _place(entry, parameter.upper, tolerance) != "as printed":
+            return least, f"{reason}; the limits alone decide"
+    return "not measured", reason
+
+
+def _place(entry: Comparable, value: float, tolerance: float) -> str:
+    """Return where one value lies beside a printed figure."""
+    assert entry.figure is not None and entry.value is not None
+    if entry.figure.kind in ("max", "range"):
+        if value > entry.value:
+            return "worse than max"
+        return "better than typ" if value < (entry.least or 0.0) else "as printed"
+    if value > entry.value * (1.0 + tolerance):
+        return "worse than typ"
+    return "better than typ" if value < entry.value * (1.0 - tolerance) else "as printed"
+
+
+def _relative(value: float | None, printed: float | None) -> float | None:
+    """Return the relative difference, where both are there and the printed figure is a size."""
+    if value is None or printed is None or printed <= 0:
+        return None
+    return value / printed - 1.0
+
+
+@dataclass(frozen=True)
+class CurveRms:
+    """How far a measured curve is from the lines of a datasheet.
+
+    Attributes
+    ----------
+    noise, floor : Comparable or None
+        The printed figures that the lines are of.
+    rms : float
+        Root mean square over tau of measured minus printed Allan deviation, rad/s or m/s².
+    rms_log10 : float
+        The same of the difference of log10, decades.
+    """
+
+    noise: Comparable | None
+    floor: Comparable | None
+    rms: float
+    rms_log10: float
+
+
+def curve_rms(
+    printed: Sequence[Comparable], tau: NDArray[np.float64], adev: NDArray[np.float64]
+) -> list[CurveRms]:
+    """Compare a measured curve with the lines N/√τ and bias instability of a datasheet.
+
+    The two add as variances: σ²(τ) = N²/τ + floor². A datasheet that prints one of them gives
+    that line alone, and one that does not say the side of its density gives two curves.
+
+    Parameters
+    ----------
+    printed : sequence of Comparable
+        What `comparable.comparables` gives of a channel. Typical figures are taken where there
+        are any, else the others.
+    tau : ndarray, shape (m,)
+        s.
+    adev : ndarray, shape (m,)
+        Measured Allan deviation, rad/s or m/s².
+
+    Returns
+    -------
+    list of CurveRms
+        One a reading of the noise; empty if the datasheet has no line.
+
+    Raises
+    ------
+    ValueError
+        If the two arrays do not go together, or a deviation is not above 0.
+    """
+    if tau.shape != adev.shape or not tau.size or np.any(adev <= 0):
+        raise ValueError(
+            f"tau of shape {tau.shape} and Allan deviations of shape {adev.shape}; expected as "
+            "many, and deviations above 0"
+        )
+    noises: list[Comparable | None] = [*_lines(printed, "N")]
+    floors: list[Comparable | None] = [*_lines(printed, "adev_minimum")]
+    found = []
+    for noise, floor in product(noises or [None], floors[:1] or [None]):
+        if noise is None and floor is None:
+            continue
+        white = noise.value if noise and noise.value else 0.0
+        bottom = floor.value if floor and floor.value else 0.0
+        line = np.sqrt(white**2 / tau + bottom**2)
+        absolute, relative = adev - line, np.log10(adev / line)
+        rms, rms_log10 = (float(np.sqrt(np.mean(each**2))) for each in (absolute, relative))
+        found.append(CurveRms(noise, floor, rms, rms_log10))
+    return found
+
+
+def _lines(printed: Sequence[Comparable], statistic: str) -> list[Comparable]:
+    """Return the typical figures of a statistic; the others where there are none."""
+    known = [row for row in printed if row.statistic == statistic and row.value is not None]
+    typical = [row for row in known if row.figure and row.figure.kind in _TYPICAL]
+    return typical or known

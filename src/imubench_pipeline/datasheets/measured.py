@@ -1,0 +1,185 @@
+"""What a recording says of the statistics that vendors print figures of."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.datasheets.comparable import Comparable
+from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.estimators.curve_bias import of_model
+from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.noise import FLOOR
+
+_EARTH_RATE = 7.292115e-5
+"""rad/s; its part in the mean of a gyro depends on how the axis stands."""
+
+_LOCAL_GRAVITY = 0.027
+"""m/s²; gravity on the ground differs by less from its standard value."""
+
+NO_READINGS = Parameter(None, "not_shown", "the log has no readings of the temperature")
+"""What a log without them says of the sensitivity."""
+
+_VERTICAL = math.cos(math.radians(15.0))
+_AT_REST = 0.15
+
+
+def measured(entry: Comparable, estimate: Estimate, tau: NDArray[np.float64]) -> Parameter:
+    """Return what an estimate says of the statistic that a printed figure is compared with.
+
+    Parameters
+    ----------
+    entry : Comparable
+    estimate : Estimate
+        In SI.
+    tau : ndarray, shape (m,)
+        Where the log shows the curve well enough, s.
+
+    Returns
+    -------
+    Parameter
+        SI. The minimum and the plateau are those of `imubench_pipeline.estimators.curve_bias`.
+        The limits of another point of the curve are at least as wide as 95 %: all amplitudes are
+        taken at the same end of their intervals, each correlation time at either end.
+    """
+    statistic = entry.statistic
+    if statistic in ("plateau", "adev_minimum"):
+        # An estimate that was made by hand has its terms alone.
+        of_curve = estimate.curve or of_model(estimate.model, tau)
+        if statistic == "plateau":
+            return _scaled(of_curve["B_curve"], FLOOR)
+        return of_curve["sigma_min"]
+    if statistic == "adev":
+        return _ordinate(estimate, tau, entry.tau or math.nan)
+    return estimate.parameters[statistic]
+
+
+def _scaled(parameter: Parameter, factor: float) -> Parameter:
+    value, lower, upper = (
+        None if each is None else each * factor
+        for each in (parameter.value, parameter.lower, parameter.upper)
+    )
+    return replace(parameter, value=value, lower=lower, upper=upper)
+
+
+def _ordinate(estimate: Estimate, tau: NDArray[np.float64], at: float) -> Parameter:
+    if not len(tau) or not tau[0] <= at <= tau[-1]:
+        return Parameter(None, "not_shown", f"the log does not show the curve at {at:g} s")
+    where = np.array([at])
+    return _within(math.sqrt(float(estimate.model.allan_variance(where)[0])), estimate, where)
+
+
+def _within(value: float, estimate: Estimate, tau: NDArray[np.float64]) -> Parameter:
+    """Give a point of a model's curve the limits that those of its parameters allow."""
+    points = [float(np.sqrt(end.model.allan_variance(tau)[0])) for end in _ends(estimate)]
+    if not points:
+        return Parameter(value)
+    return Parameter(value, lower=min(value, *points), upper=max(value, *points))
+
+
+def _ends(estimate: Estimate) -> Iterator[Estimate]:
+    """Yield the estimate at the ends of its intervals; nothing if one has no interval."""
+    groups = [estimate.parameters, *estimate.further]
+    known = [p for group in groups for p in group.values() if p.in_model]
+    if any(p.lower is None or p.upper is None for p in known):
+        return
+
+    def at(group: Mapping[str, Parameter], amplitudes: str, times: str) -> dict[str, Parameter]:
+        return {
+            name: Parameter(getattr(p, times if name == "T_B" else amplitudes)) if p.in_model else p
+            for name, p in group.items()
+        }
+
+    for ends in product(("lower", "upper"), repeat=2):
+        first, *further = (at(group, *ends) for group in groups)
+        yield replace(estimate, parameters=first, further=further)
+
+
+def fixed_bias(channel: str, means: Mapping[str, float]) -> Parameter:
+    """Return the size of the fixed bias of a channel, as far as a recording at rest shows it.
+
+    That of a gyro is its mean; the rotation of the Earth is in it, up to 15.04 °/h either way.
+    That of an accelerometer is hidden in gravity: on a vertical axis it is the norm of the three
+    axes less that of gravity, with the error of the scale factor in it; on any other axis it
+    cannot be told from a tilt.
+
+    Parameters
+    ----------
+    channel : str
+    means : mapping of str to float
+        Mean of every channel of the recording, rad/s or m/s².
+
+    Returns
+    -------
+    Parameter
+        Without sign, rad/s or m/s²; the limits are those of what is not known of the Earth.
+    """
+    if channel.startswith("gyro"):
+        reason = "mean of the recording; the Earth's rotation is in it, 15 °/h either way at most"
+        return _size(means[channel], _EARTH_RATE, reason)
+    axes = [means.get(f"accel_{axis}") for axis in "xyz"]
+    if any(value is None for value in axes):
+        return Parameter(None, "not_shown", "gravity cannot be taken off: three axes are needed")
+    norm = math.hypot(*(value or 0.0 for value in axes))
+    if abs(norm / STANDARD_GRAVITY - 1.0) > _AT_REST:
+        reason = f"the mean acceleration is {norm:.4g} m/s², and not gravity"
+        return Parameter(None, "not_shown", reason)
+    if abs(means[channel]) < _VERTICAL * norm:
+        reason = "the axis is not vertical: its offset cannot be told from a tilt"
+        return Parameter(None, "not_shown", reason)
+    reason = (
+        "norm of the three axes less standard gravity, with the scale factor error; local gravity "
+        "differs by 0.027 m/s² at most"
+    )
+    return _size(norm - STANDARD_GRAVITY, _LOCAL_GRAVITY, reason)
+
+
+def _size(value: float, unknown: float, reason: str) -> Parameter:
+    size = abs(value)
+    return Parameter(size, "ok", reason, max(size - unknown, 0.0), size + unknown)
+
+
+def sensitivity(
+    rows: Iterable[Mapping[str, Any]], lowest: float | None, highest: float | None
+) -> Parameter:
+    """Return the size of the sensitivity of a channel to temperature, as its thermal fit tells it.
+
+    A vendor prints ± so much per kelvin: the sign is left out.
+
+    Parameters
+    ----------
+    rows : iterable of mapping
+        Of the table ``temperature``, of the channel.
+    lowest, highest : float or None
+        Temperatures of the recording, °C.
+
+    Returns
+    -------
+    Parameter
+        rad/s/K or m/s²/K; the reason says at what temperature and over which range it holds.
+        Where temperature is not taken out of the log, the upper limit alone; where it cannot be
+        told from time, nothing.
+    """
+    found = {row["parameter"]: row for row in rows}
+    row = found.get("sensitivity")
+    if row is None:
+        return NO_READINGS
+    at = f"slope at {found['T_0']['value']:.3g} °C"
+    if lowest is not None and highest is not None:
+        at += f", of readings from {lowest:.3g} to {highest:.3g} °C; the vendor has another range"
+    if found["quadratic"]["value"] is not None:
+        at += "; the bias bends with temperature, the slope is another elsewhere"
+    lower, upper = row["lower"], row["upper"]
+    if row["value"] is None or lower is None or upper is None:
+        return Parameter(None, "not_identified", row["reason"] or "no interval")
+    largest = max(abs(lower), abs(upper))
+    if not row["compensated"]:
+        return Parameter(None, "not_identified", f"{row['reason']}; {at}", 0.0, largest)
+    least = 0.0 if lower <= 0.0 <= upper else min(abs(lower), abs(upper))
+    return Parameter(abs(row["value"]), "ok", at, least, largest)

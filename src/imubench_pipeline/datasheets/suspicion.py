@@ -1,0 +1,244 @@
+"""Whether a printed or an estimated figure is so far from others that its unit is in doubt."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from statistics import median
+from typing import Any
+
+from imubench_pipeline.datasheets.comparable import Comparable, comparables
+from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.settings.sensor import QUANTITIES, Sensor, quantity_of
+from imubench_pipeline.tables.findings import Finding
+from imubench_pipeline.units import from_si
+
+_FAR = 20.0
+_FEWEST = 5
+_DEGREES = math.degrees(1.0)
+_THOUSANDS = (
+    (1e-3, "thousandths of its unit"),
+    (1e3, "thousands of its unit"),
+    (1e-6, "millionths of its unit"),
+    (1e6, "millions of its unit"),
+)
+_MISTAKES: Mapping[str, Sequence[tuple[float, str]]] = {
+    "gyro": (
+        (1.0 / _DEGREES, "degrees, and not rad"),
+        (_DEGREES, "rad, and not degrees"),
+        *_THOUSANDS,
+    ),
+    "accel": (
+        (STANDARD_GRAVITY, "g, and not m/s²"),
+        (1.0 / STANDARD_GRAVITY, "m/s², and not g"),
+        *_THOUSANDS,
+    ),
+}
+"""Units that are mixed up: the factor that mends a figure, and what it would be in."""
+
+NEAR_PRINTED = 4.0
+"""Times a printed figure that is usual of its sensor, either way: behind a low-pass, of a bad
+specimen, in another sidedness."""
+
+_NEAR_OTHERS = 2.0
+"""Times the least and the most of a catalogue that is usual."""
+
+_SHOWN: dict[tuple[str, str], tuple[str, str]] = {
+    ("gyro", "N"): ("°/s/√Hz", "gyro_density"),
+    ("gyro", "B"): ("°/h", "angular_rate"),
+    ("accel", "N"): ("µg/√Hz", "accel_density"),
+    ("accel", "B"): ("µg", "acceleration"),
+}
+
+
+@dataclass(frozen=True)
+class Usual:
+    """What is usual of a figure.
+
+    Attributes
+    ----------
+    median, least, most : float
+        SI.
+    sensors : int
+        How many there are.
+    """
+
+    median: float
+    least: float
+    most: float
+    sensors: int
+
+
+UsualFigures = Mapping[tuple[str, str], Usual]
+
+
+def usual_figures(sensors: Mapping[str, Sensor]) -> dict[tuple[str, str], Usual]:
+    """Return what is usual of N and B in a catalogue.
+
+    Parameters
+    ----------
+    sensors : mapping of str to Sensor
+
+    Returns
+    -------
+    dict
+        By quantity and figure (``N``, ``B``), where at least five sensors have it.
+    """
+    found: dict[tuple[str, str], list[float]] = {}
+    for sensor in sensors.values():
+        for quantity in QUANTITIES:
+            for figure, value in printed_figures(sensor, quantity).items():
+                found.setdefault((quantity, figure), []).append(value)
+    return {
+        key: Usual(median(values), min(values), max(values), len(values))
+        for key, values in found.items()
+        if len(values) >= _FEWEST
+    }
+
+
+def printed_figures(sensor: Sensor, quantity: str) -> dict[str, float]:
+    """Return N and B of a sensor as its datasheet prints them, of the first axis that has them.
+
+    Parameters
+    ----------
+    sensor : Sensor
+    quantity : str
+        ``gyro`` or ``accel``.
+
+    Returns
+    -------
+    dict
+        SI, under ``N`` and ``B``; B is the minimum of the curve, as vendors print it.
+    """
+    found: dict[str, float] = {}
+    for axis in "xyz":
+        rows = comparables(sensor.datasheet, f"{quantity}_{axis}")
+        known = [(row, row.value) for row in rows if row.value is not None]
+        for figure, statistic in (("N", "N"), ("B", "adev_minimum")):
+            values = [value for row, value in known if row.statistic == statistic and _plain(row)]
+            if values:
+                found.setdefault(figure, values[0])
+    return found
+
+
+def _plain(row: Comparable) -> bool:
+    return row.figure is not None and row.figure.kind != "range"
+
+
+def suspicious(
+    quantity: str,
+    figures: Mapping[str, float],
+    usual: UsualFigures,
+    printed: Mapping[str, float] | None = None,
+) -> list[str]:
+    """Say which figures are twenty times off what is usual, and in which unit they would not be.
+
+    Too large is what is above twenty times the median of the catalogue; too small, since there
+    are sensors of every price, what is below a twentieth of its least. A figure as the sensor's own
+    datasheet prints it is neither. Another unit is named where its factor explains the figure: what
+    is left is usual of the sensor, or of the catalogue where its datasheet prints nothing.
+
+    Parameters
+    ----------
+    quantity : str
+        ``gyro`` or ``accel``.
+    figures : mapping of str to float
+        ``N`` and ``B``, printed or estimated, SI.
+    usual : mapping
+        What `usual_figures` returns.
+    printed : mapping of str to float, optional
+        The same figures as the datasheet of the sensor prints them, SI.
+
+    Returns
+    -------
+    list of str
+        A sentence a figure.
+    """
+    found = []
+    for figure, value in figures.items():
+        known = usual.get((quantity, figure))
+        if known is None:
+            continue
+        least, most = known.least / _NEAR_OTHERS, known.most * _NEAR_OTHERS
+        if own := (printed or {}).get(figure):
+            least, most = own / NEAR_PRINTED, own * NEAR_PRINTED
+            if least <= value <= most:
+                continue
+        if value > _FAR * known.median:
+            how = f"{value / known.median:.3g} times the median of {known.sensors} sensors, "
+            other = known.median
+        elif 0 < value < known.least / _FAR:
+            how = f"{known.least / value:.3g} times below the least of {known.sensors} sensors, "
+            other = known.least
+        else:
+            continue
+        doubt = _explained(quantity, figure, value, least, most)
+        shown = _text(quantity, figure, value)
+        than = _text(quantity, figure, other)
+        found.append(f"{quantity} {figure} = {shown} is {how}{than}: {doubt}")
+    return found
+
+
+def _explained(quantity: str, figure: str, value: float, least: float, most: float) -> str:
+    """Return the question whether it is in another unit, which is named if that explains it."""
+    for factor, unit in _MISTAKES[quantity]:
+        if least <= value * factor <= most:
+            mended = _text(quantity, figure, value * factor)
+            return f"is it in {unit}? It would be {mended} then"
+    return "is its unit right?"
+
+
+def _text(quantity: str, figure: str, value: float) -> str:
+    unit, dimension = _SHOWN[quantity, figure]
+    return f"{from_si(value, unit, dimension):.3g} {unit}"
+
+
+def suspicious_datasheets(sensors: Mapping[str, Sensor]) -> dict[str, list[str]]:
+    """Say which printed figures of a catalogue are twenty times off what is usual in it.
+
+    Parameters
+    ----------
+    sensors : mapping of str to Sensor
+
+    Returns
+    -------
+    dict
+        Sentences (see `suspicious`) by sensor, of those that have any.
+    """
+    usual = usual_figures(sensors)
+    said = {
+        name: [
+            sentence
+            for quantity in QUANTITIES
+            for sentence in suspicious(quantity, printed_figures(sensor, quantity), usual)
+        ]
+        for name, sensor in sensors.items()
+    }
+    return {name: sentences for name, sentences in said.items() if sentences}
+
+
+def unusual_rows(
+    parameters: Iterable[Mapping[str, Any]], sensors: Mapping[str, Sensor]
+) -> Iterator[Mapping[str, Any]]:
+    """Yield the rows of the table ``findings`` about estimates far from what vendors print.
+
+    Parameters
+    ----------
+    parameters : iterable of mapping
+        Rows of the table ``parameters``.
+    sensors : mapping of str to Sensor
+        The catalogue.
+    """
+    usual = usual_figures(sensors)
+    for row in parameters:
+        # What vendors print of B is the minimum of the curve.
+        figure = {"N": "N", "sigma_min": "B"}.get(row["parameter"])
+        value = row["value"]
+        if figure is None or value is None:
+            continue
+        quantity, sensor = quantity_of(row["channel"]), sensors.get(row["sensor"])
+        printed = printed_figures(sensor, quantity) if sensor else None
+        for sentence in suspicious(quantity, {figure: value}, usual, printed):
+            finding = Finding("unusual_figure", "warning", sentence, value, row["channel"])
+            yield finding.row(row["sensor"], row["recording"])

@@ -1,0 +1,9 @@
+"""What the Earth does to a sensor at rest: its rate of rotation, and gravity."""
+
+from __future__ import annotations
+
+EARTH_RATE = 7.292115e-5
+"""w_ie, rad/s (WGS 84)."""
+
+STANDARD_GRAVITY = 9.80665
+"""m/s² in one g."""

@@ -1,0 +1,110 @@
+"""The limits of an Allan curve by the spectrum that was fitted to the same log.
+
+A power law identified at each tau does not know the noise a decade away: near the hump of a
+Gauss-Markov process its degrees of freedom are too many. The fitted model knows, where it explains
+the log.
+
+Where few clusters remain, a log that shows little random walk by chance has too low a curve there
+too: its upper limit allows for a walk one standard error above the fitted one. On 100 logs of the
+MTi-7's gyro, whose walk a log of 5 h hardly shows, the limits from a third of the log on held the
+truth in 90 to 93 % without this.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.allan import FITTED, POWER_LAW, AllanCurve
+from imubench_pipeline.allan.presence import Presence
+from imubench_pipeline.estimators.likelihood import Likelihood
+from imubench_pipeline.estimators.whittle import model_of
+from imubench_pipeline.noise import NoiseModel, Sinusoid
+from imubench_pipeline.noise.spectral_degrees import Degrees, Span, degrees_of_model
+
+_FEW_CLUSTERS = 100
+
+_BEYOND_BAND = 1.0
+"""Tau times the end of the band below which the curve shows what was not fitted."""
+
+
+def with_fitted_limits(
+    curve: AllanCurve,
+    found: Likelihood,
+    segments: tuple[Span, ...] | None = None,
+    presence: Presence | None = None,
+) -> AllanCurve:
+    """Return a curve with the degrees of freedom that the fitted spectrum implies.
+
+    Where the model does not explain the log, and at tau so short that the curve shows frequencies
+    that were not fitted, the fewer of these and those of the identified power law are taken.
+
+    Parameters
+    ----------
+    curve : AllanCurve
+        With the degrees of freedom of the identified power law.
+    found : Likelihood
+        Of the same log.
+    segments : tuple of (int, int), optional
+        First and one-past-last sample of each.
+    presence : Presence, optional
+        Of the samples, where some are missing.
+
+    Returns
+    -------
+    AllanCurve
+        The same where nothing was fitted.
+    """
+    if not found.candidates or found.band is None:
+        return curve
+    chosen = found.candidates[0]
+    rate = float(curve.cluster_size[0] / curve.tau[0])
+    model = with_lines(model_of(chosen.found), found)
+
+    def degrees_at(model: NoiseModel, those: NDArray[np.bool_]) -> Degrees:
+        return degrees_of_model(
+            model,
+            rate,
+            curve.cluster_size[those],
+            curve.samples,
+            segments,
+            presence,
+            curve.share[those],
+        )
+
+    degrees = degrees_at(model, np.ones(len(curve.tau), dtype=np.bool_))
+    upper = degrees.upper
+    walking = _with_more_walk(model, found)
+    few = curve.cluster_size * _FEW_CLUSTERS > curve.samples
+    if walking is not None and few.any():
+        upper[few] = np.minimum(upper[few], degrees_at(walking, few).upper)
+    doubtful = np.full(len(curve.tau), chosen.goodness.verdict != "explained")
+    if found.band.highest < 0.5 * rate * (1.0 - 1e-9):
+        doubtful |= curve.tau * found.band.highest < _BEYOND_BAND
+    filtered = found.low_pass
+    if filtered is not None and filtered.behind is not None:
+        # The model has the noise before the sensor's low-pass.
+        doubtful |= curve.tau * (filtered.frequency.in_model or np.inf) < _BEYOND_BAND
+    fitted = ~doubtful | (degrees.edf < curve.edf)
+    return replace(
+        curve,
+        edf=np.where(fitted, degrees.edf, curve.edf),
+        edf_upper=np.where(fitted, upper, curve.edf_upper),
+        edf_source=tuple(FITTED if one else POWER_LAW for one in fitted),
+    )
+
+
+def _with_more_walk(model: NoiseModel, found: Likelihood) -> NoiseModel | None:
+    """Return a model with a random walk half way to its upper 95 % limit; None: no limit."""
+    upper = found.estimates[0].parameters["K"].upper if found.estimates[0].parameters else None
+    if upper is None or upper <= model.K:
+        return None
+    return replace(model, K=(model.K + upper) / 2.0)
+
+
+def with_lines(model: NoiseModel, found: Likelihood) -> NoiseModel:
+    """Return a model with the narrow lines that were found beside it."""
+    lines = [Sinusoid(line.amplitude, line.frequency) for line in found.lines if line.narrow]
+    return replace(model, sinusoids=lines)

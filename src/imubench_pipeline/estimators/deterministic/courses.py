@@ -1,0 +1,386 @@
+"""What is no noise in a log: steps of the bias, warm-ups and periodic drift, with their sizes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from imubench_pipeline.estimators.deterministic.means import Means, means_of
+from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates
+from imubench_pipeline.estimators.deterministic.regressors import Regressor
+from imubench_pipeline.estimators.deterministic.scores import FEWEST_CYCLES, Gain
+from imubench_pipeline.estimators.deterministic.search import Searched, again, search
+from imubench_pipeline.estimators.deterministic.uncertainty import covariance_of_sizes
+from imubench_pipeline.typing import Array
+
+Kind = Literal["bias_step", "warm_up_drift", "periodic_drift"]
+
+_NAMES: dict[str, Kind] = {
+    "step": "bias_step",
+    "restart": "bias_step",
+    "exponential": "warm_up_drift",
+    "sinusoid": "periodic_drift",
+}
+"""Pulses are single bad blocks and ramps are a term of the noise model: neither is taken out."""
+
+_LARGE = 8.0
+"""Standard errors of a block that a step has to be, to be placed to the sample."""
+
+_MOST_STEPS = 8
+"""More, among as many regressors as are taken, are telegraph noise."""
+
+_LIMIT = 1.96
+_HALF_LOG_LIKELIHOOD = 1.92
+_MOST_LEVERAGE = 0.5
+"""Part of what a log tells of its random walk that may go to what is taken out."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """A deterministic course that was found.
+
+    Attributes
+    ----------
+    kind : {"bias_step", "warm_up_drift", "periodic_drift"}
+    start, end : float
+        The part of the log that has it, s from the first sample; both the place of a step.
+    size, size_lower, size_upper : float
+        Change at a step; value at the beginning of a warm-up, which it loses; amplitude of
+        periodic drift; with 95 % limits, rad/s or m/s².
+    time, time_lower, time_upper : float or None
+        Time constant of a warm-up, or period, s, with 95 % limits.
+    place_error : float or None
+        Half width of the 95 % interval of a step's place, s.
+    gain : float
+        Twice the log likelihood that is lost without it.
+    regressor : Regressor
+    amplitudes : ndarray, shape (1,) or (2,)
+        Of the regressor, SI.
+    """
+
+    kind: Kind
+    start: float
+    end: float
+    size: float
+    size_lower: float
+    size_upper: float
+    time: float | None
+    time_lower: float | None
+    time_upper: float | None
+    place_error: float | None
+    gain: float
+    regressor: Regressor
+    amplitudes: Array
+
+
+@dataclass(frozen=True)
+class Courses:
+    """What was found in a log beside noise.
+
+    Attributes
+    ----------
+    found : tuple of Course
+    means : Means or None
+        The block means that were searched; None where the log is too short.
+    searched : Searched or None
+    telegraph : bool
+        There are more steps than can be told one by one: nothing was taken out.
+    """
+
+    found: tuple[Course, ...]
+    means: Means | None
+    searched: Searched | None
+    telegraph: bool = False
+
+    def less(self, blocks: Iterable[Array]) -> Iterator[Array]:
+        """Yield the blocks of a log without what was found.
+
+        Parameters
+        ----------
+        blocks : iterable of ndarray
+            The log in order, SI.
+        """
+        reached = 0
+        for values in blocks:
+            stop = reached + len(values)
+            yield values - self.at(reached, stop) if self.found else values
+            reached = stop
+
+    def at(self, start: int, stop: int) -> Array:
+        """Return the sum of all courses at samples of the log, SI."""
+        total = np.zeros(stop - start)
+        if self.means is None:
+            return total
+        for course in self.found:
+            part = self.means.parts[course.regressor.part]
+            first, last = self._span(course.regressor.part)
+            low, high = max(start, first), min(stop, last)
+            if high <= low:
+                continue
+            places = (np.arange(low, high) + 0.5 - part.start) / self.means.block
+            total[low - start : high - start] += course.amplitudes @ course.regressor.at(places)
+        return total
+
+    def _span(self, number: int) -> tuple[int, int]:
+        """Return the samples that a part stands for: up to the next, its last blocks included."""
+        assert self.means is not None
+        parts = self.means.parts
+        last = number == len(parts) - 1
+        return parts[number].start, (1 << 62) if last else parts[number + 1].start
+
+    def without(self) -> Means:
+        """Return the block means less what was found.
+
+        Raises
+        ------
+        ValueError
+            If the log is too short to have been searched.
+        """
+        if self.means is None:
+            raise ValueError("the log is too short to be searched")
+        parts = []
+        for number, part in enumerate(self.means.parts):
+            mean = part.mean.copy()
+            for course in self.found:
+                if course.regressor.part == number:
+                    mean -= course.amplitudes @ course.regressor.means(len(mean))
+            parts.append(replace(part, mean=mean))
+        return replace(self.means, parts=tuple(parts))
+
+    @property
+    def against_random_walk(self) -> str | None:
+        """Why a random walk cannot be told from a deterministic course, or None."""
+        if self.searched is None or self.means is None or self.searched.many:
+            return None
+        rival = self.searched.rival
+        if rival is not None:
+            what = _in_words(rival.courses, self.means)
+            return f"{what} would explain the log about as well as a random walk"
+        if self.found and _leverage_on_walk(self.searched.fit) > _MOST_LEVERAGE:
+            return (
+                "what is taken out as deterministic takes most of what the log tells of a random "
+                "walk with it"
+            )
+        return None
+
+
+def _in_words(courses: Sequence[Regressor], means: Means) -> str:
+    regressor = courses[0]
+    if regressor.kind == "restart":
+        if len(courses) == 1:
+            return "a step of the bias at a pause of the log"
+        return f"steps of the bias at {len(courses)} pauses of the log"
+    start = means.parts[regressor.part].start / means.rate
+    where = regressor.where * means.interval
+    if regressor.kind == "step":
+        return f"a step of the bias at {start + where:.5g} s"
+    if regressor.kind == "exponential":
+        return f"a warm-up with a time constant of {where:.3g} s"
+    return f"a periodic drift with a period of {means.interval / regressor.where:.3g} s"
+
+
+def _leverage_on_walk(fit: Fit) -> float:
+    """Return the part of the information on a random walk that the regressors take."""
+    # What is known of K comes from the ordinates that rise as 1/f^2 to the lowest.
+    information = np.minimum(fit.density / np.median(fit.density), 1e300) - 1.0
+    slow = np.clip(information / (1.0 + information), 0.0, 1.0) ** 2
+    return float(np.sum(slow * fit.leverage) / max(float(np.sum(slow)), 1e-300))
+
+
+def find_courses(
+    blocks: Callable[[], Iterable[Array]],
+    samples: int,
+    rate: float,
+    *,
+    segments: Sequence[tuple[int, int]] | None = None,
+    highest: float | None = None,
+) -> Courses:
+    """Find steps, warm-ups and periodic drift in a log.
+
+    Parameters
+    ----------
+    blocks : callable
+        Gives the log in order, in SI, as often as it is called; NaN where a sample is missing.
+    samples : int
+        L, the length of all blocks together.
+    rate : float
+        Hz.
+    segments : sequence of (int, int), optional
+        First and one-past-last sample of each part that no time relates to the others.
+    highest : float, optional
+        Frequency up to which the log shows its noise unfiltered, Hz.
+
+    Returns
+    -------
+    Courses
+        None found where the log is too short.
+    """
+    means = means_of(blocks(), samples, rate, segments)
+    if not means.parts:
+        return Courses((), None, None)
+    ordinates = Ordinates(means, highest)
+    if not ordinates.usable:
+        return Courses((), None, None)
+    searched = search(ordinates)
+    if searched.many:
+        steps = sum(x.kind in ("step", "restart") for x in searched.fit.regressors)
+        # Bursts of noise look like pulses, and are another finding.
+        return Courses((), means, searched, telegraph=steps > _MOST_STEPS)
+    if any(x.kind == "step" for x in searched.fit.regressors):
+        placed = _placed(blocks, means, searched.fit)
+        if placed != searched.fit.regressors:
+            searched = again(ordinates, searched, placed)
+    return Courses(tuple(_described(ordinates, searched)), means, searched)
+
+
+def _described(ordinates: Ordinates, searched: Searched) -> Iterator[Course]:
+    """Yield the courses with their sizes and intervals."""
+    fit, means = searched.fit, ordinates.means
+    covariance = covariance_of_sizes(ordinates, fit)
+    column = 0
+    for regressor, gain in zip(fit.regressors, searched.gains, strict=True):
+        here = slice(column, column + regressor.columns)
+        column = here.stop
+        if regressor.kind not in _NAMES:
+            continue
+        amplitudes = fit.sizes[here]
+        part = means.parts[regressor.part]
+        start = part.start / means.rate
+        end = start + len(part.mean) * means.interval
+        size = _size(amplitudes)
+        along = amplitudes / size if len(amplitudes) > 1 else np.ones(1)
+        error = _LIMIT * math.sqrt(float(along @ covariance[here, here] @ along))
+        low, high = _limits(ordinates, fit, regressor)
+        if regressor.kind not in ("exponential", "restart"):
+            # Where it is taken to be has been chosen to make it large; and of a swing that is
+            # shorter than its period the size hangs on the period.
+            error = math.hypot(error, _spread(ordinates, fit, regressor, here, (low, high)))
+        place = start + regressor.where * means.interval
+        period = regressor.kind == "sinusoid"
+        step = regressor.kind in ("step", "restart")
+        if step:
+            times: tuple[float | None, ...] = (None, None, None)
+        elif period:
+            times = tuple(means.interval / f for f in (regressor.where, high, low))
+        else:
+            times = tuple(means.interval * t for t in (regressor.where, low, high))
+        yield Course(
+            kind=_NAMES[regressor.kind],
+            start=place if step else start,
+            end=place if step else end,
+            size=size,
+            size_lower=size - error,
+            size_upper=size + error,
+            time=times[0],
+            time_lower=times[1],
+            time_upper=times[2],
+            place_error=0.5 * (high - low) * means.interval if step else None,
+            gain=gain,
+            regressor=regressor,
+            amplitudes=amplitudes,
+        )
+
+
+def _limits(ordinates: Ordinates, fit: Fit, regressor: Regressor) -> tuple[float, float]:
+    """Return 95 % limits of a place, time constant or frequency: those of its likelihood."""
+    if regressor.kind == "restart":
+        half = 0.5 * regressor.length
+        return regressor.where - half, regressor.where + half
+    others = tuple(x for x in fit.regressors if x is not regressor)
+    gain = Gain(ordinates, others, fit.density, regressor.part)
+    best = gain.of(regressor)
+    n = ordinates.sizes[regressor.part]
+    unit = {"step": 0.25, "exponential": 0.02 * regressor.where, "sinusoid": 0.02 / n}
+    least = FEWEST_CYCLES / n if regressor.kind == "sinusoid" else 1e-6
+    limits = []
+    for side in (-1.0, 1.0):
+        away = unit[regressor.kind]
+        for _ in range(24):
+            moved = regressor.where + side * away
+            if not least < moved < n:
+                break
+            if best - gain.of(replace(regressor, where=moved)) > 2.0 * _HALF_LOG_LIKELIHOOD:
+                break
+            away *= 1.5
+        limits.append(min(max(regressor.where + side * away, least), float(n)))
+    return limits[0], limits[1]
+
+
+def _spread(
+    ordinates: Ordinates,
+    fit: Fit,
+    regressor: Regressor,
+    here: slice,
+    limits: tuple[float, float],
+) -> float:
+    """Return half the range of a size over the limits of its place."""
+    sizes = []
+    for where in limits:
+        moved = tuple(replace(x, where=where) if x is regressor else x for x in fit.regressors)
+        sizes.append(ordinates.solved(moved, fit.density)[0][here])
+    return 0.5 * float(np.ptp([_size(one) for one in (fit.sizes[here], *sizes)]))
+
+
+def _size(amplitudes: Array) -> float:
+    """Return the amplitude of a sinusoid, or the signed size of another course."""
+    return float(np.hypot(*amplitudes)) if len(amplitudes) > 1 else float(amplitudes[0])
+
+
+def _placed(blocks: Callable[[], Iterable[Array]], means: Means, fit: Fit) -> tuple[Regressor, ...]:
+    """Return the regressors with large steps placed to the sample, in one pass over the log.
+
+    Around a step that is many times the noise of a block the place is where the squares of the
+    samples about the levels on both sides are least.
+    """
+    size = means.block
+    wanted: dict[int, tuple[int, int, float]] = {}
+    column = 0
+    for i, regressor in enumerate(fit.regressors):
+        change = float(fit.sizes[column])
+        column += regressor.columns
+        if regressor.kind != "step" or size == 1:
+            continue
+        part = means.parts[regressor.part]
+        white = math.sqrt(float(np.nanmedian(part.power)) / size)
+        if abs(change) > _LARGE * white:
+            middle = part.start + round(regressor.where * size)
+            first = max(part.start, middle - 3 * size)
+            last = min(part.start + len(part.mean) * size, middle + 3 * size)
+            wanted[i] = (first, last, change)
+    if not wanted:
+        return fit.regressors
+    pieces: dict[int, list[Array]] = {i: [] for i in wanted}
+    reached = 0
+    for values in blocks():
+        for i, (first, last, _) in wanted.items():
+            low, high = max(first, reached), min(last, reached + len(values))
+            if low < high:
+                pieces[i].append(np.asarray(values[low - reached : high - reached], np.float64))
+        reached += len(values)
+    placed = list(fit.regressors)
+    for i, (first, _, _) in wanted.items():
+        samples = np.concatenate(pieces[i])
+        if np.isfinite(samples).sum() < 4:
+            continue
+        at = first + _change_point(samples)
+        part = means.parts[placed[i].part]
+        placed[i] = replace(placed[i], where=(at - part.start) / size)
+    # Two steps stand for one inside a block, until it is placed.
+    return tuple(dict.fromkeys(placed))
+
+
+def _change_point(samples: Array) -> int:
+    """Return where two levels explain samples best: the first of the second level."""
+    there = np.isfinite(samples)
+    values = np.where(there, samples - np.nanmean(samples), 0.0)
+    count = np.cumsum(there)
+    total = np.cumsum(values)
+    before, after = count[:-1], count[-1] - count[:-1]
+    left, right = total[:-1], total[-1] - total[:-1]
+    explained = left**2 / np.maximum(before, 1) + right**2 / np.maximum(after, 1)
+    explained[(before == 0) | (after == 0)] = -np.inf
+    return int(np.argmax(explained)) + 1

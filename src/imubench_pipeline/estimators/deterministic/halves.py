@@ -1,0 +1,141 @@
+"""Whether the slow noise is the same on both halves of a log."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from imubench_pipeline.estimators.deterministic.means import Means
+from imubench_pipeline.estimators.deterministic.ordinates import Ordinates
+from imubench_pipeline.estimators.spectral_shapes import Shapes
+from imubench_pipeline.estimators.whittle import Maximum
+from imubench_pipeline.typing import Array
+
+_FEWEST = 256
+"""Blocks in a part that is halved."""
+
+_POWERS = np.concatenate(([0.0], np.geomspace(1e-4, 1e4, 241)))
+"""Times the power that the whole log has."""
+
+_ROUNDS = 4
+_LEAST_WHITE = 0.1
+
+_CHANCE = 13.0
+"""Twice the log likelihood ratio that is beyond chance: 0.03 % of chi-squared, for the other terms
+are held, although they are not known."""
+
+
+@dataclass(frozen=True)
+class Halves:
+    """The slow noise of the two halves of a log, the other terms held.
+
+    Attributes
+    ----------
+    of : {"K", "slow noise"}
+        The random walk, or all terms but the white noise together.
+    first, second : float
+        Deviation of each half over that of the whole log.
+    ratio : float
+        Twice the log likelihood ratio of two values against one.
+    begin, middle, end : float
+        Of the halves, s from the first sample.
+    """
+
+    of: Literal["K", "slow noise"]
+    first: float
+    second: float
+    ratio: float
+    begin: float
+    middle: float
+    end: float
+
+    @property
+    def differ(self) -> bool:
+        """Whether one value does not explain both."""
+        return self.ratio > _CHANCE
+
+
+def compare_halves(means: Means, noise: Maximum) -> Iterator[Halves]:
+    """Estimate the slow noise on each half of the longest part of a log, and compare.
+
+    Parameters
+    ----------
+    means : Means
+        Less what is deterministic.
+    noise : Maximum
+        Of the whole log.
+
+    Yields
+    ------
+    Halves
+        Of the random walk, where there is one, and of all slow noise; nothing of short logs.
+    """
+    part = max(means.parts, key=lambda one: len(one.mean))
+    half = len(part.mean) // 2
+    if half < _FEWEST // 2:
+        return
+    densities = []
+    for first in (0, half):
+        one = replace(part, mean=part.mean[first : first + half], power=part.power[:half])
+        ordinates = Ordinates(replace(means, parts=(one,)))
+        if not ordinates.usable:
+            return
+        densities.append(_densities(ordinates, noise))
+    begin = part.start / means.rate
+    length = half * means.interval
+    for name in ("K", "slow noise"):
+        scaled = "K" if name == "K" else "FKG"
+        likelihoods = [
+            _log_likelihoods(nu, data, columns, scaled) for nu, data, columns in densities
+        ]
+        earlier, later = likelihoods
+        if earlier is None or later is None:
+            continue
+        best = [int(np.argmax(earlier)), int(np.argmax(later))]
+        ratio = 2.0 * float(earlier[best[0]] + later[best[1]] - np.max(earlier + later))
+        yield Halves(
+            "K" if name == "K" else "slow noise",
+            math.sqrt(_POWERS[best[0]]),
+            math.sqrt(_POWERS[best[1]]),
+            ratio,
+            begin,
+            begin + length,
+            begin + 2.0 * length,
+        )
+
+
+def _densities(ordinates: Ordinates, noise: Maximum) -> tuple[Array, Array, dict[str, Array]]:
+    """Return ordinates and density of each bin, and the density of each term in it."""
+    spectrum = ordinates.spectrum(ordinates.coefficient, np.ones_like(ordinates.length))
+    shapes = Shapes(spectrum)
+    units = {"N": shapes.white, "F": shapes.flicker, "K": shapes.random_walk}
+    columns = {letter: noise.parameter(letter) ** 2 * units[letter]() for letter in "NFK"}
+    columns["G"] = np.zeros(len(spectrum.density))
+    for B, time in zip(noise.biases, noise.times, strict=True):
+        columns["G"] += B**2 * shapes.gauss_markov(float(time))
+    return spectrum.ordinates, spectrum.density, columns
+
+
+def _log_likelihoods(
+    nu: Array, data: Array, columns: dict[str, Array], scaled: str
+) -> Array | None:
+    """Return the log likelihood of a half for each power of some terms; None: they are 0."""
+    slow = sum((columns[name] for name in scaled), np.zeros(len(nu)))
+    if not slow.any() or not columns["N"].any():
+        return None
+    white = columns["N"]
+    others = [columns[name] for name in columns if name not in scaled and name != "N"]
+    rest = sum(others, np.zeros(len(nu))) + _POWERS[:, None] * slow
+    # White noise that grows must not pass for slow noise: it has its own power on each half.
+    power = np.ones((len(rest), 1))
+    for _ in range(_ROUNDS):
+        weight = nu / (rest + power * white) ** 2
+        above = np.sum(weight * white * (data - rest), axis=1)
+        power = (above / np.sum(weight * white**2, axis=1))[:, None]
+        power = np.clip(power, _LEAST_WHITE, 1.0 / _LEAST_WHITE)
+    density = rest + power * white
+    return np.asarray(-0.5 * np.sum(nu * (np.log(density) + data / density), axis=1))

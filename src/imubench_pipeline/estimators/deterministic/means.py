@@ -1,0 +1,224 @@
+"""Block means of a log, and the power of its fast noise in each block: one pass."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.allan.phase import split
+from imubench_pipeline.typing import Array
+
+_MOST = 1 << 14
+"""Blocks of a log, about: a step is placed to so many parts of it, and better where it is large."""
+
+_LEAST = 10
+"""Samples in a block: its mean lies below the low-pass of most sensors."""
+
+_FEWEST = 512
+"""Blocks of a short log, whose blocks are smaller for it."""
+
+_SHORTEST_PART = 64
+"""Blocks: of a shorter part nothing is told."""
+
+_MAD = 1.4826
+"""Standard deviation over the median absolute deviation, of normal noise."""
+
+_LONGEST_HOLE = 1 / 5
+"""Part of a segment: a longer hole divides it."""
+
+_SHORTEST_PAUSE = 2.0
+"""s: a sensor or its host takes as long to begin anew."""
+
+_MOST_PAUSES = 48
+
+
+@dataclass(frozen=True)
+class Part:
+    """Block means of a part of a log without long holes.
+
+    Attributes
+    ----------
+    start : int
+        First sample.
+    mean : ndarray, shape (n,)
+        rad/s or m/s²; interpolated, with white noise, where a block has few samples.
+    power : ndarray, shape (n,)
+        Half the mean squared difference of neighbouring samples in each block: the variance of
+        white noise, (rad/s)² or (m/s²)². NaN where a block has few samples.
+    kurtosis : float
+        Excess kurtosis of samples that are independent: twice that of their differences.
+    present : float
+        Share of its samples that are there.
+    pauses : tuple of (float, float)
+        Middle and length, in blocks, of holes so long that the sensor may have begun anew; the
+        longest of them, in order.
+    """
+
+    start: int
+    mean: Array
+    power: Array
+    kurtosis: float
+    present: float
+    pauses: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class Means:
+    """Block means of a log.
+
+    Attributes
+    ----------
+    block : int
+        Samples in a block.
+    rate : float
+        Of the samples, Hz.
+    parts : tuple of Part
+    """
+
+    block: int
+    rate: float
+    parts: tuple[Part, ...]
+
+    @property
+    def interval(self) -> float:
+        """Duration of a block, s."""
+        return self.block / self.rate
+
+
+def means_of(
+    blocks: Iterable[Array],
+    samples: int,
+    rate: float,
+    segments: Sequence[tuple[int, int]] | None = None,
+) -> Means:
+    """Return the block means of a log in one pass, in bounded memory.
+
+    Parameters
+    ----------
+    blocks : iterable of ndarray
+        The log in order, in SI; NaN where a sample is missing.
+    samples : int
+        L, the length of all blocks together.
+    rate : float
+        Hz.
+    segments : sequence of (int, int), optional
+        First and one-past-last sample of each; one by default.
+    """
+    spans = tuple(segments) if segments else ((0, samples),)
+    total = sum(stop - start for start, stop in spans)
+    size = max(-(-total // _MOST), min(_LEAST, max(total // _FEWEST, 1)))
+    gathered: list[list[Array]] = [[] for _ in spans]
+    rests: list[Array] = [np.empty(0) for _ in spans]
+    for number, values in split(blocks, spans):
+        values = np.asarray(values, dtype=np.float64)
+        rest = rests[number]
+        if len(rest):
+            values = np.concatenate((rest, values))
+        whole = len(values) // size * size
+        if whole:
+            gathered[number].append(_rows(values[:whole].reshape(-1, size)))
+        rests[number] = values[whole:].copy()
+    parts: list[Part] = []
+    for (start, _), rows in zip(spans, gathered, strict=True):
+        if rows:
+            parts += _parts(start, size, np.concatenate(rows, axis=1), size / rate)
+    return Means(size, rate, tuple(parts))
+
+
+def _rows(values: Array) -> Array:
+    """Return mean, power and fourth moment of differences, share present, shape (4, rows)."""
+    size = values.shape[1]
+    if np.isfinite(values.sum()):
+        level = values[0, 0]
+        mean = (values - level).mean(axis=1) + level
+        squares = np.diff(values, axis=1)
+        squares *= squares
+        pairs = max(size - 1, 1)
+        power = squares.sum(axis=1) / (2.0 * pairs)
+        fourth = np.einsum("ij,ij->i", squares, squares) / pairs
+        return np.array([mean, power, fourth, np.ones(len(values))])
+    there = np.isfinite(values)
+    count = there.sum(axis=1)
+    mean = np.where(there, values, 0.0).sum(axis=1) / np.maximum(count, 1)
+    both = there[:, 1:] & there[:, :-1]
+    steps = np.where(both, np.diff(np.where(there, values, 0.0), axis=1), 0.0)
+    pairs = both.sum(axis=1)
+    squares = steps**2
+    known = np.where(pairs > 0, np.maximum(pairs, 1), np.nan)
+    power = squares.sum(axis=1) / (2.0 * known)
+    return np.array([mean, power, (squares**2).sum(axis=1) / known, count / size])
+
+
+def _parts(start: int, size: int, rows: Array, interval: float) -> list[Part]:
+    """Divide a segment at its longest holes, and bridge the others."""
+    mean, power, fourth, share = rows
+    there = np.flatnonzero(share >= 0.5)
+    if len(there) < _SHORTEST_PART:
+        return []
+    longest = max(2.0, _LONGEST_HOLE * len(mean))
+    cuts = np.flatnonzero(np.diff(there) > longest)
+    parts = []
+    for first, last in zip(
+        there[np.concatenate(([0], cuts + 1))],
+        there[np.append(cuts, len(there) - 1)],
+        strict=True,
+    ):
+        here = slice(int(first), int(last) + 1)
+        if here.stop - here.start < _SHORTEST_PART:
+            continue
+        parts.append(
+            Part(
+                start + here.start * size,
+                _bridged(mean[here], share[here] >= 0.5),
+                np.where(share[here] >= 0.5, power[here], np.nan),
+                _kurtosis(power[here], fourth[here], share[here] >= 0.5),
+                float(share[here].mean()),
+                _pauses(share[here] < 0.5, interval),
+            )
+        )
+    return parts
+
+
+def _pauses(missing: NDArray[np.bool_], interval: float) -> tuple[tuple[float, float], ...]:
+    """Return middle and length of the longest runs of missing blocks, in order."""
+    edges = np.flatnonzero(np.diff(missing.astype(np.int8), prepend=0, append=0))
+    first, end = edges[::2].astype(np.float64), edges[1::2].astype(np.float64)
+    long = np.flatnonzero((end - first) * interval >= _SHORTEST_PAUSE)
+    longest = long[np.argsort(first[long] - end[long], kind="stable")][:_MOST_PAUSES]
+    kept = np.sort(longest)
+    return tuple(zip(0.5 * (first + end)[kept], (end - first)[kept], strict=True))
+
+
+def _kurtosis(power: Array, fourth: Array, there: NDArray[np.bool_]) -> float:
+    """Return the excess kurtosis of samples whose differences have these moments."""
+    known = there & np.isfinite(fourth)
+    square = 2.0 * float(power[known].mean()) if known.any() else 0.0
+    return 2.0 * (float(fourth[known].mean()) / square**2 - 3.0) if square > 0.0 else 0.0
+
+
+def _bridged(mean: Array, there: NDArray[np.bool_]) -> Array:
+    """Fill blocks without samples: interpolated, with the white noise of the others.
+
+    A long hole is bridged between the means of several blocks, for the white noise of one would
+    be a slow course over it.
+    """
+    if there.all():
+        return mean
+    filled = mean.copy()
+    neighbours = np.diff(mean)[there[1:] & there[:-1]]
+    white = _MAD * float(np.median(np.abs(neighbours))) / np.sqrt(2.0) if len(neighbours) else 0.0
+    rng = np.random.default_rng(int((~there).sum()))
+    missing = np.flatnonzero(~there)
+    for run in np.split(missing, np.flatnonzero(np.diff(missing) > 1) + 1):
+        first, last = int(run[0]), int(run[-1])
+        reach = max(1, len(run) // 4)
+        before = slice(max(0, first - reach), first)
+        after = slice(last + 1, last + 1 + reach)
+        left = mean[before][there[before]].mean()
+        right = mean[after][there[after]].mean()
+        share = (run - first + 1) / (len(run) + 1)
+        filled[run] = left + share * (right - left) + white * rng.standard_normal(len(run))
+    return filled

@@ -1,0 +1,250 @@
+"""The cosine transform of block means, and the noise that it shows beside regressors.
+
+The coefficients c_k are independent, of variance S(omega_k) of the noise model, so that
+generalised least squares are weighted sums. Regressors that are taken out of the lowest
+ordinates take noise with them: an ordinate of leverage h_k counts as 1 - h_k of one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from imubench_pipeline.estimators.deterministic.means import Means
+from imubench_pipeline.estimators.deterministic.regressors import Regressor
+from imubench_pipeline.estimators.spectrum import Spectrum, bin_edges
+from imubench_pipeline.estimators.whittle import COARSE, Maximum, Terms, Whittle, whittle_of
+from imubench_pipeline.typing import Array
+
+NOISE = Terms("NFK", 1)
+"""One model for all noise: it nests what a log without regressors may be, K among it."""
+
+_ROUNDS = 2
+_LEAST_WEIGHT = 0.05
+"""Of an ordinate that regressors explain nearly whole."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Noise and regressors fitted together.
+
+    Attributes
+    ----------
+    regressors : tuple of Regressor
+    sizes : ndarray, shape (p,)
+        Amplitudes, SI, in the order of the regressors' columns.
+    covariance : ndarray, shape (p, p)
+        Of the amplitudes, for the noise as fitted.
+    noise : Maximum
+    density : ndarray, shape (k,)
+        Of the noise at each ordinate, SI²/Hz.
+    residual : ndarray, shape (k,)
+        Coefficients less the regressors.
+    leverage : ndarray, shape (k,)
+        Part of each ordinate that the regressors take.
+    log_likelihood : float
+        Up to a constant that all fits of the ordinates share.
+    """
+
+    regressors: tuple[Regressor, ...]
+    sizes: Array
+    covariance: Array
+    noise: Maximum
+    density: Array
+    residual: Array
+    leverage: Array
+    log_likelihood: float
+
+
+class Ordinates:
+    """The ordinates of all parts of a log.
+
+    Parameters
+    ----------
+    means : Means
+    highest : float, optional
+        Frequency up to which they are used, Hz.
+    """
+
+    def __init__(self, means: Means, highest: float | None = None) -> None:
+        self.means = means
+        interval = means.interval
+        self.sizes = [len(part.mean) for part in means.parts]
+        self.starts = np.cumsum([0, *(n - 1 for n in self.sizes)])
+        self.coefficient = np.concatenate(
+            [
+                scipy.fft.dct(part.mean - part.mean.mean(), type=2, norm="ortho")[1:]
+                for part in means.parts
+            ]
+        )
+        self.frequency = np.concatenate(
+            [np.arange(1, n) / (2.0 * n * interval) for n in self.sizes]
+        )
+        self.length = np.concatenate([np.full(n - 1, n * interval) for n in self.sizes])
+        self.used = self.frequency <= (highest or math.inf)
+        self._columns: dict[Regressor, Array] = {}
+
+    @property
+    def usable(self) -> bool:
+        """Whether there are enough ordinates for the noise model."""
+        return int(self.used.sum()) >= 64 and float(np.ptp(self.coefficient)) > 0.0
+
+    def part(self, number: int) -> slice:
+        """Return the ordinates of a part."""
+        return slice(int(self.starts[number]), int(self.starts[number + 1]))
+
+    def columns(self, regressor: Regressor) -> Array:
+        """Return the coefficients of a regressor, shape (columns, n - 1) of its part."""
+        if regressor not in self._columns:
+            self._columns[regressor] = regressor.coefficients(self.sizes[regressor.part])
+        return self._columns[regressor]
+
+    @cached_property
+    def _order(self) -> NDArray[np.int64]:
+        order = np.argsort(self.frequency, kind="stable")
+        return np.asarray(order[self.used[order]])
+
+    @cached_property
+    def _edges(self) -> NDArray[np.int64]:
+        return bin_edges(self.frequency[self._order])
+
+    def spectrum(self, residual: Array, weight: Array) -> Spectrum:
+        """Return the binned spectrum of coefficients that count for ``weight`` each."""
+        order, edges = self._order, self._edges
+        interval = self.means.interval
+        frequency, length = self.frequency[order], self.length[order]
+        counts = np.diff(np.append(edges, len(order)))
+        last = edges + counts - 1
+        ordinates = np.add.reduceat(weight[order], edges)
+        power = np.add.reduceat(residual[order] ** 2, edges) * interval
+        zeros = np.zeros(len(edges))
+        return Spectrum(
+            frequency=np.add.reduceat(frequency, edges) / counts,
+            lower=frequency[edges] - 0.25 / length[edges],
+            upper=frequency[last] + 0.25 / length[last],
+            ordinates=ordinates,
+            density=power / ordinates,
+            block=np.full(len(edges), self.means.block),
+            length=np.add.reduceat(length, edges) / counts,
+            ramp=zeros,
+            cross=zeros,
+            rate=self.means.rate,
+            duration=float(sum(self.sizes)) * interval,
+            mean=0.0,
+        )
+
+    @cached_property
+    def _whittle(self) -> Whittle:
+        highest = min(0.5 / self.means.interval, float(self.frequency[self.used].max()))
+        return whittle_of(
+            self.spectrum(self.coefficient, np.ones_like(self.length)), highest, COARSE
+        )
+
+    def density(self, noise: Maximum) -> Array:
+        """Return the density of a noise model at each ordinate, shape (k,)."""
+        bins = self._whittle.spectrum.frequency
+        return np.asarray(
+            np.exp(
+                np.interp(
+                    np.log(self.frequency), np.log(bins), np.log(self._whittle.density(noise))
+                )
+            )
+        )
+
+    def fit(
+        self, regressors: Sequence[Regressor], start: Array | None = None, terms: Terms = NOISE
+    ) -> Fit:
+        """Fit noise and regressors together.
+
+        Parameters
+        ----------
+        regressors : sequence of Regressor
+        start : ndarray, shape (k,), optional
+            Density of the noise that the first weights are taken from.
+        terms : Terms
+            The noise model.
+        """
+        weight = np.ones_like(self.coefficient)
+        residual, leverage = self.coefficient, np.zeros_like(weight)
+        sizes, covariance = np.empty(0), np.empty((0, 0))
+        rounds = _ROUNDS if regressors else 1
+        density = start
+        for _ in range(rounds):
+            if regressors and density is not None:
+                sizes, covariance, residual, leverage = self.solved(regressors, density)
+                weight = np.maximum(1.0 - leverage, _LEAST_WEIGHT)
+            whittle = self._whittle.of(self.spectrum(residual, weight))
+            noise = whittle.maximum(terms)
+            density = self.density(noise)
+        if density is None:
+            raise ValueError("no round was made")
+        if regressors:
+            sizes, covariance, residual, leverage = self.solved(regressors, density)
+        return Fit(
+            tuple(regressors),
+            sizes,
+            covariance,
+            noise,
+            density,
+            residual,
+            leverage,
+            self.log_likelihood(residual, density),
+        )
+
+    def carried_on(self, fit: Fit, held_out: int) -> Array:
+        """Return the density of noise fitted to all but the lowest ordinates of each part."""
+        spectrum = self.spectrum(fit.residual, np.maximum(1.0 - fit.leverage, _LEAST_WEIGHT))
+        beyond = np.rint(2.0 * spectrum.frequency * spectrum.length) > held_out
+        if beyond.sum() < 4 * NOISE.parameters:
+            return fit.density
+        whittle = self._whittle.taken(spectrum, beyond)
+        return self.density(whittle.maximum(fit.noise.terms))
+
+    def log_likelihood(self, residual: Array, density: Array) -> float:
+        """Return the log likelihood of coefficients, up to a constant."""
+        used = self.used
+        variance = density[used] / self.means.interval
+        return -0.5 * float(np.sum(np.log(variance) + residual[used] ** 2 / variance))
+
+    def weights(self, density: Array) -> Array:
+        """Return the inverse variance of each coefficient; 0 where it is not used."""
+        return np.where(self.used, self.means.interval / density, 0.0)
+
+    def solved(
+        self, regressors: Sequence[Regressor], density: Array
+    ) -> tuple[Array, Array, Array, Array]:
+        """Return amplitudes, their covariance, what is left, and the leverage of each ordinate."""
+        weight = self.weights(density)
+        owner = [r.part for r in regressors for _ in range(r.columns)]
+        columns = [row for r in regressors for row in self.columns(r)]
+        p = len(columns)
+        gram, target = np.zeros((p, p)), np.zeros(p)
+        weighted = []
+        for a in range(p):
+            here = self.part(owner[a])
+            weighted.append(columns[a] * weight[here])
+            target[a] = weighted[a] @ self.coefficient[here]
+            for b in range(a + 1):
+                if owner[b] == owner[a]:
+                    gram[a, b] = gram[b, a] = weighted[a] @ columns[b]
+        norm = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+        scaled = gram / np.outer(norm, norm)
+        inverse = np.linalg.pinv(scaled, rcond=1e-10, hermitian=True)
+        covariance = inverse / np.outer(norm, norm)
+        sizes = covariance @ target
+        residual = self.coefficient.copy()
+        leverage = np.zeros_like(residual)
+        for number in set(owner):
+            here = self.part(number)
+            own = [a for a in range(p) if owner[a] == number]
+            X = np.array([columns[a] for a in own])
+            residual[here] -= sizes[own] @ X
+            solved = covariance[np.ix_(own, own)] @ X
+            leverage[here] = np.einsum("ak,ak->k", X, solved) * weight[here]
+        return sizes, covariance, residual, leverage

@@ -1,0 +1,291 @@
+"""How far each regressor stands out of given noise: the matched filter, at every place at once.
+
+The numerator of a step at place t is sum_k w_k r_k s_k(t) with s_k(t) = -sqrt(2 / n)
+sin(pi k t / n) / (2 sin(pi k / 2 n)), a sine transform over k; the denominators are cosine
+transforms. What other regressors explain already is projected out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import scipy.fft
+from scipy.special import chdtri
+
+from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates
+from imubench_pipeline.estimators.deterministic.regressors import Kind, Regressor
+from imubench_pipeline.typing import Array
+
+FALSE_ALARM: dict[Kind, float] = {
+    "step": 0.001,
+    "restart": 0.001,
+    "exponential": 0.0015,
+    "sinusoid": 0.0015,
+    "ramp": 0.002,
+    "pulse": 0.001,
+}
+"""Chance that a log without any shows one of a kind."""
+
+_EDGE = 3
+"""Blocks at the ends of a part where no step is looked for."""
+
+_TIMES = 24
+"""Time constants that are tried."""
+
+_SHORTEST, _LONGEST = 1 / 200, 1 / 2
+"""Time constants, as parts of the part of the log."""
+
+_SLOW_ORDINATES = 2048
+"""In which exponentials are looked for."""
+
+_MOST_CYCLES = 64
+_CYCLES = 0.25
+"""Distance of the frequencies that are tried, cycles in the part."""
+
+FEWEST_CYCLES = 0.25
+"""A day in a log of six hours; of less a sinusoid is a ramp and a bend."""
+
+_KNOWN = 1e-3
+"""Part of a regressor that others leave: less is told by rounding errors."""
+
+
+@dataclass(frozen=True)
+class Score:
+    """The best regressor of a kind.
+
+    Attributes
+    ----------
+    regressor : Regressor
+    gain : float
+        Twice the log likelihood that it adds, for given noise.
+    threshold : float
+        What it must reach (`FALSE_ALARM`).
+    """
+
+    regressor: Regressor
+    gain: float
+    threshold: float
+
+
+def best_scores(
+    ordinates: Ordinates, fit: Fit, density: Array, *, smooth: bool = False
+) -> Iterator[Score]:
+    """Yield the best further regressor of each kind in each part.
+
+    Parameters
+    ----------
+    ordinates : Ordinates
+    fit : Fit
+        Its regressors are there already.
+    density : ndarray, shape (k,)
+        Of the noise, SI²/Hz.
+    smooth : bool
+        Look for slow courses only, not for steps and pulses.
+    """
+    weight = ordinates.weights(density)
+    residual = ordinates.coefficient
+    if fit.regressors:
+        residual = ordinates.solved(fit.regressors, density)[2]
+    parts = len(ordinates.sizes)
+    for number, n in enumerate(ordinates.sizes):
+        here = ordinates.part(number)
+        w, r = weight[here], residual[here]
+        others = [x for x in fit.regressors if x.part == number]
+        basis = _orthonormal([row for x in others for row in ordinates.columns(x)], w)
+        if not smooth:
+            yield from _steps_and_pulses(number, n, w, r, basis, parts)
+        yield _exponentials(number, n, w, r, basis, parts)
+        yield _sinusoids(number, n, w, r, basis, parts)
+        ramp = Regressor("ramp", number)
+        gain = _gains(ordinates.columns(ramp), w, r, basis)[0]
+        yield Score(ramp, gain, float(chdtri(1, FALSE_ALARM["ramp"] / parts)))
+
+
+class Gain:
+    """What regressors of one part add to the likelihood beside others, for given noise.
+
+    Parameters
+    ----------
+    ordinates : Ordinates
+    regressors : sequence of Regressor
+        Those that are there already.
+    density : ndarray, shape (k,)
+        Of the noise, SI²/Hz.
+    part : int
+    """
+
+    def __init__(
+        self, ordinates: Ordinates, regressors: Sequence[Regressor], density: Array, part: int
+    ) -> None:
+        self._ordinates = ordinates
+        here = ordinates.part(part)
+        self._weight = ordinates.weights(density)[here]
+        others = [row for x in regressors if x.part == part for row in ordinates.columns(x)]
+        self._basis = _orthonormal(others, self._weight)
+        given = ordinates.coefficient[here]
+        self._residual = given - (self._basis @ (self._weight * given)) @ self._basis
+
+    def of(self, regressor: Regressor) -> float:
+        """Return twice the log likelihood that a regressor adds."""
+        columns = regressor.coefficients(self._ordinates.sizes[regressor.part])
+        if len(columns) == 1:
+            return float(_gains(columns, self._weight, self._residual, self._basis)[0])
+        # Cosine and sine of a few cycles are not orthogonal: what the one takes, the other lacks.
+        first = _orthonormal([self._beside(columns[0])], self._weight)
+        taken = first @ (self._weight * self._residual)
+        both = np.concatenate([self._basis, first])
+        left = self._residual - taken @ first
+        return float(taken @ taken + _gains(columns[1:], self._weight, left, both)[0])
+
+    def _beside(self, column: Array) -> Array:
+        return np.asarray(column - (self._basis @ (self._weight * column)) @ self._basis)
+
+
+def _orthonormal(columns: Sequence[Array], w: Array) -> Array:
+    """Return a basis of columns that is orthonormal with weights, shape (q, k)."""
+    if not columns:
+        return np.empty((0, len(w)))
+    X = np.array(columns)
+    gram = (X * w) @ X.T
+    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
+    kept = values > 1e-10
+    return np.asarray((vectors[:, kept] / np.sqrt(values[kept])).T @ (X / scale[:, None]))
+
+
+def _gains(columns: Array, w: Array, r: Array, basis: Array) -> Array:
+    """Return the gain of each of several columns, shape (c, k)."""
+    weighted = columns * w
+    above = weighted @ r
+    whole = np.einsum("ck,ck->c", weighted, columns)
+    left = whole - np.sum((weighted @ basis.T) ** 2, axis=1)
+    return np.asarray(np.where(left > _KNOWN * whole, above**2 / np.maximum(left, 1e-300), 0.0))
+
+
+def _steps_and_pulses(
+    number: int, n: int, w: Array, r: Array, basis: Array, parts: int
+) -> Iterator[Score]:
+    k = np.arange(1, n)
+    slope = -math.sqrt(2.0 / n) / (2.0 * np.sin(np.pi * k / (2.0 * n)))
+    above = _sines(slope * w * r)
+    power = slope**2 * w
+    padded = np.concatenate(([0.0], power))
+    turned = scipy.fft.fft(padded).real
+    whole = 0.5 * (turned[0] - turned[1:])
+    left = whole.copy()
+    for row in basis:
+        left -= _sines(slope * w * row) ** 2
+    gains = np.where(left > _KNOWN * whole, above**2 / np.maximum(left, 1e-300), 0.0)
+    gains[: _EDGE - 1] = 0.0
+    gains[n - _EDGE :] = 0.0
+    place = int(np.argmax(gains))
+    # Neighbouring places see nearly the same: as many count as the noise lets one tell apart
+    # (Rice's formula), and not more than there are.
+    alike = float(np.sum(power * np.cos(np.pi * k / n)) / np.sum(power))
+    apart = (n - 1) * math.sqrt(2.0 * max(1.0 - alike, 0.0))
+    yield Score(
+        Regressor("step", number, float(place + 1)),
+        float(gains[place]),
+        _threshold(FALSE_ALARM["step"] / parts, apart, n),
+    )
+    k0 = np.concatenate(([0.0], w * r))
+    above = scipy.fft.idct(k0, type=2, norm="ortho")
+    whole = np.full(n, float(w.sum()) / n)
+    left = whole.copy()
+    for row in basis:
+        left -= scipy.fft.idct(np.concatenate(([0.0], w * row)), type=2, norm="ortho") ** 2
+    gains = np.where(left > _KNOWN * whole, above**2 / np.maximum(left, 1e-300), 0.0)
+    place = int(np.argmax(gains))
+    yield Score(
+        Regressor("pulse", number, float(place)),
+        float(gains[place]),
+        _threshold(FALSE_ALARM["pulse"] / parts, math.inf, n),
+    )
+
+
+def _threshold(chance: float, apart: float, places: int) -> float:
+    """Return what the largest of many gains stays below: Rice's formula, or Bonferroni's."""
+    low, high = 4.0, 200.0
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        single = math.erfc(math.sqrt(0.5 * middle))
+        crossed = single + apart / math.pi * math.exp(-0.5 * middle)
+        if min(crossed, places * single) > chance:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def _sines(values: Array) -> Array:
+    """Return sum_k a_k sin(pi k t / n) for t = 1 ... n - 1."""
+    return np.asarray(0.5 * scipy.fft.dst(values, type=1))
+
+
+@lru_cache(maxsize=8)
+def _exponential_columns(n: int) -> tuple[Array, Array]:
+    """Return time constants in blocks and their coefficients, shape (t, n - 1)."""
+    times = np.geomspace(max(_SHORTEST * n, 2.0), _LONGEST * n, _TIMES)
+    rows = [Regressor("exponential", 0, t).coefficients(n)[:, :_SLOW_ORDINATES] for t in times]
+    return times, np.concatenate(rows)
+
+
+def _exponentials(number: int, n: int, w: Array, r: Array, basis: Array, parts: int) -> Score:
+    times, columns = _exponential_columns(n)
+    low = slice(0, columns.shape[1])
+    gains = _gains(columns, w[low], r[low], basis[:, low])
+    best = int(np.argmax(gains))
+    return Score(
+        Regressor("exponential", number, float(times[best])),
+        float(gains[best]),
+        _threshold(FALSE_ALARM["exponential"] / parts, float(_TIMES), _TIMES),
+    )
+
+
+@lru_cache(maxsize=8)
+def _sinusoid_columns(n: int) -> tuple[Array, Array, int]:
+    """Return cycles in the part, coefficients of cosine and sine (2, c, k), and how many k."""
+    most = min(_MOST_CYCLES, n // 8)
+    cycles = np.arange(FEWEST_CYCLES, most + 1e-9, _CYCLES)
+    kept = min(n - 1, 4 * most)
+    columns = np.empty((2, len(cycles), kept))
+    # The low ordinates of a slow course are those of fewer, longer blocks.
+    few = min(n, 8 * most)
+    scale = math.sqrt(n / few)
+    for i, c in enumerate(cycles):
+        columns[:, i] = scale * Regressor("sinusoid", 0, c / few).coefficients(few)[:, :kept]
+    return cycles, columns, kept
+
+
+def _sinusoids(number: int, n: int, w: Array, r: Array, basis: Array, parts: int) -> Score:
+    cycles, columns, kept = _sinusoid_columns(n)
+    w, r, basis = w[:kept], r[:kept], basis[:, :kept]
+    weighted = columns * w
+    above = weighted @ r
+    a, b = np.einsum("xck,xck->xc", weighted, columns)
+    c = np.einsum("ck,ck->c", weighted[0], columns[1])
+    known = weighted @ basis.T
+    whole = a * b - c**2
+    a = a - np.sum(known[0] ** 2, axis=1)
+    b = b - np.sum(known[1] ** 2, axis=1)
+    c = c - np.sum(known[0] * known[1], axis=1)
+    left = a * b - c**2
+    good = left > 10.0 * _KNOWN * whole
+    gains = np.where(
+        good,
+        (b * above[0] ** 2 - 2.0 * c * above[0] * above[1] + a * above[1] ** 2)
+        / np.where(good, left, 1.0),
+        0.0,
+    )
+    best = int(np.argmax(gains))
+    # Of two amplitudes each; two places in a cycle are apart.
+    chance = FALSE_ALARM["sinusoid"] / parts / (2.0 * len(cycles) * _CYCLES)
+    return Score(
+        Regressor("sinusoid", number, float(cycles[best]) / n),
+        float(gains[best]),
+        float(chdtri(2, chance)),
+    )

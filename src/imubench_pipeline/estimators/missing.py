@@ -1,0 +1,320 @@
+"""Missing samples drawn from their distribution, given the samples present and a noise model.
+
+A spectrum needs a complete log. Each missing sample is replaced by a draw: the slow part of the
+noise, which a Kalman smoother carries through the hole from the block means on both sides, and
+white noise of its own. The result is distributed as a complete log, if the model is right, so
+that a fit and the filling are done in turn (data augmentation).
+
+References
+----------
+M. Tanner and W. Wong, "The calculation of posterior distributions by data augmentation", J. Am.
+Stat. Assoc. 82, 1987; J. Durbin and S. J. Koopman, "A simple and efficient simulation smoother
+for state space time series analysis", Biometrika 89, 2002.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from imubench_pipeline.noise import GaussMarkov, NoiseModel, RandomWalk
+from imubench_pipeline.noise.state_space import StateSpace
+from imubench_pipeline.typing import Array
+
+BLOCK = 64
+"""Samples whose mean is one measurement of the slow part."""
+
+_WINDOW = 4096
+_AHEAD = 1024
+"""Blocks: a hole that is longer divides the log, for the two sides know nothing of each other."""
+
+_DIFFUSE = 1e4
+
+
+@dataclass(frozen=True)
+class BlockMeans:
+    """Means over the samples present in blocks of `BLOCK`, no block over two segments.
+
+    Attributes
+    ----------
+    begin, end : ndarray of int, shape (b,)
+        First and one-past-last sample of each block.
+    mean : ndarray, shape (b,)
+        rad/s or m/s²; 0 where no sample is present.
+    count : ndarray of int, shape (b,)
+        Samples present.
+    """
+
+    begin: NDArray[np.int64]
+    end: NDArray[np.int64]
+    mean: Array
+    count: NDArray[np.int64]
+
+    def within(self, start: int, stop: int) -> slice:
+        """Return the blocks from one sample to another."""
+        first, last = np.searchsorted(self.begin, [start, stop])
+        return slice(int(first), int(last))
+
+
+@dataclass(frozen=True)
+class SlowPath:
+    """The slow part of the noise, the level of the log included, linear between knots.
+
+    Attributes
+    ----------
+    sample : ndarray, shape (k,)
+        Place of the knots on the grid of the log: the middles of blocks, and the ends of parts.
+    value : ndarray, shape (k,)
+        rad/s or m/s².
+    """
+
+    sample: Array
+    value: Array
+
+    def at(self, samples: NDArray[np.int64]) -> Array:
+        """Return the slow part at samples of the log."""
+        return np.interp(samples, self.sample, self.value)
+
+
+def block_means(blocks: Iterable[Array], segments: Sequence[tuple[int, int]]) -> BlockMeans:
+    """Return the means of blocks of a log with missing samples (NaN), in one pass.
+
+    Parameters
+    ----------
+    blocks : iterable of ndarray
+        The log in order.
+    segments : sequence of (int, int)
+        First and one-past-last sample of each, in order.
+    """
+    begin = np.concatenate([np.arange(start, stop, BLOCK) for start, stop in segments])
+    ends = np.concatenate([np.full(-(-(b - a) // BLOCK), b) for a, b in segments])
+    end = np.minimum(begin + BLOCK, ends)
+    total, count = np.zeros(len(begin)), np.zeros(len(begin), dtype=np.int64)
+    for place, present in samples_present(blocks, begin, end):
+        first, width = place[0], place[-1] + 1 - place[0]
+        part = slice(first, first + width)
+        total[part] += np.bincount(place - first, weights=present, minlength=width)
+        count[part] += np.bincount(place - first, minlength=width)
+    return BlockMeans(begin, end, total / np.maximum(count, 1), count)
+
+
+def samples_present(
+    parts: Iterable[Array], begin: NDArray[np.int64], end: NDArray[np.int64]
+) -> Iterator[tuple[NDArray[np.int64], Array]]:
+    """Yield the samples of a log that are present, and the blocks that they belong to.
+
+    Parameters
+    ----------
+    parts : iterable of ndarray
+        The log in order; NaN where a sample is missing.
+    begin, end : ndarray of int, shape (b,)
+        First and one-past-last sample of each block, rising; samples of no block are left out.
+
+    Yields
+    ------
+    place : ndarray of int, shape (n,)
+        Block of each sample, rising.
+    present : ndarray, shape (n,)
+        The samples, at least one.
+    """
+    reached = 0
+    for values in parts:
+        there = np.flatnonzero(np.isfinite(values))
+        place = np.searchsorted(begin, reached + there, side="right") - 1
+        inside = (place >= 0) & (reached + there < end[place])
+        if inside.any():
+            yield place[inside], values[there[inside]]
+        reached += len(values)
+
+
+def divided(means: BlockMeans, segments: Sequence[tuple[int, int]]) -> tuple[tuple[int, int], ...]:
+    """Divide segments at the holes that are too long to be filled, and trim their ends.
+
+    Parameters
+    ----------
+    means : BlockMeans
+    segments : sequence of (int, int)
+        First and one-past-last sample of each, as `block_means` had them.
+
+    Returns
+    -------
+    tuple of (int, int)
+        Parts in which every hole can be filled, from the beginning of a block to the end of one.
+    """
+    parts: list[tuple[int, int]] = []
+    for start, stop in segments:
+        chosen = means.within(start, stop)
+        there = np.flatnonzero(means.count[chosen] > 0) + chosen.start
+        if len(there) == 0:
+            continue
+        cuts = np.flatnonzero(np.diff(there) > _AHEAD)
+        begins = means.begin[there[np.concatenate(([0], cuts + 1))]]
+        ends = means.end[there[np.append(cuts, len(there) - 1)]]
+        parts += zip(begins.tolist(), ends.tolist(), strict=True)
+    return tuple(parts)
+
+
+def slow_part(
+    means: BlockMeans,
+    parts: Sequence[tuple[int, int]],
+    model: NoiseModel,
+    rate: float,
+    rng: np.random.Generator,
+) -> SlowPath:
+    """Draw the slow part of the noise, given the block means.
+
+    Parameters
+    ----------
+    means : BlockMeans
+    parts : sequence of (int, int)
+        First and one-past-last sample of each part of the log (`divided`).
+    model : NoiseModel
+    rate : float
+        Hz.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    SlowPath
+        Its jumps lie between the parts.
+    """
+    interval = BLOCK / rate
+    white = max(model.N**2 * rate, 1e-300)
+    places, values = [], []
+    for start, stop in parts:
+        chosen = means.within(start, stop)
+        middle = 0.5 * (means.begin[chosen] + means.end[chosen] - 1)
+        ramp = model.R * middle / rate
+        mean, count = means.mean[chosen] - ramp, means.count[chosen]
+        spread = float(np.std(mean[count > 0])) + math.sqrt(white)
+        level = float(mean[count > 0].mean())
+        terms = [
+            term.state_space(interval)
+            for term in model.realised(interval, max(len(mean), 2) * interval)
+            if isinstance(term, GaussMarkov | RandomWalk)
+        ]
+        # The level itself is not known, but does not change.
+        terms.append(StateSpace.scalar(1.0, 0.0, _DIFFUSE * spread**2))
+        decay = np.array([space.transition[0, 0] for space in terms])
+        drive = np.array([space.process_noise[0, 0] for space in terms])
+        begin = np.array([space.initial_variance[0, 0] for space in terms])
+        # A random walk starts at the level.
+        normals = rng.standard_normal((len(mean), len(terms) + 1))
+        state = np.sqrt(np.append(begin[:-1], 0.0)) * rng.standard_normal(len(terms))
+        error = white / np.maximum(count, 1)
+        path = level + _smoothed(
+            mean - level, count > 0, error, decay, drive, begin, state, normals
+        )
+        # The path is level from the last middle to the end of the part, which lies before a
+        # jump: between this knot and the first of the next part there is no sample.
+        place = np.concatenate(([start - 0.25], middle, [stop - 0.75]))
+        places.append(place)
+        values.append(np.concatenate((path[:1], path, path[-1:])) + model.R * place / rate)
+    return SlowPath(np.concatenate(places), np.concatenate(values))
+
+
+def filled(
+    blocks: Iterable[Array],
+    path: SlowPath,
+    model: NoiseModel,
+    rate: float,
+    rng: np.random.Generator,
+) -> Iterator[Array]:
+    """Yield the blocks of a log with each missing sample replaced by a draw.
+
+    Parameters
+    ----------
+    blocks : iterable of ndarray
+        The log in order, NaN where a sample is missing.
+    path : SlowPath
+    model : NoiseModel
+        Its N is the white part.
+    rate : float
+        Hz.
+    rng : numpy.random.Generator
+    """
+    reached = 0
+    for values in blocks:
+        missing = np.flatnonzero(~np.isfinite(values))
+        complete = values
+        if len(missing):
+            complete = np.array(values, dtype=np.float64)
+            white = model.N * math.sqrt(rate) * rng.standard_normal(len(missing))
+            complete[missing] = path.at(reached + missing) + white
+        reached += len(values)
+        yield complete
+
+
+@njit(cache=True)
+def _smoothed(
+    mean: Array,
+    there: NDArray[np.bool_],
+    error: Array,
+    decay: Array,
+    drive: Array,
+    begin: Array,
+    state: Array,
+    normals: Array,
+) -> Array:
+    """Draw the sum of scalar states given measurements of it (Durbin and Koopman's smoother).
+
+    A path is simulated; the smoothed difference between the measurements and those of the
+    simulated path is added to it. It goes through the log in windows, each with a look ahead.
+    """
+    n, s = len(mean), len(decay)
+    simulated = np.empty(n)
+    difference = np.zeros(n)
+    for k in range(n):
+        simulated[k] = state.sum()
+        if there[k]:
+            difference[k] = mean[k] - simulated[k] - np.sqrt(error[k]) * normals[k, s]
+        for a in range(s):
+            state[a] = decay[a] * state[a] + np.sqrt(drive[a]) * normals[k, a]
+    path = np.empty(n)
+    ahead = np.zeros(s)
+    spread = np.diag(begin)
+    size = min(n, _WINDOW + _AHEAD)
+    means = np.empty((size, s))
+    gains = np.empty((size, s))
+    spreads = np.empty((size, s, s))
+    innovations = np.empty((size, 2))
+    for first in range(0, n, _WINDOW):
+        last = min(n, first + _WINDOW + _AHEAD)
+        here, matrix = ahead, spread
+        for k in range(first, last):
+            i = k - first
+            if k == first + _WINDOW:
+                ahead, spread = here.copy(), matrix.copy()
+            means[i] = here
+            spreads[i] = matrix
+            total = matrix.sum(axis=1)
+            if there[k]:
+                variance = total.sum() + error[k]
+                gain = total / variance
+                wrong = difference[k] - here.sum()
+                innovations[i, 0], innovations[i, 1] = wrong, variance
+                here = here + gain * wrong
+                matrix = matrix - np.outer(gain, total)
+                gains[i] = gain
+            here = here * decay
+            matrix = matrix * np.outer(decay, decay)
+            for a in range(s):
+                matrix[a, a] += drive[a]
+        back = np.zeros(s)
+        for k in range(last - 1, first - 1, -1):
+            i = k - first
+            back = back * decay
+            if there[k]:
+                # L = Phi (I - gain H): its transpose, and H / F times the innovation.
+                along = 0.0
+                for a in range(s):
+                    along += gains[i, a] * back[a]
+                back = back - along + innovations[i, 0] / innovations[i, 1]
+            if k < first + _WINDOW:
+                path[k] = simulated[k] + (means[i] + spreads[i] @ back).sum()
+    return path

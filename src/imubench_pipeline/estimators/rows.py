@@ -1,0 +1,157 @@
+"""Curves and estimates as rows of the tables, and estimates back from them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import pyarrow as pa
+
+from imubench_pipeline.allan import AllanCurve
+from imubench_pipeline.estimators.estimate import (
+    CURVE,
+    FAMILY,
+    SI_UNITS,
+    Estimate,
+    JointDraws,
+    Parameter,
+    Status,
+)
+from imubench_pipeline.settings.sensor import quantity_of
+from imubench_pipeline.tables import read
+from imubench_pipeline.tables.keys import Key, divided
+from imubench_pipeline.typing import Row
+
+
+def allan_rows(key: Key, curve: AllanCurve) -> Iterator[Row]:
+    """Yield the rows of the table ``allan``."""
+    for i, about in enumerate(limit_rows(curve)):
+        yield (
+            asdict(key)
+            | about
+            | {
+                "cluster_size": int(curve.cluster_size[i]),
+                "averaged": float(curve.averaged[i]),
+                "exponent": int(curve.exponent[i]),
+                "share": float(curve.share[i]),
+            }
+        )
+
+
+def limit_rows(curve: AllanCurve) -> Iterator[dict[str, Any]]:
+    """Yield what every table of a measured curve says at each tau."""
+    lower, upper = curve.limits(0.95)
+    for i, tau in enumerate(curve.tau):
+        yield {
+            "tau": float(tau),
+            "adev": float(curve.deviation[i]),
+            "lower": float(lower[i]),
+            "upper": float(upper[i]),
+            "edf": float(curve.edf[i]),
+            "edf_upper": float(curve.edf_upper[i]),
+            "edf_source": curve.edf_source[i],
+        }
+
+
+def parameter_rows(key: Key, estimate: Estimate, *, recommended: bool) -> Iterator[Row]:
+    """Yield the rows of the table ``parameters``."""
+    units = SI_UNITS[quantity_of(key.channel)]
+    for component, name, parameter in estimate.components():
+        yield asdict(key) | {
+            "method": estimate.method,
+            "recommended": recommended,
+            "model": estimate.model.name,
+            "component": component,
+            "parameter": name,
+            "unit": units[name],
+            **asdict(parameter),
+        }
+
+
+def draw_rows(key: Key, estimate: Estimate) -> Iterator[Row]:
+    """Yield the rows of the table ``draws``; none of an estimate that has no joint draws."""
+    if estimate.draws is None:
+        return
+    for number, (first, further) in enumerate(
+        zip(estimate.draws.first.tolist(), estimate.draws.further.tolist(), strict=True)
+    ):
+        about = asdict(key) | {"method": estimate.method, "draw": number}
+        there = {name: value for name, value in zip(FAMILY, first, strict=True) if value}
+        yield about | {"component": 1} | there
+        for component, (B, T_B) in enumerate(further, start=2):
+            if B:
+                yield about | {"component": component, "B": B, "T_B": T_B}
+
+
+def draws(path: Path) -> dict[tuple[str, str], JointDraws]:
+    """Read the table ``draws`` of a recording, by channel and method."""
+    found = {}
+    for (channel, method), table in divided(read("draws", [path]), "channel", "method").items():
+        columns = {name: table[name].to_numpy().astype(np.float64) for name in FAMILY}
+        draw, component = table["draw"].to_numpy(), table["component"].to_numpy()
+        count = int(draw.max()) + 1
+        first = np.zeros((count, len(FAMILY)))
+        further = np.tile([0.0, np.nan], (count, int(component.max()) - 1, 1))
+        for place, name in enumerate(FAMILY):
+            own = component == 1
+            values = columns[name][own]
+            first[draw[own], place] = values if name == "T_B" else np.nan_to_num(values)
+        for number in range(further.shape[1]):
+            own = component == number + 2
+            further[draw[own], number] = np.column_stack((columns["B"][own], columns["T_B"][own]))
+        found[str(channel), str(method)] = JointDraws(first, further)
+    return found
+
+
+def estimates(path: Path, joint: Path | None = None) -> dict[str, list[Estimate]]:
+    """Read the estimates of a recording from its table ``parameters``, by channel.
+
+    Parameters
+    ----------
+    path : Path
+    joint : Path, optional
+        Of its table ``draws``; without it no estimate has joint draws.
+    """
+    return _estimates(read("parameters", [path]), joint)
+
+
+def recommended_estimates(path: Path, joint: Path | None = None) -> dict[str, Estimate]:
+    """Read the recommended estimate of each channel (see `estimates`)."""
+    table = read("parameters", [path])
+    found = _estimates(table.filter(table["recommended"]), joint)
+    return {channel: by_method[0] for channel, by_method in found.items()}
+
+
+def _estimates(table: pa.Table, joint: Path | None) -> dict[str, list[Estimate]]:
+    drawn = draws(joint) if joint is not None else {}
+    found: dict[str, list[Estimate]] = {}
+    for (channel, method), rows in divided(table, "channel", "method").items():
+        estimate = estimate_of(method, rows.to_pylist())
+        estimate = replace(estimate, draws=drawn.get((channel, method)))
+        found.setdefault(channel, []).append(estimate)
+    return found
+
+
+def estimate_of(method: str, rows: Iterable[Row]) -> Estimate:
+    """Return the estimate that rows of the table ``parameters`` stand for."""
+    components: dict[int, dict[str, Parameter]] = {}
+    lines: dict[int, dict[str, Parameter]] = {}
+    of_curve: dict[str, Parameter] = {}
+    for row in rows:
+        name = row["parameter"]
+        group = lines if name in ("amplitude", "frequency") else components
+        place = of_curve if name in CURVE else group.setdefault(row["component"], {})
+        place[name] = Parameter(
+            row["value"],
+            cast(Status, row["status"]),
+            row["reason"],
+            row["lower"],
+            row["upper"],
+            row["duration_needed"],
+            row["fitted"],
+        )
+    first = components.pop(1, {})
+    return Estimate(method, first, list(components.values()), list(lines.values()), of_curve)

@@ -1,0 +1,151 @@
+"""What the noise terms look like in a binned spectrum: their mean density in each bin.
+
+The low frequencies of a spectrum come from block means, whose spectrum is that of the samples
+folded: exact closed forms for white noise, quantization, random walk and Gauss-Markov process,
+a sum over the folds for flicker noise.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+
+from imubench_pipeline.estimators.spectrum import SINGLE, Spectrum
+from imubench_pipeline.noise.terms import driving_density
+from imubench_pipeline.typing import Array
+
+_POINTS = 6
+"""Frequencies at which a bin is sampled."""
+
+_SLOW = 1e-3
+"""Blocks shorter than this part of T_B see a Gauss-Markov process as a random walk."""
+
+
+class Shapes:
+    """Mean densities of unit terms in the bins of a spectrum, in SI^2/Hz.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+    """
+
+    def __init__(self, spectrum: Spectrum) -> None:
+        self._interval = 1.0 / spectrum.rate
+        self._block = spectrum.block.astype(np.float64)[:, None]
+        self._length = spectrum.length
+        inside = (np.arange(_POINTS) + 0.5) / _POINTS
+        width = spectrum.upper - spectrum.lower
+        # A bin of one ordinate is its frequency, not the surroundings.
+        single = width < 0.75 / spectrum.length
+        frequency = np.where(
+            single[:, None],
+            spectrum.frequency[:, None],
+            spectrum.lower[:, None] + width[:, None] * inside,
+        )
+        self._omega = 2.0 * np.pi * frequency * self._block * self._interval
+        self._gap = 4.0 * np.sin(self._omega / 2.0) ** 2  # 2 - 2 cos(omega)
+        self._single = np.flatnonzero(single & (np.arange(len(width)) < SINGLE))
+        self._order = np.rint(
+            2.0 * spectrum.frequency[self._single] * spectrum.length[self._single]
+        )
+
+    @property
+    def bins(self) -> int:
+        """Number of bins."""
+        return len(self._length)
+
+    def white(self) -> Array:
+        """Return the density of N = 1: 1 in every bin."""
+        return np.ones(self.bins)
+
+    def quantization(self) -> Array:
+        """Return the density of Q = 1: (2 - 2 cos(omega)) / (m T)."""
+        return np.asarray((self._gap / (self._block * self._interval)).mean(axis=1))
+
+    def random_walk(self) -> Array:
+        """Return the density of K = 1, with what averaging m samples leaves of it."""
+        step = self._block * self._interval
+        m = self._block
+        # The mean of m samples of a walk: (2 + cos(omega)) / 3 for large m, 1 for m = 1.
+        averaged = 1.0 - self._gap / 6.0 * (1.0 - 1.0 / m**2)
+        return np.asarray((step**2 / self._gap * averaged).mean(axis=1))
+
+    def flicker(self) -> Array:
+        """Return the density of B = 1 flicker noise, 1 / (2 pi f) well below Nyquist."""
+        density = np.empty_like(self._omega)
+        for m in np.unique(self._block):
+            rows = self._block[:, 0] == m
+            folded = (self._omega[rows][..., None] + 2.0 * np.pi * np.arange(m)) / m
+            sine = np.abs(np.sin(folded / 2.0))
+            # |sin(m w / 2)| is the same in every fold.
+            kernel = np.sin(self._omega[rows] / 2.0)[..., None] ** 2 / (m * sine) ** 2
+            density[rows] = (kernel / (2.0 * sine)).mean(axis=-1) * m * self._interval
+        shape = density.mean(axis=1)
+        shape[self._single] *= _flicker_edges(self._order)
+        return np.asarray(shape)
+
+    def gauss_markov(self, T_B: float) -> Array:
+        """Return the density of a Gauss-Markov process of B = 1.
+
+        The means of m samples are an ARMA(1, 1) process. The lowest ordinates are mended for
+        the ends of the log: c_k^2 is the quadratic form of the covariance in closed form, not
+        the spectrum.
+        """
+        variance = driving_density(1.0, T_B) * T_B / 2.0
+        h = self._interval / T_B
+        m = self._block
+        q, p = -math.expm1(-h), math.exp(-h)
+        Q, P = -np.expm1(-m * h), np.exp(-m * h)
+        # Covariance 0 and 1 of the block means; for m = 1 they are v and v p.
+        zero = variance / m**2 * _bracket(m, h, p, q)
+        one = variance / m**2 * p * (Q / q) ** 2
+        spread = Q**2 + P * self._gap
+        shape = zero + one * (2.0 * (np.cos(self._omega) - P)) / spread
+        # That cancels for T_B far longer than a block; then averaging acts as on a random walk.
+        averaged = 1.0 - self._gap / 6.0 * (1.0 - 1.0 / m**2)
+        slow = -variance * np.expm1(-2.0 * m * h) / spread * averaged
+        shape = np.where(m * h < _SLOW, slow, shape)
+        shape = (shape * m * self._interval).mean(axis=1)
+        i = self._single
+        n = np.rint(self._length[i] / (self._block[i, 0] * self._interval))
+        decay, phase = P[i, 0], self._omega[i, 0] / 2.0
+        sign = np.where(self._order % 2 == 1, 1.0, -1.0)
+        ends = (
+            4.0
+            * variance
+            / n
+            * decay
+            * Q[i, 0] ** 2
+            * np.cos(phase) ** 2
+            * (1.0 + sign * np.exp(-n * m[i, 0] * h))
+            / spread[i, 0] ** 2
+        )
+        shape[i] -= ends * m[i, 0] * self._interval
+        return np.asarray(shape)
+
+
+def _bracket(m: Array, h: float, p: float, q: float) -> Array:
+    """Return m (1 + p) / (1 - p) - 2 p (1 - p^m) / (1 - p)^2: the variance of m sums over v."""
+    return m * (1.0 + p) / q - 2.0 * p * -np.expm1(-m * h) / q**2
+
+
+def _flicker_edges(order: Array) -> Array:
+    """Return the mean square of the ordinate k of flicker noise over its density, for k << L."""
+    return np.array([_flicker_edge(k) for k in order.tolist()])
+
+
+@cache
+def _flicker_edge(order: float) -> float:
+    """Return that of one ordinate.
+
+    Flicker noise is a sum of Gauss-Markov processes of all correlation times, and for each the
+    mean square of an ordinate is known in closed form.
+    """
+    times = np.geomspace(1e-4, 1e5, 400)  # T_B over the length of the log
+    x = np.pi * order * times  # omega T_B
+    sign = 1.0 if order % 2 == 1 else -1.0
+    full = 2.0 * times / (1.0 + x**2)  # the spectrum of unit variance, over the length
+    ends = 4.0 * times**2 * (1.0 + sign * np.exp(-1.0 / times)) / (1.0 + x**2) ** 2
+    return float((full - ends).sum() / full.sum())

@@ -1,0 +1,418 @@
+"""Temperature and noise of a log, estimated together: sensitivity, lag, bias, and what is left.
+
+y(t) = bias + s (T_L(t) - T_0) + q (T_L(t) - T_0)^2 + noise, with T_L behind a first-order lag L and
+T_0 the mean temperature of the log (a convention: it sets what `bias` means). For given noise the
+rest is generalised least squares on the DCT coefficients; for given s, q and L the noise is a
+Whittle fit of what they leave; in turn until they settle.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+
+import numpy as np
+
+from imubench_pipeline.estimators import likelihood
+from imubench_pipeline.estimators.estimate import Parameter
+from imubench_pipeline.estimators.frame import Frame, frame_of
+from imubench_pipeline.estimators.likelihood import Likelihood
+from imubench_pipeline.estimators.missing import block_means, divided
+from imubench_pipeline.estimators.model_choice import Candidate, compare
+from imubench_pipeline.estimators.spectrum import LineSpectrum, Spectrum, block_of, spectra
+from imubench_pipeline.estimators.thermal.effect import complete, shifted
+from imubench_pipeline.estimators.thermal.level import mean_error, with_likely_walk
+from imubench_pipeline.estimators.thermal.path import TemperaturePath
+from imubench_pipeline.estimators.thermal.path_errors import without_errors
+from imubench_pipeline.estimators.thermal.products import BlockSeries, Coefficients
+from imubench_pipeline.estimators.thermal.register import Span
+from imubench_pipeline.estimators.thermal.regression import Regression, Regressors
+from imubench_pipeline.estimators.thermal.result import ThermalFit
+from imubench_pipeline.estimators.thermal.uncertainty import Verdict, judge, shares
+from imubench_pipeline.estimators.whittle import Whittle, model_of
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.typing import Array
+
+_MOST_ROUNDS = 10
+_SETTLED = 0.02
+_SETTLING = (1 / 64, 1 / 32, 1 / 16)
+"""Parts of the log at its beginning in which a sensor may settle."""
+
+_BEYOND = 6.0
+"""Log likelihood by which the square, or a beginning apart, must be the better beyond BIC."""
+
+_WORTH_TRYING = 2.0
+_MOST_LOST = 2.5
+"""Growth of the error of s beyond which the beginning holds what the log says of it."""
+
+_MOVED = 0.3
+"""Part of the standard error of a bin that temperature adds to it, from which that matters."""
+
+_FEWEST_BINS = 24
+
+
+def fit_temperature(
+    blocks: Callable[[], Iterable[Array]],
+    samples: int,
+    rate: float,
+    path: TemperaturePath,
+    *,
+    holes: bool = False,
+    band: float | None = None,
+    bandwidth: float | None = None,
+    resolution: float = 0.0,
+    quadratic: bool | None = None,
+    longest_lag: float | None = None,
+    plain: Likelihood | None = None,
+    rng: np.random.Generator,
+) -> ThermalFit:
+    """Estimate what temperature does to a channel, together with its noise.
+
+    Parameters
+    ----------
+    blocks : callable
+        Gives the log in order, in SI, as often as it is called; NaN where a sample is missing.
+    samples : int
+        L, the length of all blocks together.
+    rate : float
+        Hz.
+    path : TemperaturePath
+        Temperature of the log; its segments are those of the log.
+    holes : bool
+        Samples may be missing.
+    band, bandwidth, resolution : float, optional
+        As in `imubench_pipeline.estimators.likelihood.fit`.
+    quadratic : bool, optional
+        Whether the square of the temperature is in the model; by default where the log favours
+        it.
+    longest_lag : float, optional
+        s; by default a twentieth of the longest segment, at most half an hour. 0: no lag.
+    plain : Likelihood, optional
+        The noise of the log as it is, where it is known already.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    ThermalFit
+
+    Raises
+    ------
+    ValueError
+        If the log has fewer than 16 samples.
+
+    References
+    ----------
+    A. C. Aitken, "On least squares and linear combinations of observations", Proc. R. Soc.
+    Edinburgh 55, 1935; H. D. Patterson and R. Thompson, "Recovery of inter-block information
+    when block sizes are unequal", Biometrika 58, 1971.
+    """
+    spans = path.segments
+    find_frame = partial(frame_of, band=band, bandwidth=bandwidth, resolution=resolution)
+
+    def frame(spectrum: Spectrum, lines: list[LineSpectrum]) -> Frame:
+        if plain is not None and len(plain.frame.used) == len(spectrum.frequency):
+            return plain.frame
+        return find_frame(spectrum, lines)
+
+    varies = path.range > 0.0 and path.range >= 2.0 * float(np.median(path.deviation))
+    if holes:
+        means = block_means(blocks(), spans)
+        spans = divided(means, spans)
+        plain = plain or likelihood.fit_blocks(
+            blocks,
+            samples,
+            rate,
+            holes=True,
+            segments=path.segments,
+            band=band,
+            bandwidth=bandwidth,
+            resolution=resolution,
+            rng=rng,
+        )
+        model, effect = plain.estimates[0].model, np.zeros(len(path.value))
+        for _ in range(2):
+            log = complete(blocks, spans, model, path, effect, rate, rng)
+            fit = _Fit(log, samples, rate, spans, path, frame, longest_lag)
+            if not (fit.possible and varies):
+                break
+            found = fit.settle(quadratic)
+            model, effect = _model_of(found), found.regressors.effect(found.regression)
+    else:
+        fit = _Fit(blocks(), samples, rate, spans, path, frame, longest_lag)
+        plain = plain or likelihood.fit_spectrum(fit.spectrum, fit.frame, rng=rng)
+    if not fit.possible:
+        return _nothing(plain, path, fit, "too short a log")
+    if not varies:
+        return _nothing(plain, path, fit, f"the temperature changes by {path.range:.2g} K only")
+    found = fit.settle(quadratic)
+    verdict = fit.judged(found, rng)
+    if not verdict.compensated and len(fit.lags) > 1:
+        # A lag of nothing is whatever lets a walk pass for temperature: there is none.
+        fit.lags = fit.lags[:1]
+        found = fit.settle(quadratic)
+        verdict = replace(fit.judged(found, rng), lag=verdict.lag)
+
+    def spectra_left() -> tuple[Spectrum, list[LineSpectrum]]:
+        effect, log = found.regressors.effect(found.regression), blocks()
+        if holes:
+            log = complete(blocks, spans, _model_of(found), path, effect, rate, rng)
+        return spectra(shifted(log, path, effect, -1.0), samples, rate, spans)
+
+    lines = fit.lines
+    if verdict.compensated:
+        left, lines = spectra_left()
+        if fit.take_fast(left):
+            found = fit.settle(quadratic)
+            verdict = replace(fit.judged(found, rng), compensated=True, reason=verdict.reason)
+            left, lines = spectra_left()
+            fit.take_fast(left)
+    return _described(fit, found, verdict, plain, path, lines, find_frame, rng)
+
+
+@dataclass(frozen=True)
+class _Found:
+    """Where the fit has settled."""
+
+    regressors: Regressors
+    regression: Regression
+    whittle: Whittle
+    candidates: Sequence[Candidate]
+    cost: float
+
+
+class _Fit:
+    """The spectrum of a complete log, and its products with the temperature."""
+
+    def __init__(
+        self,
+        blocks: Iterable[Array],
+        samples: int,
+        rate: float,
+        spans: Sequence[Span],
+        path: TemperaturePath,
+        frame: Callable[[Spectrum, list[LineSpectrum]], Frame],
+        longest_lag: float | None,
+    ) -> None:
+        series = BlockSeries(spans, block_of(spans))
+        self.spectrum: Spectrum
+        self.lines: list[LineSpectrum]
+        self.spectrum, self.lines = spectra(series.watch(blocks), samples, rate, spans)
+        self.series = series
+        self.frame = frame(self.spectrum, self.lines)
+        self.used = self.frame.used
+        self.possible = bool(self.used.sum() >= _FEWEST_BINS)
+        if not self.possible:
+            return
+        self.chosen = self.spectrum.taken(self.used)
+        self.whittle = self.frame.whittle(self.spectrum)
+        self.quantization = self.frame.shows_quantization(rate)
+        self.regressors = Regressors(
+            Coefficients(self.spectrum, series), path, rate, path.mean, self.used
+        )
+        self.lags = self.regressors.lags(longest_lag)
+
+    def take_fast(self, left: Spectrum) -> bool:
+        """Take the high frequencies of what temperature leaves; return whether they are others.
+
+        What temperature shares with the log is known at the low frequencies only (`Coefficients`),
+        and a temperature that jumps has high ones too.
+        """
+        fast = self.spectrum.block != self.series.block
+        before, after = self.spectrum.density[fast], left.density[fast]
+        moved = np.abs(after / before - 1.0) * np.sqrt(self.spectrum.ordinates[fast])
+        if not (moved > _MOVED).any():
+            return False
+        density = self.spectrum.density.copy()
+        density[fast] = after
+        self.spectrum = replace(self.spectrum, density=density)
+        self.chosen = self.spectrum.taken(self.used)
+        self.whittle = self.whittle.of(self.chosen)
+        vars(self).pop("of_the_log", None)
+        return True
+
+    def settle(self, quadratic: bool | None) -> _Found:
+        """Return the joint fit; the square is tried where nothing is said of it.
+
+        So is another sensitivity at the beginning, where a sensor settles.
+        """
+        needed = 0.5 * math.log(len(self.chosen.density)) + _WORTH_TRYING
+        found = self._best(self.regressors.also(quadratic=bool(quadratic)))
+        duration = self.spectrum.duration
+        for _ in range(2):
+            tried = [found.regressors.also(settling=part * duration) for part in _SETTLING]
+            tried = [] if found.regressors.settling else tried
+            if quadratic is None and not found.regressors.quadratic:
+                tried.append(found.regressors.also(quadratic=True))
+            gains = [self._gained(found, regressors) for regressors in tried]
+            if not gains or max(gains) < needed:
+                break
+            wider = self._best(tried[int(np.argmax(gains))])
+            if wider.cost > found.cost - _BEYOND or _error(wider) > _MOST_LOST * _error(found):
+                break
+            found = wider
+        return found
+
+    def _gained(self, found: _Found, regressors: Regressors) -> float:
+        """Return the log likelihood that more regressors gain, for the noise as it is fitted."""
+        density = found.whittle.density(found.candidates[0].found)
+        wider = regressors.at(found.regression.lag, self.chosen.ordinates / density)
+        return wider.log_likelihood_gain - found.regression.log_likelihood_gain
+
+    def _best(self, regressors: Regressors) -> _Found:
+        """Settle from the noise of the log as it is, and from that of ordinary least squares."""
+        flat = self.chosen.ordinates
+        rough = regressors.at(0.0, flat)
+        left = self.whittle.of(regressors.without(self.chosen, rough, flat))
+        starts = (
+            self._weights(self.whittle, self.of_the_log),
+            self._weights(left, self._compared(left)),
+        )
+        return min((self._settle(regressors, start) for start in starts), key=lambda f: f.cost)
+
+    def _compared(self, whittle: Whittle) -> Sequence[Candidate]:
+        return compare(whittle, quantization=self.quantization)
+
+    def _weights(self, whittle: Whittle, candidates: Sequence[Candidate]) -> Array:
+        return self.chosen.ordinates / whittle.density(candidates[0].found)
+
+    def _settle(self, regressors: Regressors, weights: Array) -> _Found:
+        before: Regression | None = None
+        for _ in range(_MOST_ROUNDS):
+            found = regressors.best(weights, self.lags)
+            left = regressors.without(self.chosen, found, weights)
+            whittle = self.whittle.of(left)
+            candidates = self._compared(whittle)
+            weights = self._weights(whittle, candidates)
+            ramp = candidates[0].found.terms.ramp
+            if ramp != regressors.ramp:
+                regressors = regressors.also(ramp=ramp)
+                before = None
+                continue
+            if before is not None:
+                spread = math.sqrt(found.covariance[0, 0])
+                if abs(found.beta[0] - before.beta[0]) < _SETTLED * spread:
+                    break
+            before = found
+        free = candidates[0].found.terms.parameters + len(found.beta) - ramp + (found.lag > 0.0)
+        return _Found(regressors, found, whittle, candidates, self._cost(whittle, candidates, free))
+
+    def _cost(self, whittle: Whittle, candidates: Sequence[Candidate], free: int) -> float:
+        """Return half the BIC, with the ordinates of the log.
+
+        Those that a fit takes are counted as its parameters.
+        """
+        found, ordinates = candidates[0].found, self.chosen.ordinates
+        density = whittle.density(found)
+        data = whittle.data(found) * whittle.spectrum.ordinates / ordinates
+        cost = 0.5 * float(np.sum(ordinates * (np.log(density) + data / density)))
+        return cost + 0.5 * free * math.log(len(density))
+
+    def judged(self, found: _Found, rng: np.random.Generator) -> Verdict:
+        """Return what a settled fit tells."""
+        return judge(
+            found.regressors,
+            found.regression,
+            found.whittle,
+            found.candidates,
+            self.lags,
+            gained=2.0 * (self.plain() - found.cost),
+            rng=rng,
+        )
+
+    def plain(self) -> float:
+        """Return half the BIC of the best noise without temperature."""
+        candidates = self.of_the_log
+        return self._cost(self.whittle, candidates, candidates[0].found.terms.parameters)
+
+    @cached_property
+    def of_the_log(self) -> Sequence[Candidate]:
+        """The models of the noise without temperature, the best first."""
+        return self._compared(self.whittle)
+
+
+def _error(found: _Found) -> float:
+    """Return the standard deviation of s, for given noise."""
+    return math.sqrt(float(found.regression.covariance[0, 0]))
+
+
+def _model_of(found: _Found) -> NoiseModel:
+    return model_of(found.candidates[0].found)
+
+
+def _described(
+    fit: _Fit,
+    found: _Found,
+    verdict: Verdict,
+    plain: Likelihood,
+    path: TemperaturePath,
+    lines: list[LineSpectrum],
+    find_frame: Callable[[Spectrum, list[LineSpectrum]], Frame],
+    rng: np.random.Generator,
+) -> ThermalFit:
+    """Return the fit as it is told, with the noise that temperature leaves.
+
+    ``lines`` are those of what temperature leaves: it stands out of that noise.
+    """
+    without, effect = plain, np.zeros(len(path.value))
+    mean = fit.spectrum.mean
+    if verdict.compensated:
+        regressors = found.regressors.also(used=np.ones(len(fit.used), dtype=np.bool_))
+        weights = np.zeros(len(fit.used))
+        weights[fit.used] = fit.chosen.ordinates / found.whittle.density(found.candidates[0].found)
+        left = regressors.without(fit.spectrum, found.regression, weights)
+        terms = found.candidates[0].found.terms
+        left = without_errors(left, fit.used, found.whittle, terms, verdict.path_errors)
+        effect = regressors.effect(found.regression)
+        without = likelihood.fit_spectrum(left, find_frame(left, lines), rng=rng)
+    added = [path.means(*place, effect) for place in fit.series.places]
+    shift = float(np.concatenate(added).mean())
+    candidates = found.candidates if verdict.compensated else fit.of_the_log
+    K = without.estimates[0].parameters["K"]
+    noises = [
+        (with_likely_walk(model, K) if "K" in one.found.terms.linear else model, share)
+        for one, share in shares(candidates)
+        for model in [model_of(one.found)]
+    ]
+    # T_0 is as uncertain as the mean of the path.
+    of_reference = float(np.std(path.draws.mean(axis=1))) * (verdict.sensitivity.in_model or 0.0)
+    spread = math.hypot(
+        mean_error(noises, fit.spectrum),
+        verdict.temperature_error,
+        of_reference if verdict.compensated else 0.0,
+    )
+    bias = Parameter(
+        mean - shift, lower=mean - shift - 1.96 * spread, upper=mean - shift + 1.96 * spread
+    )
+    return ThermalFit(
+        path.mean,
+        verdict.sensitivity,
+        verdict.quadratic,
+        verdict.lag,
+        bias,
+        verdict.compensated,
+        verdict.reason,
+        plain,
+        without,
+        effect,
+        path,
+    )
+
+
+def _nothing(plain: Likelihood, path: TemperaturePath, fit: _Fit, reason: str) -> ThermalFit:
+    unknown = Parameter(None, "not_identified", reason)
+    mean, spread = fit.spectrum.mean, mean_error([(plain.estimates[0].model, 1.0)], fit.spectrum)
+    return ThermalFit(
+        path.mean,
+        unknown,
+        unknown,
+        unknown,
+        Parameter(mean, lower=mean - 1.96 * spread, upper=mean + 1.96 * spread),
+        False,
+        reason,
+        plain,
+        plain,
+        np.zeros(len(path.value)),
+        path,
+    )

@@ -1,0 +1,328 @@
+"""The smooth path of a temperature that is known by a register, with its error.
+
+The temperature is an integrated random walk; a block of equal readings says into which cell of
+the register it falls, a block that the register crosses where the edge of the cell was reached.
+How fast it varies and how much noise the register adds are those of the greatest evidence.
+
+References
+----------
+T. Minka, "Expectation propagation for approximate Bayesian inference", UAI 2001; G. Wahba,
+"Improper priors, spline smoothing and the problem of guarding against model errors in
+regression", J. R. Stat. Soc. B 40, 1978.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+from scipy.special import ndtri
+
+from imubench_pipeline.estimators.thermal.dwells import dwells
+from imubench_pipeline.estimators.thermal.jumps import at_jumps
+from imubench_pipeline.estimators.thermal.path_kernels import drawn, propagate
+from imubench_pipeline.estimators.thermal.register import Readings, Span, readings
+from imubench_pipeline.typing import Array
+
+DRAWS = 24
+"""Paths drawn from the distribution of what the register leaves open."""
+
+_SCAN = range(-14, 5, 2)
+_NOISES = (0.01, 0.1, 0.4)
+_QUIETEST = 1e-4
+_MOST_TRIES = 40
+_NEVER = 1e300
+_FLOOR = 1e-3
+_COARSE = 0.25
+"""Noise over step below which a reading bounds the temperature."""
+
+
+@dataclass(frozen=True)
+class TemperaturePath:
+    """A temperature on a coarse grid, linear between the knots of a segment.
+
+    Attributes
+    ----------
+    sample : ndarray, shape (k,)
+        Place of the knots on the grid of the log.
+    value, deviation : ndarray, shape (k,)
+        Temperature, and its standard deviation, °C.
+    draws : ndarray, shape (d, k)
+        Paths that the readings allow, drawn from their distribution, °C.
+    parts : tuple of slice
+        Knots of each segment.
+    segments : tuple of (int, int)
+        First and one-past-last sample of each segment.
+    step, noise : float
+        Least significant bit of the register (0: none shows), and standard deviation of the
+        noise of a reading, °C.
+    """
+
+    sample: Array
+    value: Array
+    deviation: Array
+    draws: Array
+    parts: tuple[slice, ...]
+    segments: tuple[Span, ...]
+    step: float
+    noise: float
+
+    @property
+    def mean(self) -> float:
+        """Mean over the log, °C: T_0 by convention."""
+        return float(np.mean(self.value))
+
+    @property
+    def range(self) -> float:
+        """Highest less lowest, °C."""
+        return float(np.ptp(self.value))
+
+    def at(self, points: NDArray[Any], values: Array) -> Array:
+        """Return what is known at the knots, between them; no segment tells of another.
+
+        Parameters
+        ----------
+        points : ndarray, shape (n,)
+            Places on the grid of the log, rising. Those after a segment and before the next are
+            given what its last knot has.
+        values : ndarray, shape (k,)
+            At the knots, in any unit.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+        """
+        cuts = np.searchsorted(points, [start for start, _ in self.segments[1:]])
+        pieces = zip(np.split(points, cuts), self.parts, strict=True)
+        found = [np.interp(piece, self.sample[part], values[part]) for piece, part in pieces]
+        return np.concatenate(found)
+
+    def means(self, first: int, block: int, count: int, values: Array) -> Array:
+        """Return the means over blocks of what is known at the knots, linear between them.
+
+        Parameters
+        ----------
+        first : int
+            First sample of the first block.
+        block : int
+            Samples in a block.
+        count : int
+            n, number of blocks; they follow each other in one segment.
+        values : ndarray, shape (..., k)
+            At the knots, in any unit.
+
+        Returns
+        -------
+        ndarray, shape (..., n)
+        """
+        part = self.parts[sum(start <= first for start, _ in self.segments) - 1]
+        edges = first - 0.5 + block * np.arange(count + 1)
+        knots, known = self.sample[part], values[..., part]
+        # Flat beyond the first and the last knot.
+        x = np.concatenate(
+            ([min(edges[0], knots[0]) - 1.0], knots, [max(edges[-1], knots[-1]) + 1])
+        )
+        y = np.concatenate((known[..., :1], known, known[..., -1:]), axis=-1)
+        width = np.diff(x)
+        below = np.cumsum(width * 0.5 * (y[..., 1:] + y[..., :-1]), axis=-1)
+        below = np.concatenate((np.zeros_like(y[..., :1]), below), axis=-1)
+        at = np.clip(np.searchsorted(x, edges, side="right") - 1, 0, len(x) - 2)
+        inside = edges - x[at]
+        slope = (y[..., at + 1] - y[..., at]) / width[at]
+        integral = below[..., at] + inside * (y[..., at] + 0.5 * slope * inside)
+        return np.asarray(np.diff(integral, axis=-1) / block)
+
+
+def temperature_path(
+    blocks: Iterable[Array], segments: Sequence[Span], rng: np.random.Generator
+) -> TemperaturePath:
+    """Return the path of a temperature from the readings of its register.
+
+    Parameters
+    ----------
+    blocks : iterable of ndarray
+        Readings in order on the grid of the log, °C; NaN where missing.
+    segments : sequence of (int, int)
+        First and one-past-last sample of each part that no time relates to the others.
+    rng : numpy.random.Generator
+        For the draws.
+
+    Returns
+    -------
+    TemperaturePath
+
+    Raises
+    ------
+    ValueError
+        If no reading is present.
+    """
+    read = readings(blocks, segments)
+    level = float(np.nanmedian(read.mean))
+    spread = max(float(np.nanmax(read.high) - np.nanmin(read.low)), read.step, 1e-6)
+    evidence = _Evidence(read, level, spread)
+    q, noise, height = evidence.best()
+    cut = at_jumps(read)
+    if cut is not read:
+        jumping = _Evidence(cut, level, spread)
+        *found, higher = jumping.best()
+        if higher > height:
+            read, evidence, (q, noise) = cut, jumping, found
+    value, variance = np.empty(len(read.begin)), np.empty(len(read.begin))
+    draws = np.empty((DRAWS, len(read.begin)))
+    for part in read.pieces:
+        if evidence.held(part):
+            # Anywhere in the cell, all the time: as errors of a level go, the most that it may be.
+            value[part], variance[part] = read.mean[part] - level, read.step**2 / 12.0
+            off = read.step * (rng.random((DRAWS, 1)) - 0.5)
+            draws[:, part] = value[part] + off
+            continue
+        value[part], variance[part], _, precision, shift = evidence.part(part, q, noise)
+        normals = rng.standard_normal((DRAWS, part.stop - part.start, 2))
+        draws[:, part] = drawn(evidence.steps(part), q, spread, precision, shift, normals)
+        draws[:, part] += evidence.dwelling(part, q, noise, variance[part], rng)
+    value, draws = value + level, draws + level
+    if noise < _COARSE * read.step:
+        inside = read.high == read.low
+        half = 0.5 * read.step
+        value[inside] = np.clip(value, read.mean - half, read.mean + half)[inside]
+    return TemperaturePath(
+        read.centre,
+        value,
+        np.sqrt(variance),
+        draws,
+        read.parts,
+        tuple((int(start), int(stop)) for start, stop in segments),
+        read.step,
+        noise,
+    )
+
+
+class _Evidence:
+    """The readings as the kernels take them, and how likely they are."""
+
+    def __init__(self, read: Readings, level: float, spread: float) -> None:
+        self._read, self._level, self._spread = read, level, spread
+        self._width = float(np.median(read.end - read.begin))
+        there = read.count > 0
+        stepped = there & (read.step > 0.0)
+        self._cell = stepped & (read.high == read.low)
+        self._two = stepped & ~self._cell & (read.high - read.low < 1.5 * read.step)
+        self._mean = there & ~self._cell & ~self._two
+        count = np.maximum(read.count, 1)
+        # All of n readings in one cell: x keeps clear of its edges by about the greatest of n
+        # normal variates, whose median and (nearly) standard deviation these are.
+        self._clear = ndtri(0.5 ** (1.0 / count))
+        self._soft = 1.0 / np.sqrt(1.0 + 0.9 * np.log(count))
+        # Readings on both sides of an edge: x follows from the share of each.
+        share = (read.mean - read.low) / max(read.step, 1e-300)
+        share = np.clip((share * count + 0.5) / (count + 1.0), 0.01, 0.99)
+        self._beyond = ndtri(share)
+        density = np.exp(-0.5 * self._beyond**2) / math.sqrt(2.0 * math.pi)
+        self._known = share * (1.0 - share) / count / density**2
+        # Within a block x moves on.
+        self._floor = max(_FLOOR * read.step, 2.0 * spread / len(count))
+
+    def held(self, part: slice) -> bool:
+        """Return whether a piece between jumps stays in one cell of the register."""
+        read = self._read
+        one = bool(self._cell[part].all() and np.ptp(read.mean[part]) < 0.5 * read.step)
+        return one and part not in read.parts
+
+    def steps(self, part: slice) -> Array:
+        """Return the time from the block before, in blocks; 1 for the first."""
+        centre = self._read.centre[part] / self._width
+        return np.asarray(np.diff(centre, prepend=centre[0] - 1.0))
+
+    def part(self, part: slice, q: float, noise: float) -> tuple[Array, Array, float, Array, Array]:
+        """Return mean, variance and log evidence of a segment, and its Gaussian equivalents."""
+        read, least = self._read, (1e-6 * self._spread) ** 2
+        mean = read.mean[part] - self._level
+        cell, two, many = self._cell[part], self._two[part], self._mean[part]
+        edge = 0.5 * (read.low[part] + read.high[part]) - self._level
+        at = np.where(two, edge + noise * self._beyond[part], mean)
+        variance = noise**2 * np.where(
+            two, self._known[part], 1.0 / np.maximum(read.count[part], 1)
+        )
+        variance += np.where(two, self._floor**2, 0.0) + least
+        precision = np.where(two | many, 1.0 / variance, 0.0)
+        shift = np.where(two | many, at / variance, 0.0)
+        height = -0.5 * np.log(variance[many]).sum()
+        # The share of a block is given, not the x that it tells: with dx = noise dz.
+        height += 0.5 * np.log((noise**2 * self._known[part] + least) / variance)[two].sum()
+        height += float((-0.5 * at**2 / variance)[two | many].sum())
+        half = self._half(part, noise)
+        path, spread, evidence = propagate(
+            self.steps(part),
+            q,
+            self._spread,
+            cell,
+            np.where(cell, mean - half, 0.0),
+            np.where(cell, mean + half, 0.0),
+            (noise * self._soft[part]) ** 2 + least,
+            precision,
+            shift,
+        )
+        return path, spread, evidence + float(height), precision, shift
+
+    def _half(self, part: slice, noise: float) -> Array:
+        """Return half the width of what a cell allows the path in each block."""
+        step = self._read.step
+        return np.maximum(0.5 * step - noise * self._clear[part], 0.05 * step)
+
+    def dwelling(
+        self, part: slice, q: float, noise: float, variance: Array, rng: np.random.Generator
+    ) -> Array:
+        """Draw what a path may be off by for as long as it stays in a cell, shape (d, k).
+
+        With the variance of the wandering path it has that of a level anywhere in the cell.
+        """
+        inside, mean, half = self._cell[part], self._read.mean[part], self._half(part, noise)
+        off = np.zeros((DRAWS, len(inside)))
+        if not inside.any():
+            return off
+        for dwell in dwells(inside, mean, float(np.median(half[inside])), q):
+            missing = np.maximum(half**2 / 3.0 - variance, 0.0)[dwell.blocks]
+            level = math.sqrt(3.0) * (2.0 * rng.random((DRAWS, 1)) - 1.0)
+            off[:, dwell.blocks] = level * dwell.taper * np.sqrt(missing)
+        return off
+
+    def best(self) -> tuple[float, float, float]:
+        """Return q and the noise that make the readings most likely, and log their evidence."""
+        read = self._read
+        there = read.mean[read.count > 0]
+        rough = float(np.median(np.abs(np.diff(there)))) if len(there) > 1 else 0.0
+        least = _QUIETEST * self._spread
+        noises = {max(part * read.step, least) for part in _NOISES} | {max(rough, least)}
+        moving = [part for part in read.pieces if not self.held(part)]
+        # A level is anywhere in the spread of all of them.
+        held = len(read.pieces) - len(moving)
+        constant = held * math.log(read.step / self._spread) if held else 0.0
+
+        def cost(at: Array) -> float:
+            q, noise = self._spread**2 * 10.0 ** float(at[0]), 10.0 ** float(at[1])
+            if not (-16.0 < at[0] < 6.0 and 0.99 * least < noise < 10.0 * self._spread):
+                return _NEVER
+            found = sum(self.part(part, q, noise)[2] for part in moving)
+            return min(-(found + constant), _NEVER)
+
+        starts = [np.array([k, math.log10(noise)]) for k in _SCAN for noise in sorted(noises)]
+        first = min(starts, key=cost)
+        found = minimize(
+            cost,
+            first,
+            method="Nelder-Mead",
+            options={
+                "maxfev": _MOST_TRIES,
+                "initial_simplex": np.array([first, first, first])
+                + np.array([[0.0, 0.0], [0.7, 0.0], [0.0, 0.3]]),
+                "xatol": 0.05,
+                "fatol": 0.05,
+            },
+        )
+        best = float(found.x[0]), float(found.x[1])
+        return self._spread**2 * 10.0 ** best[0], 10.0 ** best[1], -float(found.fun)

@@ -1,0 +1,146 @@
+"""What the errors of a temperature's path do: they move the estimate, and add to what it leaves.
+
+A register leaves the path open. What of that looks like the temperature moves s, q and the lag; the
+rest stays in the log, times s, as noise that the sensor does not have.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.estimators.spectrum import Spectrum
+from imubench_pipeline.estimators.thermal.lag import lagged_path
+from imubench_pipeline.estimators.thermal.regression import Regression, Regressors
+from imubench_pipeline.estimators.whittle import Terms, Whittle
+from imubench_pipeline.typing import Array
+
+_NEGLIGIBLE = 0.02
+"""Part of the standard error of a bin that the errors add to it, up to which they are left."""
+
+_MOST_ROUNDS = 40
+_SETTLED = 1e-3
+_LEAST_KNOWN = 0.1
+"""Part of the power of a bin that is noise, at least: no bin loses all its weight."""
+
+
+@dataclass(frozen=True)
+class PathErrors:
+    """What the drawn paths of a temperature do.
+
+    Attributes
+    ----------
+    moved : ndarray, shape (d, p + 1)
+        How each draw moves the regressors of temperature (p), SI per K and K², and the lag, s.
+    density : ndarray, shape (b,)
+        Mean density of what they leave in each bin of the spectrum, (rad/s)²/Hz or (m/s²)²/Hz.
+    """
+
+    moved: Array
+    density: Array
+
+
+def path_errors(regressors: Regressors, found: Regression, weights: Array) -> PathErrors:
+    """Return what the drawn paths do to an estimate, to first order.
+
+    Parameters
+    ----------
+    regressors : Regressors
+    found : Regression
+        Of these regressors.
+    weights : ndarray, shape (b,)
+        nu / S of the bins used, as `Regressors.at` takes them.
+
+    Returns
+    -------
+    PathErrors
+    """
+    path, p = regressors.path, regressors.thermal
+    knots, slope = regressors.knots(found.lag), regressors.slope(found)
+    step = max(0.05 * found.lag, 0.5 * float(np.median(np.diff(path.sample))) / regressors.rate)
+    by_lag = slope * (regressors.knots(found.lag + step) - knots) / step
+    columns = regressors.columns(found.lag)
+    columns.extend(regressors.coefficients.of_knots(path, [by_lag]))
+    full = np.zeros(len(regressors.used))
+    full[regressors.used] = weights
+    gram = regressors.coefficients.products(columns).gram
+    information = np.einsum("b,bij->ij", full, gram)
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    # A lag that the log hardly tells must not carry the error of the path away.
+    inverse = np.linalg.inv(information / np.outer(scale, scale) + 1e-6 * np.eye(len(scale)))
+    errors = [
+        slope * lagged_path(path, draw - path.value, regressors.rate, found.lag)
+        for draw in path.draws
+    ]
+    moved, density = [], np.zeros(len(full))
+    for other in regressors.coefficients.of_knots(path, errors):
+        shared = regressors.coefficients.products([*columns, other]).gram[:, -1]
+        own = inverse @ ((full @ shared[:, :-1]) / scale) / scale
+        moved.append(own)
+        density += shared[:, -1] - 2.0 * shared[:, :-1] @ own
+        density += np.einsum("i,bij,j->b", own, gram, own)
+    at = np.array(moved)
+    return PathErrors(
+        np.column_stack([at[:, :p], at[:, -1]]), np.maximum(density / len(errors), 0.0)
+    )
+
+
+def without_errors(
+    left: Spectrum, used: NDArray[np.bool_], whittle: Whittle, terms: Terms, errors: Array
+) -> Spectrum:
+    """Return the spectrum that tells of the noise alone, not of what errors of the path leave.
+
+    A bin of density S of noise and P of errors tells of the noise as one of density S, measured
+    S / (S + P) times as high, with (S / (S + P))^2 of its ordinates. S is that of a noise model
+    fitted to what is left so, in turn with the parts.
+
+    Parameters
+    ----------
+    left : Spectrum
+        Of what temperature leaves, errors of the path and all.
+    used : ndarray of bool, shape (b,)
+        Its bins that are fitted.
+    whittle : Whittle
+        The likelihood in those.
+    terms : Terms
+        The noise model.
+    errors : ndarray, shape (b,)
+        P, (rad/s)²/Hz or (m/s²)²/Hz.
+
+    Returns
+    -------
+    Spectrum
+        Other bins, and all where P is small beside S, as they are.
+
+    References
+    ----------
+    D. A. Harville, "Maximum likelihood approaches to variance component estimation", J. Am. Stat.
+    Assoc. 72, 1977.
+    """
+    fitted, added = left.taken(used), errors[used]
+    density = whittle.density(whittle.of(fitted).maximum(terms))
+    if not (added * np.sqrt(fitted.ordinates) > _NEGLIGIBLE * density).any():
+        return left
+    known = np.ones(len(added))
+    for _ in range(_MOST_ROUNDS):
+        before, known = known, np.maximum(density / (density + added), _LEAST_KNOWN)
+        if np.abs(known - before).max() < _SETTLED:
+            break
+        own = whittle.of(_known(fitted, known))
+        density = own.density(own.maximum(terms))
+    everywhere = np.ones(len(used))
+    everywhere[used] = known
+    return _known(left, everywhere)
+
+
+def _known(spectrum: Spectrum, part: Array) -> Spectrum:
+    """Return the spectrum of noise that makes up a part of each bin's power."""
+    return replace(
+        spectrum,
+        ordinates=spectrum.ordinates * part**2,
+        density=spectrum.density * part,
+        cross=spectrum.cross * part,
+        ramp=spectrum.ramp * part,
+    )

@@ -1,0 +1,379 @@
+"""Generalised least squares of a log on its temperature, for given noise: s, q and the lag."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from imubench_pipeline.estimators.spectrum import Spectrum
+from imubench_pipeline.estimators.thermal.lag import lagged_path
+from imubench_pipeline.estimators.thermal.path import TemperaturePath
+from imubench_pipeline.estimators.thermal.products import Coefficients, Products
+from imubench_pipeline.typing import Array
+
+_LAGS = 16
+_LONGEST = 1 / 20
+"""Part of the log: a longer lag is a drift of its own."""
+
+_LONGEST_LAG = 1800.0
+_LEAST_ORDINATES = 0.02
+_TOGETHER = 8
+"""Lags whose regressors are in memory together."""
+
+
+@dataclass(frozen=True)
+class Regression:
+    """A fit for given noise.
+
+    Attributes
+    ----------
+    beta : ndarray, shape (p,)
+        s, then q and what the beginning adds to s where they are in the model, then R where there
+        is a ramp; SI per K, K², K and s.
+    information : ndarray, shape (p, p)
+        Inverse of their covariance.
+    lag : float
+        s.
+    log_likelihood_gain : float
+        Log likelihood over that of beta = 0.
+    """
+
+    beta: Array
+    information: Array
+    lag: float
+    log_likelihood_gain: float
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance of beta, for given noise and lag."""
+        return np.asarray(np.linalg.inv(self.information))
+
+
+class Regressors:
+    """The regressors of a log, and their products with it, for any lag.
+
+    Parameters
+    ----------
+    coefficients : Coefficients
+        Of the log.
+    path : TemperaturePath
+    rate : float
+        Hz.
+    reference : float
+        T_0, °C.
+    used : ndarray of bool, shape (b,)
+        Bins to use.
+    quadratic, ramp : bool
+        Whether the square of the temperature, and time, are regressors too.
+    settling : float
+        s from the beginning of the log in which a sensor that settles may follow the temperature
+        otherwise; 0: none.
+    """
+
+    def __init__(
+        self,
+        coefficients: Coefficients,
+        path: TemperaturePath,
+        rate: float,
+        reference: float,
+        used: NDArray[np.bool_],
+        *,
+        quadratic: bool = False,
+        ramp: bool = False,
+        settling: float = 0.0,
+    ) -> None:
+        self.coefficients, self.path, self.rate = coefficients, path, rate
+        self.reference, self.used = reference, used
+        self.quadratic, self.ramp, self.settling = quadratic, ramp, settling
+        self._known: dict[float, Products] = {}
+        self._time = coefficients.of_time(rate)
+        # With the ramp and in all bins, for `also` to share: the transforms are the costly part.
+        self._full: dict[tuple[float, bool, float], Products] = {}
+        self.ordinates = coefficients.ordinates[used]
+
+    def also(
+        self,
+        *,
+        quadratic: bool | None = None,
+        ramp: bool | None = None,
+        settling: float | None = None,
+        used: NDArray[np.bool_] | None = None,
+    ) -> Regressors:
+        """Return the regressors with other terms, or in other bins; None: as they are.
+
+        Parameters
+        ----------
+        quadratic, ramp : bool, optional
+        settling : float, optional
+            s.
+        used : ndarray of bool, shape (b,), optional
+
+        Returns
+        -------
+        Regressors
+        """
+        other = copy.copy(self)
+        other.used = self.used if used is None else used
+        other.quadratic = self.quadratic if quadratic is None else quadratic
+        other.ramp = self.ramp if ramp is None else ramp
+        other.settling = self.settling if settling is None else settling
+        other._known = {}
+        other.ordinates = self.coefficients.ordinates[other.used]
+        return other
+
+    @property
+    def thermal(self) -> int:
+        """Number of regressors that temperature has."""
+        return 1 + self.quadratic + (self.settling > 0.0)
+
+    def knots(self, lag: float) -> Array:
+        """Return T_lag - T_0 at the knots of the path.
+
+        Parameters
+        ----------
+        lag : float
+            s.
+
+        Returns
+        -------
+        ndarray, shape (k,)
+            K.
+        """
+        return lagged_path(self.path, self.path.value, self.rate, lag) - self.reference
+
+    def effect(self, found: Regression) -> Array:
+        """Return what temperature adds to the log, at the knots of the path.
+
+        Parameters
+        ----------
+        found : Regression
+            Of these regressors.
+
+        Returns
+        -------
+        ndarray, shape (k,)
+            rad/s or m/s².
+        """
+        of_knots = self._of(self.knots(found.lag))
+        return np.asarray(np.einsum("i,ik->k", found.beta[: self.thermal], np.array(of_knots)))
+
+    def _of(self, knots: Array) -> list[Array]:
+        """Return the regressors of temperature at the knots."""
+        terms = [knots, knots**2] if self.quadratic else [knots]
+        if self.settling > 0.0:
+            end = self._settled_from()
+            settled = knots[min(end, len(knots) - 1)]
+            terms.append(np.where(np.arange(len(knots)) < end, knots - settled, 0.0))
+        return terms
+
+    def slope(self, found: Regression) -> Array:
+        """Return how what temperature adds to the log changes with it, at the knots of the path.
+
+        Parameters
+        ----------
+        found : Regression
+            Of these regressors.
+
+        Returns
+        -------
+        ndarray, shape (k,)
+            SI per K.
+        """
+        knots = self.knots(found.lag)
+        slope = np.full(len(knots), found.beta[0])
+        if self.quadratic:
+            slope += 2.0 * found.beta[1] * knots
+        if self.settling > 0.0:
+            slope[: self._settled_from()] += found.beta[self.thermal - 1]
+        return slope
+
+    def _settled_from(self) -> int:
+        """Return the first knot at which the sensor has settled."""
+        begin = self.path.sample[0] + self.settling * self.rate
+        return int(np.searchsorted(self.path.sample, begin))
+
+    def means(self, lag: float) -> Array:
+        """Return the mean over the log of each regressor of temperature.
+
+        Parameters
+        ----------
+        lag : float
+            s.
+
+        Returns
+        -------
+        ndarray, shape (thermal,)
+            K, or K² of the square.
+        """
+        return np.array([float(term.mean()) for term in self._of(self.knots(lag))])
+
+    def columns(self, lag: float) -> list[Array]:
+        """Return the coefficients of the regressors, in the order of `Regression.beta`.
+
+        Parameters
+        ----------
+        lag : float
+            s.
+
+        Returns
+        -------
+        list of ndarray, shape (n,)
+            K, or K² of the square; s of the ramp.
+        """
+        columns = self.coefficients.of_knots(self.path, self._of(self.knots(lag)))
+        return [*columns] + [self._time] * self.ramp
+
+    def prepare(self, lags: Sequence[float] | Array) -> None:
+        """Compute the products for several lags together, which takes less time.
+
+        Parameters
+        ----------
+        lags : sequence of float
+            s.
+        """
+        new = [float(lag) for lag in lags if self._key(float(lag)) not in self._full]
+        for first in range(0, len(new), _TOGETHER):
+            some = new[first : first + _TOGETHER]
+            terms = [term for lag in some for term in self._of(self.knots(lag))]
+            columns = self.coefficients.of_knots(self.path, terms).reshape(
+                len(some), self.thermal, -1
+            )
+            for lag, own in zip(some, columns, strict=True):
+                self._full[self._key(lag)] = self.coefficients.products([*own, self._time])
+
+    def _key(self, lag: float) -> tuple[float, bool, float]:
+        return lag, self.quadratic, self.settling
+
+    def products(self, lag: float) -> Products:
+        """Return the products of log and regressors in the bins used.
+
+        Parameters
+        ----------
+        lag : float
+            s.
+
+        Returns
+        -------
+        Products
+        """
+        if lag not in self._known:
+            self.prepare([lag])
+            full, kept = self._full[self._key(lag)], slice(None if self.ramp else self.thermal)
+            cross, gram = full.cross[self.used, kept], full.gram[self.used, kept, kept]
+            self._known[lag] = Products(cross, gram)
+        return self._known[lag]
+
+    def at(self, lag: float, weights: Array) -> Regression:
+        """Return the fit at a lag.
+
+        Parameters
+        ----------
+        lag : float
+            s.
+        weights : ndarray, shape (b,)
+            nu / S of the bins used: their ordinates over the density of the noise, Hz/SI².
+
+        Returns
+        -------
+        Regression
+        """
+        products = self.products(lag)
+        information = np.einsum("b,bij->ij", weights, products.gram)
+        target = weights @ products.cross
+        information += 1e-12 * np.diag(np.diag(information)) + 1e-300 * np.eye(len(target))
+        beta = np.linalg.solve(information, target)
+        return Regression(beta, information, lag, 0.5 * float(target @ beta))
+
+    def lags(self, longest: float | None = None) -> Array:
+        """Return the lags to scan.
+
+        Parameters
+        ----------
+        longest : float, optional
+            s; by default a twentieth of the longest segment, at most half an hour.
+
+        Returns
+        -------
+        ndarray, shape (l,)
+            s, 0 first, then rising; 0 alone where the knots lie too far apart for more.
+        """
+        duration = max(stop - start for start, stop in self.path.segments) / self.rate
+        knot = float(np.median(np.diff(self.path.sample))) / self.rate
+        last = longest if longest is not None else min(_LONGEST * duration, _LONGEST_LAG)
+        first = max(0.5 * knot, last / 1000.0)
+        if first >= last:
+            return np.array([0.0])
+        return np.concatenate(([0.0], np.geomspace(first, last, _LAGS)))
+
+    def best(self, weights: Array, lags: Array) -> Regression:
+        """Return the fit of the greatest log likelihood: scan the lags, then polish.
+
+        Parameters
+        ----------
+        weights : ndarray, shape (b,)
+            As for `at`.
+        lags : ndarray, shape (l,)
+            s, rising (`lags`).
+
+        Returns
+        -------
+        Regression
+        """
+        self.prepare(lags)
+        fits = [self.at(float(lag), weights) for lag in lags]
+        place = int(np.argmax([fit.log_likelihood_gain for fit in fits]))
+        best = fits[place]
+        if len(lags) == 1:
+            return best
+        low, high = float(lags[max(place - 1, 0)]), float(lags[min(place + 1, len(lags) - 1)])
+        polished = minimize_scalar(
+            lambda lag: -self.at(float(lag), weights).log_likelihood_gain,
+            bounds=(low, high),
+            method="bounded",
+            options={"xatol": 2e-3 * high, "maxiter": 25},
+        )
+        other = self.at(float(polished.x), weights)
+        return other if other.log_likelihood_gain > best.log_likelihood_gain + 1e-9 else best
+
+    def without(self, spectrum: Spectrum, found: Regression, weights: Array) -> Spectrum:
+        """Return the spectrum (of the bins used) less what temperature explains.
+
+        The degrees of freedom that the fit takes from a bin are taken from its ordinates, so
+        that the density keeps its mean.
+
+        Parameters
+        ----------
+        spectrum : Spectrum
+            Of the bins used.
+        found : Regression
+            Of these regressors.
+        weights : ndarray, shape (b,)
+            As for `at`: those that the fit was made with.
+
+        Returns
+        -------
+        Spectrum
+        """
+        products = self.products(found.lag)
+        p = self.thermal
+        beta, cross, gram = found.beta[:p], products.cross[:, :p], products.gram[:, :p, :p]
+        left = spectrum.density - 2.0 * cross @ beta + np.einsum("i,bij,j->b", beta, gram, beta)
+        taken = weights * np.einsum("bij,ij->b", gram, np.linalg.inv(found.information[:p, :p]))
+        ordinates = np.maximum(
+            spectrum.ordinates - np.minimum(taken, 1.0), _LEAST_ORDINATES * spectrum.ordinates
+        )
+        with_time = self.also(ramp=True).products(found.lag) if not self.ramp else products
+        return replace(
+            spectrum,
+            ordinates=ordinates,
+            density=np.maximum(left, 1e-12 * spectrum.density) * spectrum.ordinates / ordinates,
+            cross=(spectrum.cross - with_time.gram[:, :p, -1] @ beta)
+            * spectrum.ordinates
+            / ordinates,
+            ramp=spectrum.ramp * spectrum.ordinates / ordinates,
+        )

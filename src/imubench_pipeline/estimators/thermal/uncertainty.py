@@ -1,0 +1,333 @@
+"""How well a log tells what temperature does to it: intervals, and what cannot be told apart.
+
+The noise is drawn from its posterior, over the models that the log does not rule out; the lag from
+its likelihood for that noise (flat from 0 to the longest); s and q from their Gaussian for both.
+What the register leaves open of the temperature moves the estimate as its drawn paths do.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from imubench_pipeline.estimators.estimate import Parameter
+from imubench_pipeline.estimators.model_choice import Candidate
+from imubench_pipeline.estimators.posterior import sample
+from imubench_pipeline.estimators.thermal.path_errors import path_errors
+from imubench_pipeline.estimators.thermal.regression import Regression, Regressors
+from imubench_pipeline.estimators.whittle import Maximum, Whittle
+from imubench_pipeline.typing import Array
+
+_DRAWS = 1_000
+_NOISES = 250
+"""Draws of the noise that are kept, over all models."""
+
+_LAGS = 48
+_WITHIN = 8.0
+"""Log likelihood below the best at which lags are no longer of interest."""
+
+_LEAST_SHARE = 0.05
+_LEAST_WALK = 0.3
+"""Share of a random walk among the models of the noise, at least."""
+
+_FAVOURED = 4.0
+"""BIC by which temperature must be the better: a walk is easily taken for it."""
+
+_AS_TIME = 0.95
+"""Share of what the log says of s that a ramp takes: beyond, temperature is time."""
+
+_MONOTONE = 0.9
+_EXPLAINED = 0.5
+_WIDE_LAG = 0.5
+_AS_SHORT = 1.02
+"""Width of the interval from 0 over that of the shortest, up to which it is that from 0: draws are
+uneven."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the log tells.
+
+    Attributes
+    ----------
+    sensitivity, quadratic, lag : Parameter
+    compensated : bool
+    reason : str
+    temperature_error : float
+        Standard deviation of the mean of what temperature adds to the log, SI.
+    path_errors : ndarray, shape (b,)
+        Density of what errors of the path leave in each bin, (rad/s)²/Hz or (m/s²)²/Hz.
+    """
+
+    sensitivity: Parameter
+    quadratic: Parameter
+    lag: Parameter
+    compensated: bool
+    reason: str
+    temperature_error: float
+    path_errors: Array
+
+
+def judge(
+    regressors: Regressors,
+    found: Regression,
+    whittle: Whittle,
+    candidates: Sequence[Candidate],
+    lags: Array,
+    *,
+    gained: float,
+    rng: np.random.Generator,
+) -> Verdict:
+    """Say what a settled fit tells.
+
+    Parameters
+    ----------
+    regressors : Regressors
+    found : Regression
+    whittle : Whittle
+        Of what temperature leaves.
+    candidates : sequence of Candidate
+        Noise models of that, the best first.
+    lags : ndarray, shape (l,)
+        Lags that were scanned, s.
+    gained : float
+        BIC of the best noise without temperature, less that of the fit.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    Verdict
+    """
+    weights = whittle.spectrum.ordinates / whittle.density(candidates[0].found)
+    p = regressors.thermal
+    errors = path_errors(regressors, found, weights)
+    fine = _fine(regressors, weights, lags)
+    betas, drawn_lags = _drawn(regressors, whittle, candidates, fine, rng)
+    moved = np.sqrt(np.mean(errors.moved**2, axis=0))
+    extra = rng.standard_normal((len(betas), 1)) * moved[None, :]
+    betas, drawn_lags = betas[:, :p] + extra[:, :p], np.maximum(drawn_lags + extra[:, p], 0.0)
+    lower, upper = np.quantile(betas, [0.025, 0.975], axis=0)
+    lower, upper = np.minimum(lower, found.beta[:p]), np.maximum(upper, found.beta[:p])
+    at_mean = regressors.means(found.lag)
+    excluded = any(lower[i] > 0.0 or upper[i] < 0.0 for i in range(1 + regressors.quadratic))
+    confused = _confused(regressors, found, weights, excluded)
+    compensated = excluded and confused is None and gained > _FAVOURED
+    reason = confused or _reason(excluded, gained)
+    if regressors.settling > 0.0:
+        reason += (
+            f"; the first {regressors.settling:.0f} s follow it otherwise and do not count for the "
+            "sensitivity"
+        )
+    s = _parameter(float(found.beta[0]), float(lower[0]), float(upper[0]), confused)
+    q = Parameter(None, "absent", "the data do not ask for it")
+    if regressors.quadratic:
+        q = _parameter(float(found.beta[1]), float(lower[1]), float(upper[1]), confused)
+    return Verdict(
+        s,
+        q,
+        told_lag(found.lag, drawn_lags, float(lags[-1]), compensated),
+        compensated,
+        reason,
+        float(np.std(betas @ at_mean)),
+        errors.density,
+    )
+
+
+def _reason(excluded: bool, gained: float) -> str:
+    if not excluded:
+        return "the interval of the sensitivity contains 0"
+    if gained <= _FAVOURED:
+        return f"BIC favours the noise with temperature by {gained:.1f} only"
+    return f"BIC favours the noise with temperature by {gained:.1f}"
+
+
+def _parameter(value: float, lower: float, upper: float, confused: str | None) -> Parameter:
+    if confused is not None:
+        return Parameter(None, "not_identified", confused, lower, upper, fitted=value)
+    return Parameter(value, "ok", None, lower, upper)
+
+
+def told_lag(value: float, draws: Array, longest: float, compensated: bool) -> Parameter:
+    """Return the lag as it is told, with the shortest interval that holds 95 % of its draws.
+
+    Equal tails would leave out a lag of 0 in every other log that has none.
+
+    Parameters
+    ----------
+    value : float
+        The most likely lag, s.
+    draws : ndarray, shape (d,)
+        s.
+    longest : float
+        The longest lag that was looked for, s.
+    compensated : bool
+        Temperature is taken out of the noise.
+
+    Returns
+    -------
+    Parameter
+    """
+    if longest == 0.0:
+        return Parameter(None, "absent", "no lag was asked for")
+    if not compensated:
+        return Parameter(None, "not_identified", "temperature explains nothing that would lag")
+    lower, upper = _shortest(draws)
+    # A lag at its lower end: one limit, of the whole 5 %.
+    below = float(np.quantile(draws, 0.95))
+    if value == 0.0 or below < _AS_SHORT * (upper - lower):
+        lower, upper = 0.0, below
+    lower, upper = min(lower, value), max(upper, value)
+    if upper - lower > _WIDE_LAG * longest:
+        reason = f"the log allows lags from {lower:.3g} to {upper:.3g} s"
+        return Parameter(None, "not_identified", reason, lower, upper, fitted=value)
+    if lower == 0.0:
+        reason = "its interval contains 0; only that is given"
+        return Parameter(None, "not_identified", reason, lower, upper, fitted=value)
+    return Parameter(value, "ok", None, lower, upper)
+
+
+def _shortest(draws: Array) -> tuple[float, float]:
+    """Return the shortest interval that holds 95 % of the draws."""
+    ordered = np.sort(draws)
+    inside = math.ceil(0.95 * len(ordered))
+    widths = ordered[inside - 1 :] - ordered[: len(ordered) - inside + 1]
+    first = int(np.argmin(widths))
+    return float(ordered[first]), float(ordered[first + inside - 1])
+
+
+def _confused(
+    regressors: Regressors, found: Regression, weights: Array, excluded: bool
+) -> str | None:
+    """Return why temperature and time cannot be told apart, or None where they can."""
+    both = regressors.also(ramp=True).at(found.lag, weights)
+    of_s, of_time = both.information[0, 0], both.information[-1, -1]
+    shared = both.information[0, -1] ** 2 / (of_s * of_time)
+    if shared > _AS_TIME:
+        return (
+            "the temperature is too close to a ramp: time alone would explain "
+            f"{100 * shared:.0f} % of what the log says of the sensitivity"
+        )
+    value = regressors.path.value
+    if abs(value[-1] - value[0]) > _MONOTONE * regressors.path.range:
+        z = both.beta[0] / math.sqrt(both.covariance[0, 0])
+        if excluded and abs(z) < 1.96:
+            return "the temperature only rises or falls, and a drift with time explains as much"
+    if not excluded and _explained(regressors, found) > _EXPLAINED:
+        return (
+            "temperature follows most of the slow drift, but a random walk as strong as the "
+            "log's own would do so by chance"
+        )
+    return None
+
+
+def _explained(regressors: Regressors, found: Regression) -> float:
+    """Return the part of the drift, at the frequencies of the temperature, that it follows."""
+    products = regressors.products(found.lag)
+    plain = regressors.coefficients.density()[regressors.used]
+    nu = regressors.ordinates
+    power = nu * products.gram[:, 0, 0]
+    upto = int(np.searchsorted(np.cumsum(power), 0.95 * power.sum())) + 1
+    part = slice(0, max(upto, 8))
+    cross = float(nu[part] @ products.cross[part, 0])
+    return cross**2 / float(power[part].sum() * (nu[part] @ plain[part]) + 1e-300)
+
+
+def _fine(regressors: Regressors, weights: Array, lags: Array) -> Array:
+    """Return lags that lie densely where the log allows them, s."""
+    low, high = _about_the_likely(regressors, weights, lags)
+    if high == low:
+        return np.array([low])
+    low, high = _about_the_likely(regressors, weights, np.linspace(low, high, _LAGS))
+    return np.linspace(low, high, _LAGS)
+
+
+def _about_the_likely(regressors: Regressors, weights: Array, lags: Array) -> tuple[float, float]:
+    """Return the lags of a scan between which, and next to which, the likely ones lie."""
+    regressors.prepare(lags)
+    gains = np.array([regressors.at(float(lag), weights).log_likelihood_gain for lag in lags])
+    likely = np.flatnonzero(gains > gains.max() - _WITHIN)
+    return float(lags[max(likely[0] - 1, 0)]), float(lags[min(likely[-1] + 1, len(lags) - 1)])
+
+
+def shares(candidates: Sequence[Candidate]) -> list[tuple[Candidate, float]]:
+    """Return the noise models that the log does not rule out, each with its share of 1.
+
+    Parameters
+    ----------
+    candidates : sequence of Candidate
+        The best first.
+
+    Returns
+    -------
+    list of (Candidate, float)
+    """
+    chosen = candidates[0]
+    alike = {
+        place: c.share
+        for place, c in enumerate(candidates)
+        if c is chosen or (c.share >= _LEAST_SHARE and not c.found.terms.ramp)
+    }
+    walks = (
+        place
+        for place, c in enumerate(candidates)
+        if "K" in c.found.terms.linear and not c.found.terms.ramp
+    )
+    walk = next(walks, None)
+    if walk is not None:
+        # What temperature takes from a walk leaves the fit without one all too easily.
+        alike.setdefault(walk, candidates[walk].share)
+        alike[walk] = max(alike[walk], _LEAST_WALK * sum(alike.values()))
+    total = sum(alike.values())
+    return [(candidates[place], share / total) for place, share in alike.items()]
+
+
+def _drawn(
+    regressors: Regressors,
+    whittle: Whittle,
+    candidates: Sequence[Candidate],
+    lags: Array,
+    rng: np.random.Generator,
+) -> tuple[Array, Array]:
+    """Return draws of beta (d, p) and of the lag (d,)."""
+    alike = shares(candidates)
+    regressors.prepare(lags)
+    everything = [regressors.products(float(lag)) for lag in lags]
+    cross = np.array([products.cross for products in everything])
+    gram = np.array([products.gram for products in everything])
+    betas, chosen_lags = [], []
+    for candidate, share in alike:
+        number = max(8, round(_NOISES * share))
+        densities = _densities(whittle, candidate.found, number, rng)
+        weights = regressors.ordinates / densities
+        information = np.einsum("db,lbij->dlij", weights, gram, optimize=True)
+        information += (
+            1e-12
+            * information.diagonal(axis1=2, axis2=3)[..., None]
+            * np.eye(information.shape[-1])
+        )
+        target = np.einsum("db,lbi->dli", weights, cross, optimize=True)
+        beta = np.linalg.solve(information, target[..., None])[..., 0]
+        gain = 0.5 * np.einsum("dli,dli->dl", target, beta)
+        mass = np.exp(gain - gain.max(axis=1, keepdims=True)).cumsum(axis=1)
+        for _ in range(_DRAWS // _NOISES):
+            level = rng.random(number) * mass[:, -1]
+            place = np.minimum((mass < level[:, None]).sum(axis=1), len(lags) - 1)
+            row = np.arange(number)
+            root = np.linalg.cholesky(np.linalg.inv(information[row, place]))
+            normal = rng.standard_normal((number, root.shape[-1]))
+            betas.append(beta[row, place] + np.einsum("dij,dj->di", root, normal))
+            chosen_lags.append(lags[place])
+    return np.concatenate(betas), np.concatenate(chosen_lags)
+
+
+def _densities(whittle: Whittle, found: Maximum, number: int, rng: np.random.Generator) -> Array:
+    """Return densities of the noise drawn from its posterior, shape (number, b)."""
+    posterior = sample(whittle, found, rng, 8 * number)
+    rows = []
+    for row in range(0, 8 * number, 8):
+        powers, times = posterior.parameters[row] ** 2, posterior.times[row]
+        rows.append(whittle.matrix(found.terms, times) @ powers)
+    return np.array(rows)

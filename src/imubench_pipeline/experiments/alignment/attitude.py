@@ -1,0 +1,150 @@
+"""Attitude: matrices, Euler angles, and small errors of them.
+
+The navigation frame is north, east, down; the body frame forward, right, down. C turns vectors of
+the body frame into the navigation frame, C = R_z(heading) R_y(pitch) R_x(roll). An estimate C~ is
+in error by the small angles psi of the navigation frame,
+
+    C~ = (I - [psi x]) C        (D. H. Titterton and J. L. Weston, "Strapdown Inertial Navigation
+                                 Technology", IET 2004, section 12.3).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from imubench_pipeline.typing import Array
+
+STEEPEST = 1e-6
+"""Least cosine of the pitch at which roll and heading are two angles."""
+
+
+def matrix(roll: float, pitch: float, heading: float) -> Array:
+    """Return the matrix from body to navigation frame.
+
+    Parameters
+    ----------
+    roll, pitch, heading : float
+        rad.
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+    """
+    (cr, cp, ch), (sr, sp, sh) = (
+        [float(f(angle)) for angle in (roll, pitch, heading)] for f in (np.cos, np.sin)
+    )
+    return np.array(
+        [
+            [ch * cp, ch * sp * sr - sh * cr, ch * sp * cr + sh * sr],
+            [sh * cp, sh * sp * sr + ch * cr, sh * sp * cr - ch * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def euler_angles(attitude: Array) -> Array:
+    """Return roll, pitch and heading.
+
+    Parameters
+    ----------
+    attitude : ndarray, shape (..., 3, 3)
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+        rad; roll and heading from -pi to pi, pitch from -pi/2 to pi/2. Where the pitch is +-pi/2
+        roll and heading are not told apart.
+    """
+    c = attitude
+    level = np.hypot(c[..., 0, 0], c[..., 1, 0])
+    return np.stack(
+        [
+            np.arctan2(c[..., 2, 1], c[..., 2, 2]),
+            np.arctan2(-c[..., 2, 0], level),
+            np.arctan2(c[..., 1, 0], c[..., 0, 0]),
+        ],
+        axis=-1,
+    )
+
+
+def cross_matrix(vector: ArrayLike) -> Array:
+    """Return [v x], so that [v x] u is v x u.
+
+    Parameters
+    ----------
+    vector : array_like, shape (..., 3)
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+    """
+    v = np.asarray(vector, dtype=np.float64)
+    found = np.zeros((*v.shape, 3))
+    found[..., 0, 1], found[..., 0, 2], found[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
+    return found - np.swapaxes(found, -1, -2)
+
+
+def rotation(vector: ArrayLike) -> Array:
+    """Return the matrix that turns by a vector (O. Rodrigues), exp([v x]).
+
+    Parameters
+    ----------
+    vector : array_like, shape (..., 3)
+        rad.
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+    """
+    v = np.asarray(vector, dtype=np.float64)
+    angle = np.linalg.norm(v, axis=-1)[..., None, None]
+    across = cross_matrix(v)
+    # sin(x)/x and (1 - cos(x))/x^2 = sinc^2(x/2)/2, which keep their digits towards 0.
+    one = np.sinc(angle / np.pi)
+    two = 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2
+    return np.asarray(np.eye(3) + one * across + two * across @ across)
+
+
+def corrected(attitude: Array, psi: Array) -> Array:
+    """Return an attitude from which an error is taken off.
+
+    Parameters
+    ----------
+    attitude : ndarray, shape (..., 3, 3)
+        C~.
+    psi : ndarray, shape (..., 3)
+        Its error, rad.
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+        C; exp([psi x]) is the inverse of I - [psi x] to the first order, and a rotation.
+    """
+    return np.asarray(rotation(psi) @ attitude)
+
+
+def of_euler_angles(attitude: Array) -> Array:
+    """Return what a small error psi does to roll, pitch and heading.
+
+    Parameters
+    ----------
+    attitude : ndarray, shape (3, 3)
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+        Times psi: the errors of roll, pitch and heading, rad.
+
+    Raises
+    ------
+    ValueError
+        If the pitch is +-pi/2: roll and heading are then one angle.
+    """
+    _, pitch, heading = euler_angles(attitude)
+    cp, sp, ch, sh = np.cos(pitch), np.sin(pitch), np.cos(heading), np.sin(heading)
+    if cp < STEEPEST:
+        raise ValueError("the x axis is vertical: roll and heading cannot be told from each other")
+    # Columns: the turns of the navigation frame that roll, pitch and heading alone are.
+    turns = np.array([[cp * ch, -sh, 0.0], [cp * sh, ch, 0.0], [-sp, 0.0, 1.0]])
+    return -np.linalg.inv(turns)

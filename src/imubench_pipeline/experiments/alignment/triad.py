@@ -1,0 +1,207 @@
+"""A triad of gyros and accelerometers at rest: its noise, where it is, and how it is turned."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from imubench_pipeline.earth import EARTH_RATE, STANDARD_GRAVITY
+from imubench_pipeline.experiments.alignment.attitude import rotation
+from imubench_pipeline.experiments.earth_rate.experiment import Blocks, Dwell, Experiment
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.typing import Array
+
+_NEAREST_POLE = 1e-6
+"""Least cosine of a latitude at which the Earth's rate points north."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Site:
+    """A place on the Earth, and what a triad at rest there is exposed to.
+
+    Parameters
+    ----------
+    latitude : float
+        rad, north positive.
+    gravity : float
+        m/s^2.
+
+    Raises
+    ------
+    ValueError
+        If the latitude is not between the poles, where there is no north, or gravity not above 0.
+    """
+
+    latitude: float
+    gravity: float = STANDARD_GRAVITY
+
+    def __post_init__(self) -> None:
+        if not (abs(self.latitude) < math.pi and math.cos(self.latitude) > _NEAREST_POLE):
+            raise ValueError(f"latitude is {self.latitude}, expected one between the poles, in rad")
+        if not (math.isfinite(self.gravity) and self.gravity > 0):
+            raise ValueError(f"gravity is {self.gravity}, expected a number above 0")
+
+    @property
+    def earth_rate(self) -> Array:
+        """Rate of the Earth, north, east and down, rad/s."""
+        return EARTH_RATE * np.array([math.cos(self.latitude), 0.0, -math.sin(self.latitude)])
+
+    @property
+    def specific_force(self) -> Array:
+        """What carries a triad at rest, north, east and down, m/s^2."""
+        return np.array([0.0, 0.0, -self.gravity])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Triad:
+    """Three gyros and three accelerometers along the axes x, y, z of the body.
+
+    Parameters
+    ----------
+    gyros, accelerometers : sequence of NoiseModel
+        Three each, SI.
+    gyro_bias, accelerometer_bias : float
+        Standard deviations of the fixed biases, of each axis by itself, rad/s and m/s^2.
+
+    Raises
+    ------
+    ValueError
+        If there are not three of each, or a deviation is negative or not finite.
+    """
+
+    gyros: Sequence[NoiseModel]
+    accelerometers: Sequence[NoiseModel]
+    gyro_bias: float
+    accelerometer_bias: float
+
+    def __post_init__(self) -> None:
+        for name in ("gyros", "accelerometers"):
+            if len(getattr(self, name)) != 3:
+                raise ValueError(f"{len(getattr(self, name))} {name}, expected three")
+        for name in ("gyro_bias", "accelerometer_bias"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0):
+                raise ValueError(f"{name} is {value}, expected a number from 0")
+
+    @classmethod
+    def of_one_kind(
+        cls,
+        gyro: NoiseModel,
+        accelerometer: NoiseModel,
+        *,
+        gyro_bias: float,
+        accelerometer_bias: float,
+    ) -> Triad:
+        """Return a triad whose axes are alike.
+
+        Parameters
+        ----------
+        gyro, accelerometer : NoiseModel
+        gyro_bias, accelerometer_bias : float
+            rad/s and m/s^2.
+
+        Returns
+        -------
+        Triad
+        """
+        return cls(
+            gyros=(gyro,) * 3,
+            accelerometers=(accelerometer,) * 3,
+            gyro_bias=gyro_bias,
+            accelerometer_bias=accelerometer_bias,
+        )
+
+    @property
+    def axes(self) -> list[tuple[NoiseModel, float]]:
+        """Noise and deviation of the fixed bias of gyros x, y, z and accelerometers x, y, z."""
+        return [(one, self.gyro_bias) for one in self.gyros] + [
+            (one, self.accelerometer_bias) for one in self.accelerometers
+        ]
+
+
+@dataclass(frozen=True)
+class Positions:
+    """Blocks of a run at rest, in one position or in several that are known from the first.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        Neither their sense nor their latitude is used.
+    turned : ndarray, shape (dwells, 3, 3)
+        Turns vectors of the body frame in each dwell into that of the first.
+
+    Raises
+    ------
+    ValueError
+        If there is no rotation matrix for every dwell.
+    """
+
+    blocks: Blocks
+    turned: Array
+
+    def __post_init__(self) -> None:
+        dwells = int(self.blocks.dwell[-1]) + 1
+        if self.turned.shape != (dwells, 3, 3):
+            raise ValueError(f"turned has the shape {self.turned.shape}, expected ({dwells}, 3, 3)")
+        square = self.turned @ np.swapaxes(self.turned, 1, 2)
+        if not (
+            np.allclose(square, np.eye(3), atol=1e-6) and np.all(np.linalg.det(self.turned) > 0)
+        ):
+            raise ValueError("turned holds a matrix that is no rotation")
+
+    @classmethod
+    def at_rest(cls, duration: float, block: float, rate: float) -> Positions:
+        """Return one position.
+
+        Parameters
+        ----------
+        duration : float
+            s.
+        block : float
+            Of a block at most, s.
+        rate : float
+            Sampling rate, Hz.
+
+        Returns
+        -------
+        Positions
+        """
+        samples = max(round(duration * rate), 1)
+        run = Experiment((Dwell(0, samples, 1),), rate, 0.0)
+        return cls(run.blocks(max(round(block * rate), 1)), np.eye(3)[None])
+
+    @classmethod
+    def turned_about_z(
+        cls, headings: Sequence[float], *, dwell: float, turning: float, block: float, rate: float
+    ) -> Positions:
+        """Return positions that differ by turns about the z axis, exactly known.
+
+        Parameters
+        ----------
+        headings : sequence of float
+            Angle of each position from the first, rad; 0, pi is the classical pair.
+        dwell, turning : float
+            Data in each position, and the time between two, s.
+        block : float
+            Of a block at most, s.
+        rate : float
+            Sampling rate, Hz.
+
+        Returns
+        -------
+        Positions
+        """
+        run = Experiment.regular(
+            dwell=dwell, turning=turning, dwells=len(headings), rate=rate, latitude=0.0
+        )
+        angles = np.zeros((len(headings), 3))
+        angles[:, 2] = np.asarray(headings) - headings[0]
+        return cls(run.blocks(max(round(block * rate), 1)), rotation(angles))
+
+    @property
+    def of_blocks(self) -> Array:
+        """The matrix of each block, shape (b, 3, 3)."""
+        return np.asarray(self.turned[self.blocks.dwell])

@@ -1,0 +1,245 @@
+"""Generalised least squares on the means of blocks of a log, with the noise model's covariance.
+
+    y = X b + e,   cov(e) = C,   b^ = (X^T C^-1 X)^-1 X^T C^-1 y,   cov(b^) = (X^T C^-1 X)^-1
+
+(A. C. Aitken 1935). C is that of `earth_rate.covariance`: white noise, Gauss-Markov processes,
+flicker noise, random walk and the rest, as they correlate the means. The standard errors are those
+of the noise model, and not of the scatter, which sees little of what is slow. The scatter is a
+check: (y - X b^)^T C^-1 (y - X b^) is chi-squared of b - p degrees of freedom where the noise model
+and X are right.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+from scipy.stats import chi2, norm
+
+from imubench_pipeline.experiments.calibration.observability import NotObservableError
+from imubench_pipeline.experiments.earth_rate.covariance import of_means
+from imubench_pipeline.experiments.earth_rate.experiment import Blocks, Experiment
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.typing import Array
+
+_TOLERANCE = 1e-3
+"""Relative loss of a standard error by longer blocks that is nothing."""
+
+_MOST_BLOCKS = 1024
+"""Blocks whose covariance is still formed."""
+
+_RANK = 1e-8
+"""Least singular value of whitened regressors of unit length that is not rounding."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What generalised least squares finds in runs of one design.
+
+    Attributes
+    ----------
+    value : ndarray, shape (runs, p)
+        Estimates, SI.
+    covariance : ndarray, shape (p, p)
+        Of their errors, by the noise model.
+    chi_squared : ndarray, shape (runs,)
+        Squared residuals in units of the noise model.
+    freedom : int
+        Their degrees of freedom, b - p.
+    """
+
+    value: Array
+    covariance: Array
+    chi_squared: Array
+    freedom: int
+
+    @property
+    def sigma(self) -> Array:
+        """Standard errors, shape (p,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def p_value(self) -> Array:
+        """Chance of residuals at least as large where model and noise are right, shape (runs,)."""
+        return np.asarray(chi2.sf(self.chi_squared, self.freedom))
+
+    def interval(self, level: float = 0.95) -> tuple[Array, Array]:
+        """Return confidence limits, normal with the standard errors of the noise model.
+
+        Parameters
+        ----------
+        level : float
+
+        Returns
+        -------
+        (ndarray, ndarray), shapes (runs, p)
+
+        Raises
+        ------
+        ValueError
+            If the level is not between 0 and 1.
+        """
+        half = half_width(level) * self.sigma
+        return self.value - half, self.value + half
+
+
+def half_width(level: float) -> float:
+    """Return half of a two-sided interval of the normal distribution, in standard deviations.
+
+    Parameters
+    ----------
+    level : float
+        0.95 gives 1.96.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    ValueError
+        If it is not between 0 and 1.
+    """
+    if not 0 < level < 1:
+        raise ValueError(f"level is {level}, expected one between 0 and 1")
+    return float(norm.ppf(0.5 + level / 2.0))
+
+
+class LeastSquares:
+    """The estimator of one design: blocks, noise model and regressors.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        Their sense is not used.
+    model : NoiseModel
+        With some noise in every sample.
+    regressors : ndarray, shape (b, p)
+    further : ndarray, shape (b, b), optional
+        Covariance that is added to that of the noise, (rad/s)^2.
+    names : sequence of str
+        Of the regressors, for the error.
+
+    Raises
+    ------
+    NotObservableError
+        If there are fewer blocks than regressors, or these cannot be told from each other.
+    """
+
+    def __init__(
+        self,
+        blocks: Blocks,
+        model: NoiseModel,
+        regressors: Array,
+        *,
+        further: Array | None = None,
+        names: Sequence[str] = (),
+    ) -> None:
+        said = f" ({', '.join(names)})" if names else ""
+        if len(blocks) < regressors.shape[1]:
+            raise NotObservableError(
+                f"{len(blocks)} means cannot tell {regressors.shape[1]} parameters{said}"
+            )
+        covariance = of_means(model, blocks)
+        if further is not None:
+            covariance = covariance + further
+        self._root = cholesky(covariance, lower=True)
+        white = solve_triangular(self._root, regressors, lower=True)
+        length = np.linalg.norm(white, axis=0)
+        if np.any(length == 0.0):
+            raise NotObservableError(f"a regressor is 0 throughout{said}")
+        basis, values, turn = np.linalg.svd(white / length, full_matrices=False)
+        if values[-1] < _RANK:
+            raise NotObservableError(f"the data cannot tell these from each other{said}")
+        self._basis = basis
+        self._back = (turn.T / values) / length[:, None]
+        self.covariance = self._back @ self._back.T
+
+    @property
+    def sigma(self) -> Array:
+        """Standard errors of the parameters; they need no data, shape (p,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    def fit(self, means: Array) -> Fit:
+        """Estimate the parameters of runs of one design.
+
+        Parameters
+        ----------
+        means : ndarray, shape (runs, b)
+
+        Returns
+        -------
+        Fit
+
+        Raises
+        ------
+        ValueError
+            If there is not one finite mean a block.
+        """
+        if means.ndim != 2 or means.shape[1] != len(self._root):
+            raise ValueError(
+                f"the means have the shape {means.shape}, expected {len(self._root)} columns"
+            )
+        if not np.isfinite(means).all():
+            raise ValueError("a block mean is not finite; leave its block out")
+        white = solve_triangular(self._root, means.T, lower=True).T
+        along = white @ self._basis
+        left = white - along @ self._basis.T
+        return Fit(
+            along @ self._back.T,
+            self.covariance,
+            np.sum(left**2, axis=1),
+            means.shape[1] - self._basis.shape[1],
+        )
+
+
+def block_length(
+    experiment: Experiment, model: NoiseModel, regressors: Callable[[Blocks], Array]
+) -> int:
+    """Return the longest block whose means tell as much of the parameters as the samples.
+
+    Blocks are shortened by halves until a fourth of their length would lower no standard error by
+    0.1 %; with 1,024 blocks at most.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    model : NoiseModel
+    regressors : callable
+        Gives those of blocks, shape (b, p).
+
+    Returns
+    -------
+    int
+        Samples; at most those of the longest dwell.
+
+    Raises
+    ------
+    NotObservableError
+        If samples could not tell the parameters, either.
+    """
+    length = max(dwell.stop - dwell.start for dwell in experiment.dwells)
+    sigmas: dict[int, Array] = {}
+
+    def sigma(longest: int) -> Array:
+        if longest not in sigmas:
+            blocks = experiment.blocks(longest)
+            sigmas[longest] = LeastSquares(blocks, model, regressors(blocks)).sigma
+        return sigmas[longest]
+
+    while len(experiment.blocks(length)) < _columns(experiment, length, regressors) and length > 1:
+        length //= 2
+    while length > 1:
+        shorter = max(length // 4, 1)
+        if len(experiment.blocks(shorter)) > _MOST_BLOCKS:
+            break
+        if np.all(sigma(shorter) > (1.0 - _TOLERANCE) * sigma(length)):
+            break
+        length //= 2
+    return length
+
+
+def _columns(experiment: Experiment, longest: int, regressors: Callable[[Blocks], Array]) -> int:
+    return regressors(experiment.blocks(longest)).shape[1]

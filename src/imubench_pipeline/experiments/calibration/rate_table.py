@@ -1,0 +1,416 @@
+"""Scale factor and bias of a gyro from steady rates of a rate table, and whether a line fits.
+
+    mean of a block = bias + S (table rate + Earth's rate along the axis) + noise
+
+by generalised least squares over all steady rates (`least_squares`): the gyro's drift from one rate
+to the next counts as what the noise model says it is. A line is what IEEE Std 952-2020 fits in its
+scale-factor tests; what it may hide is asked for: a quadratic term; an asymmetry, the scale factor
+of positive less that of negative rates as a fraction of their mean; and the linearity, the largest
+deviation of a rate from the line as a fraction of full scale, for which the largest rate of the
+test stands.
+
+The axis is along that of the table. Then the Earth's rate along it is constant and, not known, it
+is a bias; across it, it averages out over whole turns. An angle a between the two axes lowers the
+scale factor by the factor cos(a), and is not told from it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from imubench_pipeline.experiments.calibration.least_squares import (
+    Fit,
+    LeastSquares,
+    block_length,
+    half_width,
+)
+from imubench_pipeline.experiments.calibration.observability import (
+    NotObservable,
+    NotObservableError,
+)
+from imubench_pipeline.experiments.calibration.schedule import Schedule
+from imubench_pipeline.experiments.earth_rate.experiment import Blocks, Measured, block_means
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.settings.pointing import Pointing
+from imubench_pipeline.typing import Array
+
+_LEVEL = 1e-12
+"""rad/s of the Earth's rate that may be open."""
+
+_NO_SCALE = NotObservable(
+    "asymmetry", "the gyro does not follow the table: there is no scale factor to be a fraction of"
+)
+
+_SAME = 1e-9
+"""Relative difference of two rates that is rounding."""
+
+
+@dataclass(frozen=True)
+class Term:
+    """A further term of the line, in runs of one design.
+
+    Attributes
+    ----------
+    value : ndarray, shape (runs,)
+        Of the quadratic term, s/rad; of the asymmetry, a fraction of the scale factor.
+    sigma : float
+        Its standard error by the noise model.
+    """
+
+    value: Array
+    sigma: float
+
+    @property
+    def p_value(self) -> Array:
+        """Chance of a value at least as far from 0 where the line is right, shape (runs,)."""
+        return np.asarray(chi2.sf((self.value / self.sigma) ** 2, 1))
+
+    def interval(self, level: float = 0.95) -> tuple[Array, Array]:
+        """Return confidence limits.
+
+        Parameters
+        ----------
+        level : float
+
+        Returns
+        -------
+        (ndarray, ndarray), shapes (runs,)
+        """
+        half = half_width(level) * self.sigma
+        return self.value - half, self.value + half
+
+
+@dataclass(frozen=True)
+class Linearity:
+    """The largest deviation of a rate from the line, over full scale, in runs of one design.
+
+    Attributes
+    ----------
+    deviation : ndarray, shape (runs, levels)
+        What each rate is above the line, over full scale.
+    sigma : ndarray, shape (levels,)
+        Its standard error by the noise model.
+    full_scale : float
+        The largest rate of the test, rad/s.
+    p_value : ndarray, shape (runs,)
+        Chance of deviations at least as large, all together, where the line is right.
+    """
+
+    deviation: Array
+    sigma: Array
+    full_scale: float
+    p_value: Array
+
+    @property
+    def value(self) -> Array:
+        """The largest deviation, a fraction of full scale without sign, shape (runs,)."""
+        return np.abs(self.deviation).max(axis=1)
+
+    def interval(self, level: float = 0.95) -> tuple[Array, Array]:
+        """Return confidence limits of the largest true deviation.
+
+        The limits hold of all rates together (Bonferroni): noise alone makes the largest of many
+        deviations large.
+
+        Parameters
+        ----------
+        level : float
+
+        Returns
+        -------
+        (ndarray, ndarray), shapes (runs,)
+        """
+        half = half_width(1.0 - (1.0 - level) / self.sigma.size) * self.sigma
+        size = np.abs(self.deviation)
+        return np.maximum(size - half, 0.0).max(axis=1), (size + half).max(axis=1)
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Bias and scale factor in runs of one design.
+
+    Attributes
+    ----------
+    line : Fit
+        Bias, rad/s, at the first sample of the first block, and scale factor.
+    bias_sigma : float
+        Standard error of the bias, with that of the Earth's rate along the axis, rad/s.
+    quadratic : Term or None
+        Coefficient of the square of the rate beside the line, s/rad.
+    asymmetry : Term or None
+        Scale factor of positive less that of negative rates over their mean, beside a bias that
+        both share.
+    linearity : Linearity or None
+    not_observable : tuple of NotObservable
+        Why there is no value of what is None, and what is a part of what.
+    """
+
+    line: Fit
+    bias_sigma: float
+    quadratic: Term | None
+    asymmetry: Term | None
+    linearity: Linearity | None
+    not_observable: tuple[NotObservable, ...]
+
+    @property
+    def bias(self) -> Array:
+        """Bias, rad/s, shape (runs,)."""
+        return self.line.value[:, 0]
+
+    @property
+    def scale_factor(self) -> Array:
+        """Indicated over true rate, shape (runs,): 1 and the scale factor's error."""
+        return self.line.value[:, 1]
+
+    @property
+    def scale_factor_sigma(self) -> float:
+        """Its standard error."""
+        return float(self.line.sigma[1])
+
+    def bias_interval(self, level: float = 0.95) -> tuple[Array, Array]:
+        """Return confidence limits of the bias, rad/s.
+
+        Parameters
+        ----------
+        level : float
+
+        Returns
+        -------
+        (ndarray, ndarray), shapes (runs,)
+        """
+        half = half_width(level) * self.bias_sigma
+        return self.bias - half, self.bias + half
+
+    def scale_factor_interval(self, level: float = 0.95) -> tuple[Array, Array]:
+        """Return confidence limits of the scale factor.
+
+        Parameters
+        ----------
+        level : float
+
+        Returns
+        -------
+        (ndarray, ndarray), shapes (runs,)
+        """
+        lower, upper = self.line.interval(level)
+        return lower[:, 1], upper[:, 1]
+
+
+class RateTable:
+    """A recording on a rate table: its blocks, the gyro's noise, and the rates that are known.
+
+    Parameters
+    ----------
+    schedule : Schedule
+    blocks : Blocks
+        Of the schedule's `experiment`.
+    model : NoiseModel
+        Of the gyro, with some noise in every sample.
+    pointing : Pointing, optional
+        Direction of the table's axis, along which the gyro's is; without one the Earth's rate is
+        a part of the bias. Its heading may be left open where the axis is vertical.
+    setting_sigma : float
+        Standard deviation of the table's true rate about the stated one, of each stretch by
+        itself, rad/s.
+
+    Raises
+    ------
+    NotObservableError
+        If there is one rate only: the scale factor cannot be told from the bias.
+    ValueError
+        If the deviation is negative, or the heading is left open where it counts.
+    """
+
+    def __init__(
+        self,
+        schedule: Schedule,
+        blocks: Blocks,
+        model: NoiseModel,
+        pointing: Pointing | None = None,
+        *,
+        setting_sigma: float = 0.0,
+    ) -> None:
+        if not (math.isfinite(setting_sigma) and setting_sigma >= 0):
+            raise ValueError(f"setting_sigma is {setting_sigma}, expected a number from 0")
+        if pointing is not None and pointing.heading is None and pointing.half_width > _LEVEL:
+            raise ValueError(
+                "the heading of the table's axis is not known: give it, or leave the direction out "
+                "and the Earth's rate is a part of the bias"
+            )
+        earth = 0.0 if pointing is None else pointing.rate
+        self._earth_sigma = 0.0 if pointing is None else pointing.rate_sigma
+        rate = schedule.of_blocks(blocks) + earth
+        self._levels = _levels(rate)
+        number = int(self._levels.max()) + 1
+        self._rates = np.array([rate[self._levels == level][0] for level in range(number)])
+        if number < 2:
+            raise NotObservableError(
+                f"the table has one rate only, {rate[0]:g} rad/s: a scale factor cannot be told "
+                "from a bias; another rate is needed, best of the other sense"
+            )
+        further = setting_sigma**2 * np.equal.outer(blocks.dwell, blocks.dwell)
+        ones = np.ones(len(blocks))
+
+        def squares(*columns: Array) -> LeastSquares:
+            return LeastSquares(blocks, model, np.column_stack(columns), further=further)
+
+        self._line = squares(ones, rate)
+        self._open: list[NotObservable] = []
+        if pointing is None:
+            self._open.append(
+                NotObservable("bias", "the Earth's rate along the axis is a part of the bias")
+            )
+        self._quadratic = self._asymmetry = self._each = None
+        if number > 2:
+            self._quadratic = squares(ones, rate, rate**2)
+            self._each = squares(*np.eye(number)[self._levels].T)
+        else:
+            for name in ("quadratic", "linearity"):
+                self._open.append(
+                    NotObservable(name, "two rates lie on a line whatever the gyro does")
+                )
+        try:
+            self._asymmetry = squares(ones, rate, np.abs(rate) / 2.0)
+        except NotObservableError:
+            self._open.append(
+                NotObservable(
+                    "asymmetry",
+                    "it takes three rates, and both senses among them: otherwise it is a bias or a "
+                    "scale factor",
+                )
+            )
+
+    @property
+    def sigma(self) -> tuple[float, float]:
+        """Standard errors of bias, rad/s, and scale factor; they need no data."""
+        bias, scale = self._line.sigma
+        return math.hypot(bias, self._earth_sigma), float(scale)
+
+    def fit(self, means: Array) -> Calibration:
+        """Estimate bias and scale factor in runs of this design.
+
+        Parameters
+        ----------
+        means : ndarray, shape (runs, b)
+            Block means, rad/s.
+
+        Returns
+        -------
+        Calibration
+
+        Raises
+        ------
+        ValueError
+            If there is not one finite mean a block.
+        """
+        line = self._line.fit(means)
+        asymmetry = self._fraction(means)
+        still = self._asymmetry is not None and asymmetry is None
+        return Calibration(
+            line,
+            self.sigma[0],
+            _term(self._quadratic, means),
+            asymmetry,
+            self._linearity(line, means),
+            (*self._open, *[_NO_SCALE] * still),
+        )
+
+    def _linearity(self, line: Fit, means: Array) -> Linearity | None:
+        if self._each is None:
+            return None
+        each = self._each.fit(means)
+        more = np.maximum(line.chi_squared - each.chi_squared, 0.0)
+        at_rates = np.column_stack([np.ones(len(self._rates)), self._rates])
+        # The line is fitted to the same means: what it takes of their noise is no deviation.
+        variance = np.diag(each.covariance - at_rates @ line.covariance @ at_rates.T)
+        full_scale = float(np.abs(self._rates).max())
+        return Linearity(
+            (each.value - line.value @ at_rates.T) / full_scale,
+            np.sqrt(np.maximum(variance, 0.0)) / full_scale,
+            full_scale,
+            np.asarray(chi2.sf(more, line.freedom - each.freedom)),
+        )
+
+    def _fraction(self, means: Array) -> Term | None:
+        """Return the asymmetry over the mean scale factor of both senses."""
+        if self._asymmetry is None:
+            return None
+        found = self._asymmetry.fit(means)
+        scale = found.value[:, 1]
+        if np.any(np.abs(scale) <= half_width(0.95) * found.sigma[1]):
+            return None
+        # The scale factor's own error is of second order.
+        sigma = float(self._asymmetry.sigma[-1] / np.abs(scale).mean())
+        return Term(found.value[:, -1] / scale, sigma)
+
+
+def calibrate(
+    log: Array,
+    schedule: Schedule,
+    model: NoiseModel,
+    pointing: Pointing | None = None,
+    *,
+    setting_sigma: float = 0.0,
+) -> tuple[Calibration, Measured]:
+    """Return bias and scale factor of a gyro from a log on a rate table.
+
+    Parameters
+    ----------
+    log : ndarray, shape (n,)
+        rad/s; NaN where a sample is missing.
+    schedule : Schedule
+    model : NoiseModel
+        Of the gyro.
+    pointing : Pointing, optional
+        Direction of the table's axis.
+    setting_sigma : float
+        Of the table's rate, see `RateTable`, rad/s.
+
+    Returns
+    -------
+    Calibration
+        Of one run.
+    Measured
+        The block means, and what was left out.
+
+    Raises
+    ------
+    NotObservableError
+        If there is one rate only.
+    ValueError
+        If the log ends before the schedule does, or too few samples are present.
+    """
+    run = schedule.experiment
+    _ = RateTable(schedule, run.blocks(_of_stretch(schedule)), model, pointing)
+    longest = block_length(
+        run,
+        model,
+        lambda blocks: np.column_stack([np.ones(len(blocks)), schedule.of_blocks(blocks)]),
+    )
+    measured = block_means([log], run, longest)
+    table = RateTable(schedule, measured.blocks, model, pointing, setting_sigma=setting_sigma)
+    return table.fit(measured.means), measured
+
+
+def _of_stretch(schedule: Schedule) -> int:
+    return max(stretch.stop - stretch.start for stretch in schedule.stretches)
+
+
+def _levels(rate: Array) -> NDArray[np.int64]:
+    """Return the number of each rate among the different ones, which rounding does not split."""
+    order = np.argsort(rate, kind="stable")
+    risen = np.diff(rate[order], prepend=rate[order[0]]) > _SAME * np.abs(rate).max()
+    levels = np.empty(len(rate), dtype=np.int64)
+    levels[order] = np.cumsum(risen)
+    return levels
+
+
+def _term(squares: LeastSquares | None, means: Array) -> Term | None:
+    if squares is None:
+        return None
+    return Term(squares.fit(means).value[:, -1], float(squares.sigma[-1]))

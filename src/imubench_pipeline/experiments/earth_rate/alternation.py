@@ -1,0 +1,184 @@
+"""How the level of a log alternates from dwell to dwell, without the Earth's rate being known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from imubench_pipeline.experiments.earth_rate.transients import Blocks, calm_means
+from imubench_pipeline.typing import Array
+
+_WHITE = 16.0 / 6.0
+"""Variance of a dwell's mean over that of its A-B-A difference / 4, where the noise is white."""
+
+
+@dataclass(frozen=True)
+class Alternation:
+    """How far the dwells of the first sense lie above the mean, the others below it.
+
+    Attributes
+    ----------
+    value, sigma : float
+        rad/s; of one sense less the mean of both, and its standard error.
+    """
+
+    value: float
+    sigma: float
+
+    @property
+    def z(self) -> float:
+        """The value in standard errors."""
+        return self.value / self.sigma
+
+
+def differences(blocks: Blocks, stretches: Sequence[tuple[float, float]]) -> tuple[Array, Array]:
+    """Return the A-B-A differences of the dwells, the sign of the middle one taken off.
+
+    (-1)^i (2 m_i - m_(i-1) - m_(i+1)) / 4, in which a drift that is straight over three dwells is
+    not seen; of two dwells, half their difference.
+
+    Parameters
+    ----------
+    blocks : Blocks
+    stretches : sequence of (float, float)
+        Start and stop of the dwells, s; at least two.
+
+    Returns
+    -------
+    difference : ndarray, shape (n - 2,), or (1,) of two dwells
+        rad/s; positive where the first dwell is of the sense that reads more.
+    white : ndarray, shape (n,)
+        Variance of the means of the dwells from the noise of the blocks alone, (rad/s)^2.
+    """
+    total = np.concatenate(([0.0], np.cumsum(calm_means(blocks))))
+    there = np.concatenate(([0], np.cumsum(blocks.there)))
+    edges = np.clip(np.rint(np.asarray(stretches) / blocks.length), 0, len(blocks.z)).astype(int)
+    count = there[edges[:, 1]] - there[edges[:, 0]]
+    has = count > 0
+    mean = (total[edges[:, 1]] - total[edges[:, 0]]) / np.maximum(count, 1)
+    mean[~has] = np.nan
+    white = np.where(has, blocks.sigma**2 / np.maximum(count, 1), np.nan)
+    if len(mean) == 2:
+        return np.array([0.5 * (mean[0] - mean[1])]), white
+    sign = (-1.0) ** np.arange(1, len(mean) - 1)
+    return sign * (2.0 * mean[1:-1] - mean[:-2] - mean[2:]) / 4.0, white
+
+
+def alternation(blocks: Blocks, stretches: Sequence[tuple[float, float]]) -> Alternation:
+    """Return the mean of the A-B-A differences, with its standard error.
+
+    The error is that of white noise of the scatter seen, and no less than the white noise of the
+    blocks says.
+
+    Parameters
+    ----------
+    blocks : Blocks
+    stretches : sequence of (float, float)
+        Start and stop of the dwells, s; at least two.
+    """
+    difference, white = differences(blocks, stretches)
+    return _mean(difference, white)
+
+
+def _mean(difference: Array, white: Array) -> Alternation:
+    there = np.isfinite(difference)
+    if not there.any():
+        return Alternation(0.0, math.inf)
+    n = int(there.sum())
+    # Where dwells have no samples, few of the others are in a difference.
+    variance = float(np.nanmean(white)) / min(len(white), n + 2)
+    if n > 2:
+        variance = max(variance, _WHITE * float(np.var(difference[there], ddof=1)) / (n + 2))
+    return Alternation(float(difference[there].mean()), math.sqrt(variance))
+
+
+def contradiction(
+    blocks: Blocks, stretches: Sequence[tuple[float, float]], least: float = 3.5
+) -> int | None:
+    """Return the dwell from which on the log alternates the other way, if it does.
+
+    A turn too many or too few turns the sign of all that follows. Nothing is decided by it: it is
+    a doubt.
+
+    Parameters
+    ----------
+    blocks : Blocks
+    stretches : sequence of (float, float)
+        Start and stop of the dwells, s.
+    least : float
+        Standard errors that the alternation must have before and after it.
+    """
+    difference, white = differences(blocks, stretches)
+    if len(difference) < 6:
+        return None
+    worst, place = least, None
+    for k in range(3, len(difference) - 2):
+        before = _mean(difference[:k], white[: k + 2]).z
+        after = _mean(difference[k:], white[k:]).z
+        size = min(abs(before), abs(after))
+        if before * after < 0.0 and size > worst:
+            worst, place = size, k + 1
+    return place
+
+
+def best_shift(
+    blocks: Blocks, turns: Array, half_width: float, longest: float, duration: float
+) -> tuple[float, float, float]:
+    """Return by how much the turns should come later to make the log alternate the most.
+
+    Only the constancy of the alternation is used, not its size or sign. Its standard error is
+    taken as the same for all shifts: z^2 is then twice the log-likelihood.
+
+    Parameters
+    ----------
+    blocks : Blocks
+    turns : ndarray, shape (n,)
+        Middle of the turns that the schedule says, s.
+    half_width : float
+        Half of what is left out about a turn, s.
+    longest : float
+        Largest shift to try to either side, s.
+    duration : float
+        Of the log, s.
+
+    Returns
+    -------
+    shift : float
+        s.
+    z, unshifted : float
+        Alternation in standard errors with it, and without.
+    """
+    shifts = np.arange(-math.floor(longest / 0.5), math.floor(longest / 0.5) + 1) * 0.5
+    found = []
+    for shift in shifts:
+        moved = turns + shift
+        moved = moved[(moved > half_width) & (moved < duration - half_width)]
+        found.append(alternation(blocks, between(moved, half_width, duration)))
+    z = np.array([one.value for one in found]) / np.median([one.sigma for one in found])
+    best = int(np.argmax(np.abs(z)))
+    return float(shifts[best]), float(z[best]), float(z[shifts == 0.0][0])
+
+
+def between(turns: Array, half_width: float, duration: float) -> list[tuple[float, float]]:
+    """Return the stretches between turns.
+
+    Parameters
+    ----------
+    turns : ndarray, shape (n,)
+        Middle of the turns, s.
+    half_width : float
+        Half of what is left out about a turn, s.
+    duration : float
+        Of the log, s.
+
+    Returns
+    -------
+    list of (float, float)
+        n + 1 of them.
+    """
+    starts = np.concatenate(([0.0], turns + half_width))
+    stops = np.concatenate((turns - half_width, [duration]))
+    return list(zip(starts.tolist(), np.maximum(stops, starts).tolist(), strict=True))

@@ -1,0 +1,173 @@
+"""Constants seen through the errors of one or several axes: a square-root Kalman filter.
+
+The unknown constants c (the Earth's rate, small angles of attitude) stand beside the states of each
+axis' own error, and beside the mean of that error over the block that has just ended:
+
+    x = [c, states of axis 1, 2 ..., means of axis 1, 2 ...],    y_i = seen_i c + mean_i + v_i.
+
+The mean is a state, so that what the states gain during the block and what the mean sees of it are
+correlated as they are (`states`). Covariances do not depend on the data: they are computed once, as
+triangular roots that are turned by QR (P. Park and T. Kailath 1995). A root keeps its digits from a
+start that stands for no knowledge at all, where a covariance would have lost them.
+
+References
+----------
+P. Park and T. Kailath, "New square-root algorithms for Kalman filtering", IEEE Trans. Autom.
+Control 40(5), 1995.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from imubench_pipeline.experiments.earth_rate.states import BlockStates
+from imubench_pipeline.typing import Array
+
+
+class BlockFilter:
+    """The filter of one design; it filters any number of runs at once.
+
+    Parameters
+    ----------
+    axes : sequence of BlockStates
+        a of them, over the same blocks.
+    seen : ndarray, shape (b, a, p)
+        What the mean of each axis over each block sees of the constants.
+    start : ndarray, shape (p, p)
+        A root of the covariance of what is known of the constants at the start, about 0.
+
+    Attributes
+    ----------
+    roots : ndarray, shape (b, n, n)
+        Lower triangular roots of the covariances after each block.
+    gains : ndarray, shape (b, n, a)
+        Of what is measured less what was predicted.
+    innovation_roots : ndarray, shape (b, a, a)
+        Lower triangular roots of the covariances of that.
+    """
+
+    def __init__(self, axes: Sequence[BlockStates], seen: Array, start: Array) -> None:
+        b, a, p = seen.shape
+        sizes = [len(axis.names) for axis in axes]
+        self._which = axes[0].which
+        self._places = _places(p, sizes)
+        n = p + sum(sizes) + a
+        self._matrices = [self._matrix(axes, kind, n, p) for kind in range(len(axes[0].steps))]
+        self._seen = np.zeros((b, a, n))
+        self._seen[:, :, :p] = seen
+        self._seen[:, np.arange(a), n - a + np.arange(a)] = 1.0
+        root = np.zeros((n, n))
+        root[:p, :p] = start
+        for axis, place in zip(axes, self._places, strict=True):
+            root[place, place] = axis.initial
+        white = np.stack([axis.white for axis in axes], axis=1)
+        self.roots = np.empty((b, n, n))
+        self.gains = np.empty((b, n, a))
+        self.innovation_roots = np.empty((b, a, a))
+        self._cover(root, white)
+
+    def matrices(self, block: int) -> tuple[Array, Array]:
+        """Return the transition into a block, and a root of its noise.
+
+        Parameters
+        ----------
+        block : int
+
+        Returns
+        -------
+        (ndarray, ndarray), shapes (n, n) and (n, r)
+        """
+        return self._matrices[self._which[block]]
+
+    def run(self, means: Array) -> tuple[Array, Array]:
+        """Filter runs of one design.
+
+        Parameters
+        ----------
+        means : ndarray, shape (runs, b, a)
+
+        Returns
+        -------
+        states : ndarray, shape (runs, b, n)
+            After each block.
+        innovations : ndarray, shape (runs, b, a)
+            What is measured less what was predicted.
+        """
+        b, _, n = self._seen.shape
+        states = np.empty((len(means), b, n))
+        innovations = np.empty_like(means)
+        here = np.zeros((len(means), n))
+        for k in range(b):
+            here = here @ self.matrices(k)[0].T
+            innovations[:, k] = means[:, k] - here @ self._seen[k].T
+            here = here + innovations[:, k] @ self.gains[k].T
+            states[:, k] = here
+        return states, innovations
+
+    def _matrix(
+        self, axes: Sequence[BlockStates], kind: int, n: int, p: int
+    ) -> tuple[Array, Array]:
+        a = len(axes)
+        transition, noise = np.zeros((n, n)), np.zeros((n, n - p))
+        transition[:p, :p] = np.eye(p)
+        for i, (axis, place) in enumerate(zip(axes, self._places, strict=True)):
+            step, mean = axis.steps[kind], n - a + i
+            transition[place, place] = step.transition[:-1]
+            transition[mean, place] = step.transition[-1]
+            driven = np.r_[place.start - p : place.stop - p, mean - p]
+            noise[place, driven] = step.factor[:-1]
+            noise[mean, driven] = step.factor[-1]
+        return transition, noise
+
+    def _cover(self, root: Array, white: Array) -> None:
+        """Carry the root of the covariance through the blocks."""
+        a = white.shape[1]
+        for k in range(len(self._seen)):
+            transition, noise = self.matrices(k)
+            predicted = np.concatenate([transition @ root, noise], axis=1)
+            before = np.zeros((len(predicted) + a, predicted.shape[1] + a))
+            before[:a, :a] = np.diag(white[k])
+            before[:a, a:] = self._seen[k] @ predicted
+            before[a:, a:] = predicted
+            after = triangle(before)
+            self.innovation_roots[k] = after[:a, :a]
+            self.gains[k] = np.linalg.solve(after[:a, :a].T, after[a:, :a].T).T
+            root = after[a:, a:]
+            self.roots[k] = root
+
+
+def triangle(root: Array) -> Array:
+    """Return a lower triangular root of the same covariance.
+
+    Parameters
+    ----------
+    root : ndarray, shape (n, r)
+
+    Returns
+    -------
+    ndarray, shape (n, n)
+    """
+    return np.asarray(np.linalg.qr(root.T, mode="r")).T
+
+
+def deviation(roots: Array, state: int) -> Array:
+    """Return the standard deviation of a state.
+
+    Parameters
+    ----------
+    roots : ndarray, shape (..., n, n)
+    state : int
+
+    Returns
+    -------
+    ndarray, shape (...)
+    """
+    return np.asarray(np.linalg.norm(roots[..., state, :], axis=-1))
+
+
+def _places(first: int, sizes: Sequence[int]) -> list[slice]:
+    edges = first + np.concatenate(([0], np.cumsum(sizes))).astype(int)
+    return [slice(int(a), int(b)) for a, b in pairwise(edges)]

@@ -1,0 +1,196 @@
+"""The estimates of an Earth-rate experiment by every method, as they grow with time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.experiments.earth_rate.bound import block_length
+from imubench_pipeline.experiments.earth_rate.experiment import (
+    Blocks,
+    Experiment,
+    Measured,
+    block_means,
+)
+from imubench_pipeline.experiments.earth_rate.kalman import RateFilter
+from imubench_pipeline.experiments.earth_rate.known_rate import track
+from imubench_pipeline.experiments.earth_rate.pairs import Differences, by_pairs, by_triples
+from imubench_pipeline.experiments.earth_rate.states import WIDE
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.typing import Array
+
+METHODS = ("pairs", "triples", "filter", "smoother", "known_rate")
+"""In the order in which they are shown; the last is given the rate, and cannot find it."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """What one method says as the data come in.
+
+    Attributes
+    ----------
+    method : str
+        One of `METHODS`.
+    time : ndarray, shape (k,)
+        s from the first sample of the log.
+    rate : ndarray, shape (k,)
+        Estimate from the data up to then, rad/s; by the smoother from all of the data.
+    sigma : ndarray, shape (k,), or None
+        Its standard deviation, rad/s; None where the method has none.
+    reason : str or None
+        Why there is no estimate: the arrays are empty then.
+    """
+
+    method: str
+    time: Array
+    rate: Array
+    sigma: Array | None
+    reason: str | None = None
+
+
+@dataclass(frozen=True)
+class Courses:
+    """The estimates of one experiment, and what they are made of.
+
+    Attributes
+    ----------
+    courses : tuple of Course
+        One a method.
+    measured : Measured
+    longest : int
+        Samples of a block at most.
+    drift_time, drift, drift_sigma : ndarray, shape (b,)
+        Middle of each block in s from the first sample of the log; the gyro's slow error in it
+        with its bias, from all of the data, and its standard deviation, rad/s.
+    """
+
+    courses: tuple[Course, ...]
+    measured: Measured
+    longest: int
+    drift_time: Array
+    drift: Array
+    drift_sigma: Array
+
+
+def white_sigma(model: NoiseModel, blocks: Blocks) -> float:
+    """Return N / sqrt(T) / cos(latitude), below which no estimate from T s of data can be, rad/s.
+
+    Parameters
+    ----------
+    model : NoiseModel
+    blocks : Blocks
+        T is the time that their samples stand for.
+    """
+    return model.N / math.sqrt(blocks.time_in_blocks) / math.cos(blocks.latitude)
+
+
+def estimated(
+    log: Array,
+    experiment: Experiment,
+    model: NoiseModel,
+    papers: NoiseModel,
+    turn_on_bias: float | None = None,
+) -> Courses:
+    """Estimate the Earth's rate by every method.
+
+    The filter starts with the variance of the turn-on bias (of no knowledge, where it is not
+    stated), its Gauss-Markov processes with their stationary one.
+
+    Parameters
+    ----------
+    log : ndarray, shape (n,)
+        rad/s; NaN where a sample is missing.
+    experiment : Experiment
+        Dwells of both senses.
+    model : NoiseModel
+        Of the gyro, with N.
+    papers : NoiseModel
+        N, B with T_B, and K, for the paper's filter.
+    turn_on_bias : float or None
+        Standard deviation of the fixed bias, rad/s; None: not known.
+
+    Returns
+    -------
+    Courses
+
+    Raises
+    ------
+    ValueError
+        If the dwells are all of one sense, or no block of them has enough samples.
+    """
+    if len({dwell.sense for dwell in experiment.dwells}) < 2:
+        raise ValueError("all dwells are of one position: the rate cannot be told from the bias")
+    longest = block_length(experiment, model)
+    measured = block_means([log], experiment, longest)
+    blocks, means = measured.blocks, measured.means
+    first = blocks.start[0] / blocks.rate
+    one = RateFilter(blocks, model, turn_on_bias=WIDE if turn_on_bias is None else turn_on_bias)
+    filtered = one.run(means)
+    smoothed = one.smooth(filtered)
+    # Before the second position is seen the rate is not told from the bias.
+    known = slice(int(np.argmax(blocks.sense != blocks.sense[0])), None)
+    whole = np.array([first, first + blocks.duration])
+    courses = (
+        _differences("pairs", blocks, lambda: by_pairs(means, blocks, model)),
+        _differences("triples", blocks, lambda: by_triples(means, blocks, model)),
+        Course(
+            "filter",
+            first + filtered.time[known],
+            filtered.rate[0, known],
+            filtered.rate_sigma[known],
+        ),
+        Course(
+            "smoother",
+            whole,
+            np.full(2, smoothed.rate[0]),
+            np.full(2, smoothed.rate_sigma),
+        ),
+        _tracked(log, experiment, papers),
+    )
+    return Courses(
+        courses,
+        measured,
+        longest,
+        first + blocks.middle,
+        smoothed.drift[0],
+        smoothed.drift_sigma,
+    )
+
+
+def _differences(method: str, blocks: Blocks, estimate: Callable[[], Differences]) -> Course:
+    try:
+        found = estimate()
+    except ValueError as error:
+        return Course(method, np.empty(0), np.empty(0), np.empty(0), str(error))
+    first = blocks.start[0] / blocks.rate
+    return Course(method, first + found.time, found.rate[0], found.sigma)
+
+
+def _tracked(log: Array, experiment: Experiment, papers: NoiseModel) -> Course:
+    try:
+        found = track(log, experiment, papers, EARTH_RATE)
+    except ValueError as error:
+        return Course("known_rate", np.empty(0), np.empty(0), None, str(error))
+    return Course("known_rate", found.sample / experiment.rate, found.mean, None)
+
+
+def thinned(points: int, most: int = 400) -> Iterator[int]:
+    """Yield places of a course that show it: as many at its begin as later, and its end.
+
+    Parameters
+    ----------
+    points : int
+        Of the course.
+    most : int
+        About so many are kept.
+    """
+    if points <= most:
+        yield from range(points)
+        return
+    even = np.linspace(0, points - 1, most // 2)
+    early = np.geomspace(1, points, most // 2) - 1
+    yield from np.unique(np.rint(np.concatenate([even, early])).astype(np.int64)).tolist()

@@ -1,0 +1,146 @@
+"""What is found in the log of a gyro that was turned: dwells, turns, and what to leave out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.experiments.earth_rate.alternation import Alternation
+from imubench_pipeline.experiments.earth_rate.experiment import Dwell
+
+FoundBy = Literal["transient", "step", "schedule", "column"]
+
+SURE: tuple[FoundBy, ...] = ("column", "transient", "step", "schedule")
+"""What turns are found by, the surest first."""
+
+
+@dataclass(frozen=True)
+class Turn:
+    """A turn of the sensor.
+
+    Attributes
+    ----------
+    start, stop : float
+        s from the first sample; what is left out for it, with the margin.
+    time : float
+        Its middle as found, s.
+    found_by : "transient", "step", "schedule" or "column"
+    peak : float or None
+        Largest rate sensed of it, or the step, rad/s.
+    doubts : tuple of str
+        What speaks against it, in words.
+    """
+
+    start: float
+    stop: float
+    time: float
+    found_by: FoundBy
+    peak: float | None = None
+    doubts: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class FoundDwell:
+    """A dwell between two turns, or between a turn and an end of the log.
+
+    Attributes
+    ----------
+    start, stop : float
+        s from the first sample; the turning beside it is left out.
+    sense : int
+        +1 or -1.
+    found_by : "transient", "step", "schedule" or "column"
+        How the less sure of the turns beside it was found.
+    doubts : tuple of str
+        What to doubt about its length and sense, in words; empty where nothing is.
+    """
+
+    start: float
+    stop: float
+    sense: int
+    found_by: FoundBy = "schedule"
+    doubts: tuple[str, ...] = ()
+
+    def in_samples(self, rate: float) -> Dwell:
+        """Return the dwell as an experiment has it.
+
+        Parameters
+        ----------
+        rate : float
+            Hz.
+
+        Returns
+        -------
+        Dwell
+            The samples that lie in it.
+
+        Raises
+        ------
+        ValueError
+            If none does.
+        """
+        return Dwell(_whole(self.start, rate), _whole(self.stop, rate), self.sense)
+
+
+@dataclass(frozen=True)
+class Turning:
+    """The dwells and turns of a log.
+
+    Attributes
+    ----------
+    dwells : tuple of FoundDwell
+        In order; the sense alternates.
+    turns : tuple of Turn
+        In order.
+    knocks : tuple of (float, float)
+        Start and stop of disturbances that are no turns, s: not to be used either.
+    ambiguous : bool
+        Whether the sense of the first dwell was assumed: all senses may be the other way round.
+    alternation : Alternation
+        Level of sense +1 less the mean of both, from A-B-A differences: the Earth's rate as
+        sensed, for a look at it and no more.
+    doubts : tuple of str
+        About the log as a whole, in words.
+    """
+
+    dwells: tuple[FoundDwell, ...]
+    turns: tuple[Turn, ...]
+    knocks: tuple[tuple[float, float], ...]
+    ambiguous: bool
+    alternation: Alternation
+    doubts: tuple[str, ...] = ()
+
+    @property
+    def by_schedule(self) -> int:
+        """How many turns rest on the schedule alone."""
+        return sum(turn.found_by == "schedule" for turn in self.turns)
+
+    def senses(self, samples: int, rate: float) -> NDArray[np.int8]:
+        """Return the sense of each sample, 0 where it is not to be used.
+
+        Parameters
+        ----------
+        samples : int
+            Of the log.
+        rate : float
+            Hz.
+
+        Returns
+        -------
+        ndarray of int8, shape (samples,)
+            1, -1 or 0. Missing samples are not told apart.
+        """
+        sense = np.zeros(samples, dtype=np.int8)
+        for dwell in self.dwells:
+            sense[_whole(dwell.start, rate) : _whole(dwell.stop, rate)] = dwell.sense
+        for start, stop in self.knocks:
+            sense[max(0, _whole(start, rate)) : max(0, _whole(stop, rate))] = 0
+        return sense
+
+
+def _whole(time: float, rate: float) -> int:
+    """Return the first sample that is not before a time; a last digit does not move it."""
+    return int(np.ceil(time * rate - 1e-6))

@@ -1,0 +1,283 @@
+"""The Earth's rate as an unknown constant, by Kalman filter and smoother.
+
+The paper's filter (003 eq. 15, 16) is given the rate that it finds; see `known_rate`. Here the rate
+w is a state beside the gyro's own error, seen with the sign of the dwell:
+
+    x = [w, z_G ..., z_K],    mean of a block = s cos(latitude) w + mean of (z_G + ... + z_K) + v.
+
+The filter is that of `block_filter`, with one constant and one axis. Its roots keep their digits
+from a start of 1 rad/s, which stands for no knowledge at all, down to 1e-10 rad/s.
+
+References
+----------
+P. Park and T. Kailath, "New square-root algorithms for Kalman filtering" and "Square-root RTS
+smoothing algorithms", IEEE Trans. Autom. Control 40(5), 1995, and Int. J. Control 62(5), 1995;
+H. E. Rauch, F. Tung and C. T. Striebel, AIAA Journal 3(8), 1965; Y. Bar-Shalom, X. R. Li and
+T. Kirubarajan, "Estimation with Applications to Tracking and Navigation", Wiley 2001, section 5.4
+(NEES, NIS).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from imubench_pipeline.experiments.earth_rate.block_filter import BlockFilter, deviation, triangle
+from imubench_pipeline.experiments.earth_rate.experiment import Blocks
+from imubench_pipeline.experiments.earth_rate.states import WIDE, block_states
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.typing import Array
+
+_NOTHING = 1e-12
+"""Singular value of a predicted root, of unit rows, that is rounding alone."""
+
+
+@dataclass(frozen=True)
+class Filtered:
+    """What a filter knows after each block, from the data up to there.
+
+    Attributes
+    ----------
+    time : ndarray, shape (b,)
+        End of each block, s from the first sample of the first.
+    rate : ndarray, shape (runs, b)
+        Estimated Earth's rate, rad/s.
+    rate_sigma : ndarray, shape (b,)
+        Its standard deviation, rad/s.
+    drift : ndarray, shape (runs, b)
+        Estimated mean of the gyro's slow error over the block, its bias included, rad/s.
+    drift_sigma : ndarray, shape (b,)
+        Its standard deviation, rad/s.
+    innovation : ndarray, shape (runs, b)
+        Each block mean less its prediction, rad/s.
+    innovation_sigma : ndarray, shape (b,)
+        Its standard deviation, rad/s.
+    states : ndarray, shape (runs, b, m + 2)
+        Rate, the states of `RateFilter.names` at the sample after the block, and the drift.
+    roots : ndarray, shape (b, m + 2, m + 2)
+        Lower triangular roots of their covariances.
+    """
+
+    time: Array
+    rate: Array
+    rate_sigma: Array
+    drift: Array
+    drift_sigma: Array
+    innovation: Array
+    innovation_sigma: Array
+    states: Array
+    roots: Array
+
+    @property
+    def nis(self) -> Array:
+        """Normalised innovation squared, shape (runs, b): chi-squared of one degree."""
+        return np.asarray((self.innovation / self.innovation_sigma) ** 2)
+
+    def rate_nees(self, rate: float) -> Array:
+        """Return the squared error of the rate over its variance.
+
+        Parameters
+        ----------
+        rate : float
+            The true one, rad/s.
+
+        Returns
+        -------
+        ndarray, shape (runs, b)
+            Chi-squared of one degree of freedom, where the filter is consistent and what it knew
+            at the start no longer counts: once both positions have been seen.
+        """
+        return np.asarray(((self.rate - rate) / self.rate_sigma) ** 2)
+
+    def nees(self, rate: float, states: Array) -> Array:
+        """Return the normalised estimation error squared of the rate and all states.
+
+        Parameters
+        ----------
+        rate : float
+            The true one, rad/s.
+        states : ndarray, shape (runs, b, m)
+            The true ones, at the sample after each block.
+
+        Returns
+        -------
+        ndarray, shape (runs, b)
+            Chi-squared of m + 1 degrees of freedom; see `rate_nees`. Not finite where a state is
+            known exactly.
+        """
+        error = self.states[:, :, :-1].copy()
+        error[:, :, 0] -= rate
+        error[:, :, 1:] -= states
+        found = np.empty(error.shape[:2])
+        for k, root in enumerate(self.roots[:, :-1, :-1]):
+            white = solve_triangular(root, error[:, k].T, lower=True)
+            found[:, k] = np.sum(white**2, axis=0)
+        return found
+
+
+@dataclass(frozen=True)
+class Smoothed:
+    """What is known of each block from all the data.
+
+    Attributes
+    ----------
+    rate : ndarray, shape (runs,)
+        Estimated Earth's rate, rad/s: a constant, which the filter has found at the end.
+    rate_sigma : float
+        Its standard deviation, rad/s.
+    drift : ndarray, shape (runs, b)
+        Mean of the gyro's slow error over each block, its bias included, rad/s.
+    drift_sigma : ndarray, shape (b,)
+        Its standard deviation, rad/s.
+    states : ndarray, shape (runs, b, m + 2)
+        As those of `Filtered`.
+    """
+
+    rate: Array
+    rate_sigma: float
+    drift: Array
+    drift_sigma: Array
+    states: Array
+
+
+class RateFilter:
+    """The filter of one design: blocks and noise model. It filters any number of runs at once.
+
+    Parameters
+    ----------
+    blocks : Blocks
+    model : NoiseModel
+        Its flicker noise is a bank of Gauss-Markov processes; a ramp and lines are estimated, see
+        `states.block_states`.
+    turn_on_bias : float
+        Standard deviation of the fixed bias, rad/s. By default it is not known at all.
+    rate_sigma : float
+        Standard deviation of what is known of the rate at the start, about 0, rad/s; by default
+        so much that it adds nothing.
+
+    Raises
+    ------
+    ValueError
+        If a standard deviation is negative or not finite.
+    """
+
+    def __init__(
+        self,
+        blocks: Blocks,
+        model: NoiseModel,
+        *,
+        turn_on_bias: float = WIDE,
+        rate_sigma: float = WIDE,
+    ) -> None:
+        if not (math.isfinite(rate_sigma) and rate_sigma >= 0):
+            raise ValueError(f"rate_sigma is {rate_sigma}, expected a number from 0")
+        self.blocks = blocks
+        self._states = block_states(model, blocks, turn_on_bias)
+        self._filter = BlockFilter(
+            (self._states,), blocks.seen[:, None, None], np.array([[rate_sigma]])
+        )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The m states of the gyro's error, see `states.BlockStates`; the rate is before them."""
+        return self._states.names
+
+    @property
+    def rate_sigma(self) -> Array:
+        """Standard deviation of the rate after each block, rad/s, shape (b,); needs no data."""
+        return deviation(self._filter.roots, 0)
+
+    def run(self, means: Array) -> Filtered:
+        """Filter runs of one design.
+
+        Parameters
+        ----------
+        means : ndarray, shape (runs, b)
+            Block means, rad/s.
+
+        Returns
+        -------
+        Filtered
+
+        Raises
+        ------
+        ValueError
+            If there is not one mean a block, or one is not finite: a block without a mean is no
+            block (`experiment.block_means`).
+        """
+        if means.ndim != 2 or means.shape[1] != len(self.blocks):
+            raise ValueError(
+                f"the means have the shape {means.shape}, expected {len(self.blocks)} columns"
+            )
+        if not np.isfinite(means).all():
+            raise ValueError("a block mean is not finite; leave its block out")
+        states, innovation = self._filter.run(means[:, :, None])
+        roots = self._filter.roots
+        return Filtered(
+            self.blocks.end,
+            states[:, :, 0],
+            self.rate_sigma,
+            states[:, :, -1],
+            deviation(roots, -1),
+            innovation[:, :, 0],
+            np.abs(self._filter.innovation_roots[:, 0, 0]),
+            states,
+            roots,
+        )
+
+    def smooth(self, filtered: Filtered) -> Smoothed:
+        """Smooth what `run` has filtered (Rauch, Tung and Striebel), with roots.
+
+        Parameters
+        ----------
+        filtered : Filtered
+
+        Returns
+        -------
+        Smoothed
+        """
+        states = filtered.states.copy()
+        gains, sigma = self._backward
+        for k in range(len(self.blocks) - 2, -1, -1):
+            transition, _ = self._filter.matrices(k + 1)
+            predicted = filtered.states[:, k] @ transition.T
+            states[:, k] += (states[:, k + 1] - predicted) @ gains[k].T
+        return Smoothed(
+            states[:, -1, 0],
+            float(self.rate_sigma[-1]),
+            states[:, :, -1],
+            sigma,
+            states,
+        )
+
+    @cached_property
+    def _backward(self) -> tuple[Array, Array]:
+        """Gains of the smoother at each block but the last, and deviations of the drift at each."""
+        root = self._filter.roots[-1]
+        gains = np.empty((len(self.blocks) - 1, *root.shape))
+        sigma = np.empty(len(self.blocks))
+        sigma[-1] = deviation(root, -1)
+        for k in range(len(gains) - 1, -1, -1):
+            gains[k], rest = self._smoothing(k)
+            root = triangle(np.concatenate([rest, gains[k] @ root], axis=1))
+            sigma[k] = deviation(root, -1)
+        return gains, sigma
+
+    def _smoothing(self, k: int) -> tuple[Array, Array]:
+        """Return the gain at a block, and a root of what the next one leaves unknown."""
+        transition, noise = self._filter.matrices(k + 1)
+        root = self._filter.roots[k]
+        n = len(root)
+        joint = np.zeros((2 * n, n + noise.shape[1]))
+        joint[:n, :n], joint[:n, n:], joint[n:, :n] = transition @ root, noise, root
+        after = triangle(joint)
+        predicted, shared, rest = after[:n, :n], after[n:, :n], after[n:, n:]
+        # The mean of a block is a combination of the states where nothing drives them: no inverse.
+        scale = np.linalg.norm(predicted, axis=1)
+        unit = np.where(scale > 0.0, scale, 1.0)
+        gain = shared @ np.linalg.pinv(predicted / unit[:, None], rcond=_NOTHING) / unit
+        return gain, rest

@@ -1,0 +1,163 @@
+"""The Earth's rate from pairs of dwells, with the standard error that the noise model gives.
+
+    w = (w_N - w_S) / (2 cos(latitude))    (003 eq. 14)
+
+for each pair of dwells that follow each other, and the mean over pairs. What the gyro drifts
+between the two dwells is taken for rotation, now with one sign and now with the other where turns
+are alternate. A-B-A differences take out the part of it that is linear in time.
+
+The weights of an estimate on the means of the dwells add up to 0: the fixed bias drops out. The
+standard error is the root of w^T C w with C the covariance of these means, in closed form
+(`covariance`), and not the scatter of the estimates, which is that of few and correlated ones.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from imubench_pipeline.experiments.earth_rate.covariance import of_means
+from imubench_pipeline.experiments.earth_rate.experiment import Blocks
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.typing import Array
+
+
+@dataclass(frozen=True)
+class Differences:
+    """Estimates from differences between dwells, and their mean as it grows with time.
+
+    Attributes
+    ----------
+    time : ndarray, shape (p,)
+        End of the last dwell of each, s from the first sample of the first dwell.
+    each : ndarray, shape (runs, p)
+        Each estimate, rad/s.
+    each_sigma : ndarray, shape (p,)
+        Its standard error, rad/s.
+    rate : ndarray, shape (runs, p)
+        Mean of the estimates up to each, rad/s.
+    sigma : ndarray, shape (p,)
+        Its standard error, rad/s.
+    scatter : ndarray, shape (runs, p)
+        What the scatter would give for it, were the estimates independent, rad/s; NaN for one.
+    """
+
+    time: Array
+    each: Array
+    each_sigma: Array
+    rate: Array
+    sigma: Array
+    scatter: Array
+
+
+def by_pairs(means: Array, blocks: Blocks, model: NoiseModel) -> Differences:
+    """Estimate the rate by 003 eq. 14 from pairs of dwells, each dwell in one pair at most.
+
+    A dwell that the same sense follows, a turn having been missed, is left out.
+
+    Parameters
+    ----------
+    means : ndarray, shape (runs, b)
+        Block means, rad/s.
+    blocks : Blocks
+    model : NoiseModel
+        Of the gyro, for the standard errors.
+
+    Returns
+    -------
+    Differences
+
+    Raises
+    ------
+    ValueError
+        If there is no pair.
+    """
+    dwells = blocks.of_dwells()
+    found, i = [], 0
+    while i + 1 < len(dwells):
+        if dwells.sense[i] == dwells.sense[i + 1]:
+            i += 1
+            continue
+        found.append([(i, dwells.sense[i] / 2.0), (i + 1, dwells.sense[i + 1] / 2.0)])
+        i += 2
+    return _estimated(found, means, blocks, dwells, model, "pair of dwells north and south")
+
+
+def by_triples(means: Array, blocks: Blocks, model: NoiseModel) -> Differences:
+    """Estimate the rate by A-B-A differences: a drift that is linear in time is taken out.
+
+    Of each three dwells of alternate sense that follow each other, the middle one is compared with
+    what the line through the outer two has at its mean time. Triples overlap: each dwell but the
+    first and the last is the middle of one.
+
+    Parameters
+    ----------
+    means : ndarray, shape (runs, b)
+        Block means, rad/s.
+    blocks : Blocks
+    model : NoiseModel
+        Of the gyro, for the standard errors.
+
+    Returns
+    -------
+    Differences
+
+    Raises
+    ------
+    ValueError
+        If there are no three such dwells.
+    """
+    dwells = blocks.of_dwells()
+    # The mean time of the samples present is that of the blocks they lie in.
+    middle = blocks.means_of_dwells(blocks.middle[None, :])[0]
+    found = []
+    for i in range(1, len(dwells) - 1):
+        before, sense, after = dwells.sense[i - 1 : i + 2]
+        if before == sense or after == sense:
+            continue
+        part = (middle[i] - middle[i - 1]) / (middle[i + 1] - middle[i - 1])
+        found.append(
+            [
+                (i - 1, -sense * (1.0 - part) / 2.0),
+                (i, sense / 2.0),
+                (i + 1, -sense * part / 2.0),
+            ]
+        )
+    return _estimated(found, means, blocks, dwells, model, "three dwells of alternate sense")
+
+
+def _estimated(
+    found: list[list[tuple[int, float]]],
+    means: Array,
+    blocks: Blocks,
+    dwells: Blocks,
+    model: NoiseModel,
+    wanted: str,
+) -> Differences:
+    if not found:
+        raise ValueError(f"the experiment has no {wanted} one after the other")
+    weights = np.zeros((len(found), len(dwells)))
+    for row, parts in zip(weights, found, strict=True):
+        for place, weight in parts:
+            row[place] = weight
+    weights /= np.cos(blocks.latitude)
+    each = blocks.means_of_dwells(means) @ weights.T
+    covariance = weights @ of_means(model, dwells) @ weights.T
+    number = np.arange(1, len(found) + 1)
+    # Sums of the leading parts of the covariance.
+    total = np.diag(np.cumsum(np.cumsum(covariance, axis=0), axis=1))
+    rate = np.cumsum(each, axis=1) / number
+    squares = np.cumsum((each - each[:, :1]) ** 2, axis=1) / number - (rate - each[:, :1]) ** 2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        scatter = np.sqrt(np.maximum(squares, 0.0) / (number - 1.0))
+    scatter[:, 0] = np.nan
+    last = np.array([parts[-1][0] for parts in found])
+    return Differences(
+        dwells.end[last],
+        each,
+        np.sqrt(np.maximum(np.diag(covariance), 0.0)),  # a ramp leaves nothing of triples
+        rate,
+        np.sqrt(np.maximum(total, 0.0)) / number,
+        scatter,
+    )

@@ -1,0 +1,290 @@
+"""How well a gyro can find the Earth's rate and north, before anything is measured: the best dwell.
+
+All of it is the Cramér-Rao bound of runs of equal dwells (`experiments.earth_rate.bound`).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.experiments.earth_rate.bound import (
+    MOST_BLOCKS,
+    block_length,
+    information_by_states,
+    sigma_of,
+)
+from imubench_pipeline.experiments.earth_rate.experiment import Experiment
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.typing import Array
+
+_SUMMED = 64
+"""Dwells that are computed; the information of more grows by what the latter half of them add."""
+
+_LEAST_SUMMED = 8
+"""Dwells that are computed where they have so many blocks that 64 would be too many."""
+
+_ROUNDING = 1e-9
+"""Relative error of the information that rounding may make."""
+
+_CURVE = 40
+"""Numbers of dwells on a curve over the dwell, about."""
+
+_BETWEEN = 15
+"""Numbers of dwells about the best of these."""
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """The least standard deviation of the rate as a run grows.
+
+    Attributes
+    ----------
+    turns : ndarray of int, shape (k,)
+        Turns done, from 1.
+    time : ndarray, shape (k,)
+        End of the dwell after the last turn, s.
+    sigma : ndarray, shape (k,)
+        rad/s.
+    """
+
+    turns: NDArray[np.int64]
+    time: Array
+    sigma: Array
+
+
+@dataclass(frozen=True)
+class DwellCurve:
+    """The least standard deviation of the rate for a given run time, over the dwell.
+
+    Attributes
+    ----------
+    dwells : ndarray of int, shape (k,)
+        How many, rising.
+    dwell : ndarray, shape (k,)
+        Data in each, s.
+    sigma : ndarray, shape (k,)
+        rad/s.
+    """
+
+    dwells: NDArray[np.int64]
+    dwell: Array
+    sigma: Array
+
+    @property
+    def best(self) -> int:
+        """Place of the least standard deviation."""
+        return int(np.argmin(self.sigma))
+
+    def nearly_best(self, loss: float = 0.01) -> tuple[float, float]:
+        """Return the dwells between which little is lost: the best is mostly a broad one.
+
+        Parameters
+        ----------
+        loss : float
+            Relative rise of the standard deviation that counts as little.
+
+        Returns
+        -------
+        (float, float)
+            Shortest and longest dwell of the curve about the best one, s.
+        """
+        little = self.sigma <= (1.0 + loss) * self.sigma[self.best]
+        worse = np.flatnonzero(~little)
+        first = int(np.max(worse[worse < self.best], initial=-1)) + 1
+        last = int(np.min(worse[worse > self.best], initial=len(little))) - 1
+        return float(self.dwell[last]), float(self.dwell[first])
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """A gyro, a place and a way of turning it, of which the bound is wanted.
+
+    Beyond 64 dwells the information of the rate grows by as much a dwell as before: what turns
+    at a steady pace sees the noise at the frequency of the turns and its odd multiples alone.
+
+    Parameters
+    ----------
+    model : NoiseModel
+    latitude : float
+        rad.
+    turning : float
+        Time that a turn takes, s.
+    rate : float
+        Sampling rate, Hz.
+    turn_on_bias : float
+        Standard deviation of the fixed bias, rad/s; by default it is not known.
+    """
+
+    model: NoiseModel
+    latitude: float
+    turning: float
+    rate: float
+    turn_on_bias: float = math.inf
+
+    def against_time(self, dwell: float, turns: int) -> Prediction:
+        """Return the bound after each turn and dwell.
+
+        Parameters
+        ----------
+        dwell : float
+            Data in each dwell, s.
+        turns : int
+            The last one wanted, from 1.
+
+        Returns
+        -------
+        Prediction
+        """
+        found = self._information(dwell, turns + 1)
+        number = np.arange(1, turns + 1)
+        time = (number + 1) * dwell + number * self.turning
+        return Prediction(number, time, sigma_of(found[1:]))
+
+    def turns_needed(self, dwell: float, relative: float) -> int:
+        """Return how many turns give the Earth's rate to a relative standard deviation.
+
+        Parameters
+        ----------
+        dwell : float
+            Data in each dwell, s.
+        relative : float
+            Of the Earth's rate: 0.01 is 1 %.
+
+        Returns
+        -------
+        int
+            The run lasts (turns + 1) dwells and as many turns.
+
+        Raises
+        ------
+        ValueError
+            If it is not above 0.
+        """
+        if not relative > 0:
+            raise ValueError(f"relative is {relative}, expected a number above 0")
+        wanted = (relative * EARTH_RATE) ** -2
+        found = self._information(dwell, _SUMMED)
+        reached = np.flatnonzero(found >= wanted * (1.0 - _ROUNDING))
+        if len(reached):
+            return int(reached[0])
+        left = (wanted - found[-1]) / _growth(found)
+        return _SUMMED - 1 + math.ceil(left - _ROUNDING * left)
+
+    def sigma_after(self, dwell: float, turns: int) -> float:
+        """Return the bound after a number of turns and the dwell after the last, rad/s."""
+        found = self._information(dwell, _SUMMED)
+        beyond = max(turns + 1 - _SUMMED, 0)
+        last = found[min(turns, _SUMMED - 1)] + (_growth(found) * beyond if beyond else 0.0)
+        return float(sigma_of(np.array([last]))[0])
+
+    def time_needed(self, dwell: float, relative: float) -> float:
+        """Return how long a run gives the Earth's rate to a relative standard deviation, s.
+
+        Parameters
+        ----------
+        dwell : float
+            Data in each dwell, s.
+        relative : float
+            Of the Earth's rate: 0.01 is 1 %.
+
+        Returns
+        -------
+        float
+        """
+        turns = self.turns_needed(dwell, relative)
+        return (turns + 1) * dwell + turns * self.turning
+
+    def over_dwell(self, run_time: float) -> DwellCurve:
+        """Return the bound of a run of given length over the dwell, from one turn to short dwells.
+
+        Parameters
+        ----------
+        run_time : float
+            Length of the run, s: all of it is dwell or turning.
+
+        Returns
+        -------
+        DwellCurve
+            Down to dwells of a fourth of the turning time, or of one second.
+
+        Raises
+        ------
+        ValueError
+            If there is no time for two dwells and a turn.
+        """
+        if run_time - self.turning < 2.0 / self.rate:
+            raise ValueError(f"{run_time} s do not hold two dwells and a turn")
+        shortest = max(self.turning / 4.0, 1.0, 2.0 / self.rate)
+        most = max(int((run_time + self.turning) / (shortest + self.turning)), 2)
+        number = np.unique(np.rint(np.geomspace(2, most, _CURVE)).astype(np.int64))
+        sigma = self._of_run(run_time, number)
+        best = int(np.argmin(sigma))
+        around = number[max(best - 1, 0)], number[min(best + 1, len(number) - 1)]
+        between = np.rint(np.linspace(*around, _BETWEEN)).astype(np.int64)
+        between = np.setdiff1d(between, number)
+        sigma = np.concatenate([sigma, self._of_run(run_time, between)])
+        number = np.concatenate([number, between])
+        order = np.argsort(number)
+        number = number[order]
+        dwell = (run_time - (number - 1) * self.turning) / number
+        return DwellCurve(number, dwell, sigma[order])
+
+    def _of_run(self, run_time: float, dwells: NDArray[np.int64]) -> Array:
+        """Return the bound of a run that is divided into so many dwells, shape (k,)."""
+        last = [
+            self._information((run_time - (n - 1) * self.turning) / n, n)[-1]
+            for n in dwells.tolist()
+        ]
+        return sigma_of(np.array(last))
+
+    def heading(self, dwell: float, turns: int) -> Array:
+        """Return the least standard deviation of the heading by gyrocompassing after each turn.
+
+        The axis lies across north, and is turned end for end: half the difference of its readings
+        is w_ie cos(latitude) times the (small) heading error. An error s of that half difference
+        is a heading error s / (w_ie cos(latitude)), the same as `error_budget.Gyrocompass` with
+        two positions; with s = sigma cos(latitude), sigma that of the rate.
+
+        Parameters
+        ----------
+        dwell : float
+            Data in each dwell, s.
+        turns : int
+            The last one wanted, from 1.
+
+        Returns
+        -------
+        ndarray, shape (turns,)
+            rad.
+        """
+        of_axis = self.against_time(dwell, turns).sigma * math.cos(self.latitude)
+        return np.asarray(of_axis / (EARTH_RATE * math.cos(self.latitude)))
+
+    def _information(self, dwell: float, dwells: int) -> Array:
+        """Return the information after each of a number of dwells."""
+        design = Experiment.regular(
+            dwell=dwell,
+            turning=self.turning,
+            dwells=min(dwells, _SUMMED),
+            rate=self.rate,
+            latitude=self.latitude,
+        )
+        longest = block_length(design, self.model)
+        each = -(-design.samples_in_dwells // len(design.dwells) // longest)
+        summed = max(MOST_BLOCKS // each, _LEAST_SUMMED)
+        blocks = replace(design, dwells=design.dwells[:summed]).blocks(longest)
+        last = np.flatnonzero(np.diff(blocks.dwell, append=-1))
+        found = information_by_states(blocks, self.model, self.turn_on_bias)[last]
+        more = np.arange(1, dwells - len(found) + 1)
+        return np.concatenate([found, found[-1] + _growth(found) * more]) if len(more) else found
+
+
+def _growth(found: Array) -> float:
+    """Return what each of the latter half of the dwells adds on average."""
+    half = len(found) // 2
+    return float(found[-1] - found[-1 - half]) / half

@@ -1,0 +1,115 @@
+"""What a source prints of its runs, beside what the noise that it prints allows.
+
+A run is taken as its source describes it: a turn at each time of the schedule, and the noise of
+the printed figures. An estimate from pairs of dwells then scatters about the true rate with the
+standard deviation of `experiments.earth_rate.pairs`; a published one that is many of these
+away has other errors in it: a sensor that is warming up, an axis that is off, turns that are taken
+into the mean, or a sense that is wrong.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.experiments.earth_rate.bound import block_length
+from imubench_pipeline.experiments.earth_rate.courses import white_sigma
+from imubench_pipeline.experiments.earth_rate.experiment import Experiment
+from imubench_pipeline.experiments.earth_rate.kalman import RateFilter
+from imubench_pipeline.experiments.earth_rate.pairs import by_pairs
+from imubench_pipeline.noise import NoiseModel
+
+Row = dict[str, Any]
+
+_WITHIN = 1.96
+"""Standard deviations, of either sign, within which 95 % of the estimates lie."""
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """A run as its source describes it.
+
+    Attributes
+    ----------
+    dwell : float
+        From turn to turn, s.
+    turning : float
+        Of it that turning takes, s.
+    rate : float
+        Sampling rate, Hz.
+    latitude : float
+        rad.
+    """
+
+    dwell: float
+    turning: float
+    rate: float
+    latitude: float
+
+    def run(self, duration: float) -> Experiment:
+        """Return the design of a run of so many s.
+
+        Parameters
+        ----------
+        duration : float
+        """
+        return Experiment.regular(
+            dwell=self.dwell - self.turning,
+            turning=self.turning,
+            dwells=round(duration / self.dwell),
+            rate=self.rate,
+            latitude=self.latitude,
+        )
+
+
+def allowed(schedule: Schedule, duration: float, model: NoiseModel) -> Row:
+    """Return the standard deviations that noise gives the estimates of a run, rad/s.
+
+    Parameters
+    ----------
+    schedule : Schedule
+    duration : float
+        s.
+    model : NoiseModel
+
+    Returns
+    -------
+    dict
+        ``white``, by white noise alone; ``sigma``, of the mean over pairs; ``sigma_filter``.
+    """
+    design = schedule.run(duration)
+    blocks = design.blocks(block_length(design, model))
+    nothing = np.zeros((1, len(blocks)))
+    return {
+        "white": white_sigma(model, blocks),
+        "sigma": float(by_pairs(nothing, blocks, model).sigma[-1]),
+        "sigma_filter": float(RateFilter(blocks, model).rate_sigma[-1]),
+    }
+
+
+def published_row(value: float, schedule: Schedule, duration: float, model: NoiseModel) -> Row:
+    """Return what noise says of a published estimate: columns of ``earth_rate_published``.
+
+    Parameters
+    ----------
+    value : float
+        As published, rad/s.
+    schedule : Schedule
+    duration : float
+        Of the run, or of the part of it, s.
+    model : NoiseModel
+        As published.
+    """
+    found = allowed(schedule, duration, model)
+    off = (value - EARTH_RATE) / found["sigma"]
+    verdict = "within the noise" if abs(off) <= _WITHIN else "beyond the noise"
+    return found | {
+        "duration": duration,
+        "published": value,
+        "truth": EARTH_RATE,
+        "off_sigma": off,
+        "verdict": verdict,
+    }

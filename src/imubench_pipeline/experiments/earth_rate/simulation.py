@@ -1,0 +1,199 @@
+"""Simulated Earth-rate experiments: the block means of many runs, or a whole log.
+
+The runs of Silva et al. (003 section 6) are here as designs: 120, 12, 25 and 60 minutes at 32 Hz,
+turned every 30 s, with the parameters that the paper prints. Neither the latitude nor the time
+that turning takes is printed; both are assumed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from imubench_pipeline.experiments.earth_rate.experiment import Blocks, Experiment
+from imubench_pipeline.experiments.earth_rate.states import block_states
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.simulate.model import SensorModel
+from imubench_pipeline.simulate.simulation import simulate
+from imubench_pipeline.typing import Array
+
+PAPER_MODEL = NoiseModel(
+    N=math.radians(0.0122), B=math.radians(0.0027), T_B=238.1, K=math.radians(6.8314e-5)
+)
+"""SiRRS01-03, 003 section 5.1, SI."""
+
+PAPER_RATE = 32.0
+"""Sampling rate of the runs, Hz (003 section 6)."""
+
+PAPER_PERIOD = 30.0
+"""Time between turns, s (003 section 6)."""
+
+PAPER_MINUTES = {"1": 120.0, "2": 12.0, "3": 25.0, "4": 60.0, "4, last 13 min": 13.0}
+"""Length of the runs, min (003 section 6); the last is a part of run 4."""
+
+ASSUMED_LATITUDE = math.radians(-23.3)
+"""Of Londrina, where the authors work, rad: the paper prints none."""
+
+ASSUMED_TURNING = 2.0
+"""Time of each 30 s that turning takes, s: the paper prints none."""
+
+
+def paper_run(
+    minutes: float, latitude: float = ASSUMED_LATITUDE, turning: float = ASSUMED_TURNING
+) -> Experiment:
+    """Return the design of a run of the paper: north first, a turn every 30 s.
+
+    Parameters
+    ----------
+    minutes : float
+        Its length, such as in `PAPER_MINUTES`.
+    latitude : float
+        rad.
+    turning : float
+        Part of the 30 s that turning takes, s.
+
+    Returns
+    -------
+    Experiment
+    """
+    return Experiment.regular(
+        dwell=PAPER_PERIOD - turning,
+        turning=turning,
+        dwells=round(60.0 * minutes / PAPER_PERIOD),
+        rate=PAPER_RATE,
+        latitude=latitude,
+    )
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Simulated runs of one design, and their truth.
+
+    Attributes
+    ----------
+    means : ndarray, shape (runs, b)
+        Block means, rad/s.
+    drift : ndarray, shape (runs, b)
+        Mean of the slow error over each block, its bias included, rad/s.
+    states : ndarray, shape (runs, b, m)
+        States at the sample after each block (`states.BlockStates`).
+    """
+
+    means: Array
+    drift: Array
+    states: Array
+
+
+def simulate_runs(
+    model: NoiseModel,
+    blocks: Blocks,
+    *,
+    earth_rate: float,
+    turn_on_bias: float,
+    runs: int,
+    rng: np.random.Generator,
+) -> Runs:
+    """Draw the block means of many runs, from their exact joint distribution.
+
+    Parameters
+    ----------
+    model : NoiseModel
+    blocks : Blocks
+    earth_rate : float
+        rad/s.
+    turn_on_bias : float
+        Standard deviation of the fixed bias, which is drawn for each run, rad/s.
+    runs : int
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    Runs
+    """
+    known = block_states(model, blocks, turn_on_bias)
+    m = len(known.names)
+    here = rng.standard_normal((runs, m)) @ known.initial.T
+    states, drift = np.empty((runs, len(blocks), m)), np.empty((runs, len(blocks)))
+    for k, which in enumerate(known.which):
+        step = known.steps[which]
+        after = here @ step.transition.T + rng.standard_normal((runs, m + 1)) @ step.factor.T
+        here, drift[:, k] = after[:, :m], after[:, m]
+        states[:, k] = here
+    white = known.white * rng.standard_normal(drift.shape)
+    return Runs(earth_rate * blocks.seen + drift + white, drift, states)
+
+
+def simulate_log(
+    model: SensorModel,
+    experiment: Experiment,
+    *,
+    earth_rate: float,
+    transient: ArrayLike,
+    rng: np.random.Generator,
+) -> Array:
+    """Return a whole log of an experiment, turning samples among it.
+
+    While it turns, the axis goes from one position to the other at a speed that rises and falls
+    as a sine, and sees the Earth's rate by the cosine of the angle. The turn is about an axis
+    across it: of that turn itself it senses only what misalignment lets through, a pulse
+    peak sin^2(pi t / turning).
+
+    Parameters
+    ----------
+    model : SensorModel
+        The gyro; its bias is the fixed one of this run.
+    experiment : Experiment
+        The log begins with its first sample at 0 and ends with its last dwell.
+    earth_rate : float
+        rad/s.
+    transient : array_like
+        Peak of what is sensed of the turns, rad/s: one, or one a turn.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    ndarray, shape (samples,)
+        rad/s.
+    """
+    true = true_rate(experiment, earth_rate, transient)
+    return simulate(model, experiment.rate, len(true), rng, true=lambda a, b: true[a:b])
+
+
+def true_rate(experiment: Experiment, earth_rate: float, transient: ArrayLike) -> Array:
+    """Return what a gyro without errors senses in an experiment.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    earth_rate : float
+        rad/s.
+    transient : array_like
+        Peak of what is sensed of the turns, rad/s: one, or one a turn.
+
+    Returns
+    -------
+    ndarray, shape (samples,)
+        rad/s, to the end of the last dwell.
+    """
+    dwells = experiment.dwells
+    peaks = np.broadcast_to(np.asarray(transient, dtype=np.float64), len(dwells) - 1)
+    seen = earth_rate * math.cos(experiment.latitude)
+    true = np.full(dwells[-1].stop, dwells[0].sense * seen)
+    for i, dwell in enumerate(dwells):
+        true[dwell.start : dwell.stop] = dwell.sense * seen
+        if i == 0:
+            continue
+        before = dwells[i - 1]
+        part = (np.arange(before.stop, dwell.start) - before.stop + 0.5) / max(
+            dwell.start - before.stop, 1
+        )
+        if dwell.sense == before.sense:
+            true[before.stop : dwell.start] = before.sense * seen
+        else:
+            angle = 0.5 * math.pi * (1.0 - np.cos(math.pi * part))
+            true[before.stop : dwell.start] = before.sense * seen * np.cos(angle)
+        true[before.stop : dwell.start] += peaks[i - 1] * np.sin(math.pi * part) ** 2
+    return true

@@ -1,0 +1,183 @@
+"""The states of a gyro's error from block to block, exactly.
+
+The states stand at a sample; the mean of a block and the states at the sample after it are jointly
+Gaussian, given the states before the block. They are discretised with the samples of the log, not
+as a continuous process, so that the means are those of a log as it is simulated.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
+
+from imubench_pipeline.experiments.earth_rate.covariance import longest
+from imubench_pipeline.experiments.earth_rate.experiment import Blocks
+from imubench_pipeline.noise import (
+    GaussMarkov,
+    NoiseModel,
+    Quantization,
+    Ramp,
+    RandomWalk,
+    Sinusoid,
+    Term,
+)
+from imubench_pipeline.noise.block_means import of_block_means
+from imubench_pipeline.noise.state_space import StateSpace, repeated
+from imubench_pipeline.typing import Array
+
+WIDE = 1.0
+"""Standard deviation, rad/s, of what is not known at all: 14,000 times the Earth's rate."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """From the states after one block to those after the next, and its mean.
+
+    Attributes
+    ----------
+    transition : ndarray, shape (m + 1, m)
+        The last row gives the mean of the block.
+    factor : ndarray, shape (m + 1, m + 1)
+        A root of the noise: its covariance is ``factor @ factor.T``.
+    """
+
+    transition: Array
+    factor: Array
+
+
+@dataclass(frozen=True)
+class BlockStates:
+    """The states over the blocks of an experiment.
+
+    Attributes
+    ----------
+    names : tuple of str
+        One a state: ``z_G`` and a number for each Gauss-Markov process, members of a flicker bank
+        among them; ``z_Q``, ``z_R``, ``z_S`` in pairs for quantization, a ramp (level and slope)
+        and lines; ``z_K``, the last, is the random walk with the fixed bias.
+    initial : ndarray, shape (m, m)
+        A root of the covariance of the states at the first sample of the first block.
+    steps : tuple of Step
+        The different ones.
+    which : ndarray of int, shape (b,)
+        Step of each block.
+    white : ndarray, shape (b,)
+        Standard deviation of the white noise of each mean, rad/s.
+    """
+
+    names: tuple[str, ...]
+    initial: Array
+    steps: tuple[Step, ...]
+    which: NDArray[np.int64]
+    white: Array
+
+
+def block_states(model: NoiseModel, blocks: Blocks, turn_on_bias: float = WIDE) -> BlockStates:
+    """Return the states of a noise model over blocks.
+
+    Parameters
+    ----------
+    model : NoiseModel
+        Gauss-Markov processes start in their stationary distribution; flicker noise is its bank
+        up to the duration of the blocks; a ramp has a slope of variance R^2, of either sign; a
+        line's phase is not known.
+    blocks : Blocks
+    turn_on_bias : float
+        Standard deviation of the fixed bias, rad/s, with which z_K starts.
+
+    Returns
+    -------
+    BlockStates
+
+    Raises
+    ------
+    ValueError
+        If the turn-on bias is negative or not finite.
+    """
+    if not (math.isfinite(turn_on_bias) and turn_on_bias >= 0):
+        raise ValueError(f"turn_on_bias is {turn_on_bias}, expected a number from 0")
+    interval = 1.0 / blocks.rate
+    names: list[str] = []
+    spaces: list[StateSpace] = []
+    white = drive = 0.0
+    for term in model.realised(interval, longest(blocks)):
+        if isinstance(term, RandomWalk):
+            drive = term.K**2 * interval
+            continue
+        space = _space(term, interval)
+        white += space.measurement_noise
+        spaces.append(space)
+        names += _names(term, names)
+    spaces.append(StateSpace.scalar(1.0, drive, turn_on_bias**2))
+    names.append("z_K")
+    whole = _together(spaces)
+    gaps = np.diff(blocks.start, prepend=blocks.start[0])
+    gaps[1:] -= (blocks.stop - blocks.start)[:-1]
+    kinds, which = np.unique(
+        np.stack([gaps, blocks.stop - blocks.start]), axis=1, return_inverse=True
+    )
+    steps = tuple(_step(whole, int(gap), int(size)) for gap, size in kinds.T)
+    return BlockStates(
+        tuple(names),
+        np.sqrt(whole.initial_variance),
+        steps,
+        which.ravel(),
+        np.sqrt(white / blocks.count),
+    )
+
+
+def _space(term: Term, interval: float) -> StateSpace:
+    space = term.state_space(interval)
+    if isinstance(term, Ramp):
+        slope = np.diag([0.0, term.R**2])
+        return StateSpace(
+            space.transition, space.process_noise, space.output, 0.0, np.zeros(2), slope
+        )
+    return space
+
+
+def _names(term: Term, before: list[str]) -> list[str]:
+    if isinstance(term, GaussMarkov):
+        return [f"z_G{sum(name.startswith('z_G') for name in before) + 1}"]
+    pairs: dict[type, list[str]] = {
+        Quantization: ["z_Q", "z_Q before"],
+        Ramp: ["z_R", "z_R slope"],
+        Sinusoid: ["z_S", "z_S quadrature"],
+    }
+    return pairs.get(type(term), [])
+
+
+def _together(spaces: list[StateSpace]) -> StateSpace:
+    return StateSpace(
+        np.asarray(block_diag(*(space.transition for space in spaces))),
+        np.asarray(block_diag(*(space.process_noise for space in spaces))),
+        np.concatenate([space.output for space in spaces]),
+        0.0,
+        np.concatenate([space.initial_mean for space in spaces]),
+        np.asarray(block_diag(*(space.initial_variance for space in spaces))),
+    )
+
+
+def _step(space: StateSpace, gap: int, size: int) -> Step:
+    m = len(space.output)
+    transition, noise = np.zeros((m + 1, m)), np.zeros((m + 1, m + 1))
+    if size == 1:
+        transition[:m], transition[m] = space.transition, space.output
+        noise[:m, :m] = space.process_noise
+    else:
+        found = of_block_means(space, size)
+        transition[:], noise[:] = found.transition[:, :m], found.process_noise
+    over, added = repeated(space.transition, space.process_noise, gap)
+    return Step(transition @ over, _root(noise + transition @ added @ transition.T))
+
+
+def _root(covariance: Array) -> Array:
+    """Return a root of a covariance that may be singular, in units of its own deviations."""
+    scale = np.sqrt(np.diag(covariance))
+    unit = np.where(scale > 0.0, scale, 1.0)
+    values, vectors = np.linalg.eigh(covariance / np.outer(unit, unit))
+    return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))

@@ -1,0 +1,295 @@
+"""Dwells and turning points of a gyro that is turned end for end, from its log.
+
+Turning a sensitive axis end for end is a rotation about an axis perpendicular to it: the gyro
+senses cross-axis coupling and handling, which may be much or nothing. What is sensed decides
+where there is something, a column with the position where there is one, and the schedule where
+there is nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from imubench_pipeline.experiments.earth_rate.alternation import alternation, contradiction
+from imubench_pipeline.experiments.earth_rate.choice_of_turns import EDGE
+from imubench_pipeline.experiments.earth_rate.found import SURE, FoundDwell, Turn, Turning
+from imubench_pipeline.experiments.earth_rate.position import stays
+from imubench_pipeline.experiments.earth_rate.sight import (
+    ALTERNATES,
+    Plan,
+    by_sight,
+    disturbances,
+    without,
+)
+from imubench_pipeline.experiments.earth_rate.transients import (
+    CLEAR,
+    Blocks,
+    Event,
+    blocks_of,
+    outliers,
+    steps,
+    transients,
+)
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.typing import Array
+
+
+def find_turning(
+    log: Array,
+    rate: float,
+    dwell: float,
+    *,
+    turning: float = 2.0,
+    start: float = 0.0,
+    first_sense: int | None = None,
+    sense_by_rate: bool = False,
+    position: Array | None = None,
+    model: NoiseModel | None = None,
+    tolerance: float | None = None,
+    margin: float = 0.5,
+    trust_schedule: bool = False,
+) -> Turning:
+    """Find the dwells and the turning points of a log.
+
+    A column with the position decides where there is one. Else transients and steps are chosen
+    that fit the schedule best (`experiments.earth_rate.choice_of_turns.choose`): a missed
+    turn makes a dwell twice as long, an overshoot belongs to its turn, a knock is left out. Turns
+    that leave too little to be seen are filled in from the schedule, between those seen; where
+    fewer than 40 % of the schedule's are seen, all of them are the schedule's.
+
+    A transient within a fifth of a dwell of an end of the log is handling, and cut off with that
+    end. Handling that lasts as long as a turn (0.2 s and more) is told from one by the schedule
+    alone: where dwells are unequal by more than some tenths, it is taken for a turn
+    (``benchmarks/dwell_detection.py`` says how often, and what peaks are found).
+
+    The sense alternates at each turn. A turn too many or too few reverses all senses after it;
+    where the level then alternates the other way clearly, a doubt says so. Which is first is what
+    ``first_sense`` says, or the column if it has +1 and -1. Otherwise +1 is assumed and the result
+    is ``ambiguous``: all senses may be the other way round, and so may be the sign of a rate
+    estimated from them. The known rate of the Earth chooses only where ``sense_by_rate`` asks for
+    it; then the estimate is positive by construction, and its sign says nothing. Neither its sign
+    nor its size is used otherwise.
+
+    Without a transient, the log must alternate by 3 standard errors with the schedule: runs in
+    which chance hides the alternation are then refused, which favours large estimates.
+    ``trust_schedule`` takes the schedule's word instead.
+
+    Parameters
+    ----------
+    log : ndarray, shape (n,)
+        Rate of the gyro, rad/s; NaN where a sample is missing.
+    rate : float
+        Hz.
+    dwell : float
+        Nominal time from the start of a turn to the start of the next, s.
+    turning : float
+        Time that a turn takes, s; for turns that are not seen.
+    start : float
+        When the first dwell of the schedule begins, s from the first sample; only for turns that
+        are not seen.
+    first_sense : {1, -1}, optional
+        Sense of the first dwell.
+    sense_by_rate : bool
+        Let the sign of the Earth's rate, positive, choose the sense of the first dwell.
+    position : ndarray, shape (n,), optional
+        How the sensor stands (`experiments.earth_rate.position.stays`), sampled as the log.
+    model : NoiseModel, optional
+        Noise of the sensor at rest, SI; without it, it is found in the log.
+    tolerance : float, optional
+        How far a turn may be from the schedule, s (a standard deviation); a tenth of a dwell, and
+        at least 2 s. So much is left out on both sides of a turn that is not seen.
+    margin : float
+        Left out on both sides of a turn that is seen, s.
+    trust_schedule : bool
+        Take the schedule's word where the log shows no turns at all.
+
+    Returns
+    -------
+    Turning
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range; if the log is shorter than two dwells; if nothing in it
+        shows that it was turned.
+    """
+    log = np.asarray(log, dtype=np.float64)
+    plan = _checked(log, rate, dwell, turning, start, first_sense, tolerance, margin)
+    blocks = blocks_of(log, rate, dwell, model)
+    events = _seen(blocks, log, rate, dwell, model)
+    doubts = []
+    if blocks.rough:
+        doubts.append("the noise of the log is not that of the model: the log's is used")
+    column_sense = None
+    if position is not None:
+        turns, knocks, column_sense, more = _by_column(position, log, rate, events, plan)
+    else:
+        turns, knocks, more = by_sight(blocks, events, plan, trust_schedule)
+    doubts += more
+    stretches, more = _stretches(turns, knocks, plan)
+    doubts += more
+    knocks = sorted([*knocks, *_lone(outliers(blocks, log, rate), turns, knocks)])
+    knocks = [(max(start, 0.0), min(stop, plan.duration)) for start, stop in knocks]
+    signs = without(blocks, knocks)
+    size = alternation(signs, stretches)
+    first, more = _first_sense(first_sense, column_sense, sense_by_rate, size.z)
+    doubts += more
+    place = contradiction(signs, stretches)
+    if place is not None:
+        doubts.append(
+            f"from {stretches[place][0]:.0f} s on the log alternates the other way: "
+            "a turn too many or too few near there?"
+        )
+    ambiguous = first_sense is None and column_sense is None and not sense_by_rate
+    return Turning(
+        tuple(_dwells(stretches, turns, first, plan)),
+        tuple(turns),
+        tuple(knocks),
+        ambiguous,
+        replace(size, value=first * size.value),
+        tuple(doubts),
+    )
+
+
+def _checked(
+    log: Array,
+    rate: float,
+    dwell: float,
+    turning: float,
+    start: float,
+    first_sense: int | None,
+    tolerance: float | None,
+    margin: float,
+) -> Plan:
+    if not (math.isfinite(rate) and rate > 0.0):
+        raise ValueError(f"rate is {rate}, expected Hz above 0")
+    if not (math.isfinite(dwell) and dwell > 0.0):
+        raise ValueError(f"dwell is {dwell}, expected s above 0")
+    if not 0.0 <= turning < 0.5 * dwell:
+        raise ValueError(f"turning is {turning}, expected s from 0 to half the dwell of {dwell} s")
+    if first_sense not in (None, 1, -1):
+        raise ValueError(f"first_sense is {first_sense}, expected 1, -1 or None")
+    if tolerance is None:
+        tolerance = max(0.1 * dwell, min(2.0, 0.2 * dwell))
+    if not 0.0 < tolerance < 0.5 * dwell:
+        raise ValueError(f"tolerance is {tolerance}, expected s below half the dwell")
+    if not margin >= 0.0:
+        raise ValueError(f"margin is {margin}, expected s from 0")
+    if log.ndim != 1:
+        raise ValueError(f"the log has the shape {log.shape}, expected one axis")
+    duration = len(log) / rate
+    if duration < 2.0 * dwell - 1.0 / rate:
+        raise ValueError(f"the log lasts {duration:g} s, less than two dwells of {dwell:g} s")
+    return Plan(dwell, start, turning, tolerance, margin, duration)
+
+
+def _seen(
+    blocks: Blocks, log: Array, rate: float, dwell: float, model: NoiseModel | None
+) -> list[Event]:
+    """Return transients and steps in order of time, the greater where both are near."""
+    found = transients(blocks, log, rate)
+    near = max(3.0, 0.1 * dwell)
+    for step in steps(blocks, dwell, model, rate):
+        beside = [e for e in found if e.start - near < step.time < e.stop + near]
+        # The level follows a step at once, but for the blocks in which it comes about.
+        greater = [e for e in beside if e.kind == "transient" and e.peak > 1.5 * step.peak]
+        if all(event.haste for event in greater):
+            found = [e for e in found if e not in beside or e in greater]
+            found.append(step)
+    return sorted(found, key=lambda event: event.time)
+
+
+def _by_column(
+    position: Array, log: Array, rate: float, events: list[Event], plan: Plan
+) -> tuple[list[Turn], list[tuple[float, float]], int | None, list[str]]:
+    if np.shape(position) != np.shape(log):
+        raise ValueError(
+            f"the position has the shape {np.shape(position)}, the log {np.shape(log)}"
+        )
+    found = stays(np.asarray(position, dtype=np.float64), rate, 0.1 * plan.dwell)
+    turns, used = [], set()
+    for stop, start in zip(found.stop[:-1], found.start[1:], strict=True):
+        first, last, peak = float(stop), float(start), None
+        for k, event in enumerate(events):
+            near = event.stop > stop - 3.0 and event.start < start + 3.0
+            if near and not event.haste and event.likelihood > CLEAR:
+                first, last = min(first, event.start), max(last, event.stop)
+                peak = max(peak or 0.0, event.peak)
+                used.add(k)
+        time = 0.5 * float(stop + start)
+        turns.append(Turn(first - plan.margin, last + plan.margin, time, "column", peak))
+    doubts = ["the column is in neither position for long: more than two?"] if found.away else []
+    rest = [e for k, e in enumerate(events) if k not in used and e.kind == "transient"]
+    sense = (1 if found.high[0] else -1) if found.senses else None
+    return turns, disturbances(rest), sense, doubts
+
+
+def _lone(
+    out: Sequence[tuple[float, float]], turns: Sequence[Turn], knocks: Sequence[tuple[float, float]]
+) -> list[tuple[float, float]]:
+    """Return the outliers that are not left out already."""
+    left_out = sorted([*knocks, *((turn.start, turn.stop) for turn in turns)])
+    starts = np.array([start for start, _ in left_out])
+    latest = np.maximum.accumulate([stop for _, stop in left_out])
+    before = np.searchsorted(starts, [start for start, _ in out], side="right") - 1
+    return [
+        (start, stop)
+        for (start, stop), k in zip(out, before.tolist(), strict=True)
+        if k < 0 or latest[k] < stop
+    ]
+
+
+def _stretches(
+    turns: Sequence[Turn], knocks: Sequence[tuple[float, float]], plan: Plan
+) -> tuple[list[tuple[float, float]], list[str]]:
+    """Return start and stop of the dwells between turns; handling at the ends is cut off."""
+    edge = EDGE * plan.dwell
+    first = max((stop for _, stop in knocks if stop < min(edge, turns[0].start)), default=0.0)
+    late = max(plan.duration - edge, turns[-1].stop)
+    last = min((start for start, _ in knocks if start > late), default=plan.duration)
+    starts = [first, *(turn.stop for turn in turns)]
+    stops = [*(turn.start for turn in turns), last]
+    stretches = [(start, max(start, stop)) for start, stop in zip(starts, stops, strict=True)]
+    short = sum(stop - start < 0.1 * plan.dwell for start, stop in stretches)
+    doubts = [f"{short} dwells are shorter than a tenth of {plan.dwell:g} s"] if short else []
+    return stretches, doubts
+
+
+def _first_sense(
+    given: int | None, column: int | None, by_rate: bool, z: float
+) -> tuple[int, list[str]]:
+    """Return the sense of the first dwell, and what to doubt about it."""
+    if column is not None:
+        if given not in (None, column):
+            return column, [f"the first sense is {column:+d} by the column, {given:+d} was given"]
+        return column, []
+    if given is not None:
+        return given, []
+    if by_rate:
+        doubts = ["the sign of the Earth's rate chose the senses: that of an estimate says nothing"]
+        if abs(z) < ALTERNATES:
+            doubts.append(f"it chose on {abs(z):.1f} standard errors")
+        return (1 if z >= 0.0 else -1), doubts
+    return 1, ["the sense of the first dwell is assumed: all may be the other way round"]
+
+
+def _dwells(
+    stretches: Sequence[tuple[float, float]], turns: Sequence[Turn], first: int, plan: Plan
+) -> list[FoundDwell]:
+    """Return the dwells with their senses; the sense goes on through one with no samples."""
+    dwells = []
+    for k, (start, stop) in enumerate(stretches):
+        beside = turns[max(0, k - 1) : k + 1]
+        doubts = [word for turn in beside for word in turn.doubts]
+        if stop - start > 1.5 * plan.dwell:
+            doubts.append(f"it lasts {(stop - start) / plan.dwell:.1f} dwells: a missed turn?")
+        if stop <= start:
+            continue
+        by = max((turn.found_by for turn in beside), key=SURE.index)
+        sense = first if k % 2 == 0 else -first
+        dwells.append(FoundDwell(start, stop, sense, by, tuple(dict.fromkeys(doubts))))
+    return dwells

@@ -1,0 +1,1 @@
+"""What noise means for use: error budgets, fusion, pools, drift, requirements and verdicts."""

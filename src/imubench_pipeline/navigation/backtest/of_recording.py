@@ -1,0 +1,166 @@
+"""The back-test of a recording: rows of the table ``backtest``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.estimators.estimate import Estimate
+from imubench_pipeline.navigation.backtest.block_means import block_means
+from imubench_pipeline.navigation.backtest.comparison import Comparison, DeadReckoning, compare
+from imubench_pipeline.navigation.backtest.windows import window
+from imubench_pipeline.navigation.error_budget import draw_models, drawn_jointly
+from imubench_pipeline.noise.simulate import channel_rng
+from imubench_pipeline.recordings.recording import ChannelLog
+from imubench_pipeline.settings.requirements import DIMENSIONS, Error, Limit, Requirement
+from imubench_pipeline.settings.sensor import quantity_of
+from imubench_pipeline.typing import Row
+from imubench_pipeline.units import SI_UNITS, quantity_to_si
+
+SURE = 0.01
+"""Chance, for all rows of a recording together, below which its log contradicts its budget."""
+
+MATERIAL = 1.1
+"""Ratio below which a log does not contradict its budget, however sure: a day at 1 Hz has 30,000
+windows of 10 s, which tell a ratio of 1.01 from 1, and no margin of a requirement hangs on that."""
+
+_ORDERS: Mapping[tuple[str, Error], tuple[int, float]] = {
+    ("gyro", "attitude"): (0, 1.0),
+    ("gyro", "heading"): (0, 1.0),
+    ("gyro", "velocity"): (1, STANDARD_GRAVITY),
+    ("gyro", "position"): (2, STANDARD_GRAVITY),
+    ("accel", "velocity"): (0, 1.0),
+    ("accel", "position"): (1, 1.0),
+}
+"""Integrations but one, and what the integral is multiplied by, of the part that a quantity has in
+an error: a gyro's attitude turns gravity into velocity and position."""
+
+
+def backtest_rows(
+    names: Mapping[str, str],
+    logs: Mapping[str, ChannelLog],
+    estimates: Mapping[str, Estimate],
+    requirements: Mapping[str, Requirement],
+    deterministic: Iterable[Row],
+    *,
+    draws: int,
+    seed: int,
+) -> Iterator[Row]:
+    """Yield the rows of the table ``backtest`` of a recording.
+
+    The logs are taken as they are, with lines, drift with temperature and what is taken out of the
+    noise: that is what a user of the sensor gets.
+
+    Parameters
+    ----------
+    names : mapping of str to str
+        ``sensor`` and ``recording``.
+    logs : mapping of str to ChannelLog
+        At rest all the time.
+    estimates : mapping of str to Estimate
+        The recommended one of each channel.
+    requirements : mapping of str to Requirement
+    deterministic : iterable of mapping
+        Rows of the table ``deterministic``: what is taken out of the noise, and not in the models.
+    draws : int
+        Noise models drawn from what each log leaves open.
+    seed : int
+        Of the run; each channel has a stream of its own.
+    """
+    apart: dict[str, dict[str, None]] = {}
+    for one in deterministic:
+        apart.setdefault(one["channel"], {})[one["kind"]] = None
+    rows = [
+        dict(names) | row | {"taken_out": ", ".join(apart.get(channel, ())) or None}
+        for channel, log in logs.items()
+        if channel in estimates
+        for row in _of_channel(names, channel, log, estimates[channel], requirements, draws, seed)
+    ]
+    compared = sum(row.get("chance") is not None for row in rows)
+    for row in rows:
+        if row.get("chance") is not None:
+            row["contradicted"] = row["chance"] * compared < SURE and row["ratio"] >= MATERIAL
+        yield row
+
+
+def _of_channel(
+    names: Mapping[str, str],
+    channel: str,
+    log: ChannelLog,
+    estimate: Estimate,
+    requirements: Mapping[str, Requirement],
+    draws: int,
+    seed: int,
+) -> Iterator[dict[str, Any]]:
+    """Yield the rows of a channel, without the names of its recording."""
+    listed = [
+        (_about(channel, name, limit), _asked(channel, requirement, limit, estimate))
+        for name, requirement in requirements.items()
+        for limit in requirement.limits
+        if (quantity_of(channel), limit.error) in (*_ORDERS, ("gyro", "north"))
+    ]
+    cuts = {
+        asked: window(asked.rest, asked.time, log.rate)
+        for _, asked in listed
+        if isinstance(asked, DeadReckoning)
+    }
+    lengths = {cut.block for cut in cuts.values() if cut}
+    means = block_means(log.blocks(), log.segments, log.rate, lengths)
+    drawn = draw_models(estimate, draws, channel_rng(seed, *names.values(), channel, "backtest"))
+    jointly = drawn_jointly(estimate)
+    for about, asked in listed:
+        if not isinstance(asked, DeadReckoning):
+            yield about | {"reason": asked}
+        elif (cut := cuts[asked]) is None:
+            yield about | {
+                "reason": f"two samples are further apart than the times: {log.rate:g} Hz"
+            }
+        else:
+            found = compare(asked, cut, means[cut.block], estimate.model, drawn, efficient=jointly)
+            yield about | _columns(asked, found)
+
+
+def _about(channel: str, requirement: str, limit: Limit) -> dict[str, Any]:
+    return {
+        "channel": channel,
+        "requirement": requirement,
+        "error": limit.error,
+        "time": limit.seconds,
+        "unit": SI_UNITS[DIMENSIONS[limit.error]],
+    }
+
+
+def _asked(
+    channel: str, requirement: Requirement, limit: Limit, estimate: Estimate
+) -> DeadReckoning | str:
+    """Return what a limit asks of a channel, or why its log cannot answer."""
+    if limit.error == "north":
+        return "a log at one position does not tell the bias of a gyro from the Earth's rate"
+    if requirement.static_window is None:
+        return "turn_on: a log shows one turn-on bias, not how these scatter"
+    if not estimate.model.terms:
+        return "nothing is known of the noise of this channel"
+    order, factor = _ORDERS[quantity_of(channel), limit.error]
+    rest = quantity_to_si(requirement.static_window, "time")
+    return DeadReckoning(order, rest, limit.seconds, factor)
+
+
+def _columns(asked: DeadReckoning, found: Comparison) -> dict[str, Any]:
+    predicted = found.predicted
+    return {
+        "window": asked.rest,
+        "windows": found.windows,
+        "independent": found.independent,
+        "measured": found.measured,
+        "predicted": predicted,
+        "predicted_lower": found.lower,
+        "predicted_upper": found.upper,
+        "ratio": found.ratio,
+        "ratio_lower": None if found.least is None else found.least / predicted,
+        "ratio_upper": None if found.most is None else found.most / predicted,
+        "chance": found.chance,
+        "verdict": found.verdict,
+        "duration_needed": asked.duration_needed,
+        "reason": found.reason,
+    }

@@ -1,0 +1,313 @@
+"""Recordings of one device over time: what earlier ones lead one to expect, and what has changed.
+
+A noise parameter is followed on the logarithm, y_k = ln p_k = mu + u_k + e_k, as in `pooled`: a
+spread tau between recordings (from turn-on to turn-on) and the error of each, from its limits. A
+bias is followed as it is: it has no limits, and all its scatter is spread.
+
+mu and tau are those of a level, the recordings since the last change, weighted by 1 / (v + tau^2).
+tau^2 is what their squares about mu have beyond the errors v (moments, DerSimonian and Kacker, in
+three steps); from 8 recordings on, the squares about a straight line: about mu a slow drift would
+pass for spread and hide itself for ever. The distance of the next estimate from mu, over the root
+of v + tau^2 + var mu (v is its own half towards mu), is Student's t (of a bias exactly) with
+Satterthwaite's degrees of freedom, at most n - 1, about a line n - 2.
+
+A recording is ``changed`` where p is below `LEVEL` over its number of tests (Bonferroni). B of a
+single term and ``B_curve`` are one quantity and one test, that of ``B_curve``. It begins
+a new level, so a step is flagged once. If the next recording is nearer to the old level, the
+flagged one stood alone, and the old level goes on without it.
+
+Fewer than three do not tell tau and judge nothing: were it taken for 0, each turn-on would be a
+change. Of 42 tests one flags what exceeds, in standard deviations of a recording: 75 after 3; 14
+after 5; 6.6 after 10; 4.7 after 20; 4.0 after 50. A lesser change joins the level.
+
+References
+----------
+G. Hahn, J. Am. Stat. Assoc. 64, 1969 (the interval); R. DerSimonian and R. Kacker, Contemp. Clin.
+Trials 28, 2007; F. Satterthwaite, Biometrics Bull. 2, 1946; O. Dunn, J. Am. Stat. Assoc. 56, 1961.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from datetime import UTC, datetime
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtr, stdtrit
+
+from imubench_pipeline.navigation.pooled import POOLED, bounded_exp, points_about_median, usable
+from imubench_pipeline.typing import Row
+
+Order = Literal["started", "name"]
+
+LEVEL = 0.01
+"""Probability that a recording of an unchanged device is flagged in anything, at most."""
+
+COLUMNS = (
+    *("sensor", "device", "channel", "parameter", "recording", "position", "started"),
+    *("value", "lower", "upper", "unit", "expected", "expected_lower", "expected_upper"),
+    *("change", "p_value", "verdict", "reason"),
+)
+"""The columns of the table ``drift``."""
+
+_FEWEST = 3  # recordings that tell the spread between them
+_LINE_FROM = 8  # recordings; a line takes one degree of freedom more
+_EACH, _GROWTH = 32, 1.05  # tau is found anew with each of 32 recordings, then with each 5 % more
+_NAMES = (*POOLED, "bias")
+_ABSENT: Row = {"status": "absent", "value": None}
+_NOTHING = (math.nan, math.nan, math.nan, math.nan, 0.0, -1.0, -1.0)
+
+
+class Series(NamedTuple):
+    """The analysed recordings of one device, rows of ``recordings``, the first one first."""
+
+    sensor: str
+    device: str
+    simulated: bool
+    recordings: list[Row]
+    order: Order
+
+
+def order_of(recordings: Iterable[Row]) -> tuple[list[Row], Order]:
+    """Order rows of the table ``recordings`` of one device in time, and say by what.
+
+    By ``started`` where each has one that is ISO 8601 and not all are the same (a clock that was
+    never set); equal ones by name. Else by the name, its numbers as numbers: run_2 before run_10.
+    A stamp without a zone is UTC, as the readers write it.
+    """
+    by_name = sorted(recordings, key=lambda row: _natural(row["recording"]))
+    try:
+        stamps = [_stamp(row["started"] or "") for row in by_name]
+    except ValueError:
+        return by_name, "name"
+    if len(set(stamps)) < 2:
+        return by_name, "name"
+    pairs = sorted(zip(stamps, range(len(stamps)), strict=True))
+    return [by_name[index] for _, index in pairs], "started"
+
+
+def _stamp(started: str) -> datetime:
+    found = datetime.fromisoformat(started.strip())
+    return found if found.tzinfo else found.replace(tzinfo=UTC)
+
+
+def _natural(name: str) -> tuple[list[tuple[str, int]], str]:
+    parts = re.findall(r"(\D*)(\d*)", name)
+    return [(text.casefold(), int(digits or -1)) for text, digits in parts], name
+
+
+def series_of(recordings: Iterable[Row]) -> Iterator[Series]:
+    """Yield each device's recordings of status ``ok``, if two or more; simulated ones apart."""
+    groups: dict[tuple[str, str, bool], list[Row]] = {}
+    for row in recordings:
+        if row["status"] == "ok":
+            groups.setdefault((row["sensor"], row["device"], row["simulated"]), []).append(row)
+    for key in sorted(groups):
+        if len(groups[key]) > 1:
+            yield Series(*key, *order_of(groups[key]))
+
+
+def drift_rows(
+    parameters: Iterable[Row], fixed_bias: Iterable[Row], recordings: Iterable[Row]
+) -> Iterator[Row]:
+    """Yield the rows of the table ``drift``.
+
+    One for each recording of a series, and channel and parameter that any recording of it has;
+    those of the gyro come first, those of a parameter follow one another in time.
+
+    Parameters
+    ----------
+    parameters : iterable of mapping
+        Rows of the table ``parameters``, of the recommended method. Used are component 1 and the
+        parameters of `navigation.pooled.POOLED`; only a value with status ``ok`` is an
+        estimate. B and T_B are compared with those of the same terms: B of flicker noise and of a
+        Gauss-Markov process are different quantities; that of the curve is the same of all models.
+    fixed_bias, recordings : iterable of mapping
+        Rows of these tables.
+
+    Yields
+    ------
+    dict
+        The `COLUMNS`. The limits of ``expected`` are 95 %, of this recording's estimate. Where
+        there is no verdict (``changed`` or ``as before``), ``reason`` says why.
+    """
+    cells: dict[tuple[str, str], dict[tuple[str, str], Row]] = {}
+    for row in (*parameters, *fixed_bias):
+        name = row.get("parameter", "bias")
+        if name in _NAMES and row.get("component", 1) == 1:
+            cells.setdefault((row["sensor"], row["recording"]), {})[row["channel"], name] = row
+    for series in series_of(recordings):
+        keys = [(series.sensor, row["recording"]) for row in series.recordings]
+        yield from _rows(series, [cells.get(key, {}) for key in keys])
+
+
+def _rows(series: Series, cells: Sequence[dict[tuple[str, str], Row]]) -> Iterator[Row]:
+    points: dict[tuple[str, ...], dict[int, tuple[float, ...]]] = {}
+    units: dict[tuple[str, str], str] = {}
+    for place, cell in enumerate(cells):
+        for key, row in cell.items():
+            if row.get("status") != "absent":
+                units[key] = row["unit"]
+                points.setdefault((*key, _kind(row)), {})[place] = _point(row)
+    columns = {column: index for index, column in enumerate(sorted(points))}
+    data = np.full((3, len(cells), len(columns)), np.nan)
+    for column, index in columns.items():
+        data[:, list(points[column]), index] = np.transpose(list(points[column].values()))
+    tested_as = [columns.get(_tested_as(key), index) for key, index in columns.items()]
+    found = np.moveaxis(_Levels(data, np.array(tested_as, dtype=int)).found, 0, 2).tolist()
+    for key in sorted(units, key=lambda key: (key[0][0] != "g", key[0], _NAMES.index(key[1]))):
+        noise = key[1] != "bias"
+        for place, recording in enumerate(series.recordings):
+            row = cells[place].get(key, _ABSENT)
+            index = columns.get((*key, _kind(row)), -1)
+            *y, p, changed, count, alone = _NOTHING if index < 0 else found[place][index]
+            expected = [None if math.isnan(x) else bounded_exp(x) if noise else x for x in y]
+            value = row["value"] if row.get("status", "ok") == "ok" else None
+            change = value / expected[0] - 1.0 if noise and value and expected[0] else None
+            reasons = [_unjudged(row, count)] if math.isnan(p) else []
+            if alone >= 0.0:
+                reasons.append(f"{series.recordings[int(alone)]['recording']} stood alone")
+            if changed:
+                side = "above" if changed > 0.0 else "below"
+                reasons.append(f"{side} what the {count:.0f} before it lead one to expect")
+                if not noise and key[0].startswith("accel"):
+                    reasons.append("gravity is in it: the sensor may lie differently")
+            judged = (None, None) if math.isnan(p) else (p, "changed" if changed else "as before")
+            about = (series.sensor, series.device, *key, recording["recording"], place + 1)
+            here = (recording["started"], value, row.get("lower"), row.get("upper"), units[key])
+            found_here = (*expected, change, *judged, "; ".join(reasons) or None)
+            yield dict(zip(COLUMNS, about + here + found_here, strict=True))
+
+
+def _kind(row: Row) -> str:
+    """Return what B and T_B are parameters of, such as ``F`` or ``GM``; of others nothing."""
+    terms = row["model"].split("+") if row.get("parameter") in ("B", "T_B") else []
+    return "+".join(term for term in terms if term in ("F", "GM"))
+
+
+def _tested_as(column: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the channel, parameter and kind that say whether this one has changed."""
+    channel, parameter, kind = column
+    return (channel, "B_curve", "") if parameter == "B" and kind in ("F", "GM") else column
+
+
+def _point(row: Row) -> tuple[float, ...]:
+    """Return y and the variances of its error, where the truth lies below and above; or NaN."""
+    if "status" not in row:
+        return math.nan if row["value"] is None else row["value"], 0.0, 0.0
+    triple = (row["value"] if row["status"] == "ok" else None, row["lower"], row["upper"])
+    if not usable(triple):
+        return math.nan, math.nan, math.nan
+    y, points = points_about_median([triple])
+    return y, *points[0][1:]
+
+
+def _unjudged(row: Row, count: float) -> str:
+    status = row.get("status", "ok").replace("_", " ")
+    if status != "ok":
+        return f"{status}: {row['reason']}" if row.get("reason") else status
+    if count < 0.0:
+        return "no value with limits"
+    if count == 0.0:
+        return "the first value" + f" with {_kind(row)}" * bool(_kind(row))
+    if count < _FEWEST:
+        return f"{count:.0f} before it at this level: the spread between recordings is not known"
+    return "limits far narrower than before" if "status" in row else "all before it are the same"
+
+
+class _Levels:
+    """The levels of c columns through n recordings.
+
+    ``points`` (3, n, c) are y, and the variances of its error where the truth lies below and above;
+    NaN is no value. ``found`` (7, n, c) are the expected y and its limits, p-value (NaN: not
+    judged), 1 or -1 where changed, how many the level has before it (-1: no value), and the flagged
+    recording that this one shows to have stood alone (-1: none). A column has the p-value and the
+    verdict of the one that it is ``tested_as`` (c,), wherever that is judged.
+    """
+
+    def __init__(self, points: NDArray[np.float64], tested_as: NDArray[np.int64]) -> None:
+        _, recordings, columns = points.shape
+        self._points = points
+        self._tested_as = tested_as
+        self.found = np.tile(np.reshape(_NOTHING, (-1, 1, 1)), (recordings, columns))
+        self._member = np.zeros((recordings, columns), dtype=bool)
+        self._state = np.zeros((7, columns))
+        self._aside: dict[int, tuple[int, NDArray[np.bool_], NDArray[np.float64]]] = {}
+        with np.errstate(all="ignore"):
+            for place in range(recordings):
+                self._take(place)
+
+    def _take(self, place: int) -> None:
+        y, below, above = self._points[:, place]
+        present = np.isfinite(y)
+        for column in [column for column in self._aside if present[column]]:
+            self._resume(place, column)
+        self._settle()
+        # Recordings, of them used for tau; mu, 1 / var mu, tau^2, its degrees of freedom times
+        # their mean 1 / (v + tau^2), and these.
+        count, _, mean, weight, spread, known, freedom = self._state
+        own = spread + np.stack([np.where(y < mean, above, below), above, below])
+        error = np.sqrt(own + 1.0 / weight)
+        degrees = np.minimum((own * known) ** 2 / freedom, freedom)
+        judged = present & (count >= _FEWEST) & (own[0] > 0.0) & (degrees[0] >= 1.0)
+        p_value = 2.0 * stdtr(degrees[0], -np.abs(y - mean) / error[0])
+        half = stdtrit(np.maximum(degrees[1:], 1.0), 0.975) * error[1:]
+        here = np.arange(len(y))
+        test = np.where(judged[self._tested_as], self._tested_as, here)
+        p_value = p_value[test]
+        changed = judged & (p_value < LEVEL / max((judged & (test == here)).sum(), 1))
+        of_judged = np.stack([mean - half[0], mean + half[1], p_value, changed * np.sign(y - mean)])
+        self.found[1:5, place, judged] = of_judged[:, judged]
+        self.found[5, place, present] = count[present]
+        self.found[0, place, present & (count > 0.0)] = mean[present & (count > 0.0)]
+        for column in np.flatnonzero(changed).tolist():
+            member, state = self._member[:, column], self._state[:, column]
+            self._aside[column] = place, member.copy(), state.copy()
+            member[:], state[:] = False, 0.0
+        self._member[place] = present
+        added = np.where(present, 1.0 / np.where(own[0] > 0.0, own[0], 1.0), 0.0)
+        count += present
+        weight += added
+        mean += np.where(present, added / weight * (y - mean), 0.0)
+
+    def _resume(self, place: int, column: int) -> None:
+        """Go on with the level put aside, if a value is nearer to it than to the flagged one."""
+        flagged, member, state = self._aside.pop(column)
+        y, below, above = self._points[:, place, column]
+        new, new_below, new_above = self._points[:, flagged, column]
+        old, weight, spread = state[2:5]
+        own = (above if y < old else below) + spread + 1.0 / weight
+        both = (above + new_below if y < new else below + new_above) + 2.0 * spread
+        if (y - old) ** 2 * both < (y - new) ** 2 * own:
+            self._member[:, column], self._state[:, column] = member, state
+            self.found[6, place, column] = flagged
+
+    def _settle(self) -> None:
+        """Find mu and tau of the levels that have grown."""
+        count, settled = self._state[:2]
+        due = np.flatnonzero((count > settled) & ((count <= _EACH) | (count >= _GROWTH * settled)))
+        if not due.size:
+            return
+        rows = np.flatnonzero(self._member[:, due].any(axis=1))[:, np.newaxis]
+        member = self._member[rows, due]
+        y, below, above = np.where(member, self._points[:, rows, due], 0.0)
+        y = np.where(member, y - self._state[2, due], 0.0)  # keeps the digits of narrow limits
+        line = count[due] >= _LINE_FROM
+        weight = member.astype(np.float64)
+        for _ in range(3):
+            total = weight.sum(axis=0)
+            mean = (weight * y).sum(axis=0) / total
+            variance = np.where(y < mean, above, below)
+            along = rows - (weight * rows).sum(axis=0) / total
+            squares = np.where(line, (weight * along**2).sum(axis=0), np.inf)
+            left = y - mean - (weight * along * y).sum(axis=0) / squares * along
+            free = weight * (1.0 - weight / total - weight * along**2 / squares)
+            known = free.sum(axis=0)
+            spread = np.fmax((weight * left**2 - free * variance).sum(axis=0) / known, 0.0)
+            weight = member / np.where(variance + spread > 0.0, variance + spread, 1.0)
+        self._state[1, due] = count[due]
+        self._state[2, due] += mean
+        self._state[3:, due] = total, spread, known, count[due] - 1.0 - line

@@ -1,0 +1,45 @@
+"""What a noise model means for navigation: errors of dead reckoning, by what they come of."""
+
+from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.navigation.error_budget.budget import Levelled, Start, budget
+from imubench_pipeline.navigation.error_budget.gyrocompass import Gyrocompass
+from imubench_pipeline.navigation.error_budget.in_use import (
+    NO_FIGURES,
+    NO_USE,
+    Figure,
+    Figures,
+    Use,
+)
+from imubench_pipeline.navigation.error_budget.parts import Budget, Contribution, Missing, Quantity
+from imubench_pipeline.navigation.error_budget.uncertainty import (
+    chance_within,
+    draw_models,
+    drawn_jointly,
+    interval,
+)
+from imubench_pipeline.navigation.error_budget.until import time_until
+from imubench_pipeline.noise.growth import Calibrated, Uncalibrated
+
+__all__ = [
+    "EARTH_RATE",
+    "NO_FIGURES",
+    "NO_USE",
+    "Budget",
+    "Calibrated",
+    "Contribution",
+    "Figure",
+    "Figures",
+    "Gyrocompass",
+    "Levelled",
+    "Missing",
+    "Quantity",
+    "Start",
+    "Uncalibrated",
+    "Use",
+    "budget",
+    "chance_within",
+    "draw_models",
+    "drawn_jointly",
+    "interval",
+    "time_until",
+]

@@ -1,0 +1,344 @@
+"""Error budgets: attitude, heading, velocity and position after dead reckoning, by source.
+
+The assumptions, of all budgets here:
+
+- one horizontal axis: the accelerometer along it and the gyro across it, whose tilt turns gravity
+  into that accelerometer. The error in the plane is sqrt(2) times that of one axis where both
+  are alike. Velocity and position errors need no motion. Of what grows with motion and in the
+  field, scale factors, temperature and vibration count as far as a use is stated (`in_use`);
+  misalignment and heading times way are left out;
+- small angles: up to about 0.2 rad;
+- a flat Earth that does not turn, g = 9.80665 m/s^2: no Schuler feedback (a period of 84.4 min),
+  whose absence overstates errors. After 60 s that is 0.3 % at most. After 600 s it is 10 % of the
+  attitude, 5 to 6 % of the velocity and 3 % of the position that come of a gyro, 10 % of the
+  velocity and 5 to 6 % of the position that come of an accelerometer or an initial tilt (the first
+  from a bias, the second from white noise), and 36 % of an initial tilt itself. The Earth's rate
+  goes with the bias of a calibrated gyro, and counts as a part of the bias of another;
+- sensors independent of each other, and their terms, too;
+- deterministic terms count by their size: a ramp is as good as one of either sign.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import get_args
+
+from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.navigation.error_budget.in_use import (
+    BIASES,
+    NAMES,
+    NO_FIGURES,
+    NO_USE,
+    STATED,
+    Cause,
+    Figures,
+    Measured,
+    Use,
+    levers,
+)
+from imubench_pipeline.navigation.error_budget.parts import (
+    Budget,
+    Contribution,
+    Missing,
+    Quantity,
+    of_figure,
+)
+from imubench_pipeline.noise import (
+    Flicker,
+    GaussMarkov,
+    NoiseModel,
+    Sinusoid,
+    Term,
+    WhiteNoise,
+)
+from imubench_pipeline.noise.growth import (
+    Calibrated,
+    SensorStart,
+    Uncalibrated,
+    mean_variance,
+    of_constant,
+    of_white_mean,
+    variance,
+)
+
+_GYRO_ORDER: dict[Quantity, int] = {"attitude": 0, "heading": 0, "velocity": 1, "position": 2}
+_ACCEL_ORDER: dict[Quantity, int] = {"velocity": 0, "position": 1}
+"""Integrations but one, m of `growth`."""
+
+_WORDS: dict[Measured, str] = {"gyro": "gyro", "accel": "accelerometer"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Levelled:
+    """The initial tilt is found by the accelerometers: it is their mean error over g.
+
+    The mean is over the static window of the accelerometers, which must be calibrated. Velocity
+    and position do not see this tilt, since it cancels the mean error that made it; what they
+    see is the later departure from that mean, which is that of a calibrated accelerometer.
+
+    Parameters
+    ----------
+    bias : float, optional
+        Turn-on bias of the accelerometer, 1 sigma, m/s^2; None: it is a figure of the sensor, and
+        where that is not known, it is left out of the attitude and the budget says so.
+    on_time : float
+        Time from switch-on to the beginning of the window, s; walks, ramps and flicker noise
+        count from switch-on.
+
+    Raises
+    ------
+    ValueError
+        If one is negative or not finite.
+    """
+
+    bias: float | None = None
+    on_time: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_not_negative(bias=self.bias or 0.0, on_time=self.on_time)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Start:
+    """How dead reckoning begins.
+
+    Parameters
+    ----------
+    gyro, accel : Calibrated or Uncalibrated
+    tilt : Levelled or float
+        Initial tilt: levelled by the accelerometers, or its 1 sigma, rad, where it comes from
+        elsewhere and has nothing to do with how the accelerometers were calibrated.
+    heading : float
+        Initial heading error, 1 sigma, rad.
+
+    Raises
+    ------
+    ValueError
+        If an angle is negative or not finite, or the tilt is levelled by accelerometers that
+        are not calibrated.
+    """
+
+    gyro: SensorStart
+    accel: SensorStart
+    tilt: Levelled | float = 0.0
+    heading: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_not_negative(heading=self.heading)
+        if not isinstance(self.tilt, Levelled):
+            _check_not_negative(tilt=self.tilt)
+        elif not isinstance(self.accel, Calibrated):
+            raise ValueError("a levelled start needs the window of calibrated accelerometers")
+
+    @classmethod
+    def calibrated(
+        cls, window: float, *, tilt: Levelled | float | None = None, heading: float = 0.0
+    ) -> Start:
+        """Return a start with both biases from one static window, s; levelled if no tilt is given.
+
+        Raises
+        ------
+        ValueError
+            If the window is not above 0, or an angle is negative.
+        """
+        sensor = Calibrated(window)
+        levelled = Levelled() if tilt is None else tilt
+        return cls(gyro=sensor, accel=sensor, tilt=levelled, heading=heading)
+
+    @classmethod
+    def uncalibrated(
+        cls,
+        *,
+        gyro_bias: float | None,
+        accel_bias: float | None,
+        on_time: float,
+        tilt: float = 0.0,
+        heading: float = 0.0,
+    ) -> Start:
+        """Return a start with turn-on biases of a given sigma, rad/s and m/s^2, and no window.
+
+        None: a bias is a figure of the sensor.
+
+        Raises
+        ------
+        ValueError
+            If a value is negative.
+        """
+        return cls(
+            gyro=Uncalibrated(bias=gyro_bias, on_time=on_time),
+            accel=Uncalibrated(bias=accel_bias, on_time=on_time),
+            tilt=tilt,
+            heading=heading,
+        )
+
+
+def budget(
+    quantity: Quantity,
+    time: float,
+    *,
+    gyro: NoiseModel,
+    accel: NoiseModel,
+    start: Start,
+    use: Use = NO_USE,
+    gyro_figures: Figures = NO_FIGURES,
+    accel_figures: Figures = NO_FIGURES,
+) -> Budget:
+    """Return the error after a time of dead reckoning, by source.
+
+    The noise of the gyro is integrated once to the attitude and the heading, twice and three
+    times with g to velocity and position; that of the accelerometer once and twice; an initial
+    tilt adds g t and g t^2 / 2 times itself (see `growth.variance` for the formulas). From white
+    noise alone after t: N sqrt(t), g N sqrt(t^3/3) and g N sqrt(t^5/20) of the gyro, N sqrt(t)
+    and N sqrt(t^3/3) of the accelerometer.
+
+    White noise in the window is independent of that in motion and has a contribution of its own;
+    of every other term window and motion are taken together, because they are correlated.
+
+    Parameters
+    ----------
+    quantity : {"attitude", "heading", "velocity", "position"}
+    time : float
+        t, s.
+    gyro : NoiseModel
+        The gyro across the axis; for the heading the one that points up.
+    accel : NoiseModel
+        The accelerometer along the axis; the heading does not need it.
+    start : Start
+    use : Use
+        What happens besides.
+    gyro_figures, accel_figures : mapping of str to Figure
+        What is known of these axes beside the noise.
+
+    Returns
+    -------
+    Budget
+
+    Raises
+    ------
+    ValueError
+        If the quantity is not known, or the time is not above 0.
+
+    References
+    ----------
+    P. D. Groves, "Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems",
+    2nd ed., Artech House 2013 (error growth without Schuler feedback in
+    the short term); D. H. Titterton and J. L. Weston, "Strapdown Inertial Navigation Technology",
+    2nd ed., IEE 2004.
+    """
+    if quantity not in get_args(Quantity):
+        raise ValueError(f"quantity is {quantity!r}, expected one of {get_args(Quantity)}")
+    if not (math.isfinite(time) and time > 0):
+        raise ValueError(f"time is {time}, expected a time above 0")
+    found = _sources(quantity, time, gyro, accel, start)
+    missing: list[Missing] = []
+    assumptions: list[str] = []
+    for measured, cause, source, lever in _levers(quantity, time, start, use):
+        figures = gyro_figures if measured == "gyro" else accel_figures
+        part = of_figure(measured, cause, source, lever, figures)
+        if isinstance(part, Contribution):
+            found.append(part)
+        elif part is not None:
+            missing.append(part)
+            if cause == "turn_on_bias":
+                assumptions.append(f"turn-on bias of the {_WORDS[measured]}: not known, left out")
+    return Budget(time, quantity, found, assumptions, missing)
+
+
+def _sources(
+    quantity: Quantity, time: float, gyro: NoiseModel, accel: NoiseModel, start: Start
+) -> list[Contribution]:
+    order = _GYRO_ORDER[quantity]
+    gravity = STANDARD_GRAVITY if order > 0 else 1.0
+    found = list(of_sensor("gyro", gyro, order, time, start.gyro, gravity))
+    if quantity in _ACCEL_ORDER:
+        found.extend(of_sensor("accel", accel, _ACCEL_ORDER[quantity], time, start.accel))
+    if quantity == "heading":
+        found.append(Contribution("initial heading", start.heading, "start", STATED))
+    elif isinstance(start.tilt, Levelled):
+        if quantity == "attitude" and isinstance(start.accel, Calibrated):
+            found.extend(_of_levelling(accel, start.accel.window, start.tilt))
+    else:
+        lever = gravity * of_constant(order - 1, time)
+        found.append(Contribution("initial tilt", start.tilt * lever, "start", STATED))
+    return found
+
+
+def _levers(
+    quantity: Quantity, time: float, start: Start, use: Use
+) -> Iterator[tuple[Measured, Cause, str, float]]:
+    """Yield sensor, cause, source and lever of what figures of the sensors add."""
+    order = _GYRO_ORDER[quantity]
+    gravity = STANDARD_GRAVITY if order > 0 else 1.0
+    for cause, lever in levers("gyro", order, time, start.gyro, use, seen=order == 0):
+        yield "gyro", cause, f"gyro {NAMES[cause]}", gravity * lever
+    if quantity in _ACCEL_ORDER:
+        of_accel = levers("accel", _ACCEL_ORDER[quantity], time, start.accel, use, seen=True)
+        for cause, lever in of_accel:
+            yield "accel", cause, f"accel {NAMES[cause]}", lever
+    if quantity == "attitude" and isinstance(start.tilt, Levelled) and start.tilt.bias is None:
+        for cause in BIASES:
+            source = f"initial tilt by accel {NAMES[cause]}"
+            yield "accel", cause, source, 1.0 / STANDARD_GRAVITY
+
+
+def of_sensor(
+    sensor: str, model: NoiseModel, order: int, time: float, start: SensorStart, factor: float = 1.0
+) -> Iterator[Contribution]:
+    """Yield the contributions of one sensor axis, after ``order + 1`` integrations.
+
+    Parameters
+    ----------
+    sensor : str
+        Name in the sources.
+    model : NoiseModel
+    order : int
+        m, 0 to 2.
+    time : float
+        s.
+    start : Calibrated or Uncalibrated
+    factor : float
+        By which the sigmas are multiplied.
+    """
+    for term in model.terms:
+        if isinstance(term, WhiteNoise) and isinstance(start, Calibrated):
+            mean = term.N * math.sqrt(of_white_mean(order, time, start))
+            moving = Uncalibrated(bias=0.0, on_time=0.0)
+            sigma = math.sqrt(variance(term, order, time, moving))
+            yield Contribution(f"{sensor} N", factor * sigma)
+            yield Contribution(f"{sensor} N in the static window", factor * mean)
+        else:
+            sigma = math.sqrt(variance(term, order, time, start))
+            yield Contribution(f"{sensor} {label(term)}", factor * sigma)
+    if isinstance(start, Uncalibrated) and start.bias is not None:
+        grown = factor * start.bias * of_constant(order, time)
+        yield Contribution(f"{sensor} turn-on bias", grown, "turn_on_bias", STATED)
+
+
+def label(term: Term) -> str:
+    """Return the name of a term in a source, such as ``K`` or ``GM 89.5 s``."""
+    match term:
+        case GaussMarkov():
+            return f"GM {term.T_B:.4g} s"
+        case Flicker():
+            return "flicker"
+        case Sinusoid():
+            return f"line {term.frequency:.4g} Hz"
+    return term.symbol
+
+
+def _of_levelling(accel: NoiseModel, window: float, levelled: Levelled) -> Iterator[Contribution]:
+    for term in accel.terms:
+        sigma = math.sqrt(mean_variance(term, window, levelled.on_time)) / STANDARD_GRAVITY
+        yield Contribution(f"initial tilt by accel {label(term)}", sigma)
+    if levelled.bias is not None:
+        sigma = levelled.bias / STANDARD_GRAVITY
+        source = "initial tilt by accel turn-on bias"
+        yield Contribution(source, sigma, "turn_on_bias", STATED)
+
+
+def _check_not_negative(**values: float) -> None:
+    for name, value in values.items():
+        if not (math.isfinite(value) and value >= 0):
+            raise ValueError(f"{name} is {value}, expected a number from 0")

@@ -1,0 +1,208 @@
+"""The heading that a gyro finds from the Earth's rate, at rest.
+
+The horizontal part of the Earth's rate, w_ie cos(latitude), points north. A horizontal gyro
+across it, towards east, should read 0: an error dw of its mean turns the north that is found by
+dw / (w_ie cos(latitude)). Left out: the error of the levelling (a tilt about north turns a part
+of the vertical rate into the gyro, tan(latitude) times itself) and angles that are not small.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq, minimize_scalar
+
+from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.navigation.error_budget.budget import label
+from imubench_pipeline.navigation.error_budget.in_use import BIASES, NAMES, STATED, Figures
+from imubench_pipeline.navigation.error_budget.parts import Budget, Contribution, Missing, of_figure
+from imubench_pipeline.noise import NoiseModel, Sinusoid, Term
+from imubench_pipeline.noise.growth import mean_variance
+
+_BIAS_LEFT_OUT = "turn-on bias of the gyro: left out; the heading is no better than this"
+
+_TIMES: NDArray[np.float64] = np.geomspace(1e-3, 1e9, 601)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gyrocompass:
+    """A gyro that looks for north.
+
+    Parameters
+    ----------
+    gyro : NoiseModel
+        The horizontal gyro.
+    latitude : float
+        rad.
+    bias : float, optional
+        Turn-on bias of the gyro, 1 sigma, rad/s: at one position it cannot be told from the
+        Earth's rate. None: it is a figure of the gyro; where that is not known, it is left out and
+        the budget says so.
+    on_time : float
+        Time from switch-on to the beginning, s; a walk, a ramp and flicker noise count from
+        switch-on (see `growth.Uncalibrated`). At two positions it does not matter.
+    positions : {1, 2}
+        2: the gyro is turned end for end after half the time, in no time, and half the difference
+        of the two means is taken. That takes off the turn-on bias.
+    figures : mapping of str to Figure
+        What is known of the gyro beside its noise.
+
+    Raises
+    ------
+    ValueError
+        If the latitude is not between the poles, a value is negative, or positions is not 1 or 2.
+    """
+
+    gyro: NoiseModel
+    latitude: float
+    bias: float | None = None
+    on_time: float = 0.0
+    positions: Literal[1, 2] = 1
+    figures: Figures = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not abs(self.latitude) < math.pi / 2.0:
+            raise ValueError(f"latitude is {self.latitude}, expected one between the poles, in rad")
+        for name in ("bias", "on_time"):
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and value >= 0):
+                raise ValueError(f"{name} is {value}, expected a number from 0")
+        if self.positions not in (1, 2):
+            raise ValueError(f"positions is {self.positions}, expected 1 or 2")
+
+    def heading(self, time: float) -> Budget:
+        """Return the heading error after a static window of a given length, by source.
+
+        At one position the error of the mean has, by term, the variance `growth.mean_variance`;
+        at two positions sigma^2(t/2) / 2, with sigma^2 the Allan variance.
+
+        Parameters
+        ----------
+        time : float
+            t, s.
+
+        Returns
+        -------
+        Budget
+            Of the quantity ``heading``, rad.
+
+        Raises
+        ------
+        ValueError
+            If the time is not above 0.
+
+        References
+        ----------
+        K. R. Britting, "Inertial Navigation Systems Analysis", Wiley 1971 (the limit
+        of gyrocompassing, drift over w_ie cos(latitude)).
+        """
+        if not (math.isfinite(time) and time > 0):
+            raise ValueError(f"time is {time}, expected a time above 0")
+        biases = self._biases()
+        missing = [part for part in biases if isinstance(part, Missing)]
+        return Budget(
+            time,
+            "heading",
+            [
+                *self._of_noise(time, swings=True),
+                *(part for part in biases if isinstance(part, Contribution)),
+            ],
+            [_BIAS_LEFT_OUT] if missing else [],
+            missing,
+        )
+
+    def time_needed(self, accuracy: float) -> float | None:
+        """Return the shortest static window that gives a heading accuracy.
+
+        Longer is not always better: a walk and a ramp grow. Lines count by the envelope of their
+        mean, so that no lucky number of whole periods is found.
+
+        Parameters
+        ----------
+        accuracy : float
+            1 sigma, rad.
+
+        Returns
+        -------
+        float or None
+            s, from 1 ms to 30 years; None where no window gives it, because of turn-on bias,
+            flicker noise, walk or ramp.
+
+        Raises
+        ------
+        ValueError
+            If the accuracy is not above 0.
+        """
+        if not (math.isfinite(accuracy) and accuracy > 0):
+            raise ValueError(f"accuracy is {accuracy}, expected an angle above 0")
+
+        biases = [part.sigma for part in self._biases() if isinstance(part, Contribution)]
+
+        def excess(logarithm: float) -> float:
+            time = math.exp(logarithm)
+            sigmas = (part.sigma for part in self._of_noise(time, swings=False))
+            return math.hypot(*sigmas, *biases) / accuracy - 1.0
+
+        at = np.log(_TIMES)
+        values = np.array([excess(float(x)) for x in at])
+        reached = np.flatnonzero(values <= 0)
+        if reached.size:
+            first = int(reached[0])
+            after = float(at[first])
+        else:
+            # The best window may give it, between two of the times that were looked at.
+            first = int(np.clip(np.argmin(values), 1, len(at) - 2))
+            best = minimize_scalar(
+                excess,
+                bounds=(at[first - 1], at[first + 1]),
+                method="bounded",
+                options={"xatol": 1e-10},
+            )
+            after = float(best.x)
+            if excess(after) > 0:
+                return None
+        if first == 0:
+            return float(_TIMES[0])
+        return math.exp(brentq(excess, float(at[first - 1]), after, xtol=1e-12))
+
+    @property
+    def _north(self) -> float:
+        """The part of the Earth's rate that points north, rad/s."""
+        return EARTH_RATE * math.cos(self.latitude)
+
+    def _biases(self) -> list[Contribution | Missing]:
+        """Return what the bias of the gyro adds, which no time takes off."""
+        if self.positions == 2:
+            return []
+        if self.bias is not None:
+            sigma = self.bias / self._north
+            return [Contribution("gyro turn-on bias", sigma, "turn_on_bias", STATED)]
+        parts = (
+            of_figure("gyro", cause, f"gyro {NAMES[cause]}", 1.0 / self._north, self.figures)
+            for cause in BIASES
+        )
+        return [part for part in parts if part is not None]
+
+    def _of_noise(self, time: float, *, swings: bool) -> Iterator[Contribution]:
+        for term in self.gyro.terms:
+            if isinstance(term, Sinusoid) and not swings:
+                sigma = self._envelope(term, time)
+            else:
+                sigma = math.sqrt(self._variance(term, time))
+            yield Contribution(f"gyro {label(term)}", sigma / self._north)
+
+    def _variance(self, term: Term, time: float) -> float:
+        if self.positions == 1:
+            return mean_variance(term, time, self.on_time)
+        return float(term.allan_variance(np.array([time / 2.0]))[0]) / 2.0
+
+    def _envelope(self, line: Sinusoid, time: float) -> float:
+        # |sin(x) / x| at one position, sin^2(x/2) / (x/2) at two.
+        x = math.pi * line.frequency * time / self.positions
+        most = min(1.0, 1.0 / x) if self.positions == 1 else min(x, 1.0 / x)
+        return line.amplitude * most / math.sqrt(2.0)

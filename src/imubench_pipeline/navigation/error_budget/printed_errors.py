@@ -1,0 +1,134 @@
+"""Figures of a datasheet, and what a log tells of temperature, as standard deviations.
+
+A printed figure is no standard deviation unless the document says so. The convention:
+
+- ``1sigma``: as printed;
+- ``typ`` and ``derived``: a typical ± is taken as 1 sigma;
+- ``range``: any value between the ends is as likely, sigma is the larger end over sqrt(3);
+- ``max``: taken as 3 sigma. Data sheets of the catalogue that print both say 3 and 3.3 times the
+  typical offset (BNO055 and BMI160 gyros), 1.9 times (BNO055 accelerometer), 2 and 3.5 times the
+  typical coefficient of temperature (BNO055).
+
+Of several figures the first kind of this list counts, and of one kind the largest. What is printed
+for an option that the logged sensors do not have does not count. A coefficient of temperature that
+a log tells stands before the printed one: it is of this specimen.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+
+from imubench_pipeline.datasheets.comparable import Comparable, PrintedAxis
+from imubench_pipeline.navigation.error_budget.in_use import Cause, Figure
+from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, Datasheet
+from imubench_pipeline.typing import Row
+
+PRINTED: Mapping[Cause, str] = {
+    "turn_on_bias": "offset",
+    "repeatability": "bias_repeatability",
+    "temperature": "temperature_coefficient",
+    "scale_factor": "scale_factor_error",
+    "nonlinearity": "nonlinearity",
+    "g_sensitivity": "g_sensitivity",
+    "vibration_rectification": "vibration_rectification",
+}
+"""The figure of a datasheet that each cause follows from."""
+
+_CONVENTIONS: Mapping[str, tuple[float, str]] = {
+    "1sigma": (1.0, "1 sigma as printed"),
+    "typ": (1.0, "typical taken as 1 sigma"),
+    "derived": (1.0, "typical taken as 1 sigma"),
+    "range": (math.sqrt(3.0), "any value of the range as likely: its end is sqrt(3) sigma"),
+    "max": (3.0, "maximum taken as 3 sigma"),
+}
+"""By kind, the first that counts first: how many sigma a figure is, and in words."""
+
+_SIGMAS = 1.96
+"""Half the width of a 95 % interval."""
+
+_MEASURED: Mapping[str, Cause] = {"sensitivity": "temperature", "quadratic": "temperature_squared"}
+
+
+def of_datasheet(datasheet: Datasheet, channel: str) -> dict[Cause, Figure]:
+    """Return what a datasheet says of the errors of a channel that come in use.
+
+    Parameters
+    ----------
+    datasheet : Datasheet
+    channel : str
+        Such as ``gyro_x``.
+
+    Returns
+    -------
+    dict of str to Figure
+        SI, of every cause that a datasheet may print; without sigma where it does not.
+    """
+    axis = PrintedAxis.of(datasheet, channel)
+    names = FIGURE_DIMENSIONS[axis.quantity]
+    return {cause: _figure(axis, name) for cause, name in PRINTED.items() if name in names}
+
+
+def _figure(axis: PrintedAxis, name: str) -> Figure:
+    like = Comparable(name, name, None)
+    rows = axis.read(name, like, axis.si(name))
+    for kind, (sigmas, convention) in _CONVENTIONS.items():
+        values = [row.value for row in rows if row.figure and row.figure.kind == kind]
+        usable = [value for value in values if value is not None]
+        if usable:
+            return Figure(
+                sigma=max(usable) / sigmas, origin="datasheet", kind=kind, convention=convention
+            )
+    obstacle = next((row.obstacle for row in rows if row.obstacle), None)
+    return Figure(reason=obstacle or axis.unpublished(like, name).reason)
+
+
+def of_log(rows: Iterable[Row]) -> dict[Cause, Figure]:
+    """Return what the log of a channel tells of the errors that come in use.
+
+    Parameters
+    ----------
+    rows : iterable of mapping
+        Of the table ``temperature``, of the channel.
+
+    Returns
+    -------
+    dict of str to Figure
+        SI; ``temperature`` and ``temperature_squared`` where the log tells them.
+    """
+    return {
+        _MEASURED[row["parameter"]]: Figure(
+            sigma=abs(row["value"]),
+            origin="measured",
+            convention="of this specimen, at the mean temperature of the log",
+            spread=(row["upper"] - row["lower"]) / (2.0 * _SIGMAS),
+        )
+        for row in rows
+        if row["parameter"] in _MEASURED and row["status"] == "ok"
+    }
+
+
+def in_use(
+    datasheet: Datasheet, channels: Iterable[str], temperature: Iterable[Row]
+) -> dict[str, dict[Cause, Figure]]:
+    """Return what is known of the errors of a recording's channels that come in use.
+
+    Parameters
+    ----------
+    datasheet : Datasheet
+        Of its sensor.
+    channels : iterable of str
+    temperature : iterable of mapping
+        The table ``temperature`` of the recording.
+
+    Returns
+    -------
+    dict of str to dict
+        By channel, as `error_rows` takes it.
+    """
+    rows = list(temperature)
+    return {
+        channel: of_datasheet(datasheet, channel)
+        | of_log(row for row in rows if row["channel"] == channel)
+        for channel in channels
+    }

@@ -1,0 +1,373 @@
+"""What the estimates of a recording mean: rows of the table ``error_budget``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from imubench_pipeline.estimators.estimate import Estimate
+from imubench_pipeline.navigation.error_budget import (
+    NO_FIGURES,
+    NO_USE,
+    Budget,
+    Figures,
+    Gyrocompass,
+    Quantity,
+    Start,
+    Uncalibrated,
+    Use,
+    budget,
+    chance_within,
+    draw_models,
+    drawn_jointly,
+    interval,
+    time_until,
+)
+from imubench_pipeline.navigation.error_budget.largest import Largest, source_row
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise.simulate import channel_rng
+from imubench_pipeline.settings.requirements import (
+    DIMENSIONS,
+    Axis,
+    Environment,
+    Error,
+    Requirement,
+)
+from imubench_pipeline.settings.sensor import quantity_of
+from imubench_pipeline.typing import Row
+from imubench_pipeline.units import SI_UNITS, difference_to_si, quantity_to_si
+
+_NAMELESS: Mapping[str, Figures] = MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class AxisErrors:
+    """What is known of the errors of one axis: its noise, and figures of what comes in use."""
+
+    model: NoiseModel = field(default_factory=NoiseModel)
+    figures: Figures = field(default_factory=dict)
+
+
+_NOTHING = AxisErrors()
+_NAMES = {"gyro": "gyro", "accel": "accelerometer"}
+
+
+@dataclass(frozen=True)
+class Question:
+    """One error that is asked for.
+
+    Attributes
+    ----------
+    requirement : str or None
+        Name of the requirement; None for the times that are always given.
+    error : str
+    time : float
+        s.
+    start : Start
+    axis : str
+        Which axis of the sensor answers.
+    latitude : float or None
+        rad; for ``north``.
+    limit : float or None
+        Largest standard deviation that fulfils the requirement, SI.
+    use : Use
+        What happens besides.
+    """
+
+    requirement: str | None
+    error: Error
+    time: float
+    start: Start
+    axis: Axis
+    latitude: float | None = None
+    limit: float | None = None
+    use: Use = NO_USE
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The quantities that it takes to answer."""
+        return ("gyro",) if self.error in ("heading", "north") else ("gyro", "accel")
+
+    def answer(self, gyro: AxisErrors, accel: AxisErrors) -> Budget:
+        """Return the budget with these axes."""
+        if self.error == "north":
+            return self._compass(gyro).heading(self.time)
+        return budget(
+            self.error,
+            self.time,
+            gyro=gyro.model,
+            accel=accel.model,
+            start=self.start,
+            use=self.use,
+            gyro_figures=gyro.figures,
+            accel_figures=accel.figures,
+        )
+
+    def reached(self, gyro: AxisErrors, accel: AxisErrors) -> float | None:
+        """Return after which time the limit is reached, s; for north, the rest that it takes."""
+        if self.limit is None:
+            return None
+        if self.error == "north":
+            return self._compass(gyro).time_needed(self.limit)
+        return time_until(
+            self.limit,
+            self.error,
+            gyro=gyro.model,
+            accel=accel.model,
+            start=self.start,
+            use=self.use,
+            gyro_figures=gyro.figures,
+            accel_figures=accel.figures,
+        )
+
+    def _compass(self, gyro: AxisErrors) -> Gyrocompass:
+        assert self.latitude is not None  # checked with the requirement
+        stated = self.start.gyro.bias if isinstance(self.start.gyro, Uncalibrated) else None
+        # Whoever looks for north at any time takes a bias off by turning the gyro.
+        figures = gyro.figures if self.requirement is not None else NO_FIGURES
+        return Gyrocompass(gyro=gyro.model, latitude=self.latitude, bias=stated, figures=figures)
+
+
+def standard(
+    times: Sequence[float], window: float, latitude: float, axes: Sequence[Axis]
+) -> Iterator[Question]:
+    """Yield the questions that every recording answers.
+
+    Parameters
+    ----------
+    times : sequence of float
+        s.
+    window : float
+        Static window before, s.
+    latitude : float
+        rad.
+    axes : sequence of str
+    """
+    start = Start.calibrated(window)
+    quantities: tuple[Quantity, ...] = ("attitude", "heading", "velocity", "position")
+    for axis in axes:
+        for time in times:
+            for error in quantities:
+                yield Question(None, error, time, start, axis)
+            yield Question(None, "north", time, start, axis, latitude)
+
+
+def of_requirement(name: str, requirement: Requirement) -> Iterator[Question]:
+    """Yield the questions of a requirement."""
+    latitude = requirement.latitude and quantity_to_si(requirement.latitude, "angle")
+    for limit in requirement.limits:
+        yield Question(
+            name,
+            limit.error,
+            limit.seconds,
+            start_of(requirement),
+            requirement.axis,
+            latitude if isinstance(latitude, float) else None,
+            limit.size / requirement.sigmas,
+            use_of(requirement.environment, limit.seconds),
+        )
+
+
+def start_of(requirement: Requirement) -> Start:
+    """Return how dead reckoning begins in an application."""
+    if requirement.static_window is not None:
+        return Start.calibrated(quantity_to_si(requirement.static_window, "time"))
+    assert requirement.turn_on is not None  # checked with the requirement
+    gyro, accel = requirement.turn_on.gyro, requirement.turn_on.accel
+    return Start.uncalibrated(
+        gyro_bias=None if gyro is None else quantity_to_si(gyro, "angular_rate"),
+        accel_bias=None if accel is None else quantity_to_si(accel, "acceleration"),
+        on_time=quantity_to_si(requirement.turn_on.on_time, "time"),
+    )
+
+
+def use_of(environment: Environment, time: float) -> Use:
+    """Return what happens in an application, all of it within the time of a limit, s."""
+    stated = {
+        "turns": (environment.turns, "angle"),
+        "speed_change": (environment.speed_change, "velocity"),
+        "vibration": (environment.vibration, "acceleration"),
+    }
+    change = environment.temperature_change
+    return Use(
+        temperature_change=difference_to_si(change, "temperature") if change else 0.0,
+        over=time,
+        **{name: quantity_to_si(text, of) for name, (text, of) in stated.items() if text},
+    )
+
+
+def error_rows(
+    names: Mapping[str, str],
+    estimates: Mapping[str, Estimate],
+    questions: Iterable[Question],
+    *,
+    draws: int,
+    seed: int,
+    figures: Mapping[str, Figures] = _NAMELESS,
+) -> Iterator[Row]:
+    """Yield the rows of the table ``error_budget`` of a recording.
+
+    Parameters
+    ----------
+    names : mapping of str to str
+        ``sensor`` and ``recording``.
+    estimates : mapping of str to Estimate
+        The recommended one of each channel.
+    questions : iterable of Question
+    draws : int
+        Noise models drawn from what each log leaves open; they give the interval of a total.
+    seed : int
+        Of the run; each channel has a stream of its own.
+    figures : mapping of str to mapping
+        Of each channel, what is known of the errors that come in use (`printed_errors.in_use`).
+    """
+    # Of a log too short for any estimate nothing is known: that is not a sensor without noise.
+    known = {channel: estimate for channel, estimate in estimates.items() if estimate.model.terms}
+    axes = {
+        channel: AxisErrors(estimate.model, figures.get(channel, NO_FIGURES))
+        for channel, estimate in known.items()
+    }
+    drawn = {
+        channel: [
+            AxisErrors(model, one)
+            for model, one in zip(
+                draw_models(estimate, draws, channel_rng(seed, *names.values(), channel, "budget")),
+                _drawn(
+                    axes[channel].figures,
+                    draws,
+                    channel_rng(seed, *names.values(), channel, "temperature of the budget"),
+                ),
+                strict=True,
+            )
+        ]
+        for channel, estimate in known.items()
+    }
+    for question in questions:
+        asked: dict[str, Any] = {
+            **names,
+            "requirement": question.requirement,
+            "axis": question.axis,
+            "error": question.error,
+            "time": question.time,
+            "limit": question.limit,
+            "unit": SI_UNITS[DIMENSIONS[question.error]],
+        }
+        missing = [
+            _missing(quantity, estimates)
+            for quantity in question.needs
+            if not any(quantity_of(channel) == quantity for channel in known)
+        ]
+        if missing:
+            yield asked | {"source": "total", "reason": "; ".join(missing)}
+            continue
+        chosen = {
+            quantity: _axis(question, quantity, axes) if quantity in question.needs else None
+            for quantity in ("gyro", "accel")
+        }
+        pair = [axes[c] if c else _NOTHING for c in chosen.values()]
+        many = [drawn[c] if c else [_NOTHING] * draws for c in chosen.values()]
+        found = question.answer(*pair)
+        budgets = [question.answer(*one) for one in zip(*many, strict=True)]
+        lower, upper = interval(budgets)
+        # The draws of what is absent lie above it: the value itself is inside.
+        lower, upper = min(lower, found.total), max(upper, found.total)
+        apart = [c for c in chosen.values() if c and not drawn_jointly(estimates[c])]
+        yield (
+            asked
+            | chosen
+            | {
+                "source": "total",
+                "sigma": found.total,
+                "lower": lower,
+                "upper": upper,
+                "drawn": "one by one" if apart else "jointly",
+                "within": question.limit and chance_within(question.limit, budgets),
+                "reached_after": question.reached(*pair),
+                "reason": "; ".join(
+                    [
+                        *found.assumptions,
+                        *_doubts(chosen, estimates),
+                        *_apart(apart, estimates),
+                        *_unknown(question, estimates),
+                    ]
+                )
+                or None,
+            }
+        )
+        largest = Largest.of(found, question.limit, upper)
+        for contribution in sorted(found.contributions, key=lambda one: -one.sigma):
+            yield asked | chosen | source_row(contribution) | largest.of_bias(contribution)
+        for one in found.missing if question.limit is not None else ():
+            yield asked | chosen | largest.of_missing(one)
+
+
+def _drawn(figures: Figures, draws: int, rng: np.random.Generator) -> list[Figures]:
+    """Return draws of what is known of an axis, as sure as its measured figures are."""
+    spread = {cause: one for cause, one in figures.items() if one.spread and one.sigma is not None}
+    if not spread:
+        return [figures] * draws
+    normal = rng.standard_normal((draws, len(spread)))
+    return [
+        {
+            **figures,
+            **{
+                cause: replace(one, sigma=abs((one.sigma or 0.0) + one.spread * float(number)))
+                for (cause, one), number in zip(spread.items(), numbers, strict=True)
+            },
+        }
+        for numbers in normal
+    ]
+
+
+def _missing(quantity: str, estimates: Mapping[str, Estimate]) -> str:
+    """Return why there is no noise of a quantity to answer with."""
+    silent = [channel for channel in estimates if quantity_of(channel) == quantity]
+    if not silent:
+        return f"no {_NAMES[quantity]} in the recording"
+    return f"nothing is known of the noise of {', '.join(silent)}: {_why(estimates[silent[0]])}"
+
+
+def _unknown(question: Question, estimates: Mapping[str, Estimate]) -> Iterator[str]:
+    """Yield the axes that could not answer."""
+    for channel, estimate in estimates.items():
+        if quantity_of(channel) in question.needs and not estimate.model.terms:
+            yield f"{channel} does not count: nothing is known of its noise ({_why(estimate)})"
+
+
+def _why(estimate: Estimate) -> str:
+    reasons = (parameter.reason for parameter in estimate.parameters.values())
+    return next((reason for reason in reasons if reason), "its log does not show it")
+
+
+def _axis(question: Question, quantity: str, axes: Mapping[str, AxisErrors]) -> str:
+    """Return the channel of a quantity whose own part of the error is the worst, or the median."""
+
+    def part(channel: str) -> float:
+        own = axes[channel]
+        pair = (own, _NOTHING) if quantity == "gyro" else (_NOTHING, own)
+        return question.answer(*pair).total
+
+    ranked = sorted((c for c in axes if quantity_of(c) == quantity), key=part)
+    # Of two axes the median is the worse one.
+    return ranked[-1] if question.axis == "worst" else ranked[len(ranked) // 2]
+
+
+def _apart(channels: Sequence[str], estimates: Mapping[str, Estimate]) -> Iterator[str]:
+    """Yield the channels of which only limits of single parameters are known."""
+    for channel in channels:
+        yield (
+            f"method {estimates[channel].method} tells the parameters of {channel} one by one: "
+            "the interval is too wide where they trade off"
+        )
+
+
+def _doubts(chosen: Mapping[str, str | None], estimates: Mapping[str, Estimate]) -> Iterator[str]:
+    """Yield the parameters that the logs do not tell."""
+    for channel in chosen.values():
+        for _, name, parameter in estimates[channel].components() if channel else ():
+            if parameter.status in ("not_identified", "at_bound"):
+                yield f"{name} of {channel} is {parameter.status.replace('_', ' ')}"

@@ -1,0 +1,315 @@
+"""Several sensors on one board: their noise models, rates, and what they have in common."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from imubench_pipeline.noise import GaussMarkov, NoiseModel
+from imubench_pipeline.typing import Array
+
+_WHOLE = 1e-9
+"""Relative distance of a ratio of rates from a whole number that is rounding alone."""
+
+_AMPLITUDES = ("N", "B", "K", "R")
+"""The parameters that sensors may have in common, each the root of a variance."""
+
+
+@dataclass(frozen=True)
+class Shared:
+    """One process that several sensors see, each with a sensitivity of its own.
+
+    Such are the temperature of a board, the noise of its supply, and a motion that is not wanted
+    (sensitivity 1): the errors that come of it go together and are not averaged away.
+
+    Attributes
+    ----------
+    model : NoiseModel
+        The process in its own unit, say K (kelvin); it is taken at the fused rate.
+    sensitivity : sequence of float
+        SI unit of the sensors per that unit, one a sensor; the sign is kept: sensors of opposite
+        signs can cancel it.
+    """
+
+    model: NoiseModel
+    sensitivity: Sequence[float]
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Variances of the sensors of a board at several frequencies or tau.
+
+    The covariance of the sensors is diag(own) + sum over s of shared_s g_s g_s^T. It is kept in
+    these parts: where what is common is far the largest, the sum would have lost the rest.
+
+    Attributes
+    ----------
+    own : ndarray, shape (m, n)
+        Of what each sensor has alone, SI^2.
+    shared : ndarray, shape (m, s)
+        Of the shared processes, in their squared units.
+    sensitivities : ndarray, shape (s, n)
+        g: SI per these units.
+    """
+
+    own: Array
+    shared: Array
+    sensitivities: Array
+
+    def of_sum(self, weights: NDArray[Any]) -> Array:
+        """Return the variances of weighed sums, alone and in common.
+
+        Parameters
+        ----------
+        weights : ndarray, shape (m, n)
+            Real or complex.
+
+        Returns
+        -------
+        ndarray, shape (m, 2)
+            SI^2.
+        """
+        alone = np.sum(self.own * np.abs(weights) ** 2, axis=1)
+        common = np.sum(self.shared * np.abs(weights @ self.sensitivities.T) ** 2, axis=1)
+        return np.column_stack((alone, common))
+
+
+@dataclass(frozen=True)
+class Board:
+    """Sensors that measure one signal, all in SI: other units or scales cannot occur.
+
+    The fused rate is the lowest of the rates. A faster sensor is brought to it by the means of
+    blocks of its samples: white noise keeps its density N, the Allan variance at each tau is not
+    changed at all, and what the sensor has above the fused Nyquist frequency is folded below it,
+    weakened by the transfer of the mean, |sin(m w/2) / (m sin(w/2))|^2.
+
+    Parameters
+    ----------
+    models : sequence of NoiseModel
+        What each sensor has alone; independent of each other.
+    rates : sequence of float
+        Hz, one a sensor.
+    shared : sequence of Shared
+        What several have in common; independent of each other and of `models`.
+
+    Raises
+    ------
+    ValueError
+        If the numbers differ, there is no sensor, a rate is not above 0 or no whole multiple of
+        the lowest, or a sensitivity is not finite.
+    """
+
+    models: Sequence[NoiseModel]
+    rates: Sequence[float]
+    shared: Sequence[Shared] = ()
+
+    def __post_init__(self) -> None:
+        if not self.models or len(self.models) != len(self.rates):
+            raise ValueError(
+                f"found {len(self.models)} models and {len(self.rates)} rates, expected one of "
+                "each for every sensor"
+            )
+        if not all(math.isfinite(rate) and rate > 0 for rate in self.rates):
+            raise ValueError(f"rates are {list(self.rates)}, expected numbers above 0")
+        for rate in self.rates:
+            ratio = rate / self.rate
+            if abs(ratio - round(ratio)) > _WHOLE * ratio:
+                raise ValueError(
+                    f"a rate of {rate:g} Hz is no whole multiple of the lowest, {self.rate:g} Hz; "
+                    "resample that sensor first"
+                )
+        for one in self.shared:
+            found = np.asarray(one.sensitivity, dtype=np.float64)
+            if found.shape != (len(self.models),) or not np.all(np.isfinite(found)):
+                raise ValueError("expected one finite sensitivity for every sensor")
+
+    @classmethod
+    def alike(
+        cls,
+        model: NoiseModel,
+        number: int,
+        rate: float,
+        correlation: Mapping[str, float] | None = None,
+    ) -> Board:
+        """Return a board of several specimens of one sensor.
+
+        Parameters
+        ----------
+        model : NoiseModel
+            The whole error of each.
+        number : int
+            From 1.
+        rate : float
+            Hz.
+        correlation : mapping of str to float, optional
+            Part of the variance of N, B, K and R that is common to all, 0 to 1; by default none.
+
+        Returns
+        -------
+        Board
+
+        Raises
+        ------
+        ValueError
+            If there is no sensor, or a correlation is of another parameter or not from 0 to 1.
+        """
+        own, common = divided(model, correlation or {})
+        shared = [Shared(common, [1.0] * number)] if common.terms else []
+        return cls([own] * number, [rate] * number, shared)
+
+    @property
+    def sensors(self) -> int:
+        """How many there are."""
+        return len(self.models)
+
+    @property
+    def rate(self) -> float:
+        """Fused rate, Hz."""
+        return min(self.rates)
+
+    @property
+    def blocks(self) -> list[int]:
+        """Samples of each sensor in one of the fused rate."""
+        return [round(rate / self.rate) for rate in self.rates]
+
+    @property
+    def sensitivities(self) -> Array:
+        """Those of all shared processes, shape (s, n)."""
+        return np.array([one.sensitivity for one in self.shared], dtype=np.float64).reshape(
+            len(self.shared), self.sensors
+        )
+
+    def allan_parts(self, tau: ArrayLike) -> Parts:
+        """Return the Allan variances of what the sensors have alone and in common.
+
+        Parameters
+        ----------
+        tau : array_like, shape (m,)
+            s; taken to the nearest whole number of fused samples, at least one.
+
+        Returns
+        -------
+        Parts
+        """
+        t = np.atleast_1d(np.asarray(tau, dtype=np.float64))
+        t = np.maximum(np.rint(t * self.rate), 1.0) / self.rate
+        own = [m.allan_variance(t, r) for m, r in zip(self.models, self.rates, strict=True)]
+        common = [one.model.allan_variance(t, self.rate) for one in self.shared]
+        return self._parts(own, common, len(t))
+
+    def spectral_parts(self, omega: ArrayLike) -> Parts:
+        """Return the spectra of the fused samples; ramps and lines have none.
+
+        Parameters
+        ----------
+        omega : array_like, shape (m,)
+            rad a fused sample, above 0.
+
+        Returns
+        -------
+        Parts
+        """
+        w = np.atleast_1d(np.asarray(omega, dtype=np.float64))
+        found: dict[tuple[int, int], Array] = {}  # specimens of one sensor have one spectrum
+        keys = [(id(m), size) for m, size in zip(self.models, self.blocks, strict=True)]
+        for key, model, rate in zip(keys, self.models, self.rates, strict=True):
+            if key not in found:
+                found[key] = block_mean_spectrum(model, w, rate, key[1])
+        common = [one.model.sampled_spectrum(w, self.rate) for one in self.shared]
+        return self._parts([found[key] for key in keys], common, len(w))
+
+    def _parts(self, own: Sequence[Array], common: Sequence[Array], points: int) -> Parts:
+        shared = np.array(common).reshape(len(self.shared), points)
+        return Parts(np.column_stack(own), shared.T, self.sensitivities)
+
+
+def divided(model: NoiseModel, correlation: Mapping[str, float]) -> tuple[NoiseModel, NoiseModel]:
+    """Divide the noise of a sensor into what a specimen has alone and what all have in common.
+
+    Parameters
+    ----------
+    model : NoiseModel
+    correlation : mapping of str to float
+        Part of the variance of N, B, K and R that is common, 0 to 1; further Gauss-Markov
+        processes go with B. Quantization and lines are each sensor's own.
+
+    Returns
+    -------
+    (NoiseModel, NoiseModel)
+        Alone and in common: their spectra add up to that of the model.
+
+    Raises
+    ------
+    ValueError
+        If a correlation is of another parameter, or not from 0 to 1.
+    """
+    for name, value in correlation.items():
+        if name not in _AMPLITUDES or not 0.0 <= value <= 1.0:
+            raise ValueError(f"correlation of {name} is {value}; expected 0 to 1, of N, B, K or R")
+    parts = []
+    for common in (False, True):
+        share = {
+            name: math.sqrt(correlation.get(name, 0.0) if common else 1 - correlation.get(name, 0))
+            for name in _AMPLITUDES
+        }
+        parts.append(
+            replace(
+                model,
+                Q=0.0 if common else model.Q,
+                **{name: getattr(model, name) * share[name] for name in _AMPLITUDES},
+                further=[
+                    GaussMarkov(one.B * share["B"], one.T_B)
+                    for one in model.further
+                    if share["B"] > 0
+                ],
+                sinusoids=() if common else model.sinusoids,
+            )
+        )
+    return parts[0], parts[1]
+
+
+def block_mean_spectrum(model: NoiseModel, omega: Array, rate: float, size: int) -> Array:
+    """Return the spectrum of the means of blocks of samples, with all that is folded into it.
+
+    Parameters
+    ----------
+    model : NoiseModel
+    omega : ndarray, shape (m,)
+        rad a block, above 0 and up to pi.
+    rate : float
+        Of the samples, Hz.
+    size : int
+        Samples in a block.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        SI^2: sum over k of P((w + 2 pi k)/m) sin^2(w/2) / (m^3 sin^2((w + 2 pi k)/(2m))).
+    """
+    if size == 1:
+        return model.sampled_spectrum(omega, rate)
+    total = np.zeros_like(omega)
+    for fold in range(size):
+        folded = (omega + 2.0 * np.pi * fold) / size
+        transfer = (np.sin(omega / 2.0) / np.sin(folded / 2.0)) ** 2 / size**3
+        total += transfer * model.sampled_spectrum(folded, rate)
+    return total
+
+
+def stochastic(model: NoiseModel) -> NoiseModel:
+    """Return a model without its ramp and its lines, which have no spectrum.
+
+    Parameters
+    ----------
+    model : NoiseModel
+
+    Returns
+    -------
+    NoiseModel
+    """
+    return replace(model, R=0.0, sinusoids=())

@@ -1,0 +1,334 @@
+"""How many of one sensor, averaged, are as good as one of another: rows of the table ``fusion``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from imubench_pipeline.estimators.estimate import Estimate, JointDraws, Parameter
+from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
+from imubench_pipeline.navigation.fusion.board import divided
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise.simulate import channel_rng
+from imubench_pipeline.typing import Array, Row
+
+_MATTERS = 0.1
+"""Part of the Allan variance from which a parameter that is not known leaves no plain number."""
+
+_TAIL = 0.025
+"""Beyond each 95 % limit."""
+
+
+def number_needed(own: ArrayLike, common: ArrayLike, wanted: ArrayLike) -> Array:
+    """Return how many sensors of one kind have together the Allan variance that is wanted.
+
+    n of them with equal weights have ``own / n + common``: n = own / (wanted - common). Where
+    nothing is common, n is the ratio of the Allan variances.
+
+    Parameters
+    ----------
+    own : array_like
+        Allan variance of one, without what all have in common, (rad/s)^2 or (m/s^2)^2.
+    common : array_like
+        What all have in common.
+    wanted : array_like
+        Such as that of one better sensor.
+
+    Returns
+    -------
+    ndarray
+        Not rounded, below 1 where less than one would do; infinite where no number is enough.
+    """
+    own, common, wanted = np.broadcast_arrays(own, common, wanted)
+    room = np.asarray(wanted - common, dtype=np.float64)
+    return np.divide(own, room, out=np.full(room.shape, math.inf), where=room > 0.0)
+
+
+@dataclass(frozen=True)
+class TemperaturePart:
+    """What temperature adds to a channel: all specimens on a board follow it together.
+
+    Attributes
+    ----------
+    tau : ndarray, shape (t,)
+        s.
+    deviation : ndarray, shape (t,)
+        Its Allan deviation over the recording, (rad/s) or (m/s²).
+    relative_error : float
+        Standard deviation of the sensitivity over its value.
+    """
+
+    tau: Array
+    deviation: Array
+    relative_error: float
+
+    def variance(self, tau: float) -> float:
+        """Return its Allan variance at a tau in s, (rad/s)² or (m/s²)²."""
+        there = np.log(np.maximum(self.deviation, 1e-300))
+        return math.exp(2.0 * float(np.interp(math.log(tau), np.log(self.tau), there)))
+
+    def drawn(self, tau: float, draws: int, rng: np.random.Generator) -> Array:
+        """Return Allan variances, shape (draws,), of sensitivities drawn from their interval."""
+        factor = 1.0 + self.relative_error * rng.standard_normal(draws)
+        return np.asarray(factor**2 * self.variance(tau))
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A channel that may answer for its sensor.
+
+    Attributes
+    ----------
+    sensor, recording, channel : str
+    simulated : bool
+    duration : float
+        Of the recording, s.
+    estimate : Estimate
+        The recommended one; where temperature is taken out, that of what it leaves.
+    temperature : TemperaturePart, optional
+        What is taken out.
+    joint : callable, optional
+        Gives the joint draws of the estimate where the estimate has not got them with it: of a
+        run they are read of the channels that answer alone.
+    """
+
+    sensor: str
+    recording: str
+    channel: str
+    simulated: bool
+    duration: float
+    estimate: Estimate
+    temperature: TemperaturePart | None = None
+    joint: Callable[[], JointDraws | None] | None = None
+
+    def drawn(self, draws: int, rng: np.random.Generator) -> list[NoiseModel]:
+        """Return noise models that the log allows (`draw_models`)."""
+        estimate = self.estimate
+        if estimate.draws is None and self.joint is not None:
+            estimate = replace(estimate, draws=self.joint())
+        return draw_models(estimate, draws, rng)
+
+    @cached_property
+    def model(self) -> NoiseModel:
+        """The noise model of the estimate."""
+        return self.estimate.model
+
+    def variance(self, tau: float) -> float:
+        """Return the Allan variance, (rad/s)² or (m/s²)², at a tau in s."""
+        return float(self.model.allan_variance(tau)) + self.of_temperature(tau)
+
+    def of_temperature(self, tau: float) -> float:
+        """Return what temperature adds to it, (rad/s)² or (m/s²)², at a tau in s."""
+        return 0.0 if self.temperature is None else self.temperature.variance(tau)
+
+    def unknown(self, tau: float) -> Iterator[str]:
+        """Yield the parameters that the log does not tell and that may matter at a tau in s."""
+        total = self.variance(tau)
+        groups = [self.estimate.parameters, *self.estimate.further]
+        for group in groups:
+            for name, parameter in group.items():
+                if parameter.value is not None or parameter.status in ("absent", "not_shown"):
+                    continue
+                part = _alone(name, group, tau)
+                if part > _MATTERS * total:
+                    status = parameter.status.replace("_", " ")
+                    yield f"{name} of {self.sensor}/{self.recording} {self.channel} is {status}"
+
+
+def _alone(name: str, group: Mapping[str, Parameter], tau: float) -> float:
+    """Return the Allan variance that a parameter may stand for at most, by what is known of it."""
+    size = {key: one.in_model if one.upper is None else one.upper for key, one in group.items()}
+    if name in ("B", "T_B"):
+        time = group["T_B"].in_model if "T_B" in group else None
+        model = NoiseModel(B=size["B"] or 0.0, T_B=time or None)
+    else:
+        of = {key: (size[name] or 0.0) * (key == name) for key in ("Q", "N", "K", "R")}
+        model = NoiseModel(Q=of["Q"], N=of["N"], K=of["K"], R=of["R"])
+    return float(model.allan_variance(tau))
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a sensor has at one tau.
+
+    Attributes
+    ----------
+    candidate : Candidate
+        The channel that answers.
+    own, common : float
+        Allan variance of one specimen without the common part, and this, SI.
+    drawn_own, drawn_common : ndarray, shape (draws,)
+        The same of the models that the log allows.
+    unknown : str or None
+        The parameters that matter and are not known: there is no plain number.
+    """
+
+    candidate: Candidate
+    own: float
+    common: float
+    drawn_own: Array
+    drawn_common: Array
+    unknown: str | None
+
+
+def answer(
+    sensor: str,
+    candidates: Sequence[Candidate],
+    tau: float,
+    correlation: Mapping[str, float],
+    *,
+    longest: float,
+    draws: int,
+    seed: int,
+) -> Answer | str:
+    """Return the Allan variance of a sensor at a tau, that of its median channel; or why not.
+
+    Parameters
+    ----------
+    sensor : str
+    candidates : sequence of Candidate
+        All channels of one quantity of the sensor, at least one; where some are measured,
+        simulated ones are left out. Of two the worse one is the median.
+    tau : float
+        s.
+    correlation : mapping of str to float
+        Part of the variance of each parameter that specimens have in common.
+    longest : float
+        Longest tau that a log tells, as a part of it.
+    draws : int
+        Models that are drawn of those that the log allows.
+    seed : int
+        Each channel has a stream of its own.
+
+    Returns
+    -------
+    Answer or str
+        The reason, where there is no answer.
+    """
+    measured = [one for one in candidates if not one.simulated] or list(candidates)
+    long = [one for one in measured if tau <= longest * one.duration]
+    if not long:
+        most = longest * max(one.duration for one in measured)
+        return f"the logs of {sensor} tell tau up to {most:.3g} s alone"
+    noisy = sorted((one for one in long if one.model.terms), key=lambda one: one.variance(tau))
+    if not noisy:
+        return f"no noise model of {sensor}"
+    chosen = noisy[len(noisy) // 2]
+    stream = channel_rng(seed, chosen.sensor, chosen.recording, chosen.channel, "fusion")
+    own, common = _parts([chosen.model], correlation, tau)
+    drawn_own, drawn_common = _parts(chosen.drawn(draws, stream), correlation, tau)
+    if chosen.temperature is not None:
+        common = common + chosen.of_temperature(tau)
+        drawn_common = drawn_common + chosen.temperature.drawn(tau, draws, stream)
+    unknown = "; ".join(dict.fromkeys(chosen.unknown(tau))) or None
+    return Answer(chosen, float(own[0]), float(common[0]), drawn_own, drawn_common, unknown)
+
+
+def _parts(
+    models: Sequence[NoiseModel], correlation: Mapping[str, float], tau: float
+) -> tuple[Array, Array]:
+    pairs = [divided(model, correlation) for model in models]
+    own, common = (np.array([float(pair[i].allan_variance(tau)) for pair in pairs]) for i in (0, 1))
+    return own, common
+
+
+def equivalence_rows(
+    candidates: Iterable[Candidate],
+    taus: Sequence[float],
+    correlation: Mapping[str, float],
+    *,
+    longest: float,
+    draws: int,
+    seed: int,
+) -> Iterator[Row]:
+    """Yield the rows of the table ``fusion``: every ordered pair of sensors at every tau.
+
+    Parameters
+    ----------
+    candidates : iterable of Candidate
+        The channels of all sensors.
+    taus : sequence of float
+        s.
+    correlation : mapping of str to float
+        Part of the variance of N, B, K and R that specimens of one sensor have in common.
+    longest : float
+        Longest tau that a log tells, as a part of it.
+    draws : int
+        Noise models that give the interval.
+    seed : int
+
+    Yields
+    ------
+    mapping
+        By column of the table.
+    """
+    listed = list(candidates)
+    sensors = sorted({one.sensor for one in listed})
+    for quantity in ("gyro", "accel"):
+        own = [one for one in listed if one.channel.startswith(quantity)]
+        there = [sensor for sensor in sensors if any(one.sensor == sensor for one in own)]
+        for tau in taus:
+            answers = {
+                sensor: answer(
+                    sensor,
+                    [one for one in own if one.sensor == sensor],
+                    tau,
+                    correlation,
+                    longest=longest,
+                    draws=draws,
+                    seed=seed,
+                )
+                for sensor in there
+            }
+            for a in there:
+                for b in there:
+                    if a != b:
+                        names = {"quantity": quantity, "tau": tau, "sensor": a, "other": b}
+                        yield names | _pair(answers[a], answers[b], tau)
+
+
+def _pair(a: Answer | str, b: Answer | str, tau: float) -> dict[str, Any]:
+    row: dict[str, Any] = {}
+    reasons: list[str] = []
+    for prefix, one in (("", a), ("other_", b)):
+        if isinstance(one, str):
+            reasons.append(one)
+            continue
+        if one.unknown:
+            reasons.append(one.unknown)
+        row |= {
+            f"{prefix}recording": one.candidate.recording,
+            f"{prefix}channel": one.candidate.channel,
+            f"{prefix}simulated": one.candidate.simulated,
+            f"{prefix}adev": math.sqrt(one.own + one.common),
+        }
+    plain = not reasons
+    if not isinstance(a, str):
+        whole = a.own + a.common
+        row |= {"floor": math.sqrt(a.common), "common_share": a.common / whole}
+        row["temperature_share"] = a.candidate.of_temperature(tau) / whole
+    if isinstance(a, str) or isinstance(b, str):
+        return row | {"reason": "; ".join(reasons)}
+    number = float(number_needed(a.own, a.common, b.own + b.common))
+    drawn = number_needed(a.drawn_own, a.drawn_common, b.drawn_own + b.drawn_common)
+    # Between infinite ones there is nothing to interpolate.
+    low, high = np.quantile(drawn, [_TAIL, 1.0 - _TAIL], method="inverted_cdf")
+    # The draws of what is absent lie above it: the value itself is inside.
+    low, high = min(float(low), number), max(float(high), number)
+    if math.isinf(number):
+        reasons.append(f"no number of them reaches it at {tau:g} s: the common part is a floor")
+    elif math.isinf(high):
+        reasons.append("within the limits of the parameters, no number may reach it")
+    return row | {
+        "n": number if plain and math.isfinite(number) else None,
+        "lower": low if math.isfinite(low) else None,
+        "upper": high if math.isfinite(high) else None,
+        "reachable": math.isfinite(number),
+        "reason": "; ".join(reasons) or None,
+    }

@@ -1,0 +1,241 @@
+"""The Kalman filter that fuses the samples of a board's sensors: weights by frequency, causal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.linalg import block_diag, schur
+from scipy.sparse import csr_array
+
+from imubench_pipeline.navigation.fusion.board import Board, stochastic
+from imubench_pipeline.navigation.fusion.riccati import steady_covariance
+from imubench_pipeline.noise import GaussMarkov, NoiseModel, bias_instability
+from imubench_pipeline.noise.block_means import of_block_means
+from imubench_pipeline.typing import Array
+
+_LONGEST = 1e5
+"""Tau in s up to which the filter follows flicker noise, where nothing else is asked."""
+
+_WALK = 100.0
+"""Correlation time of what stands for a random walk, over the longest tau.
+
+A walk that all sensors have in common cannot be seen in their differences and would have no steady
+state. It does not matter what the filter thinks of it: it goes with the signal.
+"""
+
+
+class KalmanFusion:
+    """The best causal fusion in the steady state.
+
+    The common signal may be anything: nothing is assumed of it, and it passes unchanged, without
+    delay. The slow errors of the sensors are states, estimated from the differences between the
+    sensors alone; what is left is weighed by its variance. With y = 1 s + H x + v, P the steady
+    covariance of the predicted states and S = H P H^T + R,
+
+        s^ = a^T (y - H x),    a = S^-1 1 / (1^T S^-1 1),
+        x' = Phi (x + L (y - H x)),    L = P H^T (S^-1 - S^-1 1 a^T),
+
+    which is the Kalman filter of any n - 1 independent differences, and does not prefer a sensor.
+    The discretisation is exact, that of block means of faster sensors too; flicker noise is
+    its bank of Gauss-Markov processes.
+
+    It has the least variance of one sample that the past allows. At each frequency an optimal
+    smoother (`imubench_pipeline.navigation.fusion.weights.ByFrequency`) is as good or better.
+    Ramps and lines are not estimated: they pass with the weights at their frequency.
+
+    Parameters
+    ----------
+    board : Board
+        Every sensor needs white noise.
+    longest : float
+        Tau up to which flicker noise and random walks are followed, s.
+
+    Raises
+    ------
+    ValueError
+        If a sensor has no white noise.
+    """
+
+    def __init__(self, board: Board, longest: float = _LONGEST) -> None:
+        self.sensors = board.sensors
+        space = _space(board, longest)
+        if not np.all(np.diag(space.white) > 0.0):
+            raise ValueError("a filter needs white noise, N, of every sensor")
+        inverse = _without_common(space.white)
+        information = space.output.T @ inverse @ space.output
+        covariance = steady_covariance(space.transition, space.process_noise, information)
+        of_output = space.output @ covariance @ space.output.T + space.white
+        self.weights = _common(of_output)
+        gain = covariance @ space.output.T @ _without_common(of_output)
+        self._output = space.output
+        self._transition = space.transition
+        # That the signal is not seen must hold to the last digit.
+        gain -= np.outer(gain.sum(axis=1), self.weights)
+        self._gain = space.transition @ gain
+        self._seen = self.weights @ space.output
+        closed = space.transition - self._gain @ space.output
+        self._triangle, basis = schur(closed, output="complex")
+        self._row = self._seen @ basis
+        self._columns = basis.conj().T @ self._gain
+
+    @property
+    def states(self) -> int:
+        """How many states there are."""
+        return len(self._transition)
+
+    def response(self, omega: Array) -> NDArray[np.complex128]:
+        """Return the transfer from each sensor; its sum over the sensors is 1.
+
+        a^T (I - H (z I - F)^-1 Phi L) with F = Phi (I - L H), solved in the Schur form of F.
+
+        Parameters
+        ----------
+        omega : ndarray, shape (m,)
+            rad a fused sample.
+
+        Returns
+        -------
+        ndarray, shape (m, n)
+        """
+        # Loss of significance near frequency 0 is avoided: (z - 1) + (1 - F).
+        turn = np.expm1(1j * omega)
+        solved = np.zeros((self.states, len(omega)), dtype=np.complex128)
+        for j in range(self.states):
+            known = self._row[j] + self._triangle[:j, j] @ solved[:j]
+            solved[j] = known / (turn + (1.0 - self._triangle[j, j]))
+        return np.asarray(self.weights - solved.T @ self._columns)
+
+    def fuse(self, blocks: Iterable[Array]) -> Iterator[Array]:
+        """Yield the fused samples, block by block; they do not depend on the size of the blocks.
+
+        The filter begins with states of 0: take off the fixed bias of each sensor before. Where a
+        sensor has no sample (NaN), there is no fused one, and the states are predicted.
+
+        Parameters
+        ----------
+        blocks : iterable of ndarray, shape (k, n)
+            Samples of all sensors at the fused rate (`at_fused_rate`), rad/s or m/s^2.
+
+        Yields
+        ------
+        ndarray, shape (k,)
+            rad/s or m/s^2.
+
+        Raises
+        ------
+        ValueError
+            If a block has another number of sensors.
+        """
+        state = np.zeros(self.states)
+        output, transition = csr_array(self._output), csr_array(self._transition)
+        for block in blocks:
+            if block.ndim != 2 or block.shape[1] != self.sensors:
+                raise ValueError(
+                    f"a block has the shape {block.shape}, expected {self.sensors} columns"
+                )
+            fused = np.empty(len(block))
+            _run(
+                np.ascontiguousarray(block, dtype=np.float64),
+                fused,
+                state,
+                (output.indptr, output.indices, output.data),
+                (transition.indptr, transition.indices, transition.data),
+                np.ascontiguousarray(self._gain),
+                self.weights,
+            )
+            yield fused
+
+
+@dataclass(frozen=True)
+class _Space:
+    """The states of all sensors of a board, and of what they share."""
+
+    transition: Array
+    process_noise: Array
+    output: Array
+    white: Array
+
+
+def _space(board: Board, longest: float) -> _Space:
+    spaces, outputs = [], []
+    white = np.zeros((board.sensors, board.sensors))
+    members = [
+        *zip(board.models, board.rates, board.blocks, np.eye(board.sensors), strict=True),
+        *((one.model, board.rate, 1, np.asarray(one.sensitivity)) for one in board.shared),
+    ]
+    for model, rate, size, gains in members:
+        space = of_block_means(_steady(model, longest).state_space(rate, longest), size)
+        spaces.append(space)
+        outputs.append(np.outer(gains, space.output))
+        white += space.measurement_noise * np.outer(gains, gains)
+    return _Space(
+        np.asarray(block_diag(*(space.transition for space in spaces))),
+        np.asarray(block_diag(*(space.process_noise for space in spaces))),
+        np.concatenate(outputs, axis=1),
+        white,
+    )
+
+
+def _steady(model: NoiseModel, longest: float) -> NoiseModel:
+    """Return a model without what is deterministic, its walk bound to 0 by a long time."""
+    found = stochastic(model)
+    if not found.K:
+        return found
+    time = _WALK * longest
+    walk = GaussMarkov(bias_instability(found.K**2, time), time)
+    return replace(found, K=0.0, further=[*found.further, walk])
+
+
+def _common(covariance: Array) -> Array:
+    """Return S^-1 1 / (1^T S^-1 1)."""
+    solved = np.linalg.solve(covariance, np.ones(len(covariance)))
+    return np.asarray(solved / solved.sum())
+
+
+def _without_common(covariance: Array) -> Array:
+    """Return S^-1 - S^-1 1 1^T S^-1 / (1^T S^-1 1): the information of the differences."""
+    inverse = np.linalg.inv(covariance)
+    inverse = (inverse + inverse.T) / 2.0
+    rows = inverse.sum(axis=1)
+    return np.asarray(inverse - np.outer(rows, rows) / rows.sum())
+
+
+@njit(cache=True, nogil=True)
+def _run(
+    samples: Array,
+    fused: Array,
+    state: Array,
+    output: tuple[NDArray[np.int32], NDArray[np.int32], Array],
+    transition: tuple[NDArray[np.int32], NDArray[np.int32], Array],
+    gain: Array,
+    weights: Array,
+) -> None:
+    """Run the filter over samples, and leave the state as it is after the last."""
+    sensors, states = weights.size, state.size
+    left, moved = np.empty(sensors), np.empty(states)
+    for k in range(len(samples)):
+        signal = 0.0
+        for i in range(sensors):
+            seen = samples[k, i]
+            for e in range(output[0][i], output[0][i + 1]):
+                seen -= output[2][e] * state[output[1][e]]
+            left[i] = seen
+            signal += weights[i] * seen
+        fused[k] = signal
+        missing = not np.isfinite(signal)
+        if missing:
+            fused[k] = np.nan
+        for j in range(states):
+            total = 0.0
+            for e in range(transition[0][j], transition[0][j + 1]):
+                total += transition[2][e] * state[transition[1][e]]
+            if not missing:
+                # The gain does not see the signal: taken off, a large one costs no digits.
+                for i in range(sensors):
+                    total += gain[j, i] * (left[i] - signal)
+            moved[j] = total
+        state[:] = moved

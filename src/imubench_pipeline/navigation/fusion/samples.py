@@ -1,0 +1,87 @@
+"""Samples of the sensors of a board: brought to one rate, and weighed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from imubench_pipeline.navigation.fusion.board import Board
+from imubench_pipeline.navigation.fusion.kalman import KalmanFusion
+from imubench_pipeline.navigation.fusion.weights import Constant
+from imubench_pipeline.typing import Array
+
+_BLOCK = 1 << 16
+"""Fused samples that are brought to one rate at a time."""
+
+
+def at_fused_rate(board: Board, samples: Sequence[Array]) -> Array:
+    """Return the samples of all sensors at the fused rate: means of blocks.
+
+    Parameters
+    ----------
+    board : Board
+    samples : sequence of ndarray
+        Of each sensor at its own rate, rad/s or m/s^2, beginning together; a rest that fills no
+        block of every sensor is left out. NaN: missing, and so is the block.
+
+    Returns
+    -------
+    ndarray, shape (k, n)
+        rad/s or m/s^2.
+
+    Raises
+    ------
+    ValueError
+        If the number of sensors differs.
+    """
+    number = _length(board, samples)
+    fused = np.empty((number, board.sensors))
+    for i, (log, size) in enumerate(zip(samples, board.blocks, strict=True)):
+        fused[:, i] = np.asarray(log[: number * size]).reshape(number, size).mean(axis=1)
+    return fused
+
+
+def fuse(board: Board, how: Constant | KalmanFusion, samples: Sequence[Array]) -> Array:
+    """Return the samples of the virtual sensor.
+
+    Parameters
+    ----------
+    board : Board
+    how : Constant or KalmanFusion
+    samples : sequence of ndarray
+        As for `at_fused_rate`.
+
+    Returns
+    -------
+    ndarray, shape (k,)
+        rad/s or m/s^2, at the fused rate.
+
+    Raises
+    ------
+    ValueError
+        If the number of sensors differs.
+    """
+    number = _length(board, samples)
+    blocks = (
+        at_fused_rate(
+            board,
+            [
+                log[start * size : min(start + _BLOCK, number) * size]
+                for log, size in zip(samples, board.blocks, strict=True)
+            ],
+        )
+        for start in range(0, number, _BLOCK)
+    )
+    if isinstance(how, Constant):
+        parts = [block @ how.values for block in blocks]
+    else:
+        parts = list(how.fuse(blocks))
+    return np.concatenate(parts) if parts else np.empty(0)
+
+
+def _length(board: Board, samples: Sequence[Array]) -> int:
+    """Return how many fused samples the logs of all sensors make."""
+    if len(samples) != board.sensors:
+        raise ValueError(f"found samples of {len(samples)} sensors, expected {board.sensors}")
+    return min(len(log) // size for log, size in zip(samples, board.blocks, strict=True))

@@ -1,0 +1,168 @@
+"""Which sensor fulfils which requirement: rows of the table ``ranking``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+from imubench_pipeline.navigation.verdicts.basis import Basis
+from imubench_pipeline.navigation.verdicts.judgement import Judgement, judgements
+from imubench_pipeline.navigation.verdicts.standing import Standing
+from imubench_pipeline.navigation.verdicts.unless import unless_words
+from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.typing import Row
+
+
+def ranking_rows(
+    errors: Iterable[Row],
+    requirements: Mapping[str, Requirement],
+    sensors: Mapping[str, Mapping[str, Any]],
+    recordings: Iterable[Row] = (),
+    doubts: Iterable[Row] = (),
+    parameters: Iterable[Row] = (),
+    backtests: Iterable[Row] = (),
+) -> Iterator[Row]:
+    """Rank the sensors for each requirement (see `ranked`).
+
+    Parameters
+    ----------
+    errors : iterable of mapping
+        Rows of the table ``error_budget``.
+    requirements : mapping of str to Requirement
+    sensors : mapping of str to mapping
+        ``price_class`` of each sensor, and its ``abilities``, where known.
+    recordings, doubts, parameters, backtests : iterable of mapping
+        Rows of the tables of these names: what is known of the recordings beside their errors.
+
+    Yields
+    ------
+    mapping
+        One a requirement, sensor and limit.
+    """
+    basis = Basis.of(recordings, doubts, parameters, backtests)
+    yield from ranked(list(judgements(errors, requirements, sensors, basis)), basis)
+
+
+def ranked(judged: Sequence[Judgement], basis: Basis) -> Iterator[Row]:
+    """Yield the rows of the table ``ranking``.
+
+    A sensor stands where its limit with the least margin stands. Its rank is one more than the
+    number of sensors that are surely better, whose interval lies wholly above its own: sensors
+    with overlapping intervals are tied. One with a figure that is not known is surely better than
+    another only where that of the other is not known, too.
+
+    Parameters
+    ----------
+    judged : sequence of Judgement
+    basis : Basis
+        Of the recordings that they stand on.
+    """
+    for name in dict.fromkeys(one.name for one in judged):
+        own = [one for one in judged if one.name == name]
+        compared = {one.sensor: one for one in own if one.compared}
+        for one in own:
+            rank, tied = _rank(one.sensor, compared) if one.sensor in compared else (None, [])
+            place = {"rank": rank, "tied_with": ", ".join(tied) or None}
+            apart = [reason for (of, _), reason in basis.apart.items() if of == one.sensor]
+            of_sensor = {
+                "requirement": name,
+                "sensor": one.sensor,
+                **place,
+                "verdict": one.verdict,
+                "conditions": one.conditions,
+                "confidence": one.requirement.confidence,
+                "left_out": "; ".join(apart) or None,
+                **_unless_row(one),
+            }
+            for standing, weak in zip(one.standings, one.weak, strict=True):
+                key = one.sensor, standing.total["recording"]
+                yield {
+                    **of_sensor,
+                    "at_most": standing.total["limit"] * one.requirement.sigmas,
+                    "decides": standing is one.decides,
+                    **_limit_row(standing),
+                    **_evidence_row(one.sensor, standing, weak, basis),
+                    **_backtest_row(name, standing, basis),
+                    "doubts": basis.doubted(key),
+                }
+
+
+def _limit_row(standing: Standing) -> Row:
+    total, found = standing.total, standing.expected
+    known = standing.known
+    return {
+        **{key: total[key] for key in ("recording", "error", "time", "limit", "unit")},
+        "sigma": found.sigma,
+        "lower": found.lower,
+        "upper": found.upper,
+        "margin": _margin(standing),
+        "chance": standing.chance if known else None,
+        "limit_verdict": standing.verdict,
+        "source": standing.source,
+        "share": standing.share,
+        "parts": standing.parts,
+        "reached_after": total["reached_after"],
+        "reason": total["reason"],
+        "specimens": found.specimens,
+        "recordings": found.recordings,
+        "spread": found.spread.variance**0.5 if found.spread else None,
+        "spread_of": found.spread_of,
+    }
+
+
+def _evidence_row(sensor: str, standing: Standing, weak: Sequence[str], basis: Basis) -> Row:
+    durations = (basis.duration((sensor, row["recording"])) for row in standing.totals)
+    return {
+        "longest_log": max((one for one in durations if one is not None), default=None),
+        "evidence": ("weak" if weak else "strong") if standing.known else None,
+        "evidence_reasons": ", ".join(weak) or None,
+    }
+
+
+def _backtest_row(requirement: str, standing: Standing, basis: Basis) -> Row:
+    """Return what the log of the channel that an error mostly comes of shows of its part."""
+    total = standing.total
+    words = (standing.source or "").split()
+    quantity = next((word for word in words if word in ("gyro", "accel")), None)
+    where = {"requirement": requirement, "channel": total[quantity] if quantity else None}
+    found = basis.backtest({**total, **where})
+    return {
+        "backtest_channel": where["channel"] if found.get("ratio") is not None else None,
+        **{
+            f"backtest_{name}": found.get(name)
+            for name in ("ratio", "ratio_lower", "ratio_upper", "windows")
+            if found.get("ratio") is not None
+        },
+    }
+
+
+def _unless_row(one: Judgement) -> Row:
+    found = one.unless
+    if found is None or one.outside:
+        return {}
+    return {
+        "unless": unless_words(found),
+        "unless_verdict": found.mended and found.mended.verdict,
+        "unless_margin": _margin(found.mended),
+        "logged_verdict": found.logged and found.logged.verdict,
+        "logged_margin": _margin(found.logged),
+    }
+
+
+def _margin(standing: Standing | None) -> float | None:
+    return standing.margin if standing is not None and standing.known else None
+
+
+def _rank(sensor: str, compared: Mapping[str, Judgement]) -> tuple[int, list[str]]:
+    """Return the rank of a sensor, and the sensors that it is tied with."""
+
+    def better(one: str, other: str) -> bool:
+        this, that = compared[one], compared[other]
+        known = this.rests.figures.keys() <= that.rests.figures.keys()
+        return known and this.decides.margins[0] > that.decides.margins[1]
+
+    above = [other for other in compared if better(other, sensor)]
+    tied = [
+        other for other in compared if other not in (sensor, *above) and not better(sensor, other)
+    ]
+    return 1 + len(above), tied

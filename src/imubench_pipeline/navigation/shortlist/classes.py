@@ -1,0 +1,144 @@
+"""What the measured sensors of a price class show of figures that vendors do not publish."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from imubench_pipeline.recordings.fitness import left_out
+from imubench_pipeline.settings.sensor import quantity_of
+from imubench_pipeline.typing import Row
+
+_TAKEN = {"N": "N", "B_curve": "B", "K": "K", "T_B": "T_B"}
+"""Parameters of the estimates, and what stands for them here: B is that of the curve."""
+
+
+@dataclass(frozen=True)
+class Span:
+    """The least and the largest value that a figure may have.
+
+    Attributes
+    ----------
+    low, high : float
+        SI.
+    words : str
+        What it is from, where it is assumed; empty: as printed.
+    """
+
+    low: float
+    high: float
+    words: str = ""
+
+
+@dataclass(frozen=True)
+class MeasuredRanges:
+    """Ranges of measured parameters, by sensor, quantity and figure.
+
+    Attributes
+    ----------
+    of_sensor : dict
+        (sensor, quantity, figure) -> (low, high), SI.
+    classes : dict of str to str
+        The class of each sensor that states one.
+    printed : dict
+        (sensor, quantity) -> (low, high) of B, SI, as datasheets have it: where none is measured.
+    """
+
+    of_sensor: Mapping[tuple[str, str, str], tuple[float, float]]
+    classes: Mapping[str, str]
+    printed: Mapping[tuple[str, str], tuple[float, float]] = field(default_factory=dict)
+
+    def span(self, price_class: str | None, quantity: str, figure: str) -> Span | None:
+        """Return the range of a figure over the measured sensors of a class.
+
+        Parameters
+        ----------
+        price_class : str or None
+            As stated; only what stands before a comma or parenthesis counts.
+        quantity, figure : str
+            ``gyro`` or ``accel``; ``N``, ``B``, ``K`` or ``T_B``.
+
+        Returns
+        -------
+        Span or None
+            Over all measured sensors where none of the class is measured; of B where no sensor is
+        measured over datasheets; None: nothing is known.
+        """
+        there = {
+            sensor: ends
+            for (sensor, of, name), ends in self.of_sensor.items()
+            if (of, name) == (quantity, figure)
+        }
+        source = "measured sensors"
+        if not there and figure == "B":
+            there = {sensor: ends for (sensor, of), ends in self.printed.items() if of == quantity}
+            source = "datasheets"
+        if not there:
+            return None
+        wanted = class_of(price_class)
+        own = {s: ends for s, ends in there.items() if wanted and self.classes.get(s) == wanted}
+        which = f"of class {wanted}" if own else "of any class, for there is none of its own"
+        used = own or there
+        named = ", ".join(sorted(used))
+        low, high = min(ends[0] for ends in used.values()), max(ends[1] for ends in used.values())
+        return Span(low, high, f"that of {source} {which} ({named})")
+
+
+def class_of(price_class: str | None) -> str:
+    """Return the class that a price class names: ``consumer`` of consumer, about US$8."""
+    return re.split(r"[,(]", price_class or "")[0].strip().lower()
+
+
+def measured_ranges(
+    parameters: Iterable[Row],
+    recordings: Iterable[Row],
+    price_classes: Mapping[str, str | None],
+) -> MeasuredRanges:
+    """Return what the logs of a run say, of real sensors and recordings that decide.
+
+    Parameters
+    ----------
+    parameters, recordings : iterable of mapping
+        Rows of the tables.
+    price_classes : mapping of str to str or None
+        Of each sensor.
+
+    Returns
+    -------
+    MeasuredRanges
+        The 95 % limits of what has a value. A random walk that a log does not show may be 0; its
+        upper limit counts only where no log of the sensor shows one.
+    """
+    about = list(recordings)
+    apart = left_out(about)
+    real = {
+        place
+        for row in about
+        if not row["simulated"] and (place := (row["sensor"], row["recording"])) not in apart
+    }
+    shown: dict[tuple[str, str, str], list[tuple[float, float]]] = {}
+    absent: dict[tuple[str, str, str], list[float]] = {}
+    for row in parameters:
+        figure = _TAKEN.get(row["parameter"])
+        if figure is None or not row["recommended"] or row["component"] != 1:
+            continue
+        if (row["sensor"], row["recording"]) not in real:
+            continue
+        key = (row["sensor"], quantity_of(row["channel"]), figure)
+        if row["status"] == "ok" and row["value"] is not None:
+            ends = (row["lower"], row["upper"])
+            low, high = (row["value"] if end is None else end for end in ends)
+            shown.setdefault(key, []).append((low, high))
+        elif row["status"] == "absent" and figure == "K":
+            absent.setdefault(key, []).append(row["upper"] or 0.0)
+    found = {}
+    for key in {*shown, *absent}:
+        several = shown.get(key, [(0.0, max(absent.get(key, [0.0])))])
+        low = 0.0 if key in absent else min(one[0] for one in several)
+        high = max(one[1] for one in several)
+        if math.isfinite(high):
+            found[key] = (low, high)
+    classes = {sensor: class_of(one) for sensor, one in price_classes.items() if one}
+    return MeasuredRanges(found, classes)

@@ -1,0 +1,195 @@
+"""The noise that a datasheet allows: the least and the largest of each figure, as models.
+
+A density of unstated side is N or N times sqrt(2). A printed bias instability is B at best, and at
+worst the minimum of the curve, B over 0.664. Grades and ranges that a sensor comes in all count,
+unless its file says which one is meant. What is not published is that of measured sensors of its
+class, B where none is measured that of the datasheets of its class.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from imubench_pipeline.datasheets.comparable import Comparable, comparables
+from imubench_pipeline.navigation.shortlist.classes import MeasuredRanges, Span
+from imubench_pipeline.noise import FLOOR, NoiseModel
+from imubench_pipeline.settings.printed import Datasheet, QuantityDatasheet
+from imubench_pipeline.settings.sensor import Sensor
+
+End = Literal["best", "worst"]
+
+_NAMES = {"gyro": "gyro", "accel": "accelerometer"}
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What a quantity of a sensor may have.
+
+    Attributes
+    ----------
+    N, B, K : Span or None
+        SI; None: not published, and known of no other sensor. It is 0 at best then, and the worst
+        is not known.
+    times : tuple of (float or None)
+        Correlation times of the process that B may be, s; None: flicker noise.
+    assumed : tuple of str
+        What stands for what is not printed, in words.
+    """
+
+    N: Span
+    B: Span | None
+    K: Span | None
+    times: tuple[float | None, ...]
+    assumed: tuple[str, ...]
+
+    @property
+    def bounded(self) -> bool:
+        """Whether the worst is known."""
+        return self.B is not None and self.K is not None
+
+    def models(self, end: End) -> list[NoiseModel]:
+        """Return the models of one end: all figures there, for each correlation time.
+
+        Parameters
+        ----------
+        end : {"best", "worst"}
+
+        Raises
+        ------
+        ValueError
+            If the worst is not known.
+        """
+        if end == "worst" and not self.bounded:
+            raise ValueError("the worst is not known: a figure is measured of no sensor")
+        N, B, K = (
+            0.0 if span is None else span.low if end == "best" else span.high
+            for span in (self.N, self.B, self.K)
+        )
+        if B == 0.0:
+            return [NoiseModel(N=N, K=K)]
+        return [NoiseModel(N=N, B=B, T_B=T_B, K=K) for T_B in self.times]
+
+
+def figures_of(sensor: Sensor, quantity: str, ranges: MeasuredRanges) -> Figures | str:
+    """Return what a datasheet allows of a quantity.
+
+    Parameters
+    ----------
+    sensor : Sensor
+    quantity : {"gyro", "accel"}
+    ranges : MeasuredRanges
+
+    Returns
+    -------
+    Figures or str
+        str: why nothing can be said.
+    """
+    if getattr(sensor.datasheet, quantity) is None:
+        return f"it has no {_NAMES[quantity]}"
+    sheet, options = _of_every_option(sensor.datasheet, quantity)
+    printed = [
+        row
+        for axis in "xyz"
+        for row in comparables(sheet, f"{quantity}_{axis}")
+        if row.value is not None
+    ]
+    of = _NAMES[quantity]
+    said: list[str] = [f"{of}: any of {', '.join(options)}"] if options else []
+    unknown: list[str] = []
+
+    def filled(figure: str, statistic: str) -> Span | None:
+        own = [row for row in printed if row.statistic == statistic]
+        if own:
+            said.extend(f"{of} {figure}: {words}" for words in _readings(own))
+            return _ends(own)
+        found = ranges.span(sensor.price_class, quantity, figure)
+        if found is None:
+            unknown.append(figure)
+        else:
+            said.append(f"{of} {figure}: {found.low:.2g} to {found.high:.2g} SI, {found.words}")
+        return found
+
+    if not any(row.statistic == "N" for row in printed):
+        return f"no noise density of the {of} is published"
+    N = filled("N", "N")
+    assert N is not None  # some is printed
+    B = filled("B", "adev_minimum")
+    if B is not None and not B.words:
+        said.append(f"{of} B: the printed figure at best, the minimum of the curve at worst")
+        B = Span(B.low, B.high / FLOOR)
+    K = filled("K", "K")
+    T_B = filled("T_B", "T_B")
+    if unknown:
+        said.append(f"{of} {', '.join(unknown)}: not published, and not measured of any sensor")
+        if B is not None and "T_B" in unknown:
+            said.append(f"{of} B: flicker noise, for want of a T_B")
+    times: tuple[float | None, ...] = (None,)
+    if T_B is not None:
+        middle = math.sqrt(T_B.low * T_B.high)
+        alone = (T_B.low, middle, T_B.high)
+        times = alone if not T_B.words else (None, *alone)
+    return Figures(N, B, K, tuple(dict.fromkeys(times)), tuple(said))
+
+
+def printed_ranges(sensors: Mapping[str, Sensor]) -> dict[tuple[str, str], tuple[float, float]]:
+    """Return the range of B that each datasheet of a catalogue allows.
+
+    Parameters
+    ----------
+    sensors : mapping of str to Sensor
+
+    Returns
+    -------
+    dict
+        (sensor, quantity) -> (low, high), SI; without those that print none.
+    """
+    found = {}
+    for name, sensor in sensors.items():
+        for quantity in _NAMES:
+            if getattr(sensor.datasheet, quantity) is None:
+                continue
+            sheet, _ = _of_every_option(sensor.datasheet, quantity)
+            own = [
+                row
+                for axis in "xyz"
+                for row in comparables(sheet, f"{quantity}_{axis}")
+                if row.value is not None and row.statistic == "adev_minimum"
+            ]
+            if own:
+                ends = _ends(own)
+                found[name, quantity] = (ends.low, ends.high / FLOOR)
+    return found
+
+
+def _ends(rows: Sequence[Comparable]) -> Span:
+    values = [row.value for row in rows if row.value is not None]
+    least = [row.least for row in rows if row.least is not None]
+    return Span(min([*values, *least]), max(values))
+
+
+def _readings(rows: Sequence[Comparable]) -> list[str]:
+    """Return what a printed figure leaves open, in words."""
+    said = []
+    if any("assumed" in (row.reason or "") for row in rows):
+        said.append("the side of the density is not stated: both")
+    if all(row.figure is not None and row.figure.kind == "max" for row in rows):
+        said.append("a maximum alone is printed, the typical one may be better")
+    return said
+
+
+def _of_every_option(datasheet: Datasheet, quantity: str) -> tuple[Datasheet, list[str]]:
+    """Return a datasheet with every option taken, where it does not say which one is meant."""
+    sheet: QuantityDatasheet = getattr(datasheet, quantity)
+    named = {
+        figure.option
+        for name in ("noise_density", "random_walk", "rms_noise", "bias_instability")
+        for figure in sheet.printed(name)
+        if figure.option is not None
+    }
+    if datasheet.options or not named:
+        return datasheet, []
+    options = sorted(named)
+    return datasheet.model_copy(update={"options": tuple(options)}), options

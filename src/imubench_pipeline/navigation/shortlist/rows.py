@@ -1,0 +1,168 @@
+"""Which sensors of a catalogue are worth logging for a requirement: the table ``shortlist``.
+
+What comes in use counts as its datasheet prints it (see `error_budget.in_use`). A turn-on bias can
+be calibrated away: it is left out at best, and there at worst. Where a figure is not published the
+worst is not known.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+from imubench_pipeline.navigation.error_budget.in_use import BIASES, Figure
+from imubench_pipeline.navigation.error_budget.in_use import Figures as InUse
+from imubench_pipeline.navigation.error_budget.parts import Budget
+from imubench_pipeline.navigation.error_budget.printed_errors import of_datasheet
+from imubench_pipeline.navigation.expected_errors import AxisErrors, Question, of_requirement
+from imubench_pipeline.navigation.shortlist.classes import MeasuredRanges
+from imubench_pipeline.navigation.shortlist.figures import End, Figures, figures_of
+from imubench_pipeline.navigation.suitability.abilities import Abilities, abilities, judge
+from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.settings.sensor import Sensor
+from imubench_pipeline.tables.of_shortlist import SHORTLIST
+from imubench_pipeline.typing import Row
+
+VERDICTS: Mapping[str, str] = {
+    "cannot pass": "lacks what it must have, or fails even with the best that its datasheet allows",
+    "worth logging": "passes at its best and not, or nobody knows, at its worst: a log decides",
+    "passes at its worst": "passes with the worst that its datasheet allows",
+    "not judged": "too little is published, or it is outside the price class",
+}
+"""What a verdict says."""
+
+_NOTHING = AxisErrors()
+_QUANTITIES = ("gyro", "accel")
+_ALONE = dict.fromkeys(_QUANTITIES, _NOTHING)
+_CALIBRATED: InUse = dict.fromkeys(BIASES, Figure(sigma=0.0))
+
+
+def shortlist_rows(
+    requirements: Mapping[str, Requirement],
+    sensors: Mapping[str, Sensor],
+    ranges: MeasuredRanges,
+    ranking: Iterable[Row] = (),
+    recordings: Iterable[Row] = (),
+) -> Iterator[Row]:
+    """Judge all sensors of a catalogue by their datasheets alone, beside what is measured.
+
+    Parameters
+    ----------
+    requirements : mapping of str to Requirement
+    sensors : mapping of str to Sensor
+    ranges : MeasuredRanges
+        For what is not published.
+    ranking, recordings : iterable of mapping
+        Rows of the tables of a run: what its logs say.
+
+    Yields
+    ------
+    mapping
+        One a requirement and sensor, the best margin first; what is not judged is last.
+    """
+    simulated = {(row["sensor"], row["recording"]): row["simulated"] for row in recordings}
+    measured = {(row["requirement"], row["sensor"]): row for row in ranking if row["decides"]}
+    found = {
+        name: {quantity: figures_of(sensor, quantity, ranges) for quantity in ("gyro", "accel")}
+        for name, sensor in sensors.items()
+    }
+    for name, requirement in requirements.items():
+        questions = list(of_requirement(name, requirement))
+        rows = []
+        for sensor, figures in found.items():
+            row = _judged(requirement, questions, sensors[sensor], figures)
+            standing = measured.get((name, sensor))
+            if standing is not None and standing["margin"] is not None:
+                of_model = simulated.get((sensor, standing["recording"]), False)
+                row |= {
+                    "measured_margin_of": "simulated logs" if of_model else "logs",
+                    "measured_margin": standing["margin"],
+                    "measured_verdict": standing["limit_verdict"],
+                }
+            rows.append(row | {"requirement": name, "sensor": sensor})
+        yield from sorted(rows, key=lambda row: (-(row["best_margin"] or 0.0), row["sensor"]))
+
+
+def _judged(
+    requirement: Requirement,
+    questions: Sequence[Question],
+    sensor: Sensor,
+    figures: Mapping[str, Figures | str],
+) -> dict[str, Any]:
+    row: dict[str, Any] = dict.fromkeys(column.name for column in SHORTLIST)
+    row["price_class"] = price_class = sensor.price_class
+    lacking, unknown = judge(requirement.must, _before_buying(sensor))
+    if lacking:
+        return row | {"verdict": "cannot pass", "reason": "; ".join(lacking)}
+    needed = dict.fromkeys(quantity for one in questions for quantity in one.needs)
+    known = {q: one for q in needed if isinstance(one := figures[q], Figures)}
+    if len(known) < len(needed):
+        why = "; ".join(one for q in needed if isinstance(one := figures[q], str))
+        return row | {"verdict": "not judged", "reason": why}
+    in_use = {quantity: of_datasheet(sensor.datasheet, f"{quantity}_x") for quantity in known}
+    best, missing = _margins(questions, known, in_use, "best")
+    least = min(range(len(best)), key=best.__getitem__)
+    worst = None
+    if all(one.bounded for one in known.values()):
+        margins, missing = _margins(questions, known, in_use, "worst")
+        worst = min(margins) if not missing else None
+    assumed = [words for one in known.values() for words in one.assumed] + missing
+    row |= {
+        "best_margin": best[least],
+        "worst_margin": worst,
+        "decides": requirement.limits[least].text,
+        "assumed": "; ".join([*assumed, *(f"{name}: not known" for name in unknown)]) or None,
+    }
+    if not requirement.admits(price_class):
+        why = "outside the price class" if price_class else "price class not stated"
+        return row | {"verdict": "not judged", "reason": why}
+    return row | {"verdict": _verdict(row["best_margin"], row["worst_margin"])}
+
+
+def _before_buying(sensor: Sensor) -> Abilities:
+    """Return what a sensor has, logged or not: all axes of the quantities that it measures."""
+    has = abilities(sensor)
+    quantities = [name for name in _QUANTITIES if name not in has.without]
+    channels = tuple(f"{name}_{axis}" for name in quantities for axis in "xyz")
+    return has.model_copy(update={"channels": channels, "logged_rate": None})
+
+
+def _verdict(best: float, worst: float | None) -> str:
+    if best < 1.0:
+        return "cannot pass"
+    return "passes at its worst" if worst is not None and worst >= 1.0 else "worth logging"
+
+
+def _margins(
+    questions: Sequence[Question],
+    figures: Mapping[str, Figures],
+    in_use: Mapping[str, InUse],
+    end: End,
+) -> tuple[list[float], list[str]]:
+    """Return the limit over the error of each question, and what they all leave out, in words."""
+    budgets = [_budget(one, figures, in_use, end) for one in questions]
+    margins = [
+        one.limit / found.total if found.total > 0.0 else math.inf
+        for one, found in zip(questions, budgets, strict=True)
+        if one.limit is not None  # of a requirement every one has
+    ]
+    missing = (
+        f"{one.source}: not known ({one.reason})" for found in budgets for one in found.missing
+    )
+    return margins, list(dict.fromkeys(missing))
+
+
+def _budget(
+    question: Question, figures: Mapping[str, Figures], in_use: Mapping[str, InUse], end: End
+) -> Budget:
+    pick = min if end == "best" else max
+    beside = _CALIBRATED if end == "best" else {}
+    chosen = dict.fromkeys(_QUANTITIES, _NOTHING)
+    for quantity in question.needs:
+        models = figures[quantity].models(end)
+        axes = [AxisErrors(model, {**in_use[quantity], **beside}) for model in models]
+        # The quantities are independent: each has its own extreme.
+        totals = [question.answer(**{**_ALONE, quantity: one}).total for one in axes]
+        chosen[quantity] = axes[totals.index(pick(totals))]
+    return question.answer(**chosen)

@@ -1,0 +1,235 @@
+"""What a sensor has beside its noise, as far as its file tells, against what must be there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from pydantic import Field
+
+from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, Datasheet, PrintedFigure
+from imubench_pipeline.settings.requirements import Must
+from imubench_pipeline.settings.sensor import QUANTITIES, Sensor
+from imubench_pipeline.settings.validation import Strict
+from imubench_pipeline.units import from_si, quantity_to_si, to_si
+
+Measured = Literal["gyro", "accel"]
+
+_NAMES: dict[Measured, str] = {"gyro": "gyro", "accel": "accelerometer"}
+_UNITS: dict[Measured, str] = {"gyro": "deg/s", "accel": "g"}
+
+_ROUNDED = 1.0 + 1e-9
+"""For what is as asked, but in another unit."""
+
+
+class Abilities(Strict):
+    """What a sensor has; SI, None: not known.
+
+    Attributes
+    ----------
+    full_scale, bandwidth : dict
+        The largest that it has, or that can be chosen, by quantity; rad/s, m/s^2 and Hz.
+    logged_rate, rate : float or None
+        Of its logs, and the highest that it gives, Hz.
+    temperature : tuple of float or None
+        Range of operation, degC.
+    channels : tuple of str
+        Axes that its logs have.
+    without : tuple of str
+        Quantities that it does not measure.
+    mass, power : float or None
+        kg and W.
+    """
+
+    full_scale: dict[Measured, float] = Field(default_factory=dict)
+    bandwidth: dict[Measured, float] = Field(default_factory=dict)
+    logged_rate: float | None = None
+    rate: float | None = None
+    temperature: tuple[float, float] | None = None
+    channels: tuple[str, ...] = ()
+    without: tuple[Measured, ...] = ()
+    mass: float | None = None
+    power: float | None = None
+
+
+@dataclass(frozen=True)
+class _Point:
+    """One thing that must be there; fulfilled is None where it is not known."""
+
+    name: str
+    fulfilled: bool | None
+    asked: str
+    found: str = ""
+
+
+def abilities(sensor: Sensor) -> Abilities:
+    """Return what the file of a sensor tells of what it has.
+
+    Parameters
+    ----------
+    sensor : Sensor
+    """
+    quantities: tuple[Measured, ...] = ("gyro", "accel")
+    found = {
+        name: {
+            quantity: largest
+            for quantity in quantities
+            if (largest := _largest(sensor.datasheet, quantity, name)) is not None
+        }
+        for name in ("full_scale", "bandwidth")
+    }
+    ends = sensor.temperature_range
+    return Abilities(
+        full_scale=found["full_scale"],
+        bandwidth=found["bandwidth"],
+        logged_rate=sensor.log.rate_hz,
+        rate=_si(sensor.rate, "frequency"),
+        temperature=(
+            (quantity_to_si(ends[0], "temperature"), quantity_to_si(ends[1], "temperature"))
+            if ends
+            else None
+        ),
+        channels=tuple(sensor.log.channels),
+        without=tuple(one for one in quantities if getattr(sensor.datasheet, one) is None),
+        mass=_si(sensor.mass, "mass"),
+        power=_si(sensor.power, "power"),
+    )
+
+
+def _si(text: str | None, dimension: str) -> float | None:
+    return None if text is None else quantity_to_si(text, dimension)
+
+
+def _largest(datasheet: Datasheet, quantity: Measured, name: str) -> float | None:
+    """Return the largest printed figure of the axis that has the least of it, SI."""
+    sheet = getattr(datasheet, quantity)
+    figures: list[PrintedFigure] = [
+        figure
+        for figure in (sheet.printed(name) if sheet else ())
+        if figure.option is None or figure.option in datasheet.options
+    ]
+    by_axis = []
+    for axis in "xyz":
+        printed = [(figure, figure.on_axis(axis)) for figure in figures]
+        values = [
+            to_si(one, figure.unit or "", FIGURE_DIMENSIONS[quantity][name][0])
+            for figure, value in printed
+            if value is not None
+            for one in (value if isinstance(value, tuple) else (value,))
+        ]
+        if values:
+            by_axis.append(max(values))
+    return min(by_axis, default=None)
+
+
+def judge(must: Must, has: Abilities) -> tuple[list[str], list[str]]:
+    """Hold what a sensor has against what must be there.
+
+    Parameters
+    ----------
+    must : Must
+    has : Abilities
+
+    Returns
+    -------
+    (list of str, list of str)
+        What it is known not to have, such as ``full scale of the gyro 250 deg/s, 300 deg/s
+        asked``, and what is not known of it, such as ``mass``.
+    """
+    lacking: list[str] = []
+    unknown: list[str] = []
+    for point in _compared(must, has):
+        if point.fulfilled is None:
+            unknown.append(point.name)
+        elif not point.fulfilled:
+            lacking.append(
+                f"{point.name} {point.found}, {point.asked} asked"
+                if point.found
+                else f"no {point.name}"
+            )
+    return list(dict.fromkeys(lacking)), list(dict.fromkeys(unknown))
+
+
+def _compared(must: Must, has: Abilities) -> Iterator[_Point]:
+    yield from _axes(must, has)
+    yield from _full_scales(must, has)
+    yield from _bandwidths(must, has)
+    if must.rate is not None:
+        yield _rate(must.rate, has)
+    if must.temperature is not None:
+        yield _temperature(must.temperature, has)
+    for name, text, size, unit in (
+        ("mass", must.mass, has.mass, "g"),
+        ("power", must.power, has.power, "W"),
+    ):
+        if text is not None:
+            small = None if size is None else size <= quantity_to_si(text, name) * _ROUNDED
+            yield _Point(name, small, text, _shown(size, unit, name))
+
+
+def _full_scales(must: Must, has: Abilities) -> Iterator[_Point]:
+    asked: dict[Measured, str | None] = {
+        "gyro": must.full_scale.gyro,
+        "accel": must.full_scale.accel,
+    }
+    for measured, text in asked.items():
+        if text is None:
+            continue
+        name = f"full scale of the {_NAMES[measured]}"
+        dimension, largest = QUANTITIES[measured], has.full_scale.get(measured)
+        shown = _shown(largest, _UNITS[measured], dimension)
+        if measured in has.without:
+            yield _Point(_NAMES[measured], False, text)
+        elif largest is None:
+            yield _Point(name, None, text)
+        else:
+            yield _Point(name, largest * _ROUNDED >= quantity_to_si(text, dimension), text, shown)
+
+
+def _bandwidths(must: Must, has: Abilities) -> Iterator[_Point]:
+    """Yield the bandwidth of the quantities whose axes must be there, or else of all."""
+    if must.bandwidth is None:
+        return
+    asked = {text.split("_")[0] for text in must.axes} or set(_NAMES)
+    for measured, name in _NAMES.items():
+        if measured in asked and measured not in has.without:
+            width = has.bandwidth.get(measured)
+            wide = None if width is None else width >= quantity_to_si(must.bandwidth, "frequency")
+            shown = _shown(width, "Hz", "frequency")
+            yield _Point(f"bandwidth of the {name}", wide, must.bandwidth, shown)
+
+
+def _rate(text: str, has: Abilities) -> _Point:
+    least = quantity_to_si(text, "frequency")
+    if has.logged_rate is not None and has.logged_rate >= least:
+        return _Point("rate", True, text)
+    # A log at a lower rate is not all that a sensor can give.
+    fast = None if has.rate is None else has.rate >= least
+    return _Point("rate", fast, text, _shown(has.rate, "Hz", "frequency"))
+
+
+def _temperature(ends: tuple[str, str], has: Abilities) -> _Point:
+    name, text = "temperature range", " to ".join(ends)
+    if has.temperature is None:
+        return _Point(name, None, text)
+    low, high = (quantity_to_si(end, "temperature") for end in ends)
+    found = has.temperature
+    within = found[0] <= low and high <= found[1]
+    return _Point(name, within, text, f"{found[0]:.4g} to {found[1]:.4g} degC")
+
+
+def _axes(must: Must, has: Abilities) -> Iterator[_Point]:
+    for text in must.axes:
+        quantity, axes = text.split("_")
+        if quantity in has.without:
+            yield _Point(_NAMES["gyro" if quantity == "gyro" else "accel"], False, text)
+            continue
+        for axis in axes:
+            # The logs may leave out an axis that the sensor has.
+            there = f"{quantity}_{axis}" in has.channels or None
+            yield _Point(f"axis {quantity}_{axis}", there, text)
+
+
+def _shown(value: float | None, unit: str, dimension: str) -> str:
+    return "" if value is None else f"{from_si(value, unit, dimension):.4g} {unit}"

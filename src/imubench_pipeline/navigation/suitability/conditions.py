@@ -1,0 +1,223 @@
+"""On what a verdict rests beside the errors that are known: figures that are not, and musts.
+
+A sensor that is known not to have what a requirement says it must is excluded. One whose known
+errors pass, but of which a figure is not known that the use brings into play, passes if that
+figure is below the largest that leaves the limit kept; several that are not known share what room
+there is, so that with all of them at their largest the limit is just reached. One whose printed
+turn-on bias alone breaks a limit passes if it is calibrated to what there is room for.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from decimal import ROUND_DOWN, Decimal
+
+from imubench_pipeline.navigation.suitability.abilities import Abilities, judge
+from imubench_pipeline.settings.requirements import Must
+from imubench_pipeline.typing import Row
+from imubench_pipeline.units import from_si
+
+EXCLUDED = "excluded"
+
+CONDITIONAL = {"passes": "passes if", "probably passes": "probably passes if"}
+"""The verdicts that a condition changes: what fails without it fails with it, too."""
+
+_SENSORS = {"gyro": "gyro", "accel": "accelerometer"}
+
+_FIGURES = {
+    "turn_on_bias": ("its {sensor}s are calibrated to {largest}", "deg/s", "mg"),
+    "temperature": (
+        "its {sensor} temperature coefficient is below {largest}",
+        "deg/s/K",
+        "mg/K",
+    ),
+    "scale_factor": ("its {sensor} scale factor error is below {largest}", "ppm", "ppm"),
+    "g_sensitivity": ("its {sensor} g-sensitivity is below {largest}", "deg/s/g", ""),
+    "vibration_rectification": (
+        "its {sensor} vibration rectification is below {largest}",
+        "deg/s/g^2",
+        "mg/g^2",
+    ),
+}
+"""By cause: the condition, and the unit of the figure of a gyro and of an accelerometer."""
+
+_NAMES = {
+    "temperature": "temperature coefficient",
+    "scale_factor": "scale factor error",
+    "g_sensitivity": "g-sensitivity",
+    "vibration_rectification": "vibration rectification",
+}
+"""Of the figures that a datasheet can tell of every specimen."""
+
+_DIMENSIONS = {
+    "deg/s": "angular_rate",
+    "mg": "acceleration",
+    "deg/s/K": "gyro_temperature_coefficient",
+    "mg/K": "accel_temperature_coefficient",
+    "ppm": "ratio",
+    "deg/s/g": "gyro_acceleration_coefficient",
+    "deg/s/g^2": "gyro_vibration_coefficient",
+    "mg/g^2": "accel_vibration_coefficient",
+}
+
+
+@dataclass(frozen=True)
+class Rests:
+    """What a verdict on a sensor rests on.
+
+    Attributes
+    ----------
+    lacking : tuple of str
+        What it must have and has not.
+    unknown : tuple of str
+        What it must have, and nobody knows whether it has.
+    figures : mapping of (str, str) to float
+        Figures that are not known, or too large, by ``gyro`` or ``accel`` and cause, with the
+        largest with which every limit is kept, SI.
+    """
+
+    lacking: tuple[str, ...]
+    unknown: tuple[str, ...]
+    figures: Mapping[tuple[str, str], float]
+
+    @classmethod
+    def of(cls, must: Must, has: Abilities, conditions: Iterable[Row]) -> Rests:
+        """Return what the verdict on a sensor rests on.
+
+        Parameters
+        ----------
+        must : Must
+            Of the requirement.
+        has : Abilities
+            Of the sensor.
+        conditions : iterable of mapping
+            Rows of the table ``error_budget`` that a limit rests on, of all limits.
+        """
+        lacking, unknown = judge(must, has)
+        figures: dict[tuple[str, str], float] = {}
+        for row in conditions:
+            key = _measured(row), row["cause"]
+            largest = row["largest"] or 0.0
+            figures[key] = min(figures.get(key, largest), largest)
+        return cls(tuple(lacking), tuple(unknown), figures)
+
+    def verdict(self, words: str) -> tuple[str, str | None]:
+        """Return a verdict on the known errors with what it rests on, and the latter in words.
+
+        Parameters
+        ----------
+        words : str
+        """
+        if self.lacking:
+            return EXCLUDED, "; ".join(self.lacking)
+        said = list(self._conditions())
+        if words not in CONDITIONAL or not said:
+            return words, None
+        return CONDITIONAL[words], "; ".join(said)
+
+    def unknown_figures(self) -> list[str]:
+        """Return the names of the figures that its file does not say, but for turn-on biases."""
+        causes = [
+            f"{_SENSORS[measured]} {_NAMES[cause]}"
+            for measured, cause in self.figures
+            if cause in _NAMES
+        ]
+        return [*causes, *self.unknown]
+
+    def _conditions(self) -> Iterator[str]:
+        for (measured, cause), largest in self.figures.items():
+            text, *units = _FIGURES[cause]
+            unit = units[measured == "accel"]
+            size = f"{_down(from_si(largest, unit, _DIMENSIONS[unit])):g} {unit} (1 sigma)"
+            yield text.format(sensor=_SENSORS[measured], largest=size)
+        if self.unknown:
+            yield f"it has what it must (not known: {', '.join(self.unknown)})"
+
+
+def _down(value: float) -> float:
+    """Return a number above 0 cut to three digits: rounded up it would no more keep the limit."""
+    step = Decimal(1).scaleb(Decimal(value).adjusted() - 2)
+    return float(Decimal(value).quantize(step, rounding=ROUND_DOWN))
+
+
+def in_words(row: Row) -> str:
+    """Return a verdict with what it rests on: ``passes if its gyros are calibrated to ...``.
+
+    Parameters
+    ----------
+    row : mapping
+        Has ``verdict`` and ``conditions``, as the table ``ranking``.
+    """
+    if not row["conditions"]:
+        return str(row["verdict"])
+    return f"{row['verdict']}{':' * (row['verdict'] == EXCLUDED)} {row['conditions']}"
+
+
+def _measured(row: Row) -> str:
+    """Return whose figure a source is of."""
+    return next(word for word in row["source"].split() if word in _SENSORS)
+
+
+def is_condition(row: Row) -> bool:
+    """Tell whether a limit rests on the figure of a source, a row of the table ``error_budget``.
+
+    Parameters
+    ----------
+    row : mapping
+    """
+    return row["largest_unit"] is not None
+
+
+def once_calibrated(words: str, total: Row, conditions: Iterable[Row]) -> str:
+    """Return the verdict on an error when the biases that break its limit are calibrated.
+
+    A bias is in every draw of the total by its square, and so in the limits of the total.
+
+    Parameters
+    ----------
+    words : str
+        The verdict on the error as it is.
+    total : mapping
+        Row of the table ``error_budget``.
+    conditions : iterable of mapping
+        Rows of sources that the limit rests on.
+    """
+    squares = [row["sigma"] ** 2 for row in conditions if row["sigma"] is not None]
+    if not squares or words in CONDITIONAL:
+        return words
+    for size, better in (("upper", "passes"), ("sigma", "probably passes")):
+        if total[size] ** 2 - math.fsum(squares) < total["limit"] ** 2:
+            return better
+    return words
+
+
+def parts_of(total: float, sources: Iterable[Row], least: float = 0.01) -> str | None:
+    """Return the sources of an error with their parts of the variance, the largest first.
+
+    Parameters
+    ----------
+    total : float
+        Standard deviation of the error.
+    sources : iterable of mapping
+        Rows of the table ``error_budget``.
+    least : float
+        Parts below it are left out.
+    """
+    if total <= 0.0:
+        return None
+    shares = ((row, (row["sigma"] / total) ** 2) for row in sources)
+    shown = sorted((pair for pair in shares if pair[1] >= least), key=lambda pair: -pair[1])
+    return "; ".join(f"{named(row)} {100 * share:.0f} %" for row, share in shown) or None
+
+
+def named(row: Row) -> str:
+    """Return the name of a source, marked where it is printed and not measured.
+
+    Parameters
+    ----------
+    row : mapping
+        Of the table ``error_budget``.
+    """
+    return row["source"] + f" (datasheet, {row['kind']})" * (row["origin"] == "datasheet")

@@ -1,0 +1,100 @@
+"""How strong the evidence of a verdict is: all that makes it weak is derived here.
+
+A verdict says how sure a figure is if its log is what it seems. Evidence says how far the logs
+carry: how long they are, of how many specimens and axes, and what is doubted of the parameter that
+makes most of the error (`imubench_pipeline.recordings.fitness` says what is doubted of a log).
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator
+from typing import Literal, get_args
+
+from imubench_pipeline.navigation.verdicts.basis import Basis
+from imubench_pipeline.navigation.verdicts.sources import parameters_behind, quantity_behind
+from imubench_pipeline.navigation.verdicts.standing import Standing
+from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.typing import Row
+from imubench_pipeline.units import quantity_to_si
+
+Reason = Literal["one_specimen", "short_log", "wide_interval", "few_axes"]
+"""What makes evidence weak; beside these, the codes of doubts."""
+
+REASONS: tuple[str, ...] = get_args(Reason)
+
+LONGEST_PART = 1 / 9
+"""Part of a log that tells an error of that length: there the Allan deviation of white noise has
+8 differences of clusters end to end, and is known to about a quarter."""
+
+_AXES = 3
+
+
+def weaknesses(standing: Standing, requirement: Requirement, basis: Basis) -> list[str]:
+    """Return what makes the evidence of a limit weak; nothing where it is strong.
+
+    Parameters
+    ----------
+    standing : Standing
+        With a figure.
+    requirement : Requirement
+    basis : Basis
+
+    Returns
+    -------
+    list of str
+        `REASONS` and codes of the table ``doubts``. Axes and doubts count where they are those of
+        half the recordings or more, the length is that of the longest.
+    """
+    found = []
+    if standing.expected.specimens == 1:
+        found.append("one_specimen")
+    durations = [basis.duration((row["sensor"], row["recording"])) for row in standing.totals]
+    longest = max((one for one in durations if one is not None), default=math.inf)
+    if longest_asked(standing.total, requirement) > LONGEST_PART * longest:
+        found.append("short_log")
+    if standing.wide:
+        found.append("wide_interval")
+    of_logs = Counter(
+        reason
+        for total in standing.totals
+        for reason in dict.fromkeys(_of_log(total, standing, requirement, basis))
+    )
+    half = len(standing.totals) / 2.0
+    order = [*REASONS, *of_logs]
+    found += [reason for reason, count in of_logs.items() if count >= half]
+    return sorted(found, key=order.index)
+
+
+def _of_log(
+    total: Row, standing: Standing, requirement: Requirement, basis: Basis
+) -> Iterator[str]:
+    key = total["sensor"], total["recording"]
+    for quantity in ("gyro", "accel"):
+        axes = basis.axes(key, quantity) if total[quantity] else None
+        if requirement.axis == "worst" and axes is not None and axes < _AXES:
+            yield "few_axes"
+    if standing.source is None:
+        return
+    behind = parameters_behind(standing.source)
+    channel = total[quantity_behind(standing.source) or "gyro"]
+    for doubt in basis.doubts.get(key, ()):
+        named = set((doubt["parameters"] or "").split(", ")) - {""}
+        if doubt["channel"] in (None, channel) and behind and (not named or named & behind):
+            yield doubt["code"]
+
+
+def longest_asked(total: Row, requirement: Requirement) -> float:
+    """Return the longest time that a limit is about, s: its own, or the window at rest before.
+
+    Parameters
+    ----------
+    total : mapping
+        Row of the table ``error_budget``.
+    requirement : Requirement
+    """
+    window = requirement.static_window
+    # The heading found at rest has no window before it.
+    before = quantity_to_si(window, "time") if window and total["error"] != "north" else 0.0
+    return float(max(total["time"], before))

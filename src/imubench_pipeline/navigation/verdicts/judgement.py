@@ -1,0 +1,182 @@
+"""How each sensor stands to each requirement, with all that the verdict hangs on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from imubench_pipeline.navigation.suitability.abilities import Abilities
+from imubench_pipeline.navigation.suitability.conditions import Rests, once_calibrated
+from imubench_pipeline.navigation.verdicts.basis import Basis
+from imubench_pipeline.navigation.verdicts.evidence import weaknesses
+from imubench_pipeline.navigation.verdicts.specimens import Spread, usual_spread
+from imubench_pipeline.navigation.verdicts.standing import Standing, deciding, limit_of, standings
+from imubench_pipeline.navigation.verdicts.unless import Unless, unless
+from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.typing import Row
+
+_NOTHING = {"sigma": None, "lower": None, "upper": None, "within": None, "reached_after": None}
+"""What is known from a recording that does not decide."""
+
+_WORST_FIRST = (
+    "surely fails",
+    "probably fails",
+    "not enough data",
+    "probably passes",
+    "passes",
+)
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """A sensor and a requirement.
+
+    Attributes
+    ----------
+    name : str
+        Of the requirement.
+    requirement : Requirement
+    sensor : str
+    standings : sequence of Standing
+        One a limit.
+    decides : Standing
+        The one of them with which the sensor stands.
+    weak : sequence of list of str
+        What makes the evidence of each limit weak; empty also where nothing is known.
+    outside : str or None
+        Why the requirement does not admit the sensor.
+    rests : Rests
+        On what the verdict rests beside the errors that are known.
+    unless : Unless or None
+        What the verdict would be, if what is doubted were mended.
+    """
+
+    name: str
+    requirement: Requirement
+    sensor: str
+    standings: Sequence[Standing]
+    decides: Standing
+    weak: Sequence[Sequence[str]]
+    outside: str | None
+    rests: Rests
+    unless: Unless | None
+
+    @property
+    def verdict(self) -> str:
+        """What is said of the sensor."""
+        return self.outside or self.rests.verdict(self._of_errors)[0]
+
+    @property
+    def conditions(self) -> str | None:
+        """On what the verdict rests, or why the sensor is excluded, in words."""
+        return None if self.outside else self.rests.verdict(self._of_errors)[1]
+
+    @property
+    def _of_errors(self) -> str:
+        """The verdict on what is known: of the limit that decides, or of all once calibrated."""
+        once = [_once_calibrated(one) for one in self.standings]
+        if self.decides.known and once != [one.verdict for one in self.standings]:
+            return min(once, key=_WORST_FIRST.index)
+        return self.decides.verdict
+
+    @property
+    def compared(self) -> bool:
+        """Whether it has a place among the others."""
+        return self.decides.known and not self.outside and not self.rests.lacking
+
+    @property
+    def reasons(self) -> Sequence[str]:
+        """What makes the evidence of the limit weak that decides."""
+        pairs = zip(self.standings, self.weak, strict=True)
+        return next(weak for standing, weak in pairs if standing is self.decides)
+
+
+def judgements(
+    errors: Iterable[Row],
+    requirements: Mapping[str, Requirement],
+    sensors: Mapping[str, Mapping[str, Any]],
+    basis: Basis,
+) -> Iterator[Judgement]:
+    """Yield how each sensor stands to each requirement.
+
+    Parameters
+    ----------
+    errors : iterable of mapping
+        Rows of the table ``error_budget``.
+    requirements : mapping of str to Requirement
+    sensors : mapping of str to mapping
+        ``price_class`` of each sensor, and its ``abilities``, where known.
+    basis : Basis
+        The recordings; those that do not decide are left out.
+    """
+    by_requirement: dict[str, dict[str, list[Row]]] = {}
+    for row in errors:
+        of_sensors = by_requirement.setdefault(row["requirement"], {})
+        of_sensors.setdefault(row["sensor"], []).append(row)
+    for name, requirement in requirements.items():
+        of_sensors = by_requirement.get(name, {})
+        usual = {made: _usual(of_sensors, basis, simulated=made) for made in (False, True)}
+        for sensor, rows in of_sensors.items():
+            keys = [(sensor, row["recording"]) for row in rows]
+            devices = {key[1]: basis.device(key) for key in keys}
+            made = all(basis.simulated(key) for key in keys)
+            found = standings(_deciding_rows(rows, basis), devices, usual[made])
+            one = deciding(found)
+            yield Judgement(
+                name,
+                requirement,
+                sensor,
+                found,
+                one,
+                [weaknesses(each, requirement, basis) if each.known else [] for each in found],
+                _outside(requirement, sensors[sensor]["price_class"]),
+                Rests.of(
+                    requirement.must,
+                    Abilities.model_validate(sensors[sensor].get("abilities", {})),
+                    [row for each in found for row in each.conditions],
+                ),
+                unless(sensor, rows, one, basis),
+            )
+
+
+def _deciding_rows(rows: Iterable[Row], basis: Basis) -> list[Row]:
+    """Return rows without the figures of recordings that do not decide."""
+    found = []
+    for row in rows:
+        key = row["sensor"], row["recording"]
+        apart = basis.apart.get(key)
+        found.append(row if apart is None else {**row, **_NOTHING, "reason": apart})
+    return found
+
+
+def _usual(
+    of_sensors: Mapping[str, Sequence[Row]], basis: Basis, *, simulated: bool
+) -> dict[tuple[Any, ...], Spread]:
+    """Return the spread between specimens of all sensors that have several, by limit."""
+    by_limit: dict[tuple[Any, ...], list[Spread]] = {}
+    for sensor, rows in of_sensors.items():
+        keys = [(sensor, row["recording"]) for row in rows]
+        if all(basis.simulated(key) for key in keys) is not simulated:
+            continue
+        devices = {key[1]: basis.device(key) for key in keys}
+        for one in standings(_deciding_rows(rows, basis), devices):
+            if one.expected.spread is not None and one.expected.spread_of == "specimens":
+                by_limit.setdefault(limit_of(one.total), []).append(one.expected.spread)
+    found = {key: usual_spread(spreads) for key, spreads in by_limit.items()}
+    return {key: spread for key, spread in found.items() if spread is not None}
+
+
+def _once_calibrated(one: Standing) -> str:
+    error = {
+        "limit": one.total["limit"],
+        "sigma": one.expected.sigma,
+        "upper": one.expected.upper,
+    }
+    return once_calibrated(one.verdict, error, one.conditions)
+
+
+def _outside(requirement: Requirement, price_class: str | None) -> str | None:
+    if requirement.admits(price_class):
+        return None
+    return "outside the price class" if price_class else "price class not stated"

@@ -1,0 +1,272 @@
+"""What to do next: the steps that would turn or strengthen most verdicts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+from scipy.special import stdtrit
+
+from imubench_pipeline.navigation.verdicts.basis import Basis, Key
+from imubench_pipeline.navigation.verdicts.evidence import LONGEST_PART, REASONS, longest_asked
+from imubench_pipeline.navigation.verdicts.judgement import Judgement
+from imubench_pipeline.navigation.verdicts.specimens import Expected
+from imubench_pipeline.navigation.verdicts.standing import Standing
+
+Action = Literal[
+    "check_unit", "find_figures", "add_channels", "record_again", "log_longer", "add_specimens"
+]
+"""What can be done, the cheapest first."""
+
+_ORDER = get_args(Action)
+
+_LONGEST = 100.0
+"""Times the length of a log beyond which none is advised: limits ten times as narrow."""
+
+_MOST_SPECIMENS = 20
+"""Of one sensor, beyond which no more are advised."""
+
+_ENOUGH_SPECIMENS = 3
+"""Specimens that know their spread at all: t of two degrees of freedom is 4.3, of one 12.7."""
+
+
+@dataclass(frozen=True)
+class _Step:
+    """One step for one requirement."""
+
+    action: Action
+    key: tuple[str, str | None]
+    requirement: str
+    turns: bool
+    duration: float | None = None
+    specimens: int | None = None
+    what: str = ""
+
+
+def next_step_rows(judged: Sequence[Judgement], basis: Basis) -> list[dict[str, Any]]:
+    """Return the rows of the table ``next_steps``, what turns most verdicts first.
+
+    Parameters
+    ----------
+    judged : sequence of Judgement
+    basis : Basis
+        Of the recordings that they stand on.
+    """
+    groups: dict[tuple[Any, ...], list[_Step]] = {}
+    for one in judged:
+        if one.outside is None:
+            for step in _steps(one, basis):
+                groups.setdefault((step.key, step.action), []).append(step)
+    rows = [_row(steps, basis) for steps in groups.values()]
+    return sorted(
+        rows,
+        key=lambda row: (
+            -row["verdicts_turned"],
+            -row["verdicts_strengthened"],
+            _ORDER.index(row["action"]),
+            row["sensor"],
+            row["recording"] or "",
+        ),
+    )
+
+
+def _steps(one: Judgement, basis: Basis) -> Iterator[_Step]:
+    """Yield what would help one verdict: to turn it, and to make its evidence stronger."""
+    if one.unless is not None:
+        action: Action = "check_unit" if one.unless.factors else "record_again"
+        for key, doubts in one.unless.doubts.items():
+            what = _quantities(basis.factors(key)) or doubts
+            yield _Step(action, key, one.name, turns=True, what=what)
+    if not one.decides.known:
+        yield from _to_know(one, basis)
+        return
+    if one.decides.verdict not in ("passes", "surely fails"):
+        yield from _to_settle(one, basis)
+    if one.compared and (unknown := one.rests.unknown_figures()):
+        what = ", ".join(unknown)
+        yield _Step("find_figures", (one.sensor, None), one.name, turns=False, what=what)
+    for reason in one.reasons:
+        yield from _to_strengthen(one, reason, basis)
+
+
+def _to_know(one: Judgement, basis: Basis) -> Iterator[_Step]:
+    """Yield what a recording lacks of which nothing is known, or how long it is to be."""
+    total = one.decides.total
+    key = one.sensor, total["recording"]
+    if key in basis.apart:
+        return
+    needs = ("gyro",) if total["error"] in ("heading", "north") else ("gyro", "accel")
+    missing = [name for name in needs if basis.lacks(key, name)]
+    if missing:
+        yield _Step("add_channels", key, one.name, turns=True, what=_quantities(missing))
+    elif _told_by(one) > (basis.duration(key) or math.inf):
+        yield _Step("log_longer", key, one.name, turns=True, duration=_told_by(one))
+
+
+_NAMES = {"gyro": "gyro", "accel": "accelerometer"}
+
+
+def _to_settle(one: Judgement, basis: Basis) -> Iterator[_Step]:
+    decides = one.decides
+    away = abs(math.log(decides.margin))
+    if decides.expected.spread is not None:
+        more = specimens_needed(decides.expected, away)
+        if more:
+            yield _Step("add_specimens", (one.sensor, None), one.name, True, specimens=more)
+        return
+    key, duration = _longest(one.sensor, decides, basis)
+    low, high = decides.margins
+    if duration is None or not low or math.isinf(high):
+        return
+    # The side of the interval that reaches over 1.
+    half = (
+        math.log(decides.margin / low) if decides.margin > 1.0 else math.log(high / decides.margin)
+    )
+    if 0.0 < half <= away * math.sqrt(_LONGEST):
+        needed = duration * (half / away) ** 2
+        yield _Step("log_longer", key, one.name, True, duration=max(needed, _told_by(one)))
+
+
+def specimens_needed(found: Expected, away: float) -> int | None:
+    """Return how many more specimens would bring the limits of an error within a distance.
+
+    t sqrt(tau^2 (1 + 1/n)) with n - 1 degrees of freedom, where the spread stays what it is: the
+    errors of the logs are left out.
+
+    Parameters
+    ----------
+    found : Expected
+        With a spread.
+    away : float
+        Logarithm of the margin: how far the limits may be.
+
+    Returns
+    -------
+    int or None
+        None where 20 specimens would not do.
+    """
+    assert found.spread is not None
+    for number in range(found.specimens + 1, _MOST_SPECIMENS + 1):
+        half = float(stdtrit(number - 1, 0.975)) * math.sqrt(
+            found.spread.variance * (1.0 + 1.0 / number)
+        )
+        if half <= away:
+            return number - found.specimens
+    return None
+
+
+def _to_strengthen(one: Judgement, reason: str, basis: Basis) -> Iterator[_Step]:
+    key, duration = _longest(one.sensor, one.decides, basis)
+    if reason == "one_specimen":
+        more = _ENOUGH_SPECIMENS - one.decides.expected.specimens
+        yield _Step("add_specimens", (one.sensor, None), one.name, False, specimens=more)
+    elif reason == "short_log" and duration is not None:
+        yield _Step("log_longer", key, one.name, False, duration=_told_by(one))
+    elif reason == "few_axes":
+        yield _Step("add_channels", key, one.name, False, what="all three axes")
+    elif reason not in REASONS:
+        for total in one.decides.totals:
+            own = one.sensor, total["recording"]
+            said = [row for row in basis.doubts.get(own, ()) if row["code"] == reason]
+            if any(row["factor"] is not None for row in said):
+                what = _quantities(basis.factors(own))
+                yield _Step("check_unit", own, one.name, False, what=what)
+            elif said:
+                what = reason.replace("_", " ")
+                yield _Step("record_again", own, one.name, False, what=what)
+
+
+def _quantities(names: Iterable[str]) -> str:
+    return " and ".join(f"the {_NAMES[name]}" for name in names)
+
+
+def _longest(sensor: str, standing: Standing, basis: Basis) -> tuple[Key, float | None]:
+    """Return the recording of a standing that is longest, and its duration."""
+    found = [(sensor, row["recording"]) for row in standing.totals]
+    key = max(found, key=lambda one: basis.duration(one) or 0.0)
+    return key, basis.duration(key)
+
+
+def _told_by(one: Judgement) -> float:
+    """Return the length of a log that tells the error of the limit that decides, s."""
+    return longest_asked(one.decides.total, one.requirement) / LONGEST_PART
+
+
+def _row(steps: Sequence[_Step], basis: Basis) -> dict[str, Any]:
+    first = steps[0]
+    turned = {step.requirement for step in steps if step.turns}
+    strengthened = {step.requirement for step in steps} - turned
+    duration = max((step.duration for step in steps if step.duration), default=None)
+    specimens = max((step.specimens for step in steps if step.specimens), default=None)
+    whats = ", ".join(
+        dict.fromkeys(part for step in steps if step.what for part in step.what.split(", "))
+    )
+    sensor, recording = first.key
+    effect = _effect(first.action, len(turned), len(strengthened))
+    logged = basis.duration((sensor, recording)) if recording else None
+    what = _what_to_do(first.action, recording, whats, duration, logged, specimens)
+    return {
+        "sensor": sensor,
+        "recording": recording,
+        "requirements": ", ".join(dict.fromkeys(step.requirement for step in steps)),
+        "action": first.action,
+        "verdicts_turned": len(turned),
+        "verdicts_strengthened": len(strengthened),
+        "duration": duration,
+        "specimens": specimens,
+        "text": f"{what}: {effect}",
+    }
+
+
+def _what_to_do(
+    action: Action,
+    recording: str | None,
+    what: str,
+    duration: float | None,
+    logged: float | None,
+    specimens: int | None,
+) -> str:
+    match action:
+        case "check_unit":
+            return f"check the unit of {what} in {recording}"
+        case "find_figures":
+            return f"find out what its file does not say: {what}"
+        case "record_again":
+            return f"record {recording} again ({what})"
+        case "add_channels":
+            return f"log {what}, which {recording} does not have"
+        case "log_longer":
+            assert duration is not None  # of every such step
+            more = duration - (logged or 0.0)
+            return f"log {recording} for {_time(more)} more, {_time(duration)} in all"
+    return f"log {specimens} more {'specimen' if specimens == 1 else 'specimens'}"
+
+
+_WOULD = {"check_unit": "turn", "record_again": "allow", "add_channels": "allow"}
+"""What a step does with verdicts; else it settles them, if the figures stay what they are."""
+
+
+def _effect(action: Action, turned: int, strengthened: int) -> str:
+    if action == "find_figures":
+        return f"it would free {_verdicts(strengthened)} of a condition"
+    parts = []
+    if turned:
+        parts.append(f"would {_WOULD.get(action, 'settle')} {_verdicts(turned)}")
+    if strengthened:
+        parts.append(f"would give {_verdicts(strengthened)} stronger evidence")
+    return "it " + " and ".join(parts)
+
+
+def _verdicts(number: int) -> str:
+    return f"{number} {'verdict' if number == 1 else 'verdicts'}"
+
+
+def _time(seconds: float) -> str:
+    """Return a length of time in the unit that suits it, to two digits, rounded up."""
+    for unit, size in (("h", 3600.0), ("min", 60.0)):
+        if seconds >= size:
+            number = seconds / size
+            return f"{math.ceil(number) if number >= 10 else math.ceil(10 * number) / 10:g} {unit}"
+    return f"{math.ceil(seconds)} s"

@@ -1,0 +1,168 @@
+"""How a sensor stands to one limit of a requirement, and which limit decides."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from imubench_pipeline.navigation.suitability.conditions import is_condition, named, parts_of
+from imubench_pipeline.navigation.verdicts.specimens import Expected, Spread, expected
+from imubench_pipeline.typing import Row
+
+_SURE = 0.975
+"""Chance from which a verdict is sure."""
+
+VAGUE = 4.0
+"""Upper over lower limit of an error beyond which a log says too little."""
+
+
+@dataclass(frozen=True)
+class Standing:
+    """What a sensor makes of one limit of a requirement.
+
+    Attributes
+    ----------
+    total : mapping
+        Row ``total`` of the table ``error_budget`` of the recording that answers: of several, the
+        one whose error is nearest to what is expected.
+    totals : sequence of mapping
+        Those of all recordings with a figure.
+    expected : Expected
+        The error, of the next specimen where there are several.
+    source : str or None
+        The largest contribution.
+    share : float or None
+        Its part of the variance.
+    parts : str or None
+        All sources that count.
+    conditions : tuple of mapping
+        Rows of sources whose figure is not known, or breaks the limit until it is calibrated.
+    """
+
+    total: Row
+    totals: Sequence[Row]
+    expected: Expected
+    source: str | None = None
+    share: float | None = None
+    parts: str | None = None
+    conditions: tuple[Row, ...] = ()
+
+    @property
+    def known(self) -> bool:
+        """Whether there is a figure."""
+        return self.expected.sigma is not None
+
+    @property
+    def margin(self) -> float:
+        """How many times the error fits into the limit."""
+        return _over(self.total["limit"], self.expected.sigma)
+
+    @property
+    def margins(self) -> tuple[float, float]:
+        """95 % limits of the margin."""
+        limit = self.total["limit"]
+        return _over(limit, self.expected.upper), _over(limit, self.expected.lower)
+
+    @property
+    def chance(self) -> float:
+        """Chance that the error is within its limit, as far as logs and specimens tell."""
+        assert self.expected.within is not None  # of a known error with a limit
+        return self.expected.within
+
+    @property
+    def wide(self) -> bool:
+        """Whether the limits of the error are far apart."""
+        low, high = self.margins
+        return low <= 0.0 or high / low > VAGUE
+
+    @property
+    def _vague(self) -> bool:
+        """Whether the log that answers says too little: two specimens do not know their spread."""
+        lower, upper = self.total["lower"], self.total["upper"]
+        return bool(lower <= 0.0 or upper / lower > VAGUE)
+
+    @property
+    def verdict(self) -> str:
+        """The chance in words."""
+        if not self.known:
+            return "not enough data"
+        if self._vague and 1.0 - _SURE < self.chance < _SURE:
+            return "not enough data"
+        for least, words in ((_SURE, "passes"), (0.5, "probably passes")):
+            if self.chance >= least:
+                return words
+        return "probably fails" if self.chance > 1.0 - _SURE else "surely fails"
+
+
+def standings(
+    rows: Iterable[Row],
+    devices: Mapping[str, str],
+    usual: Mapping[tuple[Any, ...], Spread] | None = None,
+) -> list[Standing]:
+    """Return how one sensor stands to each limit of one requirement.
+
+    Parameters
+    ----------
+    rows : iterable of mapping
+        Of the table ``error_budget``.
+    devices : mapping of str to str
+        The specimen of each recording.
+    usual : mapping, optional
+        The spread of other sensors by `limit_of`.
+    """
+    by_limit: dict[tuple[Any, ...], list[Row]] = {}
+    for row in rows:
+        by_limit.setdefault(limit_of(row), []).append(row)
+    return [_standing(parts, devices, (usual or {}).get(key)) for key, parts in by_limit.items()]
+
+
+def limit_of(row: Row) -> tuple[Any, ...]:
+    """Return what names the limit of a row."""
+    return row["error"], row["time"], row["limit"]
+
+
+def _standing(parts: Sequence[Row], devices: Mapping[str, str], usual: Spread | None) -> Standing:
+    totals = [row for row in parts if row["source"] == "total"]
+    known = [row for row in totals if row["sigma"] is not None]
+    found = expected(known, devices, usual)
+    if found.sigma is None:
+        return Standing(totals[0], known, found)
+    answer = min(known, key=lambda row: _apart(row["sigma"], found.sigma))
+    own = [
+        row for row in parts if row["source"] != "total" and row["recording"] == answer["recording"]
+    ]
+    conditions = tuple(row for row in own if is_condition(row))
+    sources = [row for row in own if row["sigma"] is not None]
+    largest = max(sources, key=lambda row: row["sigma"], default=None)
+    if largest is None or answer["sigma"] == 0.0:
+        return Standing(answer, known, found, conditions=conditions)
+    share = (largest["sigma"] / answer["sigma"]) ** 2
+    parts_said = parts_of(answer["sigma"], sources)
+    return Standing(answer, known, found, named(largest), share, parts_said, conditions)
+
+
+def deciding(found: Sequence[Standing]) -> Standing:
+    """Return the limit that decides: one that surely fails, whatever is not known of others.
+
+    Parameters
+    ----------
+    found : sequence of Standing
+        Of one sensor.
+    """
+    known = [one for one in found if one.known]
+    worst = min(known, key=lambda one: one.margin, default=found[0])
+    unknown = [one for one in found if not one.known]
+    return worst if not unknown or worst.verdict == "surely fails" else unknown[0]
+
+
+def _apart(sigma: float, other: float | None) -> float:
+    """Return how far two errors are apart, as a factor from 0 up."""
+    if not other or not sigma:
+        return abs(sigma - (other or 0.0))
+    return abs(math.log(sigma / other))
+
+
+def _over(limit: float, error: float | None) -> float:
+    return limit / error if error else math.inf

@@ -1,0 +1,188 @@
+"""Verdicts that a doubt of a unit could turn: as logged, and with the factor of the doubt.
+
+Every noise source of a quantity in another unit is multiplied by one factor f, since all errors
+are linear in it: sigma'^2 = sum of the other sources^2 + f^2 sum of its own^2. What a requirement
+states, or a datasheet prints, stays. The limits keep their distance from sigma as factors: exact
+where one quantity makes the error, as it does where a unit turns a verdict.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from scipy.special import ndtr
+
+from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.navigation.verdicts.basis import Basis
+from imubench_pipeline.navigation.verdicts.sources import quantity_behind
+from imubench_pipeline.navigation.verdicts.standing import Standing, deciding, limit_of, standings
+from imubench_pipeline.typing import Row
+
+Factors = Mapping[str, float]  # by quantity
+
+_MEANT = {
+    "gyro": (
+        (math.radians(1.0), "°/s, and not rad/s"),
+        (math.degrees(1.0), "rad/s, and not °/s"),
+    ),
+    "accel": (
+        (STANDARD_GRAVITY, "g, and not m/s²"),
+        (1.0 / STANDARD_GRAVITY, "m/s², and not g"),
+        (1e-3, "mg, and not g"),
+        (1e3, "g, and not mg"),
+    ),
+}
+"""What is meant where a factor mends figures."""
+
+_NORMAL = 1.959963984540054  # 97.5 % of the standard normal
+
+
+@dataclass(frozen=True)
+class Unless:
+    """What the verdict on a sensor would be.
+
+    Attributes
+    ----------
+    logged : Standing or None
+        The limit that would decide with the figures as they were logged; None: as it does.
+    mended : Standing or None
+        With the factors of the doubts; None where there are none.
+    factors : mapping of str to float
+        By quantity.
+    doubts : mapping of (str, str) to str
+        What is doubted of each recording that is concerned.
+    """
+
+    logged: Standing | None
+    mended: Standing | None
+    factors: Factors
+    doubts: Mapping[tuple[str, str], str]
+
+
+def unless(sensor: str, rows: Sequence[Row], found: Standing, basis: Basis) -> Unless | None:
+    """Return what the verdict on a sensor would be if what is doubted were mended.
+
+    Parameters
+    ----------
+    sensor : str
+    rows : sequence of mapping
+        Of the table ``error_budget``, of one requirement, with the figures of all recordings.
+    found : Standing
+        The limit that decides.
+    basis : Basis
+
+    Returns
+    -------
+    Unless or None
+        None where there is nothing to say. Where all recordings of a sensor were left out, it says
+        what they would give as they were logged; else what another unit would turn.
+    """
+    keys = list(dict.fromkeys((sensor, row["recording"]) for row in rows))
+    apart = [key for key in keys if key in basis.apart]
+    unjudged = len(apart) == len(keys) and bool(keys)
+    doubted = [key for key in keys if basis.factors(key) and (unjudged or key not in apart)]
+    if not unjudged and not doubted:
+        return None
+    own = [row for row in rows if unjudged or (sensor, row["recording"]) not in apart]
+    devices = {name: basis.device((of, name)) for of, name in keys}
+    logged = deciding(standings(own, devices))
+    factors = {key: basis.factors(key) for key in doubted}
+    mended = deciding(standings(list(_mended(own, factors)), devices)) if factors else None
+    if mended is not None and not unjudged and mended.verdict == logged.verdict:
+        mended = None
+    if not logged.known or (mended is None and not unjudged):
+        return None
+    said = {key: basis.doubted(key) for key in (doubted or apart)}
+    together = {name: f for one in factors.values() for name, f in one.items()}
+    return Unless(logged if unjudged else None, mended, together, said)
+
+
+def _mended(rows: Iterable[Row], factors: Mapping[tuple[str, str], Factors]) -> Iterator[Row]:
+    """Yield rows with the figures that recordings would have in the other unit."""
+    by_total: dict[tuple[Any, ...], list[Row]] = {}
+    for row in rows:
+        by_total.setdefault((row["sensor"], row["recording"], *limit_of(row)), []).append(row)
+    for (sensor, recording, *_), parts in by_total.items():
+        yield from scaled(parts, factors.get((sensor, recording), {}))
+
+
+def scaled(parts: Sequence[Row], factors: Factors) -> list[Row]:
+    """Return the rows of one error of one recording with quantities multiplied.
+
+    Parameters
+    ----------
+    parts : sequence of mapping
+        Rows of the table ``error_budget``: ``total``, and its sources.
+    factors : mapping of str to float
+        By quantity, gyro and accel.
+    """
+    sources = [
+        {**row, "sigma": factors.get(quantity_behind(row["source"]) or "", 1.0) * row["sigma"]}
+        for row in parts
+        if row["source"] != "total" and row["sigma"] is not None
+    ]
+    missing = [row for row in parts if row["source"] != "total" and row["sigma"] is None]
+    (total,) = (row for row in parts if row["source"] == "total")
+    if not total["sigma"] or not sources:
+        return list(parts)
+    sigma = math.hypot(*(row["sigma"] for row in sources))
+    by = sigma / total["sigma"]
+    limits = {name: by * total[name] for name in ("lower", "upper")}
+    changed = {**total, "sigma": sigma, **limits}
+    return [{**changed, "within": _within(changed), "reached_after": None}, *sources, *missing]
+
+
+def _within(total: Row) -> float | None:
+    """Return the chance that an error is within its limit, log-normal on either side."""
+    if total["limit"] is None:
+        return None
+    away = math.log(total["limit"] / total["sigma"])
+    if away <= 0.0 and total["lower"] <= 0.0:
+        return 0.5  # the limits leave it open
+    side = total["upper"] / total["sigma"] if away > 0.0 else total["sigma"] / total["lower"]
+    half = math.log(side)
+    if half <= 0.0:
+        return 1.0 if away >= 0.0 else 0.0
+    return float(ndtr(_NORMAL * away / half))
+
+
+def unless_words(found: Unless) -> str:
+    """Return in words what the verdict would be.
+
+    Parameters
+    ----------
+    found : Unless
+    """
+    parts = []
+    if found.logged is not None:
+        parts.append(f"as logged it {_outcome(found.logged)}")
+    if found.mended is not None:
+        outcome = _outcome(found.mended)
+        if found.logged is not None and found.logged.verdict == found.mended.verdict:
+            outcome = outcome.replace(found.mended.verdict, "does so too")
+        parts.append(f"if {_units(found.factors)}, it {outcome}")
+    return "; ".join(parts)
+
+
+def _outcome(standing: Standing) -> str:
+    if standing.verdict == "not enough data":
+        reason = "" if standing.known else f" ({standing.total['reason']})"
+        return f"cannot be judged{reason}"
+    return f"{standing.verdict} (margin {standing.margin:.3g})"
+
+
+def _units(factors: Factors) -> str:
+    named = []
+    for quantity, factor in sorted(factors.items(), reverse=True):
+        name = "gyro" if quantity == "gyro" else "accelerometer"
+        for size, units in _MEANT[quantity]:
+            if math.isclose(factor, size, rel_tol=1e-6):
+                named.append(f"the {name} is in {units}")
+                break
+        else:
+            times, way = (1.0 / factor, "large") if factor < 1.0 else (factor, "small")
+            named.append(f"the figures of the {name} are {times:.3g} times too {way}")
+    return " and ".join(named)

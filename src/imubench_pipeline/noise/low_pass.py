@@ -1,0 +1,172 @@
+"""The low-pass filter of a sensor, in continuous time: first order, or Butterworth of order n."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.linalg import block_diag
+
+from imubench_pipeline.typing import Array
+
+_HIGHEST_ORDER = 10
+
+_FOLDS = 2
+"""Folds on each side that are added one by one, besides those up to four times the cut-off."""
+
+
+@dataclass(frozen=True)
+class LowPass:
+    """A low-pass filter of unit gain at rest: v' = F v + b u, y = c v.
+
+    It is a chain of sections of first and second order, so that its states have the size of the
+    signal, whatever the cut-off frequency.
+
+    Parameters
+    ----------
+    cutoff : float
+        Frequency at which the power is halved (-3 dB), Hz.
+    order : int
+        1, or the order of the Butterworth filter.
+
+    Raises
+    ------
+    ValueError
+        If the cut-off is not above 0, or the order not from 1 to 10.
+    """
+
+    cutoff: float
+    order: int = 1
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.cutoff) and self.cutoff > 0):
+            raise ValueError(f"the cut-off is {self.cutoff}, expected a frequency above 0")
+        if not 1 <= self.order <= _HIGHEST_ORDER:
+            raise ValueError(f"the order is {self.order}, expected 1 to {_HIGHEST_ORDER}")
+
+    @property
+    def angular_cutoff(self) -> float:
+        """Angular cut-off frequency, rad/s."""
+        return 2.0 * math.pi * self.cutoff
+
+    @property
+    def transition(self) -> Array:
+        """F, shape (order, order), 1/s."""
+        sections, _ = self._sections()
+        matrix = np.asarray(block_diag(*sections), dtype=np.float64)
+        begin = 0
+        for section, following in pairwise(sections):
+            # The first state of a section is its output, and the last one takes its input.
+            matrix[begin + len(section) + len(following) - 1, begin] = 1.0
+            begin += len(section)
+        return self.angular_cutoff * matrix
+
+    @property
+    def input(self) -> Array:
+        """Column b, shape (order,), 1/s."""
+        sections, _ = self._sections()
+        column = np.zeros(self.order)
+        column[len(sections[0]) - 1] = self.angular_cutoff
+        return column
+
+    @property
+    def output(self) -> Array:
+        """Row c, shape (order,)."""
+        sections, _ = self._sections()
+        row = np.zeros(self.order)
+        row[self.order - len(sections[-1])] = 1.0
+        return row
+
+    @property
+    def steady_state(self) -> Array:
+        """States at rest under a unit input, -F^-1 b, shape (order,)."""
+        _, states = self._sections()
+        return states
+
+    def power(self, frequency: ArrayLike) -> Array:
+        """Return |H|^2 = 1 / (1 + (f / cutoff)^(2 order)).
+
+        Parameters
+        ----------
+        frequency : array_like
+            Hz.
+
+        Returns
+        -------
+        ndarray
+            Gain of the power, in the shape of ``frequency``.
+        """
+        square = np.square(np.asarray(frequency, dtype=np.float64) / self.cutoff)
+        # Products: numpy takes ten times as long for a power above 2.
+        return np.asarray(1.0 / (1.0 + math.prod([square] * self.order)))
+
+    def folded_power(self, frequency: ArrayLike, rate: float) -> Array:
+        """Return the power gain of white noise behind the filter, sampled.
+
+        For n = 1 the sum over the folds is (pi f_c / f_s) sinh(2 pi f_c / f_s) / (cosh(2 pi f_c /
+        f_s) - cos(2 pi f / f_s)), the spectrum of a sampled Gauss-Markov process.
+
+        Parameters
+        ----------
+        frequency : array_like
+            Hz, up to Nyquist.
+        rate : float
+            f_s, Hz.
+
+        Returns
+        -------
+        ndarray
+            In the shape of the frequencies.
+        """
+        f = np.asarray(frequency, dtype=np.float64)
+        if self.order == 1:
+            h = 2.0 * np.pi * self.cutoff / rate
+            # Both over e^h, which may be great.
+            decay = math.exp(-h)
+            sine, cosine = 0.5 * -math.expm1(-2.0 * h), 0.5 * (1.0 + decay**2)
+            return np.asarray(0.5 * h * sine / (cosine - decay * np.cos(2.0 * np.pi * f / rate)))
+        folds = _FOLDS + math.ceil(4.0 * self.cutoff / rate)
+        total = np.zeros(f.shape)
+        for k in range(-folds, folds + 1):
+            total += self.power(f + k * rate)
+        # Folds beyond: the integral of (f / f_c)^(-2 n) on each side, with the next term of the
+        # sum formula of Euler and Maclaurin.
+        steep = 2 * self.order
+        for side in (f, -f):
+            end = (folds + 0.5) + side / rate
+            rest = (self.cutoff / rate) ** steep / math.prod([end] * (steep - 1)) / (steep - 1)
+            total += rest * (1.0 - steep * (steep - 1) / 24.0 / end**2)
+        return np.asarray(total)
+
+    def response(self, frequency: float) -> complex:
+        """Return H: gain and phase of a sinusoid.
+
+        Parameters
+        ----------
+        frequency : float
+            Hz.
+
+        Returns
+        -------
+        complex
+        """
+        s = 1j * frequency / self.cutoff
+        poles = np.exp(
+            1j * math.pi * (2 * np.arange(1, self.order + 1) + self.order - 1) / (2 * self.order)
+        )
+        return complex(1.0 / np.prod((s - poles) / -poles))
+
+    def _sections(self) -> tuple[list[Array], Array]:
+        """Return the matrices of the sections at a cut-off of 1 rad/s, and the states at rest."""
+        damping = [
+            math.sin(math.pi * (2 * j - 1) / (2 * self.order))
+            for j in range(1, self.order // 2 + 1)
+        ]
+        sections = [np.array([[0.0, 1.0], [-1.0, -2.0 * zeta]]) for zeta in damping]
+        if self.order % 2:
+            sections.append(np.array([[-1.0]]))
+        steady_state = np.concatenate([np.eye(len(section))[0] for section in sections])
+        return sections, steady_state

@@ -1,0 +1,232 @@
+"""The noise model of one axis: the sum of its terms."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.linalg import block_diag
+
+from imubench_pipeline.noise.flicker import bank
+from imubench_pipeline.noise.state_space import StateSpace
+from imubench_pipeline.noise.terms import (
+    FLOOR,
+    PEAK_TAU,
+    Flicker,
+    GaussMarkov,
+    Quantization,
+    Ramp,
+    RandomWalk,
+    Sinusoid,
+    Term,
+    WhiteNoise,
+    bias_instability,
+    driving_density,
+    gauss_markov_shape,
+    sampled_gauss_markov_shape,
+)
+from imubench_pipeline.typing import Array
+
+__all__ = [
+    "FLOOR",
+    "PEAK_TAU",
+    "Flicker",
+    "GaussMarkov",
+    "NoiseModel",
+    "Quantization",
+    "Ramp",
+    "RandomWalk",
+    "Sinusoid",
+    "StateSpace",
+    "Term",
+    "WhiteNoise",
+    "bias_instability",
+    "driving_density",
+    "gauss_markov_shape",
+    "sampled_gauss_markov_shape",
+]
+
+_LONGEST_FLICKER = 1e5
+"""Tau in s up to which a state space follows flicker noise, where nothing else is asked."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class NoiseModel:
+    """The stochastic error of one axis, the sum of its terms (000 eq. 2; IEEE Std 952, 647).
+
+    Parameters
+    ----------
+    Q : float
+        Quantization, rad or m/s; 0: none.
+    N : float
+        White noise density, rad/s/sqrt(Hz) or m/s^2/sqrt(Hz); 0: none.
+    B, T_B : float
+        Bias instability, rad/s or m/s^2. With a correlation time, s, it is the Gauss-Markov
+        process of the papers; without one it is flicker noise, as IEEE Std 952 has it.
+        B = 0: none.
+    K : float
+        Random walk, rad/s/sqrt(s) or m/s^2/sqrt(s); 0: none.
+    R : float
+        Ramp, rad/s^2 or m/s^3; its sign is kept; 0: none.
+    further : sequence of GaussMarkov
+        More Gauss-Markov processes.
+    sinusoids : sequence of Sinusoid
+        Lines.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is negative (R apart) or not finite, or T_B is not above 0.
+    """
+
+    Q: float = 0.0
+    N: float = 0.0
+    B: float = 0.0
+    T_B: float | None = None
+    K: float = 0.0
+    R: float = 0.0
+    further: Sequence[GaussMarkov] = ()
+    sinusoids: Sequence[Sinusoid] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("Q", "N", "B", "K"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0):
+                raise ValueError(f"{name} is {value}, expected a number from 0")
+        if not math.isfinite(self.R):
+            raise ValueError(f"R is {self.R}, expected a finite number")
+        if self.T_B is not None and not (math.isfinite(self.T_B) and self.T_B > 0):
+            raise ValueError(f"T_B is {self.T_B}, expected a time above 0, or None for flicker")
+
+    @property
+    def terms(self) -> Sequence[Term]:
+        """The terms that are not zero."""
+        terms: list[Term] = []
+        if self.Q > 0:
+            terms.append(Quantization(self.Q))
+        if self.N > 0:
+            terms.append(WhiteNoise(self.N))
+        if self.B > 0:
+            terms.append(Flicker(self.B) if self.T_B is None else GaussMarkov(self.B, self.T_B))
+        terms.extend(self.further)
+        if self.K > 0:
+            terms.append(RandomWalk(self.K))
+        if self.R != 0:
+            terms.append(Ramp(self.R))
+        terms.extend(self.sinusoids)
+        return terms
+
+    @property
+    def name(self) -> str:
+        """The terms, such as ``N+GM+K`` (F: flicker, S: a line); ``none`` where there are none."""
+        return "+".join(term.symbol for term in self.terms) or "none"
+
+    def psd(self, frequency: ArrayLike, rate: float | None = None) -> Array:
+        """Return the two-sided power spectral density.
+
+        Parameters
+        ----------
+        frequency : array_like
+            Hz, not 0.
+        rate : float, optional
+            Hz; only quantization noise depends on it.
+
+        Returns
+        -------
+        ndarray
+            (rad/s)²/Hz or (m/s²)²/Hz, in the shape of ``frequency``; lines have none.
+
+        Raises
+        ------
+        ValueError
+            If there is quantization noise, and no rate.
+        """
+        f = np.asarray(frequency, dtype=np.float64)
+        interval = None if rate is None else 1.0 / rate
+        return _sum([term.psd(f, interval) for term in self.terms], f)
+
+    def allan_variance(self, tau: ArrayLike, rate: float | None = None) -> Array:
+        """Return the Allan variance.
+
+        Parameters
+        ----------
+        tau : array_like
+            Cluster length, s.
+        rate : float, optional
+            Hz; given, the result is that of the process sampled at this rate, exactly.
+
+        Returns
+        -------
+        ndarray
+            (rad/s)² or (m/s²)², in the shape of ``tau``.
+
+        Raises
+        ------
+        ValueError
+            If a rate is given and a cluster holds no sample: it is taken to the nearest number.
+        """
+        t = np.asarray(tau, dtype=np.float64)
+        if rate is None:
+            parts = [term.allan_variance(t) for term in self.terms]
+        else:
+            n = np.rint(t * rate)
+            if (n < 1.0).any():
+                raise ValueError(
+                    f"a cluster of {t.min():g} s holds no sample at {rate:g} Hz, expected one"
+                )
+            parts = [term.sampled_allan_variance(n, 1.0 / rate) for term in self.terms]
+        return _sum(parts, t)
+
+    def sampled_spectrum(self, omega: ArrayLike, rate: float) -> Array:
+        """Return the spectrum of the samples at angular frequencies in rad a sample, SI^2.
+
+        The mean is left out: ramps and lines have none.
+        """
+        w = np.asarray(omega, dtype=np.float64)
+        return _sum([term.sampled_spectrum(w, 1.0 / rate) for term in self.terms], w)
+
+    def realised(self, interval: float, longest: float) -> Sequence[Term]:
+        """Return the terms with flicker noise as Gauss-Markov processes (`flicker.bank`).
+
+        Parameters
+        ----------
+        interval : float
+            Sampling interval, s.
+        longest : float
+            Tau up to which the flicker noise is followed, s.
+        """
+        terms: list[Term] = []
+        for term in self.terms:
+            terms.extend(bank(term.B, interval, longest) if isinstance(term, Flicker) else [term])
+        return terms
+
+    def state_space(self, rate: float, longest: float = _LONGEST_FLICKER) -> StateSpace:
+        """Return the discrete state space with exact noise covariances.
+
+        The states are those of the terms in their order; N is the measurement noise (000 eq.
+        18-23; the printed first entry of Q_d, S_B T, is an approximation).
+
+        Parameters
+        ----------
+        rate : float
+            Hz.
+        longest : float
+            Tau up to which flicker noise is followed, s; only then it has several states.
+        """
+        spaces = [term.state_space(1.0 / rate) for term in self.realised(1.0 / rate, longest)]
+        spaces.append(StateSpace.without_states(0.0))
+        return StateSpace(
+            block_diag(*(space.transition for space in spaces)),
+            block_diag(*(space.process_noise for space in spaces)),
+            np.concatenate([space.output for space in spaces]),
+            sum(space.measurement_noise for space in spaces),
+            np.concatenate([space.initial_mean for space in spaces]),
+            block_diag(*(space.initial_variance for space in spaces)),
+        )
+
+
+def _sum(parts: Sequence[Array], like: Array) -> Array:
+    return np.asarray(np.sum(parts, axis=0)) if parts else np.zeros_like(like)

@@ -1,0 +1,140 @@
+"""How much a standard deviation is off because the noise model it comes from is an estimate.
+
+A filter, a bound or a standard error takes N, B, T_B and K as if they were known. Computed again
+for models drawn from what is known of the parameters it has a range: the true standard deviation
+lies in it as often as is said, as far as what is known of the parameters holds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from imubench_pipeline.noise.model import NoiseModel
+from imubench_pipeline.typing import Array
+
+Sigma = Callable[[NoiseModel], ArrayLike]
+"""A standard deviation, or several, from a noise model; the same shape for every model."""
+
+_SCALED = ("Q", "N", "B", "T_B", "K")
+
+
+@dataclass(frozen=True)
+class SigmaRange:
+    """Standard deviations, and the range that the noise parameters leave them.
+
+    Attributes
+    ----------
+    value : ndarray, shape (...)
+        With the parameters as they are estimated.
+    lower, upper : ndarray, shape (...)
+        Limits of those of the drawn models.
+    pooled : ndarray, shape (...)
+        Root of their mean square: the standard deviation of an error whose noise model is one of
+        these, no one knows which (law of total variance; the estimates are unbiased with each).
+        Weights that come of another model than the true one add to it, to the second order.
+    """
+
+    value: Array
+    lower: Array
+    upper: Array
+    pooled: Array
+
+
+def sigma_range(
+    sigma: Sigma, model: NoiseModel, drawn: Sequence[NoiseModel], level: float = 0.95
+) -> SigmaRange:
+    """Return the range of a standard deviation over noise models.
+
+    Parameters
+    ----------
+    sigma : callable
+        Such as ``lambda model: RateFilter(blocks, model).rate_sigma[-1]``.
+    model : NoiseModel
+        As estimated.
+    drawn : sequence of NoiseModel
+        From the limits of an estimate (`error_budget.draw_models`), from a covariance of its
+        parameters (`drawn_from_covariance`), or from a posterior.
+    level : float
+        Share of the draws between the limits.
+
+    Returns
+    -------
+    SigmaRange
+
+    Raises
+    ------
+    ValueError
+        If there is no draw, or the level is not between 0 and 1.
+    """
+    if not drawn:
+        raise ValueError("expected noise models, and there is none")
+    if not 0 < level < 1:
+        raise ValueError(f"level is {level}, expected one between 0 and 1")
+    values = np.array([np.asarray(sigma(one), dtype=np.float64) for one in drawn])
+    tail = (1.0 - level) / 2.0
+    lower, upper = np.quantile(values, [tail, 1.0 - tail], axis=0)
+    return SigmaRange(
+        np.asarray(sigma(model), dtype=np.float64),
+        np.asarray(lower),
+        np.asarray(upper),
+        np.sqrt(np.mean(values**2, axis=0)),
+    )
+
+
+def drawn_from_covariance(
+    model: NoiseModel,
+    names: Sequence[str],
+    covariance: Array,
+    draws: int,
+    rng: np.random.Generator,
+) -> list[NoiseModel]:
+    """Return noise models whose parameters are log-normal about those of a model, together.
+
+    Parameters
+    ----------
+    model : NoiseModel
+        Its parameters are the medians.
+    names : sequence of str
+        Of Q, N, B, T_B and K, those that are drawn; the others stay.
+    covariance : ndarray, shape (p, p)
+        Of the natural logarithms of these: for small errors that of the relative errors.
+    draws : int
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    list of NoiseModel
+
+    Raises
+    ------
+    ValueError
+        If a name is not known, the model has no such parameter, or the covariance has not its
+        shape, is not symmetric or not a covariance.
+    """
+    for name in names:
+        if name not in _SCALED:
+            raise ValueError(f"no parameter {name!r}; expected {', '.join(_SCALED)}")
+        if not getattr(model, name):
+            raise ValueError(f"the model {model.name} has no {name}")
+    if covariance.shape != (len(names), len(names)) or not np.allclose(covariance, covariance.T):
+        raise ValueError(f"expected a symmetric covariance of {len(names)} parameters")
+    values, vectors = np.linalg.eigh(covariance)
+    if values.size and values[0] < -1e-9 * max(float(values[-1]), 0.0):
+        raise ValueError("the covariance has a negative eigenvalue")
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    logarithms = rng.standard_normal((draws, len(names))) @ root.T
+    medians = [float(getattr(model, name)) for name in names]
+    found = []
+    for row in logarithms.tolist():
+        changed: dict[str, Any] = {
+            name: median * math.exp(change)
+            for name, median, change in zip(names, medians, row, strict=True)
+        }
+        found.append(replace(model, **changed))
+    return found

@@ -1,0 +1,290 @@
+"""Logs from a noise model: full length, or just the Allan variances of many.
+
+A full-length log comes from the discrete state-space model, block by block. The Allan
+variances of an ensemble need no full-length logs: at long tau they follow from sums over
+blocks of samples, which are drawn jointly with the state (exact); at short tau, where a
+thousand clusters and more are averaged, from their covariance.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from imubench_pipeline.allan import of_phase
+from imubench_pipeline.allan.phase import integrate
+from imubench_pipeline.noise.model import NoiseModel, Quantization, Ramp, Sinusoid, WhiteNoise
+from imubench_pipeline.noise.variance_covariance import variance_covariance
+from imubench_pipeline.typing import Array
+
+_BLOCK = 1 << 20
+_SUMS = 1 << 12
+"""Blocks that a member of the ensemble is made of, at most."""
+
+_BLOCKS_IN_CLUSTER = 16
+"""Clusters of fewer blocks are drawn from the covariance of the Allan variances."""
+
+
+def channel_rng(seed: int, *names: str) -> np.random.Generator:
+    """Return the random stream of a channel: it depends on the seed and the names only."""
+    digest = hashlib.sha256("/".join(names).encode()).digest()
+    words = [int.from_bytes(digest[i : i + 4], "little") for i in range(0, 16, 4)]
+    return np.random.default_rng([seed, *words])
+
+
+def simulate(model: NoiseModel, rate: float, samples: int, rng: np.random.Generator) -> Array:
+    """Return a simulated log.
+
+    Parameters
+    ----------
+    model : NoiseModel
+    rate : float
+        Hz.
+    samples : int
+        Length of the log.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    ndarray, shape (samples,)
+        rad/s or m/s². Stationary processes start in their stationary distribution, the random
+        walk and the ramp at 0, sinusoids at a random phase; flicker noise is a bank of
+        Gauss-Markov processes up to the length of the log.
+    """
+    blocks = list(simulate_blocks(model, rate, samples, rng))
+    return np.concatenate(blocks) if blocks else np.empty(0)
+
+
+def simulate_blocks(
+    model: NoiseModel, rate: float, samples: int, rng: np.random.Generator, block: int = _BLOCK
+) -> Iterator[Array]:
+    """Yield a simulated log in blocks; the log does not depend on their size (see `simulate`)."""
+    interval = 1.0 / rate
+    terms = model.realised(interval, max(samples, 2) * interval)
+    white, *streams = rng.spawn(1 + len(terms))
+    spaces = [term.state_space(interval) for term in terms]
+    states = [term.start(stream, interval) for term, stream in zip(terms, streams, strict=True)]
+    spread = math.sqrt(sum(space.measurement_noise for space in spaces))
+    for start in range(0, samples, block):
+        size = min(block, samples - start)
+        log = white.standard_normal(size) * spread
+        for space, state, stream in zip(spaces, states, streams, strict=True):
+            if len(state):
+                driven = np.flatnonzero(np.diag(space.process_noise))
+                drive = stream.standard_normal((size, len(driven)))
+                drive *= np.sqrt(np.diag(space.process_noise)[driven])
+                _add_states(log, state, space.transition, driven, drive, space.output)
+        yield log
+
+
+@njit(cache=True, nogil=True)
+def _add_states(
+    log: Array,
+    state: Array,
+    transition: Array,
+    driven: NDArray[np.int64],
+    drive: Array,
+    output: Array,
+) -> None:
+    """Add the output of states to a log, and leave the states as they are after its last sample."""
+    if state.size == 1 and driven.size == 1:
+        x, phi, h = state[0], transition[0, 0], output[0]
+        for i in range(log.size):
+            log[i] += h * x
+            x = phi * x + drive[i, 0]
+        state[0] = x
+        return
+    before = np.empty_like(state)
+    for i in range(log.size):
+        for a in range(state.size):
+            log[i] += output[a] * state[a]
+            before[a] = state[a]
+        for a in range(state.size):
+            state[a] = 0.0
+            for b in range(state.size):
+                state[a] += transition[a, b] * before[b]
+        for j in range(driven.size):
+            state[driven[j]] += drive[i, j]
+
+
+def reconstructed_variance(
+    model: NoiseModel,
+    rate: float,
+    samples: int,
+    sizes: NDArray[np.int64],
+    rng: np.random.Generator,
+) -> Array:
+    """Return the Allan variance of one full-length simulated log, shape (m,)."""
+    phase = integrate(simulate_blocks(model, rate, samples, rng), samples, holes=False)
+    return of_phase(phase, rate, sizes).variance
+
+
+def ensemble(
+    model: NoiseModel,
+    rate: float,
+    samples: int,
+    sizes: NDArray[np.int64],
+    members: int,
+    rng: np.random.Generator,
+) -> Array:
+    """Return the Allan variances of an ensemble of simulated logs.
+
+    Parameters
+    ----------
+    model : NoiseModel
+    rate : float
+        Hz.
+    samples : int
+        Length of each log.
+    sizes : ndarray of int, shape (m,)
+        n of each tau.
+    members : int
+        Logs in the ensemble.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    ndarray, shape (members, m)
+        (rad/s)² or (m/s²)².
+    """
+    width = max(1, -(-samples // _SUMS))
+    long = sizes >= (_BLOCKS_IN_CLUSTER * width if width > 1 else 1)
+    result = np.empty((members, len(sizes)))
+    for_short, for_long = rng.spawn(2)
+    if not long.all():
+        result[:, ~long] = _from_covariance(model, rate, samples, sizes[~long], members, for_short)
+    if long.any():
+        result[:, long] = _from_block_sums(
+            model, rate, samples, sizes[long], width, members, for_long
+        )
+    return result
+
+
+def _from_block_sums(
+    model: NoiseModel,
+    rate: float,
+    samples: int,
+    sizes: NDArray[np.int64],
+    width: int,
+    members: int,
+    rng: np.random.Generator,
+) -> Array:
+    blocks = samples // width
+    in_blocks = np.maximum(1, np.rint(sizes / width).astype(np.int64))
+    in_blocks = np.minimum(in_blocks, blocks // 2)
+    # A cluster of whole blocks is a few per cent shorter or longer than the one wanted.
+    scale = model.allan_variance(sizes / rate, rate) / model.allan_variance(
+        in_blocks * width / rate, rate
+    )
+    distinct, place = np.unique(in_blocks, return_inverse=True)
+    result = np.empty((members, len(sizes)))
+    for member in range(members):
+        sums = block_sums(model, rate, blocks, width, rng)
+        phase = integrate([sums / width], blocks, holes=False)
+        variance = _variances(phase.theta, distinct)
+        result[member] = variance[place] * scale
+    return result
+
+
+@njit(cache=True, nogil=True)
+def _variances(theta: Array, sizes: NDArray[np.int64]) -> Array:
+    """Return Allan variances without limits, for the members of an ensemble."""
+    variances = np.empty(sizes.size)
+    for j in range(sizes.size):
+        n = sizes[j]
+        total = 0.0
+        terms = theta.size - 2 * n
+        for i in range(terms):
+            difference = theta[i + 2 * n] - 2.0 * theta[i + n] + theta[i]
+            total += difference * difference
+        variances[j] = total / (2.0 * n * n * terms)
+    return variances
+
+
+def block_sums(
+    model: NoiseModel, rate: float, blocks: int, width: int, rng: np.random.Generator
+) -> Array:
+    """Return the sums over adjacent blocks of ``width`` samples of a simulated log, exactly.
+
+    The sum over a block and the state after it are jointly Gaussian, given the state before.
+    """
+    interval = 1.0 / rate
+    sums = np.zeros(blocks)
+    firsts = np.arange(blocks) * width
+    for term in model.realised(interval, max(blocks * width, 2) * interval):
+        if isinstance(term, WhiteNoise):
+            sums += rng.standard_normal(blocks) * math.sqrt(width * term.N**2 * rate)
+            continue
+        if isinstance(term, Quantization):
+            sums += np.diff(rng.standard_normal(blocks + 1)) * term.Q * rate
+            continue
+        if isinstance(term, Ramp):
+            sums += term.R * interval * (firsts + (width - 1) / 2.0) * width
+            continue
+        if isinstance(term, Sinusoid):
+            half = math.pi * term.frequency * interval
+            gain = term.amplitude * math.sin(width * half) / math.sin(half)
+            phase = rng.uniform(0.0, 2.0 * math.pi)
+            sums += gain * np.cos(half * (2.0 * firsts + width - 1) + phase)
+            continue
+        space = term.state_space(interval)
+        p, drive = float(space.transition[0, 0]), float(space.process_noise[0, 0])
+        start = float(term.start(rng, interval)[0])
+        # The sample i of a block is p^i x + sum_{j<i} p^(i-1-j) w_j.
+        powers = p ** np.arange(width + 1)
+        reach = np.concatenate(([0.0], np.cumsum(powers)))
+        in_sum = reach[width - 1 - np.arange(width)]
+        in_state = powers[width - 1 - np.arange(width)]
+        moments = drive * np.array(
+            [[in_state @ in_state, in_state @ in_sum], [in_state @ in_sum, in_sum @ in_sum]]
+        )
+        to_state = math.sqrt(moments[0, 0])
+        shared = moments[0, 1] / to_state
+        own = math.sqrt(max(moments[1, 1] - shared**2, 0.0))
+        normal = rng.standard_normal((2, blocks))
+        _add_block_sums(
+            sums, start, powers[width], reach[width], normal[0], normal[1], to_state, shared, own
+        )
+    return sums
+
+
+@njit(cache=True, nogil=True)
+def _add_block_sums(
+    sums: Array,
+    state: float,
+    decay: float,
+    gain: float,
+    first: Array,
+    second: Array,
+    to_state: float,
+    shared: float,
+    own: float,
+) -> None:
+    for i in range(sums.size):
+        sums[i] += gain * state + shared * first[i] + own * second[i]
+        state = decay * state + to_state * first[i]
+
+
+def _from_covariance(
+    model: NoiseModel,
+    rate: float,
+    samples: int,
+    sizes: NDArray[np.int64],
+    members: int,
+    rng: np.random.Generator,
+) -> Array:
+    mean = model.allan_variance(sizes / rate, rate)
+    relative = variance_covariance(model, rate, samples, sizes) / np.outer(mean, mean)
+    # Wilson and Hilferty: the cube root of a chi-squared variate is very nearly normal.
+    spread = np.sqrt(np.diag(relative))
+    correlation = relative / np.outer(spread, spread)
+    values, vectors = np.linalg.eigh(correlation)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    normal = rng.standard_normal((members, len(sizes))) @ root.T
+    ninth = spread**2 / 9.0  # 2 / (9 edf) with spread^2 = 2 / edf
+    return np.asarray(mean * (1.0 - ninth + np.sqrt(ninth) * normal) ** 3)

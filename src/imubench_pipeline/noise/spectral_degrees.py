@@ -1,0 +1,248 @@
+"""The degrees of freedom of an Allan variance, from the noise model of the log.
+
+The Allan variance at n samples a cluster is the mean square of M second differences of cumulative
+sums, Gaussian numbers of covariance r_k at lag k. Its variance is 2 / M^2 times the sum of r_k^2
+over all pairs: exact, whatever the spectrum, and at the ends of a log. Of ramps and lines, which
+are no noise, the products with the noise vary.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.allan.presence import Presence
+from imubench_pipeline.allan.quadratic_forms import tail_degrees, variance_degrees
+from imubench_pipeline.noise.model import NoiseModel, Quantization, Ramp, Sinusoid
+from imubench_pipeline.typing import Array
+
+Span = tuple[int, int]
+
+_STEPS = 32
+"""Lags in a cluster's length at which the covariance is taken; linear in between."""
+
+_REACH = 10
+"""Clusters beyond which the differences of any noise are as good as independent."""
+
+_TAIL_STEPS = 12
+_MOST_WITH_TAIL = 30.0
+"""Degrees of freedom up to which the lower tail is sought from the eigenvalues."""
+
+_MOST_EIGENVALUES = 320
+
+_ROUNDED = ((0, 6.0), (1, -4.0), (2, 1.0))
+"""Clusters of lag at which rounded sums are correlated, and the factor of their variance."""
+
+
+@dataclass(frozen=True)
+class Degrees:
+    """Degrees of freedom of an Allan variance over tau.
+
+    Attributes
+    ----------
+    edf : ndarray, shape (m,)
+        Of the chi-squared variate with the same relative variance.
+    upper : ndarray, shape (m,)
+        Of that with the same lower tail, from which the upper limit follows.
+    """
+
+    edf: Array
+    upper: Array
+
+
+def degrees_of_model(
+    model: NoiseModel,
+    rate: float,
+    sizes: NDArray[np.int64],
+    samples: int,
+    segments: Sequence[Span] | None = None,
+    presence: Presence | None = None,
+    share: Array | None = None,
+) -> Degrees:
+    """Return the degrees of freedom of the Allan variances of a Gaussian log of a noise model.
+
+    Parameters
+    ----------
+    model : NoiseModel
+        Its ramp and lines add to the variance, but are no noise.
+    rate : float
+        Hz.
+    sizes : ndarray of int, shape (m,)
+        n of each tau.
+    samples : int
+        L.
+    segments : sequence of (int, int), optional
+        First and one-past-last sample of each; no difference spans two.
+    presence : Presence, optional
+        Of the samples, where some are missing.
+    share : ndarray, shape (m,), optional
+        Part of the differences that the holes leave; all by default.
+
+    References
+    ----------
+    C. Greenhall and W. Riley, "Uncertainty of stability variances based on finite differences",
+    PTTI 2003, for power laws; W. Satterthwaite, "An approximate distribution of estimates of
+    variance components", Biometrics Bulletin 2, 1946.
+    """
+    spans = tuple(segments) if segments else ((0, samples),)
+    left = np.ones(len(sizes)) if share is None else share
+    found = [
+        _degrees(model, 1.0 / rate, int(n), spans, presence, float(part))
+        for n, part in zip(sizes, left, strict=True)
+    ]
+    edf, upper = (np.array(column, dtype=np.float64) for column in zip(*found, strict=True))
+    return Degrees(edf, upper)
+
+
+def _degrees(
+    model: NoiseModel,
+    interval: float,
+    n: int,
+    spans: tuple[Span, ...],
+    presence: Presence | None,
+    share: float,
+) -> tuple[float, float]:
+    """Return both degrees of freedom at a cluster size."""
+    terms = np.array([stop - start - 2 * n + 1 for start, stop in spans])
+    terms = terms[terms > 0]
+    if not len(terms) or not share > 0:
+        return 1.0, 1.0
+    noise = _Covariance(model, n, interval)
+    if not noise.at_zero > 0:
+        return 1.0, 1.0
+    mask = presence.differences(n) if presence is not None else None
+    if mask is None:
+        squares, products = zip(*(noise.sums(int(M)) for M in terms), strict=True)
+        done = share * float(terms.sum())
+        relative = sum(squares) / float(terms.sum()) / done
+        crossed = sum(products) / float(terms.sum()) / done
+    else:
+        there, stride = mask
+        if not there.any():
+            return 1.0, 1.0
+        counted, done = float(there.sum()) * stride, share * float(terms.sum())
+        square, product = noise.masked_sums(there, stride)
+        relative, crossed = square / counted / done, product / counted / done
+    # Variance over squared mean: 2 / edf.
+    mean = noise.at_zero + noise.ramp**2 + noise.lines
+    varied = 2.0 * noise.at_zero**2 * relative
+    varied += 4.0 * noise.ramp**2 * noise.at_zero * crossed + 4.0 * noise.line_products / done
+    edf = max(2.0 * mean**2 / varied, 1.0)
+    if edf > _MOST_WITH_TAIL:
+        return edf, edf
+    weights = noise.eigenvalues(terms, mask)
+    if weights is None:
+        return edf, edf
+    return edf, edf * max(tail_degrees(weights) / variance_degrees(weights), 1.0)
+
+
+class _Covariance:
+    """The covariance of the second differences of a model's cumulative sums, by lag."""
+
+    def __init__(self, model: NoiseModel, n: int, interval: float) -> None:
+        self._n, self._interval = n, interval
+        self._noise = [t for t in model.terms if not isinstance(t, Quantization | Ramp | Sinusoid)]
+        rounded = Quantization(model.Q) if model.Q > 0 else None
+        self._rounding = rounded.Q**2 / interval**2 if rounded else 0.0
+        self.at_zero = float(self._smooth(np.zeros(1))[0]) + 6.0 * self._rounding
+        self.ramp = model.R * interval * n**2
+        self.lines = self.line_products = 0.0
+        for line in model.sinusoids:
+            omega = 2.0 * math.pi * line.frequency * interval
+            half = math.sin(omega / 2.0) or 1e-12
+            gain = 4.0 * math.sin(n * omega / 2.0) ** 4 / half**2
+            power = 0.5 * line.amplitude**2 * gain
+            density = float(model.sampled_spectrum(np.array([omega]), 1.0 / interval)[0])
+            self.lines += power
+            self.line_products += power * density * gain
+
+    def _smooth(self, lags: Array) -> Array:
+        n = self._n
+        total = np.zeros(len(lags))
+        if not self._noise:
+            return total
+        shifted = np.abs(lags[None, :] + n * np.arange(-2.0, 3.0)[:, None])
+        for term in self._noise:
+            total += np.array([1.0, -4.0, 6.0, -4.0, 1.0]) @ term.sum_covariance(
+                shifted, n, self._interval
+            )
+        return total
+
+    def _at(self, lags: NDArray[np.int64]) -> tuple[Array, Array]:
+        """Return the covariance over that at 0 without rounding, and of rounding alone."""
+        smooth = self._smooth(lags.astype(np.float64))
+        rounding = np.zeros(len(lags))
+        for place, factor in _ROUNDED:
+            rounding[lags == place * self._n] = factor * self._rounding
+        return smooth / self.at_zero, rounding / self.at_zero
+
+    def sums(self, terms: int) -> tuple[float, float]:
+        """Return the sums of r_k^2 and r_k over all pairs of consecutive differences."""
+        n = self._n
+        steps = np.arange(_REACH * _STEPS + 1)
+        lags = np.unique(steps * n // _STEPS) if n > _STEPS else np.arange(_REACH * n + 1)
+        longest = terms - 1
+        lags = np.append(lags[lags < longest], longest) if lags[-1] > longest else lags
+        smooth, rounding = self._at(lags)
+        pairs = (terms - lags).astype(np.float64)
+        width = np.diff(lags, prepend=lags[0], append=lags[-1])
+        # Between the lags the sum is that of a line; each end of it counts as a whole lag.
+        weight = (width[1:] + width[:-1]) / 2.0
+        weight[-1] += 0.5
+        if len(lags) > 1:
+            weight[0] += 0.5
+        else:
+            weight[0] = 1.0
+        both = np.where(lags == 0, 2.0 * weight - 1.0, 2.0 * weight) * pairs
+        sharp = np.where(lags == 0, 1.0, 2.0) * pairs * rounding
+        square = both @ smooth**2 + sharp @ (2.0 * smooth + rounding)
+        return float(square), float(both @ smooth + sharp.sum())
+
+    def masked_sums(self, there: NDArray[np.bool_], stride: int) -> tuple[float, float]:
+        """Return the same sums over the pairs of differences that are there, a stride apart."""
+        reach = min(len(there), _REACH * self._n // stride + 2)
+        size = 1 << (len(there) + reach).bit_length()
+        pairs = np.fft.irfft(np.abs(np.fft.rfft(there.astype(np.float64), size)) ** 2, size)[:reach]
+        lags = np.arange(reach) * stride
+        smooth, _ = self._at(lags)
+        both = np.where(lags == 0, 1.0, 2.0) * pairs * stride**2
+        # Rounding counts at single lags, wherever the stride meets them.
+        square, product = float(both @ smooth**2), float(both @ smooth)
+        for place, factor in _ROUNDED:
+            index = min(round(place * self._n / stride), reach - 1)
+            sharp = factor * self._rounding / self.at_zero
+            count = pairs[index] * stride * (1.0 if place == 0 else 2.0)
+            square += float(count * sharp * (2.0 * smooth[index] + sharp))
+            product += float(count * sharp)
+        return square, product
+
+    def eigenvalues(
+        self, terms: NDArray[np.int64], mask: tuple[NDArray[np.bool_], int] | None
+    ) -> Array | None:
+        """Return those of the covariance of the differences, thinned; None where too many."""
+        found = []
+        if mask is not None:
+            there, stride = mask
+            thinning = max(1, round(self._n / _TAIL_STEPS / stride))
+            places = np.flatnonzero(there[::thinning])
+            if not len(places):
+                places = np.flatnonzero(there)[:1]
+            layouts = [(places, float(thinning * stride))]
+        else:
+            thinned = [
+                min(int(M), max(2 * _TAIL_STEPS, round(M * _TAIL_STEPS / self._n))) for M in terms
+            ]
+            layouts = [(np.arange(m), float(M) / m) for m, M in zip(thinned, terms, strict=True)]
+        if sum(len(places) for places, _ in layouts) > _MOST_EIGENVALUES:
+            return None
+        for places, step in layouts:
+            lags = np.rint(np.arange(places[-1] - places[0] + 1) * step).astype(np.int64)
+            smooth, rounding = self._at(lags)
+            row = smooth + rounding / step
+            matrix = row[np.abs(np.subtract.outer(places, places))]
+            found.append(np.maximum(np.linalg.eigvalsh(matrix), 0.0))
+        return np.concatenate(found)

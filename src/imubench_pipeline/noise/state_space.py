@@ -1,0 +1,81 @@
+"""The discrete state space of a noise process: what simulates it, and what a filter loads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from imubench_pipeline.typing import Array
+
+
+@dataclass(frozen=True)
+class StateSpace:
+    """A discrete model x' = transition x + w, z = output x + v (000 eq. 18-23, exact).
+
+    Attributes
+    ----------
+    transition : ndarray, shape (m, m)
+        Phi.
+    process_noise : ndarray, shape (m, m)
+        Q_d, covariance of w.
+    output : ndarray, shape (m,)
+        H.
+    measurement_noise : float
+        R_d, variance of v.
+    initial_mean : ndarray, shape (m,)
+        Mean of the first x.
+    initial_variance : ndarray, shape (m, m)
+        Its covariance: the stationary one, 0 for a random walk.
+    """
+
+    transition: Array
+    process_noise: Array
+    output: Array
+    measurement_noise: float
+    initial_mean: Array
+    initial_variance: Array
+
+    @classmethod
+    def scalar(cls, transition: float, process_noise: float, initial_variance: float) -> StateSpace:
+        """Return a model of one state that is seen as it is."""
+        return cls(
+            np.array([[transition]]),
+            np.array([[process_noise]]),
+            np.ones(1),
+            0.0,
+            np.zeros(1),
+            np.array([[initial_variance]]),
+        )
+
+    @classmethod
+    def without_states(cls, measurement_noise: float) -> StateSpace:
+        """Return a model of white noise alone."""
+        none = np.zeros((0, 0))
+        return cls(none, none, np.zeros(0), measurement_noise, np.zeros(0), none)
+
+
+def repeated(transition: Array, noise: Array, times: int) -> tuple[Array, Array]:
+    """Return what a step does when it is done several times, by powers of two.
+
+    Parameters
+    ----------
+    transition : ndarray, shape (m, m)
+    noise : ndarray, shape (m, m)
+        Covariance that a step adds.
+    times : int
+        From 0.
+
+    Returns
+    -------
+    (ndarray, ndarray), shapes (m, m)
+        Phi^times, and the sum of Phi^i noise (Phi^i)^T over i from 0 to times - 1.
+    """
+    whole, added = np.eye(len(transition)), np.zeros_like(noise)
+    while times:
+        if times & 1:
+            whole, added = transition @ whole, transition @ added @ transition.T + noise
+        noise = transition @ noise @ transition.T + noise
+        transition = transition @ transition
+        times >>= 1
+    return whole, added

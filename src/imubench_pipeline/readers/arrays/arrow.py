@@ -1,0 +1,142 @@
+"""Parquet, and Feather or Arrow IPC files and streams: read by row group or record batch.
+
+A column is a name or a position; ``variable`` is not used. A null is a missing sample. A column of
+timestamps is time with ``format: iso8601``. A corrupt page of Parquet is seen where the file has
+checksums. A record batch of a compressed Feather file is unpacked as a whole.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from imubench_pipeline.readers.arrays.file import ArrayFile
+from imubench_pipeline.readers.arrays.table import Column, Table, UnusableError
+
+_PARQUET, _FILE, _STREAM, _FEATHER_1 = b"PAR1", b"ARROW1", b"\xff\xff\xff\xff", b"FEA1"
+
+
+class ArrowFile(ArrayFile):
+    """A Parquet, Feather or Arrow IPC file."""
+
+    def tables(self, stack: ExitStack) -> Iterable[Table]:
+        """Read the schema."""
+        with self.path.open("rb") as file:
+            begin = file.read(len(_FILE))
+        if begin.startswith(_PARQUET):
+            # Mapped, for else a whole column of a row group is read at once.
+            file = pq.ParquetFile(
+                self.path, memory_map=True, pre_buffer=False, page_checksum_verification=True
+            )
+            return [_ParquetTable(stack.enter_context(file))]
+        if begin.startswith((_FILE, _STREAM)):
+            source = stack.enter_context(pa.memory_map(str(self.path)))
+            opened = pa.ipc.open_file if begin == _FILE else pa.ipc.open_stream
+            return [_IpcTable(opened(source))]
+        if begin.startswith(_FEATHER_1):
+            raise UnusableError(
+                "is Feather version 1; expected version 2: read it with an older pyarrow, and "
+                "write it with pyarrow.feather.write_feather"
+            )
+        raise UnusableError(
+            "not a Parquet, Feather or Arrow file, or its beginning is damaged; mend 'reader' in "
+            "the sensor file, or copy the file again"
+        )
+
+
+class _ArrowTable(Table):
+    """The columns of a schema."""
+
+    def __init__(self, schema: pa.Schema) -> None:
+        self.schema = schema
+        self.labels = schema.names
+        self.width = len(schema.names)
+        if not self.width:
+            self.fault = "has no column"
+
+    def column(self, position: int) -> Column:
+        """Return a column by its position, counted from 0."""
+        kind = self.schema.field(position).type
+        return Column(self.labels[position], _kind(kind), str(kind))
+
+    def unit(self, position: int) -> str | None:
+        """Return the unit of a column, where its metadata state it."""
+        stated = self.schema.field(position).metadata or {}
+        found = next((stated[key] for key in (b"unit", b"units") if key in stated), b"")
+        return found.decode("utf-8", "replace") or None
+
+    def row_bytes(self, positions: Sequence[int]) -> int:
+        """Return the memory that a record takes while these columns are read."""
+        return 8 * len(positions)
+
+    def blocks(self, positions: Sequence[int], rows: int) -> Iterator[list[NDArray[Any]]]:
+        """Yield these columns, ``rows`` records at a time or fewer (see `Table.blocks`)."""
+        # Of columns with the same name, all are read.
+        same = [self.labels[:position].count(self.labels[position]) for position in positions]
+        names = [self.labels[position] for position in positions]
+        for batch in self._batches(list(dict.fromkeys(names)), rows):
+            chosen = [
+                batch.column(batch.schema.get_all_field_indices(name)[number])
+                for name, number in zip(names, same, strict=True)
+            ]
+            for column in chosen:
+                # Of what a damaged file says, nothing is sure to lie within its memory.
+                column.validate(full=True)
+            for start in range(0, len(batch), rows):
+                yield [_values(column.slice(start, rows)) for column in chosen]
+
+    @abstractmethod
+    def _batches(self, names: list[str], rows: int) -> Iterator[pa.RecordBatch]:
+        """Yield the columns of these names, and perhaps others, by row group or batch."""
+
+
+class _ParquetTable(_ArrowTable):
+    def __init__(self, file: pq.ParquetFile) -> None:
+        super().__init__(file.schema_arrow)
+        self._file = file
+        self.rows = file.metadata.num_rows
+
+    def _batches(self, names: list[str], rows: int) -> Iterator[pa.RecordBatch]:
+        yield from self._file.iter_batches(rows, columns=names, use_threads=False)
+
+
+class _IpcTable(_ArrowTable):
+    def __init__(self, reader: pa.RecordBatchFileReader | pa.RecordBatchStreamReader) -> None:
+        super().__init__(reader.schema)
+        self._reader = reader
+
+    def _batches(self, names: list[str], rows: int) -> Iterator[pa.RecordBatch]:
+        if isinstance(self._reader, pa.RecordBatchStreamReader):
+            yield from self._reader
+            return
+        for number in range(self._reader.num_record_batches):
+            yield self._reader.get_batch(number)
+
+
+def _kind(kind: pa.DataType) -> str:
+    """Return NumPy's letter for a type whose values become such."""
+    if pa.types.is_dictionary(kind):
+        kind = kind.value_type
+    if pa.types.is_floating(kind) or pa.types.is_decimal(kind) or pa.types.is_null(kind):
+        return "f"
+    if pa.types.is_integer(kind):
+        return "i" if pa.types.is_signed_integer(kind) else "u"
+    return "M" if pa.types.is_timestamp(kind) else "O"
+
+
+def _values(column: pa.Array) -> NDArray[Any]:
+    if pa.types.is_dictionary(column.type):
+        column = column.dictionary_decode()
+    if pa.types.is_decimal(column.type) or pa.types.is_null(column.type):
+        column = column.cast(pa.float64())
+    if pa.types.is_integer(column.type) and column.null_count:
+        present = column.is_valid().to_numpy(zero_copy_only=False)
+        return np.ma.masked_array(column.fill_null(0).to_numpy(), ~present)
+    return np.asarray(column.to_numpy(zero_copy_only=False))

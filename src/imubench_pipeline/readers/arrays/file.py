@@ -1,0 +1,355 @@
+"""What the readers of array formats share: columns by position or by name, blocks to batches.
+
+``variable`` names an array of the file, and ``column`` what is taken of it:
+
+- a number: the column of a matrix, counted from 1; the longer side of a matrix is time. A vector
+  is a matrix of one column;
+- a name: a field of an array of records, or a vector below a group or a structure
+  (``variable: imu, column: wx`` is ``imu/wx``);
+- without ``variable``: the name of a vector, or ``imu/wx``, or ``gyro[2]`` for the second column
+  of the matrix ``gyro``.
+
+A number as the column of time is one of the same array.
+"""
+
+from __future__ import annotations
+
+import re
+from abc import abstractmethod
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.readers.arrays.table import DATES, NUMBERS, Column, Table, UnusableError
+from imubench_pipeline.readers.arrays.time import ArrayTime
+from imubench_pipeline.readers.batch import Batch, LogFile, stated_in
+from imubench_pipeline.readers.stated_units import StatedUnit, stated
+from imubench_pipeline.tables.findings import RecordingError
+
+_BLOCK_ROWS = 1 << 18
+_BLOCK_BYTES = 1 << 26
+_TIME = "time"
+_SHOWN = 20
+_MOST_TABLES = 100_000
+_OF_MATRIX = re.compile(r"(.+)\[(\d{1,9})\]")
+
+_Place = tuple[Table, int]
+
+
+class ArrayFile(LogFile):
+    """A file of arrays, of any format."""
+
+    @abstractmethod
+    def tables(self, stack: ExitStack) -> Iterable[Table]:
+        """Open the file, to be closed by the stack, and tell what it holds."""
+
+    def batches(self) -> Iterator[Batch]:
+        """Yield the records in the order of the file (see `LogFile.batches`)."""
+        check_not_empty(self.path)
+        time = ArrayTime(self)
+        for block in self._guarded():
+            stamps = block.pop(_TIME, None)
+            # What stands in a damaged file may overflow: infinite, and counted as such.
+            with np.errstate(over="ignore", invalid="ignore"):
+                try:
+                    seconds = None if stamps is None else time.seconds(stamps)
+                except UnusableError as error:
+                    raise RecordingError(f"{self.path.name}: {error}") from None
+                columns = {name: self.to_si(name, numbers(raw)) for name, raw in block.items()}
+            yield Batch(seconds, columns)
+
+    def _guarded(self) -> Iterator[dict[str, NDArray[Any]]]:
+        """Yield the blocks as written; whatever a library raises becomes a `RecordingError`."""
+        with explained(self.path), ExitStack() as stack:
+            yield from self._blocks(
+                self._places(list(islice(self.tables(stack), _MOST_TABLES + 1)))
+            )
+
+    # --------------------------------------------------------------------------- blocks
+
+    def _blocks(self, places: dict[str, _Place]) -> Iterator[dict[str, NDArray[Any]]]:
+        tables = list(dict.fromkeys(table for table, _ in places.values()))
+        _check_lengths(places)
+        wanted = {
+            table: sorted({position for held, position in places.values() if held is table})
+            for table in tables
+        }
+        held = sum(table.row_bytes(wanted[table]) for table in tables)
+        rows = max(1, min(_BLOCK_ROWS, _BLOCK_BYTES // max(held, 1)))
+        read = 0
+        streams = [table.blocks(wanted[table], rows) for table in tables]
+        for parts in zip(*streams, strict=True):
+            of_table = dict(zip(tables, parts, strict=True))
+            block = {
+                key: of_table[table][wanted[table].index(position)]
+                for key, (table, position) in places.items()
+            }
+            count = len(next(iter(block.values())))
+            read += count
+            if count:
+                yield block
+        if read == 0:
+            raise UnusableError("no record; expected at least one")
+        promised = tables[0].rows
+        if promised is not None and read != promised:
+            raise UnusableError(f"cut short: {read} of {promised} records; copy it again")
+
+    # -------------------------------------------------------------------------- columns
+
+    def _places(self, tables: Sequence[Table]) -> dict[str, _Place]:
+        by_name: dict[str, Table] = {}
+        if len(tables) > _MOST_TABLES:
+            raise UnusableError(f"more than {_MOST_TABLES} arrays; expected the log of one sensor")
+        for table in tables:
+            if table.name in by_name:
+                raise UnusableError(f"{table.shown} stands twice; expected one array of that name")
+            by_name[table.name] = table
+        places = {}
+        for key, source in self.sources.items():
+            places[key] = _place(by_name, source.column, source.variable, key)
+            _check_kind(places[key], key, NUMBERS)
+        if self.log.time is not None:
+            places[_TIME] = self._time_place(by_name)
+        self.units = _stated_units(places)
+        return places
+
+    def _time_place(self, tables: dict[str, Table]) -> _Place:
+        time = self.log.time
+        assert time is not None  # asked for where there are stamps
+        if time.date is not None:
+            raise UnusableError(
+                "'date' of 'time' is for text; expected one column of dates or numbers"
+            )
+        if time.format not in (None, "iso8601"):
+            raise UnusableError(
+                f"found format {time.format!r} of 'time', which is for text; expected "
+                "'format: iso8601' for a column of dates, or 'unit' for numbers"
+            )
+        variables = {source.variable for source in self.sources.values()}
+        if isinstance(time.column, int) and len(variables) > 1:
+            names = _listed(str(name) for name in variables)
+            raise UnusableError(
+                f"'time' is column {time.column}, but the channels are from several variables "
+                f"({names}); say which has the stamps, as in 'column: name' or "
+                f"'column: name[{time.column}]'"
+            )
+        variable = next(iter(variables)) if len(variables) == 1 else None
+        if isinstance(time.column, str) and not (
+            _address(time.column, variable) in tables or _addressed(tables, time.column, variable)
+        ):
+            variable = None
+        place = _place(tables, time.column, variable, _TIME)
+        _check_kind(place, _TIME, NUMBERS if time.unit else DATES)
+        return place
+
+
+def _stated_units(places: Mapping[str, _Place]) -> dict[str, StatedUnit]:
+    """Return the units that a file states of its channels."""
+    found = {}
+    for name, (table, position) in places.items():
+        label = table.column(position).label or table.name.rpartition("/")[2]
+        beside = (table.unit(position), f"an attribute of {table.shown}")
+        unit = stated(name, (beside,), label)
+        if unit is not None:
+            found[name] = unit
+    return found
+
+
+def check_not_empty(path: Path) -> None:
+    """Raise `RecordingError` if a file cannot be opened or has no byte."""
+    try:
+        with path.open("rb") as file:
+            empty = not file.read(1)
+    except OSError as error:
+        raise RecordingError(
+            f"{path.name}: cannot be opened ({error.strerror}); expected a file"
+        ) from None
+    if empty:
+        raise RecordingError(f"{path.name}: the file is empty; copy it again")
+
+
+@contextmanager
+def explained(path: Path) -> Iterator[None]:
+    """Make a `RecordingError` of whatever a library raises on a file."""
+    try:
+        yield
+    except UnusableError as error:
+        raise RecordingError(f"{path.name}: {error}") from None
+    # The libraries raise nearly every kind of exception on damaged files.
+    except Exception as error:
+        said = " ".join(str(error).split())[:300] or type(error).__name__
+        raise RecordingError(
+            f"{path.name}: corrupt data, or cut short ({said}); copy it again"
+        ) from error
+
+
+def numbers(raw: NDArray[Any]) -> NDArray[np.float64]:
+    """Return a column as float64, with NaN where a value is missing."""
+    return np.ma.filled(np.ma.asanyarray(raw, np.float64), np.nan)
+
+
+def _place(tables: dict[str, Table], column: str | int, variable: str | None, key: str) -> _Place:
+    """Find a column.
+
+    Raises
+    ------
+    UnusableError
+        If it is not there, or not the only one that is meant.
+    """
+    if isinstance(column, int):
+        return _numbered(_table(tables, variable, key), column, key)
+    found = _addressed(tables, column, variable)
+    if len(found) == 1:
+        return found[0]
+    if found:
+        names = _listed(table.shown for table, _ in found)
+        if len({table for table, _ in found}) == 1:
+            raise UnusableError(
+                f"column {column!r} for {key} stands twice in {names}; take it by its position, "
+                "as a number"
+            )
+        raise UnusableError(
+            f"column {column!r} for {key} is in several variables ({names}); name the one with "
+            f"'variable:', or as in 'column: {found[0][0].name}/{column}'"
+        )
+    address = _address(column, variable)
+    if address in tables:
+        table = _sound(tables[address], key)
+        if table.width > 1:
+            raise UnusableError(
+                f"{address!r} for {key} is a matrix of {table.width} columns; name the column "
+                f"with 'column: 2, variable: {address}'"
+            )
+        return table, 0
+    if variable is None and (match := _OF_MATRIX.fullmatch(column)) and match[1] in tables:
+        return _numbered(_sound(tables[match[1]], key), int(match[2]), key)
+    if variable is not None:
+        table = _table(tables, variable, key)
+        has = _listed(table.labels) or f"{table.width} columns without names: give a number"
+        raise UnusableError(
+            f"no column {column!r} for {key}; {table.shown} has {has}; mend 'column' of {key} in "
+            f"{stated_in(key)}"
+        )
+    raise UnusableError(
+        f"no variable or column {column!r} for {key}; the file has "
+        f"{_contents(tables, labels=True)}; mend 'column' of {key} in {stated_in(key)}"
+    )
+
+
+def _address(column: str, variable: str | None) -> str:
+    """Return the path that a vector or a field has in the file."""
+    parts = [column] if variable is None else [variable, column]
+    return "/".join(part.strip("/") for part in parts)
+
+
+def _addressed(tables: dict[str, Table], column: str, variable: str | None) -> list[_Place]:
+    """Return the named columns that an address may mean."""
+    address = _address(column, variable)
+    return [
+        (table, position)
+        for table in tables.values()
+        if table.fault is None
+        for position, label in enumerate(table.labels)
+        if f"{table.name}/{label}" == address or (variable is None and label == column)
+    ]
+
+
+def _table(tables: dict[str, Table], variable: str | None, key: str) -> Table:
+    """Return the array that is named, or the only one."""
+    if variable is not None:
+        name = variable.strip("/")
+        if name and name in tables:
+            return _sound(tables[name], key)
+        if list(tables) == [""]:
+            raise UnusableError(
+                f"{variable!r} is named for {key}, but the file holds one array without a name; "
+                "drop 'variable:'"
+            )
+        raise UnusableError(
+            f"no variable {variable!r} for {key}; the file has {_contents(tables)}; mend "
+            f"'variable' of {key} in {stated_in(key)}"
+        )
+    usable = [table for table in tables.values() if table.fault is None]
+    # A number such as the rate may stand beside the samples.
+    usable = [table for table in usable if (table.rows, table.width) != (1, 1)] or usable
+    if len(tables) == 1:
+        return _sound(next(iter(tables.values())), key)
+    if not usable:
+        raise UnusableError(f"no numeric array for {key}; the file has {_contents(tables)}")
+    if len(usable) > 1:
+        raise UnusableError(
+            f"several variables ({_listed(table.shown for table in usable)}); name the one of "
+            f"{key} with 'variable:'"
+        )
+    return usable[0]
+
+
+def _numbered(table: Table, column: int, key: str) -> _Place:
+    if column > table.width:
+        samples = "" if table.rows is None else f" of {table.rows} samples"
+        names = f" ({_listed(table.labels)})" if table.labels else ""
+        raise UnusableError(
+            f"no column {column} for {key}; {table.shown} has {table.width} columns{samples}"
+            f"{names}; mend 'column' of {key} in {stated_in(key)}"
+        )
+    return table, column - 1
+
+
+def _sound(table: Table, key: str) -> Table:
+    if table.fault is not None:
+        raise UnusableError(f"{table.shown} for {key} {table.fault}")
+    return table
+
+
+def _check_kind(place: _Place, key: str, expected: str) -> None:
+    table, position = place
+    column: Column = table.column(position)
+    if column.kind in expected:
+        return
+    where = table.shown
+    if column.label or table.width > 1:
+        where = f"column {column.label or position + 1!r} of {where}"
+    if expected == DATES:
+        mend = "give 'unit' of 'time' (s, ms, us, ns), or store dates"
+        raise UnusableError(f"{where} for {key} holds {column.holds}; expected dates: {mend}")
+    mend = "store the column as numbers"
+    if key == _TIME and column.kind in DATES:
+        mend = "give 'format: iso8601' of 'time' in the sensor file"
+    raise UnusableError(f"{where} for {key} holds {column.holds}; expected numbers: {mend}")
+
+
+def _check_lengths(places: dict[str, _Place]) -> None:
+    lengths = {key: table.rows for key, (table, _) in places.items()}
+    if len(set(lengths.values())) > 1:
+        raise UnusableError(
+            f"columns of unequal length: {lengths}; expected one length: cut the longer ones, or "
+            "split them into files with 'file:'"
+        )
+    if 0 in lengths.values():
+        names = _listed(dict.fromkeys(table.shown for table, _ in places.values()))
+        raise UnusableError(f"no record in {names}; expected at least one")
+
+
+def _contents(tables: dict[str, Table], labels: bool = False) -> str:
+    """Say what the file has: arrays and perhaps their columns, or why none can be used."""
+    usable = [table for table in tables.values() if table.fault is None]
+    has = [table.name for table in usable if table.name]
+    if labels:
+        has += [f"column {label}" for table in usable for label in table.labels]
+    if not has:
+        has = [f"{table.width} columns without names" for table in usable]
+    return (
+        _listed(has)
+        or _listed(f"{table.shown}, which {table.fault}" for table in tables.values())
+        or "none"
+    )
+
+
+def _listed(names: Iterable[str]) -> str:
+    every = list(names)
+    return ", ".join(every[:_SHOWN]) + (", ..." if len(every) > _SHOWN else "")

@@ -1,0 +1,178 @@
+"""HDF5 files: data sets that are vectors, matrices, or vectors of records (compound types).
+
+``variable`` is the path of a data set, such as ``imu/gyro``; a column is a number, a field of the
+records, or a data set in the group that ``variable`` names. HDF5 has no dates of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.readers.arrays.file import ArrayFile
+from imubench_pipeline.readers.arrays.hdf5_units import stated_unit
+from imubench_pipeline.readers.arrays.table import Array, Table, UnusableError
+
+_LARGEST_CHUNK = 1 << 28
+
+
+class Hdf5File(ArrayFile):
+    """An HDF5 file."""
+
+    def tables(self, stack: ExitStack) -> Iterable[Table]:
+        """Describe every data set."""
+        if not h5py.is_hdf5(self.path):
+            raise UnusableError(
+                "not an HDF5 file, or its beginning is damaged; mend 'reader' in the sensor file, "
+                "or copy the file again"
+            )
+        return data_sets(stack.enter_context(opened(self.path)))
+
+
+def opened(path: Path) -> h5py.File:
+    """Open an HDF5 file for reading.
+
+    Parameters
+    ----------
+    path : Path
+    """
+    # A chunk that lasts for several blocks is then unpacked once.
+    return h5py.File(path, "r", rdcc_nbytes=_LARGEST_CHUNK)
+
+
+def data_sets(file: h5py.File, time_axis: int = 0) -> list[DataSet]:
+    """Return the data sets of a file by name; links to other files are not followed.
+
+    Parameters
+    ----------
+    file : h5py.File
+    time_axis : int
+        The side of a square matrix that is time.
+    """
+    found: list[DataSet] = []
+
+    def visit(name: str | bytes, item: object) -> None:
+        if isinstance(item, h5py.Dataset):
+            shown = name if isinstance(name, str) else name.decode("utf-8", "replace")
+            found.append(DataSet(item, shown, time_axis))
+
+    file.visititems(visit)
+    return found
+
+
+class DataSet(Array):
+    """A data set, read by blocks.
+
+    Parameters
+    ----------
+    data : h5py.Dataset
+    name : str
+    time_axis : int
+        See `Array`.
+    """
+
+    def __init__(self, data: h5py.Dataset, name: str, time_axis: int) -> None:
+        try:
+            dtype = data.dtype
+        except (TypeError, ValueError):
+            dtype = np.dtype(object)  # a type that NumPy does not have
+        super().__init__(name, data.shape if data.shape is not None else (0,), dtype, time_axis)
+        self.data = data
+        if self.fault is None and not _is_sound(dtype):
+            self.fault = "has a damaged or unusual type; expected standard numbers: copy it again"
+
+    def unit(self, position: int) -> str | None:
+        """Return the unit of its columns, where an attribute states it."""
+        return stated_unit(self.data)
+
+    def row_bytes(self, positions: Sequence[int]) -> int:
+        """Return the memory that a record takes while these columns are read."""
+        names = self.fields(positions)
+        if names:
+            return sum(self.dtype[name].itemsize for name in names)
+        return self.dtype.itemsize * (max(positions) - min(positions) + 1)
+
+    def blocks(self, positions: Sequence[int], rows: int) -> Iterator[list[NDArray[Any]]]:
+        """Yield these columns, ``rows`` records at a time or fewer (see `Table.blocks`)."""
+        assert self.rows is not None  # from the shape
+        _check_written(self.data, self.name)
+        names = self.fields(positions)
+        data = self.data.fields(names) if names else self.data
+        low, high = min(positions), max(positions) + 1
+        for start in range(0, self.rows, rows):
+            block = self._block(data, slice(start, start + rows), slice(low, high))
+            yield [
+                self.taken(block, position if names else position - low) for position in positions
+            ]
+
+    def _block(self, data: Any, time: slice, columns: slice) -> NDArray[Any]:
+        """Return a block with time downwards; of records, a vector."""
+        if len(self.shape) == 1:
+            block = np.asarray(data[time])
+            return block if self.labels else block.reshape(-1, 1)
+        if self.labels:
+            columns = slice(0, 1)
+        block = np.asarray(data[time, columns] if self.time_axis == 0 else data[columns, time])
+        block = block if self.time_axis == 0 else block.T
+        return block[:, 0] if self.labels else block
+
+
+def _is_sound(dtype: np.dtype[Any]) -> bool:
+    """Tell whether the library can convert a type without leaving its memory."""
+    if dtype.names is None:
+        return dtype.base.kind != "f" or dtype.base.itemsize <= 8
+    assert dtype.fields is not None  # a type with names has them
+    places = sorted((offset, offset + kind.itemsize) for kind, offset, *_ in dtype.fields.values())
+    apart = all(end <= start for (_, end), (start, _) in pairwise(places))
+    return (
+        apart
+        and places[-1][1] <= dtype.itemsize
+        and all(_is_sound(dtype[name]) for name in dtype.names)
+    )
+
+
+def _check_written(data: h5py.Dataset, name: str) -> None:
+    """Raise where values would be made up, are elsewhere, or are not to be unpacked in blocks."""
+    properties = data.id.get_create_plist()
+    layout = properties.get_layout()
+    if layout == h5py.h5d.VIRTUAL or (
+        layout == h5py.h5d.CONTIGUOUS and properties.get_external_count()
+    ):
+        raise UnusableError(
+            f"{name} is kept in other files; expected one file: repack it with h5repack"
+        )
+    size = data.id.get_type().get_size()  # as stored, which NumPy may not have
+    if layout == h5py.h5d.CONTIGUOUS and data.id.get_storage_size() < data.size * size:
+        raise UnusableError(f"{name} was never written; expected {data.size} values: record again")
+    if layout != h5py.h5d.CHUNKED:
+        return
+    for number in range(properties.get_nfilters()):
+        code, _, _, title = properties.get_filter(number)
+        if not h5py.h5z.filter_avail(code):
+            raise UnusableError(
+                f"{name} is compressed with filter {code} ({title.decode('ascii', 'replace')}), "
+                "which is not here; expected gzip: repack it with h5repack -f GZIP=4"
+            )
+    unpacked = math.prod(data.chunks) * size
+    if unpacked > _LARGEST_CHUNK:
+        raise UnusableError(
+            f"{name} has chunks of {unpacked} bytes; expected at most {_LARGEST_CHUNK}: "
+            "repack it with h5repack -l"
+        )
+    chunks = math.prod(
+        -(-side // chunk) for side, chunk in zip(data.shape, data.chunks, strict=True)
+    )
+    written = data.id.get_num_chunks()
+    if written < chunks:
+        raise UnusableError(
+            f"{written} of {chunks} chunks of {name} were written, the others would read as "
+            "zeros; cut it to what was recorded, or copy the file again"
+        )

@@ -1,0 +1,100 @@
+"""NumPy files: one array (NPY), or several in a zip archive (NPZ), streamed in both cases.
+
+An array is a matrix, a vector, or a vector of records with named fields (a structured dtype).
+``variable`` is the name of an array in an archive; an NPY file has one array, without a name.
+Dates (datetime64) are time stamps with ``format: iso8601``. Arrays of Python objects, which are
+pickled, are refused: to read them would run what is in the file.
+"""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack
+from functools import partial
+from typing import IO, Any
+
+import numpy as np
+from numpy.lib import format as npy
+
+from imubench_pipeline.readers.arrays.file import ArrayFile
+from imubench_pipeline.readers.arrays.stream import LARGEST_RATIO, StreamedArray
+from imubench_pipeline.readers.arrays.table import Table, UnusableError, sides_of
+
+_ENDING = ".npy"
+
+
+class NumpyFile(ArrayFile):
+    """An NPY or NPZ file."""
+
+    def tables(self, stack: ExitStack) -> Iterable[Table]:
+        """Read the headers of the arrays."""
+        with self.path.open("rb") as file:
+            begin = file.read(len(npy.MAGIC_PREFIX))
+        if begin == npy.MAGIC_PREFIX:
+            size = self.path.stat().st_size
+            return [_array("", lambda: self.path.open("rb"), size, checked=False)]
+        if not begin.startswith(b"PK"):
+            raise UnusableError(
+                "not a NumPy file, or its beginning is damaged; expected what numpy.save or "
+                "numpy.savez writes: mend 'reader' in the sensor file, or copy the file again"
+            )
+        archive = stack.enter_context(zipfile.ZipFile(self.path))
+        return list(_members(archive, self.path.stat().st_size))
+
+
+def _members(archive: zipfile.ZipFile, size: int) -> Iterator[Table]:
+    for info in archive.infolist():
+        if not info.filename.endswith(_ENDING):
+            continue
+        name = info.filename.removesuffix(_ENDING)
+        if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise UnusableError(
+                f"{name} is packed by method {info.compress_type}; expected stored or deflated: "
+                "save it with numpy.savez or numpy.savez_compressed"
+            )
+        if info.compress_size > size or info.file_size > LARGEST_RATIO * (info.compress_size + 8):
+            raise UnusableError(
+                f"{name} is said to have {info.file_size} bytes, which {info.compress_size} packed "
+                f"bytes in a file of {size} cannot hold; the file is corrupt: copy it again"
+            )
+        yield _array(name, partial(archive.open, info), info.file_size, checked=True)
+
+
+def _array(name: str, opened: Callable[[], IO[bytes]], size: int, checked: bool) -> StreamedArray:
+    """Read the header of an array, and compare what it promises with the bytes that are there."""
+    shown = name or "the table"
+    with opened() as stream:
+        version = npy.read_magic(stream)
+        read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+        if version not in ((1, 0), (2, 0), (3, 0)):
+            raise UnusableError(
+                f"{shown} has format version {version}; expected 1.0 to 3.0: save again"
+            )
+        shape, fortran, dtype = read(stream)
+        offset = stream.tell()
+    if version == (3, 0):
+        _decode_names(dtype)
+    array = StreamedArray(name, shape, dtype, fortran, opened, offset, checked)
+    elements = 1
+    for side in shape:
+        elements *= side
+    promised = offset + elements * dtype.itemsize
+    if min(shape, default=0) < 0 or (promised > size and not dtype.hasobject):
+        raise UnusableError(
+            f"{shown} promises {sides_of(shape)} values of {dtype.itemsize} bytes, "
+            f"{promised} bytes with the header, but {size} are there; the file is cut short or "
+            "corrupt: copy it again"
+        )
+    if promised < size and not dtype.hasobject:
+        raise UnusableError(
+            f"{size - promised} bytes stand behind {shown} ({sides_of(shape)} values); expected "
+            "one array: save several with numpy.savez"
+        )
+    return array
+
+
+def _decode_names(dtype: np.dtype[Any]) -> None:
+    """Make the names of fields what they were: version 3.0 differs from 2.0 by being UTF-8."""
+    if dtype.names is not None:
+        dtype.names = tuple(name.encode("latin1").decode("utf-8") for name in dtype.names)

@@ -1,0 +1,209 @@
+"""Of all that a log holds, what a sensor file takes: channels, temperature and time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from imubench_pipeline.readers import SEVERAL_CLOCKS
+from imubench_pipeline.readers.contents import Contents, HeldColumn, HeldTable
+from imubench_pipeline.readers.inspection.clock import Clock, clocks
+from imubench_pipeline.readers.inspection.groups import Group, groups
+from imubench_pipeline.readers.inspection.names import DERIVED, PLAIN, WITHOUT_GRAVITY
+
+_CALLED = {"gyro": "gyro", "accel": "accelerometer", "temperature": "temperature"}
+_ARRAYS = ("matlab", "numpy", "arrow", "hdf5")
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What is taken of a log.
+
+    Attributes
+    ----------
+    gyro, accel, temperature : Group or None
+    clock : Clock or None
+    local : bool
+        The time column is one of the table of the channels, in each file.
+    anchor : HeldTable or None
+        The table that the others must go with.
+    other_clocks : list of Clock
+    left : list of (Group, str)
+        What was recognised and not taken, and why.
+    unknown : list of HeldColumn
+        Numbers of the tables in use that were not recognised.
+    """
+
+    gyro: Group | None
+    accel: Group | None
+    temperature: Group | None
+    clock: Clock | None
+    local: bool
+    anchor: HeldTable | None
+    other_clocks: list[Clock]
+    left: list[tuple[Group, str]]
+    unknown: list[HeldColumn]
+
+    @property
+    def taken(self) -> list[Group]:
+        """The groups that are taken."""
+        return [g for g in (self.gyro, self.accel, self.temperature) if g is not None]
+
+
+def chosen(contents: Contents) -> Choice:
+    """Choose the channels, the temperature and the time of a recording.
+
+    Parameters
+    ----------
+    contents : Contents
+    """
+    found = groups(contents)
+    left = [(g, _why_not(g)) for g in found if _why_not(g)]
+    able = [group for group in found if not _why_not(group)]
+    gyro = _best([g for g in able if g.quantity == "gyro"], None, able)
+    accels = [g for g in able if g.quantity == "accel"]
+    first = gyro or _best(accels, None, able)
+    anchor = first.table if first else None
+    if anchor is None:
+        anchor = next((table for table in contents.tables if table.columns), None)
+    ours = [] if anchor is None else _clocks(contents, anchor, found)
+    others = {id(g.table): _clocks(contents, g.table, found) for g in able}
+    clock = _common(ours, [others[id(g.table)] for g in able if anchor is not g.table])
+
+    def fits(group: Group) -> bool:
+        return (
+            anchor is not None
+            and _readable_together(anchor, group.table)
+            and (
+                clock is None
+                or _same_clock(anchor, group.table)
+                or any(_equal(clock, other) for other in others[id(group.table)])
+            )
+        )
+
+    fitting = [group for group in able if group is gyro or fits(group)]
+    why = "other records than the channels, or another time"
+    if first is None:
+        why = "there is no channel"
+    left += [(g, why) for g in able if g not in fitting]
+    accel = _best([g for g in fitting if g.quantity == "accel"], gyro, able)
+    temperature = _best([g for g in fitting if g.quantity == "temperature"], gyro or accel, able)
+    taken = [group for group in (gyro, accel, temperature) if group is not None]
+    left += [(g, f"another {_CALLED[g.quantity]}") for g in fitting if g not in taken]
+    columns = {id(column) for group in found for column in group.columns.values()}
+    spoken = columns | ({id(clock.column)} if clock else set())
+    spoken |= {id(other.column) for other in ours}
+    return Choice(
+        gyro,
+        accel,
+        temperature,
+        clock,
+        _is_local(taken, clock),
+        anchor,
+        [other for other in ours if other is not clock],
+        left,
+        [
+            column
+            for table in _tables(taken, anchor)
+            for column in table.columns
+            if id(column) not in spoken
+            and not (clock is not None and column.source == clock.column.source)
+        ],
+    )
+
+
+def _why_not(group: Group) -> str:
+    """Say why a group is never taken; empty: it may be."""
+    if group.rank == DERIVED:
+        return "of a filter or about the measurement, not what the sensor measures"
+    if group.rank == WITHOUT_GRAVITY and group.gravity_unit is None:
+        return "without gravity: not what the accelerometer measures"
+    if group.quantity != "temperature" and len(group.columns) > 1 and group.constant:
+        return "the same in all of the first records: nothing was measured here"
+    return ""
+
+
+def _best(found: Sequence[Group], beside: Group | None, every: Sequence[Group]) -> Group | None:
+    """Return the likeliest group: near another one, or where there are others beside it."""
+
+    def order(group: Group) -> tuple[Any, ...]:
+        near = beside is not None and (group.table is beside.table)
+        same_file = beside is not None and group.table.file == beside.table.file
+        heavy = group.quantity != "accel" or group.gravity_unit is not None
+        company = {g.quantity for g in every if g.table is group.table}
+        sure = group.rank == PLAIN or (group.rank == WITHOUT_GRAVITY and heavy)
+        return (
+            not sure,
+            -len(group.columns),
+            not heavy,
+            not near,
+            not same_file,
+            -len(company),
+            group.unit is None,
+        )
+
+    return min(found, key=order, default=None)
+
+
+# ------------------------------------------------------------------------------------- time
+
+
+def _clocks(contents: Contents, table: HeldTable, found: Sequence[Group]) -> list[Clock]:
+    """Return what may be the time of a table."""
+    taken = {id(column) for group in found for column in group.columns.values()}
+    columns = [c for c in table.columns if id(c) not in taken]
+    rate = table.rate
+    if table.reader in _ARRAYS:
+        for other in contents.tables:
+            if other is not table and other.file == table.file and other.rows == table.rows:
+                columns += [c for c in other.columns if id(c) not in taken]
+    return clocks(table, columns, rate)
+
+
+def _common(ours: Sequence[Clock], others: Iterable[Sequence[Clock]]) -> Clock | None:
+    """Return the first clock that most of the other tables have, too."""
+    rest = list(others)
+
+    def shared(clock: Clock) -> int:
+        return sum(any(_equal(clock, other) for other in theirs) for theirs in rest)
+
+    return max(ours, key=lambda clock: (not clock.counts, shared(clock)), default=None)
+
+
+def _equal(one: Clock, other: Clock) -> bool:
+    """Tell whether a sensor file states both clocks alike."""
+    if one.column.source != other.column.source:
+        return False
+    keys = ("unit", "format", "date", "scale")
+    return all(one.entry.value.get(key) == other.entry.value.get(key) for key in keys)
+
+
+def _readable_together(anchor: HeldTable, table: HeldTable) -> bool:
+    if anchor is table or anchor.file != table.file:
+        return True
+    if table.reader in SEVERAL_CLOCKS:
+        return True
+    return table.reader in _ARRAYS and anchor.rows == table.rows
+
+
+def _same_clock(anchor: HeldTable, table: HeldTable) -> bool:
+    """Tell whether the records of two tables are the same, so that one clock does for both."""
+    return anchor is table or (anchor.file == table.file and table.reader in _ARRAYS)
+
+
+def _is_local(taken: Sequence[Group], clock: Clock | None) -> bool:
+    if clock is None:
+        return True
+    by_file: dict[str | None, set[int]] = {}
+    for group in taken:
+        by_file.setdefault(group.table.file, set()).add(id(group.table))
+    if any(len(tables) > 1 for tables in by_file.values()):
+        return False
+    tables = _tables(taken, None)
+    return len(tables) > 1 or any(clock.column is c for t in tables for c in t.columns)
+
+
+def _tables(taken: Sequence[Group], anchor: HeldTable | None) -> list[HeldTable]:
+    tables = [group.table for group in taken] or ([anchor] if anchor else [])
+    return list({id(table): table for table in tables}.values())

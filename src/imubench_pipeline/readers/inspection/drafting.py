@@ -1,0 +1,174 @@
+"""From what is chosen of a log to the entries of a sensor file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from imubench_pipeline.readers.contents import Contents, HeldColumn, HeldTable
+from imubench_pipeline.readers.inspection.choice import Choice, chosen
+from imubench_pipeline.readers.inspection.clock import rate_entry
+from imubench_pipeline.readers.inspection.draft import UNKNOWN, Draft, Entry
+from imubench_pipeline.readers.inspection.groups import Group
+from imubench_pipeline.readers.inspection.names import WITHOUT_GRAVITY
+from imubench_pipeline.settings.sensor import CHANNELS, Reader
+
+_VENDORS: dict[Reader, str] = {"vectornav": "VectorNav", "ubx": "u-blox"}
+_GYRO_HINT = "the file does not say: deg/s or rad/s? see the logger's manual"
+_SHOWN = 20
+_ENDINGS = re.compile(r"(?:\.[A-Za-z]\w{0,7})+$")
+_COUNTS = tuple(1 << bits for bits in range(8, 20))
+_NEAR = 0.06
+
+
+def draft(contents: Contents, model: str | None = None) -> Draft:
+    """Write a sensor file for what a recording holds, as far as it tells.
+
+    Parameters
+    ----------
+    contents : Contents
+    model : str or None
+        What the sensor is called; None: as the log.
+    """
+    choice = chosen(contents)
+    found = Draft(
+        Entry(_vendor(contents), "who makes the sensor, for the report"),
+        Entry(model or _ENDINGS.sub("", contents.path.name) or "sensor", "what it is called"),
+    )
+    if contents.reader is not None:
+        found.reader = Entry(contents.reader, "the file does not tell it by its first bytes")
+    if choice.clock is not None:
+        value = dict(choice.clock.entry.value)
+        if choice.local:
+            value["column"] = choice.clock.column.source
+        found.time = Entry(value, choice.clock.entry.comment)
+    if choice.clock is None or choice.clock.counts:
+        found.rate = rate_entry(choice.anchor or _stating(contents.tables))
+    files = {group.table.file for group in choice.taken}
+    alone = len(files) == 1 and files == {contents.only}
+    for group in (choice.gyro, choice.accel):
+        if group is not None:
+            _add(found, group, alone)
+    if choice.temperature is not None:
+        _add_temperature(found, choice.temperature, alone)
+    if not found.channels:
+        _add_placeholders(found)
+    found.left_over += _left_over(choice, contents)
+    return found
+
+
+def _vendor(contents: Contents) -> str:
+    readers = {table.reader for table in contents.tables if table.fault is None}
+    return next((_VENDORS[reader] for reader in readers if reader in _VENDORS), "unknown")
+
+
+def _stating(tables: Iterable[HeldTable]) -> HeldTable | None:
+    return next((table for table in tables if table.rate is not None), None)
+
+
+def _source(table: HeldTable, column: HeldColumn, unit: str, alone: bool) -> dict[str, Any]:
+    """Return what a sensor file says of a column."""
+    source: dict[str, Any] = {}
+    if table.file is not None and not alone:
+        source["file"] = table.file
+    if table.variable is not None:
+        source["variable"] = table.variable
+    return source | {"column": column.source, "unit": unit}
+
+
+# --------------------------------------------------------------------------------- channels
+
+
+def _add(found: Draft, group: Group, alone: bool) -> None:
+    """Add the axes of a group."""
+    unit, comment = group.unit, ""
+    if unit is None and group.quantity == "accel":
+        unit, comment = _guessed_acceleration(group)
+    elif unit is None:
+        unit, comment = UNKNOWN, _GYRO_HINT
+        if group.written:
+            comment = f"the file says {group.written!r}: deg/s or rad/s, or counts?"
+        elif all(_is_whole(column) for column in group.columns.values()):
+            comment = f"{_GYRO_HINT}; whole numbers may be counts: add 'scale'"
+    elif group.rank == WITHOUT_GRAVITY:
+        comment = "with gravity, by its mean: so this is what the accelerometer measures"
+    elif group.quantity == "accel" and group.mean_length is not None and not group.gravity_unit:
+        comment = f"the mean is {group.mean_length:.4g} {unit} long, which is not gravity"
+    comment = "; ".join(text for text in (group.guessed, comment) if text)
+    for axis, column in group.columns.items():
+        entry = Entry(_source(group.table, column, unit, alone), comment)
+        found.channels[f"{group.quantity}_{axis}"] = entry
+
+
+def _guessed_acceleration(group: Group) -> tuple[str, str]:
+    """Return the unit in which the mean is as long as gravity, and say so."""
+    length, unit = group.mean_length, group.gravity_unit
+    if length is None:
+        return UNKNOWN, "the file does not say: m/s^2, g or mg?"
+    if unit is not None:
+        return unit, f"guessed: the mean is {length:.4g} long, as gravity in {unit}"
+    counts = [one for one in _COUNTS if abs(length / one - 1) < _NEAR]
+    hint = (
+        f": counts of g/{counts[0]}? then 'unit: g, scale: {1 / counts[0]:.10g}'" if counts else ""
+    )
+    said = f"the file says {group.written!r}, and" if group.written else "the file does not say;"
+    return UNKNOWN, f"{said} the mean is {length:.4g} long{hint}"
+
+
+def _add_temperature(found: Draft, group: Group, alone: bool) -> None:
+    """Add the temperature, unless its unit cannot be told."""
+    (column,) = list(group.columns.values())[:1]
+    unit, comment = group.unit, ""
+    present = column.values[np.isfinite(column.values)]
+    if unit is None and len(present):
+        level = float(np.median(present))
+        unit = "degC" if -60 <= level <= 130 else "K" if 230 <= level <= 400 else None
+        comment = f"guessed: {level:.4g} is one in {unit}"
+    if unit is None:
+        found.left_over.append(
+            f"not taken: {_shown(group)}, a temperature in a unit that the file does not say"
+        )
+        return
+    found.temperature = Entry(_source(group.table, column, unit, alone), comment)
+
+
+def _add_placeholders(found: Draft) -> None:
+    for name in CHANNELS:
+        found.channels[name] = Entry(
+            {"column": UNKNOWN, "unit": UNKNOWN}, "no name of a column tells: fill in, or remove"
+        )
+
+
+def _is_whole(column: HeldColumn) -> bool:
+    values = column.values[np.isfinite(column.values)]
+    return bool(len(values)) and bool((values == np.rint(values)).all()) and bool(values.any())
+
+
+# -------------------------------------------------------------------------------- left over
+
+
+def _left_over(choice: Choice, contents: Contents) -> list[str]:
+    found = [f"not taken: {_shown(group)} ({why})" for group, why in choice.left]
+    if choice.other_clocks:
+        names = _listed(str(clock.entry.value["column"]) for clock in choice.other_clocks)
+        found.append(f"also a time: {names}")
+    if choice.unknown:
+        names = _listed(c.label or f"column {c.source}" for c in choice.unknown)
+        found.append(f"not recognised: {names}")
+    if contents.files > len({table.file for table in contents.tables}):
+        found.append(f"only some of the {contents.files} files were looked into")
+    return found
+
+
+def _shown(group: Group) -> str:
+    where = ", ".join(text for text in (group.table.file, group.table.name) if text)
+    return f"{group.names} of {where}" if where else group.names
+
+
+def _listed(names: Iterable[str]) -> str:
+    every = list(names)
+    more = f" and {len(every) - _SHOWN} more" if len(every) > _SHOWN else ""
+    return ", ".join(every[:_SHOWN]) + more

@@ -1,0 +1,77 @@
+"""What a log holds, as text for a human."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from imubench_pipeline.readers.contents import Contents, HeldColumn, HeldTable
+from imubench_pipeline.readers.inspection.block import printable
+from imubench_pipeline.readers.inspection.names import meaning
+from imubench_pipeline.readers.spellings import said
+
+_MOST = 40
+_WIDEST_NAME, _WIDEST_VALUES = 44, 60
+_NOT_STATED = "-"
+
+
+def listing(contents: Contents) -> str:
+    """Return what a recording holds: its tables, and of each its columns.
+
+    Parameters
+    ----------
+    contents : Contents
+    """
+    lines = [f"{printable(contents.path.name)}: {printable(contents.about)}"]
+    stated: set[object] = set()
+    for table in contents.tables[:_MOST]:
+        rate = (table.file, table.rate)
+        lines += _table(table, rate not in stated)
+        stated.add(rate)
+    if len(contents.tables) > _MOST:
+        lines.append(f"... and {len(contents.tables) - _MOST} more")
+    if contents.files > len({table.file for table in contents.tables}):
+        lines.append(f"... of {contents.files} files")
+    return "\n".join(lines) + "\n"
+
+
+def _table(table: HeldTable, with_rate: bool) -> Iterator[str]:
+    title = " ".join(printable(text) for text in (table.file, table.name) if text)
+    about = [table.about] if table.about else []
+    if table.rows is not None and " x " not in table.about:
+        about.append(f"{table.rows} records")
+    if table.rate is not None and with_rate:
+        about.append(f"states {table.rate:.6g} Hz")
+    if table.started is not None:
+        about.append(f"started {table.started}")
+    if table.fault is not None:
+        about = [table.fault]
+    yield "  " + ": ".join(text for text in (title, printable("; ".join(about))) if text)
+    for note in table.notes:
+        yield f"    | {printable(note)}"
+    shown = table.columns[:_MOST]
+    rows = [_row(column) for column in shown]
+    widths = [max((len(row[place]) for row in rows), default=0) for place in range(3)]
+    for row in rows:
+        cells = (cell.ljust(width) for cell, width in zip(row, [*widths, 0], strict=True))
+        yield ("    " + "  ".join(cells)).rstrip()
+    if len(table.columns) > _MOST:
+        yield f"    ... and {len(table.columns) - _MOST} more"
+
+
+def _row(column: HeldColumn) -> tuple[str, str, str, str]:
+    """Return name, kind, unit and first values of a column."""
+    name = printable(column.label) or f"column {column.source}"
+    found = meaning(column.label)
+    told = None if found is None else found.unit
+    unit = column.unit or told or ", ".join(said(column.label)) or _NOT_STATED
+    values = ", ".join(printable(text) for text in column.first)
+    return (
+        _cut(name, _WIDEST_NAME),
+        column.kind,
+        _cut(printable(unit), 12),
+        _cut(values, _WIDEST_VALUES),
+    )
+
+
+def _cut(text: str, longest: int) -> str:
+    return text if len(text) <= longest else text[: longest - 3] + "..."

@@ -1,0 +1,168 @@
+"""A drafted sensor file tried on its log: the first records are read with it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.readers import LogFile, read
+from imubench_pipeline.readers.inspection.block import printable
+from imubench_pipeline.readers.inspection.clock import typical_step
+from imubench_pipeline.readers.inspection.draft import UNKNOWN, Draft
+from imubench_pipeline.settings.sensor import CHANNELS, LogFormat, Sensor
+from imubench_pipeline.settings.validation import ConfigError, parse
+from imubench_pipeline.tables.findings import RecordingError
+from imubench_pipeline.units import from_si
+
+_ENOUGH, _MOST_BATCHES = 1000, 8
+_STAND_IN_RATE = "1 Hz"
+_STAND_IN_UNITS = {"gyro": "rad/s", "acce": "m/s^2", "temp": "degC", "time": "s"}
+_ORDER = ("gyro", "accel", "temperature")
+_NEAR = 0.2
+
+
+@dataclass(frozen=True)
+class Proof:
+    """What came of reading the first records as drafted.
+
+    Attributes
+    ----------
+    read : bool
+        They could be read.
+    said : str
+        One line: what they are, or why they cannot be read.
+    """
+
+    read: bool
+    said: str
+
+
+@dataclass
+class _First:
+    """The first records of one file of a recording."""
+
+    columns: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    rate: float | None = None
+    started: str | None = None
+
+
+def proof(path: Path, draft: Draft) -> Proof:
+    """Read the first records of a recording as a draft says.
+
+    Where it has not been filled in, another unit stands in, for the reading alone.
+
+    Parameters
+    ----------
+    path : Path
+    draft : Draft
+    """
+    unfilled = draft.unfilled()
+    if any(key.endswith(".column") for key in unfilled):
+        return Proof(False, f"not read: fill in {_list(unfilled)}")
+    try:
+        if not unfilled:
+            parse(Sensor, draft.sensor(), "the sensor file")
+        log = parse(LogFormat, _filled(draft.log()), "log")
+        files = [_first(file) for file in read(path, log)]
+    except (RecordingError, ConfigError) as error:
+        return Proof(False, printable(f"not read so: {error}"))
+    said = [_shown_count(files), _shown_rate(files, draft), *_shown_vectors(files, unfilled)]
+    started = next((file.started for file in files if file.started), None)
+    if started is not None:
+        said.append(f"from {started[:19]} on")
+    rest = f"; left to fill in: {_list(unfilled)}" if unfilled else ""
+    return Proof(True, "read so: " + ", ".join(said) + rest)
+
+
+def _filled(log: dict[str, Any]) -> dict[str, Any]:
+    """Return a log format in which something stands for what is not filled in."""
+    filled: dict[str, Any] = {
+        key: _STAND_IN_RATE if held == UNKNOWN else held for key, held in log.items()
+    }
+    for holder in (filled, filled["channels"]):
+        for key, entry in holder.items():
+            if isinstance(entry, dict) and entry.get("unit") == UNKNOWN:
+                holder[key] = entry | {"unit": _STAND_IN_UNITS[key[:4]]}
+    return filled
+
+
+def _first(file: LogFile) -> _First:
+    """Read the first batches of a file."""
+    parts: dict[str, list[NDArray[np.float64]]] = {name: [] for name in file.sources}
+    times: list[NDArray[np.float64]] = []
+    rows = 0
+    for number, batch in enumerate(file.batches(), start=1):
+        rows += len(batch)
+        for name, values in batch.columns.items():
+            parts[name].append(values)
+        if batch.time is not None:
+            times.append(batch.time)
+        if rows >= _ENOUGH or number >= _MOST_BATCHES:
+            break
+    if not rows:
+        raise RecordingError(f"{file.path.name}: no record in its beginning")
+    interval = typical_step(np.concatenate(times)) if times else None
+    return _First(
+        {name: np.concatenate(values) for name, values in parts.items()},
+        None if interval is None else 1 / interval,
+        file.started,
+    )
+
+
+def _shown_count(files: list[_First]) -> str:
+    names = [name for file in files for name in file.columns]
+    count = sum(name in CHANNELS for name in names)
+    shown = f"{count} channel" + ("s" if count != 1 else "")
+    return shown + (" and temperature" if len(names) > count else "")
+
+
+def _shown_rate(files: list[_First], draft: Draft) -> str:
+    if draft.time is None or draft.rate is not None:
+        rate = draft.rate.value if draft.rate is not None else UNKNOWN
+        return "no rate" if rate == UNKNOWN else f"{rate} as stated"
+    if UNKNOWN in draft.time.value.values():
+        return "no rate without the unit of time"
+    rates: dict[str, float | None] = {}
+    for file in files:
+        for name in file.columns:
+            rates.setdefault(name.split("_")[0], file.rate)
+    if None in rates.values():
+        return "stamps that do not advance"
+    known = {f"{rate:.4g} Hz" for rate in rates.values() if rate is not None}
+    if len(known) == 1:
+        return f"{known.pop()} from the stamps"
+    each = (f"{name} {rates[name]:.4g} Hz" for name in sorted(rates, key=_ORDER.index))
+    return ", ".join(each) + " from the stamps"
+
+
+def _shown_vectors(files: list[_First], unfilled: list[str]) -> list[str]:
+    """Return the lengths of the mean vectors of both quantities."""
+    means = {
+        name: float(np.nanmean(values)) if np.isfinite(values).any() else np.nan
+        for file in files
+        for name, values in file.columns.items()
+    }
+    said = []
+    for quantity, unit in (("gyro", "deg/s"), ("accel", "m/s^2")):
+        axes = [means.get(f"{quantity}_{axis}", np.nan) for axis in "xyz"]
+        if any(f".{quantity}_" in f".{key}" for key in unfilled) or not np.isfinite(axes).all():
+            continue
+        length = float(np.linalg.norm(axes))
+        dimension = "angular_rate" if quantity == "gyro" else "acceleration"
+        shown = from_si(length, unit, dimension)
+        far = quantity == "accel" and abs(length / STANDARD_GRAVITY - 1) > _NEAR
+        wrong = f" (gravity is {STANDARD_GRAVITY:.2f}: is the unit right?)" if far else ""
+        said.append(f"|{quantity}| = {shown:.3g} {unit}{wrong}")
+    return said
+
+
+def _list(keys: list[str]) -> str:
+    """Return some keys, those of the axes of one quantity as one."""
+    short = dict.fromkeys(key.replace("_x.", "_*.").replace("_y.", "_*.").replace("_z.", "_*.")
+                          for key in keys)  # fmt: skip
+    return ", ".join(short)

@@ -1,0 +1,337 @@
+"""ROS bags: sensor_msgs/Imu of ROS 1 (.bag) and ROS 2 (SQLite, MCAP, or a folder of them).
+
+Columns are ``angular_velocity.x`` ``.y`` ``.z`` in rad/s and ``linear_acceleration.x`` ``.y``
+``.z`` in m/s^2, of a topic of sensor_msgs/Imu; ``temperature`` in degC, of a topic of
+sensor_msgs/Temperature. ``variable`` is the topic; it is needed where the bag has several that
+hold the column. Time columns, with ``unit: ns``: ``header.stamp``, what the driver wrote, and
+``log_time``, when the message was recorded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from rosbags.interfaces import Connection
+from rosbags.rosbag2 import Reader
+from rosbags.rosbag2.storage_mcap import McapReader
+from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
+
+from imubench_pipeline.readers.batch import Batch, LogFile
+from imubench_pipeline.readers.rosbag.messages import LAYOUTS, Layout, figures_of
+from imubench_pipeline.readers.rosbag.version_1 import Bag
+from imubench_pipeline.readers.started import date_of
+from imubench_pipeline.readers.wrapping import WrapState, unwrapped
+from imubench_pipeline.tables.findings import Finding, RecordingError
+
+_BATCH = 1 << 14
+_SQLITE = b"SQLite format 3"
+STAMP, LOG_TIME = "header.stamp", "log_time"
+"""The columns of time."""
+
+
+class Source(Protocol):
+    """A bag of either kind."""
+
+    ros_1: bool
+    unclosed: bool
+
+    def topics(self) -> dict[str, str]:
+        """Return the topics, and the type of message of each."""
+
+    def counts(self) -> dict[str, int]:
+        """Return how many messages a topic has, where that is cheap to know."""
+
+    def messages(self, topic: str) -> Iterator[tuple[int, bytes]]:
+        """Yield time of recording (ns) and bytes of the messages of a topic."""
+
+    def close(self) -> None:
+        """Close the bag."""
+
+
+class RosbagFile(LogFile):
+    """One topic of a ROS bag."""
+
+    fixed_units: ClassVar = {"gyro": "rad/s", "accel": "m/s^2"}
+    fixed_by: ClassVar = "the type sensor_msgs/Imu of its topic"
+
+    def batches(self) -> Iterator[Batch]:
+        """Yield the records in the order of the bag (see `LogFile.batches`)."""
+        self._check_time()
+        source = opened(self.path)
+        try:
+            topic, kind = self._topic(source)
+            yield from self._read(source, topic, LAYOUTS[kind])
+        finally:
+            source.close()
+
+    def _read(self, source: Source, topic: str, layout: Layout) -> Iterator[Batch]:
+        sound = damaged = 0
+        absent = dict.fromkeys(layout.covariances, 0)
+        first: np.int64 | None = None
+        wrap = WrapState()
+        for times, messages in self._blocks(source, topic):
+            stamps, figures, good = figures_of(messages, layout, source.ros_1)
+            sound += int(good.sum())
+            damaged += int(np.count_nonzero(~good))
+            self._blank(figures, layout, absent)
+            time = None
+            if self.log.time is not None:
+                chosen = stamps if self.log.time.column == STAMP else times
+                figures, chosen = figures[good], chosen[good]
+                if not len(chosen):
+                    continue
+                if first is None:
+                    first = chosen[0]
+                    self.started = date_of(int(first))
+                if self.log.time.wraps is not None:
+                    chosen = unwrapped(chosen, self.log.time.wraps, wrap)
+                time = self.seconds(chosen, first)
+            yield Batch(
+                time,
+                {
+                    name: self.to_si(
+                        name, np.ascontiguousarray(figures[:, layout.columns[str(source.column)]])
+                    )
+                    for name, source in self.sources.items()
+                },
+            )
+        if not sound:
+            raise RecordingError(
+                f"{self.path.name}: no message of {topic} can be read, {damaged} are not as their "
+                "type says; expected the bytes that ROS writes (CDR in ROS 2, uncompressed unless "
+                "metadata.yaml is there and says so); record it again or convert it"
+            )
+        self._report(topic, source.unclosed, damaged, absent)
+
+    def _blank(self, figures: NDArray[np.float64], layout: Layout, absent: dict[str, int]) -> None:
+        """Make NaN what a message says it does not measure."""
+        for quantity, place in layout.covariances.items():
+            columns = [
+                layout.columns[str(source.column)]
+                for source in self.sources.values()
+                if str(source.column).startswith(quantity)
+            ]
+            without = figures[:, place] == -1
+            if columns and without.any():
+                figures[np.ix_(without, columns)] = np.nan
+                absent[quantity] += int(without.sum())
+
+    # ---------------------------------------------------------------------------- the bag
+
+    def _blocks(
+        self, source: Source, topic: str
+    ) -> Iterator[tuple[NDArray[np.int64], list[bytes]]]:
+        """Yield the messages of a topic in blocks, with the times of their recording."""
+        incoming = source.messages(topic)
+        while True:
+            times: list[int] = []
+            messages: list[bytes] = []
+            with explained(self.path):
+                for time, message in incoming:
+                    times.append(time)
+                    messages.append(message)
+                    if len(times) == _BATCH:
+                        break
+                written = np.array(times, np.int64)
+            if not times:
+                return
+            yield written, messages
+
+    # -------------------------------------------------------------- what the sensor file says
+
+    def _check_time(self) -> None:
+        time = self.log.time
+        if time is None:
+            return
+        if time.column not in (STAMP, LOG_TIME):
+            raise RecordingError(
+                f"{self.path.name}: no time column {time.column!r}; a ROS bag has {STAMP!r} and "
+                f"{LOG_TIME!r}; mend 'column' of 'time' in the sensor file"
+            )
+        if time.unit != "ns":
+            raise RecordingError(
+                f"{self.path.name}: {time.column} is {time.unit or time.format} in the sensor "
+                "file; a ROS bag gives ns; expected 'unit: ns' of 'time'"
+            )
+
+    def _topic(self, source: Source) -> tuple[str, str]:
+        """Return the topic that the columns are taken from, and its type."""
+        with explained(self.path):
+            topics = source.topics()
+        stated = {source.variable for source in self.sources.values() if source.variable}
+        if len(stated) > 1:
+            raise RecordingError(
+                f"{self.path.name}: columns of the topics {', '.join(sorted(stated))} cannot be "
+                "read together, for each topic has a clock of its own; expected one topic a file"
+            )
+        able = {
+            topic: kind
+            for topic, kind in topics.items()
+            if kind in LAYOUTS
+            and all(source.column in LAYOUTS[kind].columns for source in self.sources.values())
+        }
+        wanted = ", ".join(str(source.column) for source in self.sources.values())
+        found = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(topics.items())[:30])
+        if stated:
+            (name,) = stated
+            chosen = [topic for topic in able if topic.strip("/") == name.strip("/")]
+        else:
+            name, chosen = "", sorted(able)
+        if len(chosen) == 1:
+            return chosen[0], able[chosen[0]]
+        if chosen:
+            raise RecordingError(
+                f"{self.path.name}: several topics hold {wanted}: {', '.join(chosen)}; name one "
+                "with 'variable:' at each column in the sensor file"
+            )
+        cut = " (the bag is cut short, or was not closed)" if source.unclosed else ""
+        known = "; ".join(f"{kind}: {', '.join(LAYOUTS[kind].columns)}" for kind in LAYOUTS)
+        raise RecordingError(
+            f"{self.path.name}: no topic {name + ' ' if name else ''}with {wanted}; found "
+            f"{found or 'none'}{cut}; expected a topic of {known}; mend 'variable' or 'column' in "
+            "the sensor file"
+        )
+
+    # ----------------------------------------------------------------------------- findings
+
+    def _report(self, topic: str, unclosed: bool, damaged: int, absent: dict[str, int]) -> None:
+        fate = "left out" if self.log.time is not None else "missing samples"
+        if damaged:
+            self._warn(
+                "damaged_message",
+                f"{damaged} messages of {topic} are not as their type says; {fate}",
+                damaged,
+            )
+        for quantity, count in absent.items():
+            if count:
+                self._warn(
+                    "not_measured",
+                    f"{count} messages of {topic} say (covariance -1) that they hold no "
+                    f"{quantity}; missing samples",
+                    count,
+                )
+        if unclosed:
+            self._warn("truncated_file", "the bag was not closed; read as far as it goes", 1)
+        for path in _unmerged(self.path):
+            self._warn(
+                "truncated_file",
+                f"{path.name} holds records that are not yet in the bag and are not read; merge "
+                "them with sqlite3 and 'pragma wal_checkpoint'",
+                1,
+            )
+
+    def _warn(self, name: str, text: str, value: float) -> None:
+        self.findings.append(Finding(name, "warning", f"{self.path.name}: {text}", value))
+
+
+@contextmanager
+def explained(path: Path) -> Iterator[None]:
+    """Make a `RecordingError` of whatever the libraries raise on a bag."""
+    try:
+        yield
+    except RecordingError:
+        raise
+    # They raise whatever their parsing meets: struct.error, KeyError, ...
+    except Exception as error:
+        said = " ".join(str(error).replace(f"{path.parent}/", "").split())[:300]
+        if isinstance(error, MemoryError):
+            said = "a record promises more bytes than memory can hold"
+        raise RecordingError(
+            f"{path.name}: corrupt, or cut short ({said or type(error).__name__}); "
+            "expected a ROS bag; copy it again, or mend it ('ros2 bag reindex', 'mcap recover', "
+            "'.recover' of sqlite3)"
+        ) from None
+
+
+def opened(path: Path) -> Source:
+    """Open a bag; its content tells which kind it is.
+
+    Parameters
+    ----------
+    path : Path
+        A file, or the folder of a ROS 2 bag.
+
+    Raises
+    ------
+    RecordingError
+        If it cannot be opened, or is no bag.
+    """
+    with explained(path):
+        try:
+            return _opened(path)
+        except OSError as error:
+            raise RecordingError(
+                f"{path.name}: cannot be opened ({error.strerror or error})"
+            ) from None
+
+
+def _opened(path: Path) -> Source:
+    if path.is_dir():
+        for database in sorted(path.glob("*.db3")):
+            _check_whole(database)
+        return _Bag2(Reader(path))
+    with path.open("rb") as file:
+        begin = file.read(16)
+    if begin.startswith(b"\x89MCAP"):
+        return _Bag2(McapReader(path))
+    if begin.startswith(_SQLITE):
+        _check_whole(path)
+        return _Bag2(Sqlite3Reader(path))
+    return Bag(path)
+
+
+def _check_whole(path: Path) -> None:
+    """Raise if a database is shorter than it says: SQLite would take what is missing as zeros."""
+    with path.open("rb") as file:
+        header = file.read(100)
+    size = int.from_bytes(header[16:18], "big")
+    pages = int.from_bytes(header[28:32], "big")
+    # An old library leaves the count of pages as it was; then the two counters differ.
+    known = header[24:28] == header[92:96]
+    expected = (1 << 16 if size == 1 else size) * pages
+    if known and path.stat().st_size < expected:
+        raise RecordingError(
+            f"{path.name}: cut short: {path.stat().st_size} of {expected} bytes; copy it again, or "
+            "mend it with '.recover' of sqlite3"
+        )
+
+
+class _Bag2:
+    """A ROS 2 bag, read by the library."""
+
+    ros_1 = False
+    unclosed = False
+
+    def __init__(self, reader: Reader | McapReader | Sqlite3Reader) -> None:
+        self._reader = reader
+        reader.open()
+        self._connections: list[Connection] = list(reader.connections)
+
+    def topics(self) -> dict[str, str]:
+        return {str(held.topic): str(held.msgtype) for held in self._connections}
+
+    def counts(self) -> dict[str, int]:
+        found: dict[str, int] = {}
+        for held in self._connections:
+            found[str(held.topic)] = found.get(str(held.topic), 0) + held.msgcount
+        return found
+
+    def messages(self, topic: str) -> Iterator[tuple[int, bytes]]:
+        wanted = [connection for connection in self._connections if connection.topic == topic]
+        for _, time, message in self._reader.messages(wanted):
+            # A damaged database may hold anything.
+            yield time, message if isinstance(message, bytes) else b""
+
+    def close(self) -> None:
+        self._reader.close()
+
+
+def _unmerged(path: Path) -> list[Path]:
+    """Return the journals of SQLite that hold what was recorded last."""
+    logs = path.glob("*-wal") if path.is_dir() else [path.with_name(f"{path.name}-wal")]
+    return [log for log in logs if log.is_file() and log.stat().st_size]

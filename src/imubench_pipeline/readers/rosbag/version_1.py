@@ -1,0 +1,208 @@
+"""ROS 1 bags (version 2.0), read from the beginning to the end.
+
+The index of a bag names every message, so it grows with the recording, and a bag that was not
+closed has none. The chunks in their order need no index and little memory.
+"""
+
+from __future__ import annotations
+
+import bz2
+import os
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+from imubench_pipeline.tables.findings import RecordingError
+
+_MAGIC = b"#ROSBAG V2.0\n"
+_MESSAGE, _BAG, _CHUNK, _CONNECTION = b"\x02", b"\x03", b"\x05", b"\x07"
+_LARGEST_CHUNK = 1 << 28
+_U4 = struct.Struct("<I")
+_TIME = struct.Struct("<II")
+
+
+class Bag:
+    """A ROS 1 bag.
+
+    Attributes
+    ----------
+    unclosed : bool
+        The bag was not closed, or is cut short; known after the last message.
+    """
+
+    ros_1 = True
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._connections: dict[bytes, tuple[str, str]] = {}
+        self.unclosed = False
+
+    def close(self) -> None:
+        """Do nothing: the file is open only while messages are read."""
+
+    def topics(self) -> dict[str, str]:
+        """Return the topics, and the type of message of each.
+
+        Raises
+        ------
+        RecordingError
+            If this is no bag, or it is damaged.
+        """
+        for _ in self._listed():
+            pass
+        return dict(self._connections.values())
+
+    def counts(self) -> dict[str, int]:
+        """Return nothing: only the whole bag tells how many messages a topic has."""
+        return {}
+
+    def _listed(self) -> Iterator[None]:
+        """Read connections where the index says they are, or from all of the bag."""
+        with self._path.open("rb") as file:
+            try:
+                start = self._start(file)
+                if start:
+                    file.seek(start)
+                    while (record := _record(file)) is not None and record[0][b"op"] == _CONNECTION:
+                        self._connect(*record)
+            except (ValueError, KeyError, struct.error, OSError, _CutShortError):
+                self._connections.clear()
+        if not self._connections:
+            for _ in self.messages(""):
+                yield
+
+    def messages(self, topic: str) -> Iterator[tuple[int, bytes]]:
+        """Yield time of recording (ns) and bytes of the messages of a topic.
+
+        Raises
+        ------
+        RecordingError
+            If this is no bag, or it is damaged.
+        """
+        with self._path.open("rb") as file:
+            at = 0
+            try:
+                self.unclosed = not self._start(file)
+                while True:
+                    at = file.tell()
+                    record = _record(file)
+                    if record is None:
+                        break
+                    header, data = record
+                    if header[b"op"] == _CHUNK:
+                        yield from self._chunk(header, data, topic)
+                    else:
+                        yield from self._message(header, data, topic)
+            except _CutShortError:
+                self.unclosed = True
+            except (ValueError, KeyError, struct.error, OSError, EOFError, RuntimeError) as error:
+                if isinstance(error, RecordingError):
+                    raise
+                raise RecordingError(
+                    f"{self._path.name}: damaged at byte {at} ({error or type(error).__name__}); "
+                    "expected a record of a ROS 1 bag; copy it again, or try 'rosbag reindex' and "
+                    "'rosbag fix'"
+                ) from None
+
+    def _start(self, file: BinaryIO) -> int:
+        """Read the first record; return where the index begins, 0 if there is none."""
+        magic = file.read(len(_MAGIC))
+        if magic != _MAGIC:
+            raise RecordingError(
+                f"{self._path.name}: begins with {magic!r}; expected {_MAGIC!r}, a ROS 1 bag of "
+                "version 2.0 ('rosbag migrate' mends an older one)"
+            )
+        record = _record(file)
+        if record is None or record[0][b"op"] != _BAG:
+            raise ValueError("no bag header")
+        return int.from_bytes(record[0][b"index_pos"], "little")
+
+    def _chunk(
+        self, header: dict[bytes, bytes], data: bytes, topic: str
+    ) -> Iterator[tuple[int, bytes]]:
+        (size,) = _U4.unpack(header[b"size"])
+        if size > _LARGEST_CHUNK:
+            raise ValueError(f"a chunk of {size} bytes")
+        compression = header[b"compression"].decode("ascii", "replace")
+        if compression == "bz2":
+            data = bz2.BZ2Decompressor().decompress(data, size + 1)
+        elif compression == "lz4":
+            import lz4.frame  # type: ignore[import-untyped]  # has no types
+
+            data = lz4.frame.LZ4FrameDecompressor().decompress(data, size + 1)
+        elif compression != "none":
+            raise RecordingError(
+                f"{self._path.name}: a chunk is compressed with {compression!r}; expected bz2 or "
+                "lz4; write the bag anew with 'rosbag compress'"
+            )
+        if len(data) != size:
+            raise ValueError(f"a chunk is not as long as the {size} bytes that it says")
+        at = 0
+        while at < len(data):
+            fields, body, at = _record_in(data, at)
+            yield from self._message(fields, body, topic)
+
+    def _message(
+        self, header: dict[bytes, bytes], data: bytes, topic: str
+    ) -> Iterator[tuple[int, bytes]]:
+        if header[b"op"] == _MESSAGE:
+            if self._connections[header[b"conn"]][0] == topic:
+                seconds, nanoseconds = _TIME.unpack(header[b"time"])
+                yield seconds * 10**9 + nanoseconds, data
+        elif header[b"op"] == _CONNECTION:
+            self._connect(header, data)
+
+    def _connect(self, header: dict[bytes, bytes], data: bytes) -> None:
+        kind = _fields(data)[b"type"].decode("utf-8", "replace")
+        topic = header[b"topic"].decode("utf-8", "replace")
+        # The name that ROS 2 has for the same type.
+        self._connections[header[b"conn"]] = topic, kind.replace("/", "/msg/", 1)
+
+
+class _CutShortError(Exception):
+    """The file ends within a record."""
+
+
+def _record(file: BinaryIO) -> tuple[dict[bytes, bytes], bytes] | None:
+    """Return header and data of the next record of a file; None at the end."""
+    size = file.read(4)
+    if not size:
+        return None
+    header = _exactly(file, size)
+    if not header:
+        # What a power cut leaves of a file that was growing.
+        raise _CutShortError
+    return _fields(header), _exactly(file, file.read(4))
+
+
+def _exactly(file: BinaryIO, size: bytes) -> bytes:
+    if len(size) < 4:
+        raise _CutShortError
+    (count,) = _U4.unpack(size)
+    # Asked before, since a damaged size may be larger than the memory.
+    if count > os.fstat(file.fileno()).st_size - file.tell():
+        raise _CutShortError
+    return file.read(count)
+
+
+def _record_in(data: bytes, at: int) -> tuple[dict[bytes, bytes], bytes, int]:
+    """Return header and data of the record at a place of a chunk, and the place behind it."""
+    middle = at + 4 + _U4.unpack_from(data, at)[0]
+    end = middle + 4 + _U4.unpack_from(data, middle)[0]
+    if end > len(data):
+        raise ValueError("a record reaches beyond its chunk")
+    return _fields(data[at + 4 : middle]), data[middle + 4 : end], end
+
+
+def _fields(header: bytes) -> dict[bytes, bytes]:
+    fields: dict[bytes, bytes] = {}
+    at = 0
+    while at < len(header):
+        end = at + 4 + _U4.unpack_from(header, at)[0]
+        name, sign, value = header[at + 4 : end].partition(b"=")
+        if not sign or end > len(header):
+            raise ValueError("no header of a record")
+        fields[name] = value
+        at = end
+    return fields

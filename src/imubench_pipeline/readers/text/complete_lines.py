@@ -1,0 +1,206 @@
+"""The text of a log as UTF-8 with line feeds, in blocks of complete lines."""
+
+from __future__ import annotations
+
+import codecs
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+
+from imubench_pipeline.readers.compressed import open_bytes
+from imubench_pipeline.tables.findings import Finding, RecordingError
+
+_SEEN = 1 << 16
+_LONGEST_LINE = 1 << 20
+_BYTE_ORDER_MARKS: Mapping[bytes, str] = {
+    codecs.BOM_UTF8: "",
+    # Before UTF-16, whose mark is the beginning of this one.
+    codecs.BOM_UTF32_LE: "utf-32-le",
+    codecs.BOM_UTF32_BE: "utf-32-be",
+    codecs.BOM_UTF16_LE: "utf-16-le",
+    codecs.BOM_UTF16_BE: "utf-16-be",
+}
+
+
+class _Text:
+    """The bytes of a text log, decompressed, in an encoding that ASCII is a part of.
+
+    A lone carriage return at the ends of lines is a line feed here, and a byte order mark is
+    gone.
+    """
+
+    def __init__(self, path: Path, skipped: int) -> None:
+        self._bytes = open_bytes(path)
+        try:
+            self._prepare(skipped)
+        except BaseException:
+            self.close()
+            raise
+
+    def _prepare(self, skipped: int) -> None:
+        begin = b""
+        while len(begin) < _SEEN and (block := self._bytes.read(_SEEN - len(begin))):
+            begin += block
+        mark = next((mark for mark in _BYTE_ORDER_MARKS if begin.startswith(mark)), b"")
+        encoding = _BYTE_ORDER_MARKS.get(mark)
+        self._decoder = (
+            codecs.getincrementaldecoder(encoding)(errors="replace") if encoding else None
+        )
+        self._begin = self._utf_8(begin.removeprefix(mark))
+        self._returns = b"\n" not in self._begin and b"\r" in self._begin[:-1]
+        while skipped > 0 and (block := self.read(skipped)):
+            self._begin = block[skipped:]
+            skipped -= len(block)
+
+    @property
+    def ended_early(self) -> bool:
+        """Whether the compressed data stop before their end."""
+        return self._bytes.ended_early
+
+    def read(self, size: int) -> bytes:
+        """Return the next bytes, about ``size``; none at the end."""
+        block, self._begin = self._begin, b""
+        while not block:
+            read = self._bytes.read(size)
+            if not read:
+                return b""
+            block = self._utf_8(read)
+        return block.replace(b"\r", b"\n") if self._returns else block
+
+    def close(self) -> None:
+        self._bytes.close()
+
+    def _utf_8(self, block: bytes) -> bytes:
+        return self._decoder.decode(block).encode() if self._decoder else block
+
+
+class CompleteLines:
+    """A file for reading that ends with the last complete line.
+
+    What follows the last line break was being written when the power was cut: a record
+    without its line break may have lost digits, so it is left out and noted. A compressed file
+    that ends early is read as far as it goes, and noted.
+
+    Parameters
+    ----------
+    path : Path
+    findings : list of Finding
+        Gets what was left out.
+    skipped : int
+        Bytes of the text to pass over.
+    records : callable
+        Makes of complete lines what is read.
+
+    Attributes
+    ----------
+    rest : bytes
+        What follows the last complete line.
+    error : RecordingError or None
+        Kept as well as raised: a parser between us and the caller may wrap the exception.
+    """
+
+    closed = False
+
+    def __init__(
+        self,
+        path: Path,
+        findings: list[Finding],
+        skipped: int = 0,
+        records: Callable[[bytes], bytes] = bytes,
+    ) -> None:
+        self._path = path
+        self._findings = findings
+        self._records = records
+        self._ready = b""
+        self._ended = False
+        self.rest = b""
+        self.error: RecordingError | None = None
+        self._text = _Text(path, skipped)
+
+    def __enter__(self) -> CompleteLines:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file."""
+        self.closed = True
+        self._text.close()
+
+    def readable(self) -> bool:
+        """Return True: the file can be read."""
+        return True
+
+    def seekable(self) -> bool:
+        """Return False: it is read from its beginning to its end."""
+        return False
+
+    def read(self, size: int) -> bytes:
+        """Return the next complete lines, ``size`` bytes at most or one line; none at the end."""
+        try:
+            while not self._ready and not self._ended:
+                self._ready = self._records(self._lines(size))
+        except RecordingError as error:
+            self.error = error
+            raise
+        block = self._ready
+        if len(block) > size:
+            block = block[: block.rfind(b"\n", 0, size) + 1 or block.find(b"\n") + 1]
+        self._ready = self._ready[len(block) :]
+        return block
+
+    def _lines(self, size: int) -> bytes:
+        """Return the next complete lines, none where the next line is not yet complete."""
+        block = self._text.read(max(size - len(self.rest), _SEEN))
+        if not block:
+            self._end()
+            return b""
+        cut = block.rfind(b"\n") + 1
+        if not cut:
+            # What a power cut leaves of a file that was growing; one of them is kept, for what
+            # may follow is another record.
+            self.rest += b"\0" if block == bytes(len(block)) else block
+            if self.rest.endswith(b"\0"):
+                self.rest = self.rest.rstrip(b"\0") + b"\0"
+            if len(self.rest) > _LONGEST_LINE:
+                shown = self.rest[:40].decode("utf-8", "replace")
+                raise RecordingError(
+                    f"{self._path.name}: no line break in {_LONGEST_LINE} bytes from {shown!r}; "
+                    "expected shorter lines: this is no text log, or not one record a line"
+                )
+            return b""
+        lines = b"".join((self.rest, memoryview(block)[:cut]))
+        self.rest = block[cut:]
+        return lines
+
+    def _end(self) -> None:
+        self._ended = True
+        if self._text.ended_early:
+            self._findings.append(
+                Finding(
+                    "truncated_file",
+                    "warning",
+                    f"{self._path.name}: the compressed file ends early; read as far as it goes",
+                    1,
+                )
+            )
+        if self.rest.strip(b"\0\r\n\t "):
+            shown = self.rest[:60].decode("utf-8", "replace")
+            self._findings.append(
+                Finding(
+                    "incomplete_last_record",
+                    "note",
+                    f"{self._path.name}: the last record has no line break and may be cut short; "
+                    f"left out: {shown!r}",
+                    1,
+                )
+            )
+
+
+def first_lines(path: Path) -> Iterator[bytes]:
+    """Yield the lines of a text log from its beginning; the last one may lack its line break."""
+    with CompleteLines(path, []) as lines:
+        while block := lines.read(_SEEN):
+            yield from (line + b"\n" for line in block[:-1].split(b"\n"))
+        if lines.rest.strip(b"\0"):
+            yield lines.rest

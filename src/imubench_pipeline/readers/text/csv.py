@@ -1,0 +1,223 @@
+"""Logs of delimited text: found out how they are written, then read by pyarrow in big blocks."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pacsv
+from numpy.typing import NDArray
+
+from imubench_pipeline.readers.batch import Batch, LogFile
+from imubench_pipeline.readers.text.cells import MISSING
+from imubench_pipeline.readers.text.complete_lines import CompleteLines, first_lines
+from imubench_pipeline.readers.text.layout import TextLayout, find_layout
+from imubench_pipeline.readers.text.preamble import stated_rate, stated_start
+from imubench_pipeline.readers.text.records import Records
+from imubench_pipeline.readers.text.stamps import StampError
+from imubench_pipeline.readers.text.time import TextTime, time_columns
+from imubench_pipeline.readers.text.units import text_units
+from imubench_pipeline.tables.findings import Finding, RecordingError
+
+_BLOCK_BYTES = 1 << 20  # pyarrow reads 32 of them ahead
+_ADVICE = (
+    "either the file is corrupt there (copy it again, or cut it before that line), or the sensor "
+    "file does not describe it (delimiter, decimal, header, skip_lines, comment, column)"
+)
+_NOTHING = "Empty CSV file"
+_OPEN_QUOTE = "out of sync"
+_ARROW_ROW = re.compile(r"Row #(\d+)")
+_ARROW_COLUMN = re.compile(r"In CSV column #(\d+)")
+_ARROW_VALUE = re.compile(r"invalid value '(.*)'|zone offset in '(.*?)'", re.DOTALL)
+
+
+class CsvFile(LogFile):
+    """A log file of delimited text."""
+
+    def batches(self) -> Iterator[Batch]:
+        """Yield the records in the order of the file (see `LogFile.batches`)."""
+        figures = [source.column for source in self.sources.values()]
+        layout = find_layout(self.path, self.log, figures, time_columns(self.log.time))
+        columns = {
+            name: layout.position(source.column, name) for name, source in self.sources.items()
+        }
+        self.units = text_units(layout, columns)
+        preamble = [line.decode("utf-8", "replace") for line in layout.preamble]
+        self.rate, self.started = stated_rate(preamble), stated_start(preamble)
+        time = None if self.log.time is None else TextTime(self, layout)
+        for name, at in columns.items():
+            if time is not None and at in time.types:
+                raise RecordingError(
+                    f"{self.path.name}: column {layout.names[at]!r} is taken for time and for "
+                    f"{name}; mend 'column' of one of them in the sensor file"
+                )
+        records = layout.records()
+        rows = 0
+        for part in self._parts(layout, set(columns.values()), time, records):
+            try:
+                stamps = None if time is None else time.seconds(part)
+            except StampError as error:
+                assert time is not None  # there are stamps
+                line = self._line(rows + error.row + 1, layout, blank=False)
+                column = layout.names[time.position]
+                raise self._bad_cell(line, column, error.text, time.expected) from None
+            rows += len(part)
+            yield Batch(
+                stamps,
+                {name: self.to_si(name, _numbers(part, at)) for name, at in columns.items()},
+            )
+        if rows == 0:
+            raise RecordingError(f"{self.path.name}: no complete record; expected at least one")
+        self._note(layout, records)
+
+    def _parts(
+        self, layout: TextLayout, figures: set[int], time: TextTime | None, records: Records
+    ) -> Iterator[pa.RecordBatch]:
+        """Yield the wanted columns, named by their positions, block by block."""
+        types = dict.fromkeys(figures, pa.float64()) | (time.types if time else {})
+        fault = _WrongWidth()
+        rows = 0
+        with CompleteLines(self.path, self.findings, layout.bytes_before, records) as lines:
+            try:
+                reader = pacsv.open_csv(
+                    lines,
+                    read_options=pacsv.ReadOptions(
+                        use_threads=False,
+                        block_size=_BLOCK_BYTES,
+                        column_names=[str(position) for position in range(len(layout.names))],
+                    ),
+                    parse_options=pacsv.ParseOptions(
+                        delimiter=layout.split.delimiter,
+                        # A stray quote would swallow the lines up to the next one.
+                        quote_char='"' if layout.quoted else False,
+                        invalid_row_handler=fault.keep,
+                    ),
+                    convert_options=pacsv.ConvertOptions(
+                        column_types={str(at): kind for at, kind in types.items()},
+                        include_columns=[str(at) for at in types],
+                        null_values=MISSING,
+                        decimal_point=layout.decimal,
+                    ),
+                )
+                for part in reader:
+                    rows += len(part)
+                    if fault.row is not None and fault.record <= rows:
+                        raise self._wrong_width(fault.row, layout)
+                    if len(part):
+                        yield part
+            except pa.ArrowException as error:
+                if lines.error is not None:
+                    raise lines.error from None
+                if _NOTHING not in str(error):
+                    raise self._explained(error, fault, layout, time) from None
+        if fault.row is not None:
+            self._found(
+                "incomplete_last_record",
+                f"the last record has {fault.row.actual_columns} of {fault.row.expected_columns} "
+                "columns; left out",
+                1,
+            )
+
+    # ------------------------------------------------------------------- findings, faults
+
+    def _found(self, finding: str, detail: str, value: int) -> None:
+        self.findings.append(Finding(finding, "note", f"{self.path.name}: {detail}", value))
+
+    def _note(self, layout: TextLayout, records: Records) -> None:
+        if layout.passed_over:
+            count, (number, text) = len(layout.passed_over), layout.passed_over[0]
+            if layout.header:
+                name, what = "not_records", "stand under the names and are no units"
+            else:
+                name, what = "incomplete_first_record", "lack a part of their record"
+            self._found(
+                name, f"{count} lines from line {number} {what}; left out: {text[:60]!r}", count
+            )
+        if records.restarts:
+            cut = f" after a record cut short in {records.cut} places" if records.cut else ""
+            self._found(
+                "restarted_log",
+                f"the header stands again {records.restarts} times{cut}: the logger was started "
+                "again; these lines are left out",
+                records.restarts,
+            )
+
+    def _wrong_width(self, row: pacsv.InvalidRow, layout: TextLayout) -> RecordingError:
+        return RecordingError(
+            f"{self.path.name}, line {self._line(row.number, layout, blank=True)}: found "
+            f"{row.actual_columns} columns, expected {row.expected_columns}: {row.text[:80]!r}; "
+            f"{_ADVICE}"
+        )
+
+    def _bad_cell(self, line: int, column: str, found: str, expected: str) -> RecordingError:
+        return RecordingError(
+            f"{self.path.name}, line {line}, column {column!r}: found {found[:40]!r}, expected "
+            f"{expected}; {_ADVICE}"
+        )
+
+    def _line(self, row: int, layout: TextLayout, *, blank: bool) -> int:
+        """Return the line of a record in the file; ``blank``: lines of spaces count as records."""
+        stripped = b"\r\n" if blank else b"\r\n\t "
+        one, count = layout.records(), 0
+        for number, raw in enumerate(first_lines(self.path), start=1):
+            if number > layout.lines_before:
+                count += sum(bool(line.strip(stripped)) for line in one(raw).split(b"\n"))
+            if count >= row:
+                return number
+        return row + layout.lines_before
+
+    def _explained(
+        self,
+        error: pa.ArrowException,
+        fault: _WrongWidth,
+        layout: TextLayout,
+        time: TextTime | None,
+    ) -> RecordingError:
+        """Return what an error of pyarrow says, in terms of the file."""
+        text = str(error)
+        row, column = _ARROW_ROW.search(text), _ARROW_COLUMN.search(text)
+        if fault.row is not None and (row is None or fault.row.number <= int(row[1])):
+            return self._wrong_width(fault.row, layout)
+        if _OPEN_QUOTE in text:
+            text = "a quote is opened that is not closed on its line; expected one record a line"
+        value = _ARROW_VALUE.search(text)
+        if row is None or column is None or value is None:
+            return RecordingError(f"{self.path.name}: not read as columns: {text[:300]}; {_ADVICE}")
+        position = int(column[1])
+        expected = f"a number with {layout.decimal!r} before its decimals, or nothing"
+        if time is not None and position in time.types:
+            expected = time.expected
+        line = self._line(int(row[1]), layout, blank=True)
+        return self._bad_cell(line, layout.names[position], value[1] or value[2] or "", expected)
+
+
+class _WrongWidth:
+    """The first record with too many or too few columns: no fault where it is the last one.
+
+    Attributes
+    ----------
+    row : InvalidRow or None
+    record : int
+        Its number among the records without lines of spaces, counted from 1.
+    """
+
+    def __init__(self) -> None:
+        self.row: pacsv.InvalidRow | None = None
+        self.record = 0
+        self._blank = 0
+
+    def keep(self, row: pacsv.InvalidRow) -> str:
+        """Tell pyarrow to go on after the first such record, and to stop at the next."""
+        if not row.text.strip():
+            self._blank += 1
+            return "skip"
+        if self.row is not None:
+            return "error"
+        self.row, self.record = row, row.number - self._blank
+        return "skip"
+
+
+def _numbers(part: pa.RecordBatch, position: int) -> NDArray[np.float64]:
+    return np.asarray(part.column(str(position)).to_numpy(zero_copy_only=False), np.float64)

@@ -1,0 +1,76 @@
+"""Lines before the first record of a text log: which has the names, and which the units."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from imubench_pipeline.readers.text.cells import is_missing, is_number
+
+_RULED = re.compile(r"[-=_+]{2,}")
+_UNIT = re.compile(
+    r"[(\[{<].*[)\]}>]|[-–.]*|"
+    r"(?:[munpkMµμ]|milli|micro)?(?:s|sec|seconds?|g|rad|deg|degrees?|dps|m|T|gauss|Gauss|Hz|V|Pa|"
+    r"bar|[°º]?C|K|[°º])(?:\W.*|²)?|min|h|samples?|counts?|LSB",
+)
+_WORDS = re.compile(r"[^\W\d]*(?:[\s./()\[\]-]+[^\W\d]+)*[.)\]]?")
+
+
+def likely_header(lines: Sequence[Sequence[str]]) -> int | None:
+    """Return which line has the names of the columns, as far as they can be told from units.
+
+    Parameters
+    ----------
+    lines : sequence of sequence of str
+        The cells of the lines before the first record, in their order; none where a line is not
+        divided as the record is.
+
+    Returns
+    -------
+    int or None
+        The one with the most names; of equals the first. None: no line has names.
+    """
+    best, found = 0, None
+    for index, cells in enumerate(lines):
+        if any(is_number(cell) for cell in cells) or says_units(cells):
+            continue
+        names = len({cell for cell in cells if not is_missing(cell)})
+        if 2 * names >= len(cells) and names > best:
+            best, found = names, index
+    return found
+
+
+def says_units(cells: Sequence[str]) -> bool:
+    """Tell whether a line has a unit in most of its cells."""
+    texts = [cell.strip() for cell in cells if cell.strip()]
+    units = sum(_UNIT.fullmatch(text) is not None for text in texts)
+    named = [text for text in texts if not is_missing(text)]
+    return bool(named) and 2 * units > len(texts)
+
+
+def completed(names: list[str], record: list[str]) -> list[str]:
+    """Return a name for each cell of a record; none where there are more or fewer names.
+
+    Either line may end with a delimiter, and the other may not.
+    """
+    if len(names) == len(record) + 1 and not names[-1]:
+        return names[:-1]
+    if len(names) + 1 == len(record) and not record[-1].strip():
+        return [*names, ""]
+    return names if len(names) == len(record) else []
+
+
+def is_heading(cells: Sequence[str]) -> bool:
+    """Tell whether a line under the names has units, is ruled, or goes on with words."""
+    texts = [cell.strip() for cell in cells]
+    ruled = all(_RULED.fullmatch(text) for text in texts)
+    return ruled or says_units(texts) or all(_WORDS.fullmatch(text) for text in texts)
+
+
+def are_units(row: list[str], places: set[int]) -> bool:
+    """Tell whether a line under the header says units, or is ruled: it has no figure."""
+    if all(_RULED.fullmatch(cell.strip()) for cell in row):
+        return True
+    cells = [row[place].strip() for place in places if place < len(row)]
+    texts = [cell for cell in cells if not is_missing(cell)]
+    return bool(texts) and not any(is_number(text) or text[0].isdigit() for text in texts)

@@ -1,0 +1,420 @@
+"""How a text log is laid out: delimiter, decimal sign, comments, header and first record.
+
+All is found from the first lines; what the sensor file states is taken as stated.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from imubench_pipeline.readers.batch import stated_in
+from imubench_pipeline.readers.text.cells import Decimal, are_figures, is_datum, is_number
+from imubench_pipeline.readers.text.complete_lines import first_lines
+from imubench_pipeline.readers.text.header import are_units, completed, is_heading, likely_header
+from imubench_pipeline.readers.text.records import Records, are_apart
+from imubench_pipeline.readers.text.refusals import (
+    refuse_binary,
+    refuse_decimals_apart,
+    refuse_other_formats,
+)
+from imubench_pipeline.readers.text.split import MOST_COLUMNS, Split
+from imubench_pipeline.settings.sensor import LogFormat
+from imubench_pipeline.tables.findings import RecordingError
+
+Column = str | int
+
+_COMMENTS = ("#", "//", "%", ";", "!")
+_SPLITS = (*map(Split, ";\t|,"), Split(" ", runs=True), Split(" "))
+_LINES, _BYTES = 500, 1 << 20
+_COMMENT_LINES = 1000
+_MOST_LINES_BEFORE = 500_000
+_SCORED_LINES, _SCORED_CELLS = 50, 50
+_UNIT_LINES = 3
+_SHOWN, _LONGEST_SHOWN = 20, 40
+
+
+@dataclass(frozen=True)
+class TextLayout:
+    """How a text log is laid out.
+
+    Attributes
+    ----------
+    file : str
+        Its name, for messages.
+    lines_before, bytes_before : int
+        Lines and bytes before the first record.
+    split : Split
+    quoted : bool
+    decimal : {".", ","}
+    names : list of str
+        The names of the columns; their positions where there is no header.
+    rows : list of list of str
+        The cells of the first records; the last of them may be cut short.
+    comments : tuple of str
+        Beginnings of lines that are comments.
+    header : bytes
+        The line of names; empty: none.
+    preamble : tuple of bytes
+        The lines before the first record, with the comments.
+    passed_over : tuple of (int, str)
+        Number and text of the lines before the first record that are neither names nor units.
+    blank_is_missing : bool
+        A blank line among the records is one whose only cell is empty.
+    """
+
+    file: str
+    lines_before: int
+    bytes_before: int
+    split: Split
+    quoted: bool
+    decimal: Decimal
+    names: list[str]
+    rows: list[list[str]]
+    comments: tuple[str, ...]
+    header: bytes
+    preamble: tuple[bytes, ...]
+    passed_over: tuple[tuple[int, str], ...]
+    blank_is_missing: bool
+
+    def position(self, column: Column, key: str) -> int:
+        """Return the position, counted from 0, of a column that the sensor file names.
+
+        Raises
+        ------
+        RecordingError
+            If the file has no such column, or two of that name.
+        """
+        shown = [name[:_LONGEST_SHOWN] for name in self.names[:_SHOWN]]
+        found = ", ".join(shown) + (", ..." if len(self.names) > _SHOWN else "")
+        if isinstance(column, int):
+            if column > len(self.names):
+                raise RecordingError(
+                    f"{self.file}: no column {column} for {key}; found {len(self.names)} columns "
+                    f"({found}) with delimiter {self.split}; mend 'column' of {key}, or "
+                    f"'delimiter', in {stated_in(key)}"
+                )
+            return column - 1
+        if column not in self.names:
+            raise RecordingError(
+                f"{self.file}: no column {column!r} for {key}; found {found} with delimiter "
+                f"{self.split}; mend 'column' of {key} in {stated_in(key)}"
+            )
+        if self.names.count(column) > 1:
+            raise RecordingError(
+                f"{self.file}: column {column!r} for {key} stands twice in the header ({found}); "
+                "take it by its position, as a number"
+            )
+        return self.names.index(column)
+
+    def records(self) -> Records:
+        """Return what makes records of the lines from the first record on."""
+        runs, blank = self.split.runs, self.blank_is_missing
+        signs = [sign.encode() for sign in self.comments]
+        return Records(signs, self.header, self.preamble, runs, blank)
+
+
+@dataclass(frozen=True)
+class _Line:
+    """A line of the head of a file, and the bytes before it."""
+
+    number: int
+    start: int
+    raw: bytes
+    text: str
+
+
+def find_layout(
+    path: Path, log: LogFormat, figures: Sequence[Column], times: Sequence[Column]
+) -> TextLayout:
+    """Find how a text log is laid out.
+
+    Parameters
+    ----------
+    path : Path
+    log : LogFormat
+        What is stated.
+    figures, times : sequence of str or int
+        The columns of figures and those of time stamps that are wanted, by name or position. Where
+        none is, the likeliest layout is found.
+
+    Raises
+    ------
+    RecordingError
+        If there is no record, or the file is no text.
+    """
+    return _Search(path, log, figures, times).layout()
+
+
+class _Search:
+    """The search for the layout of one file."""
+
+    def __init__(
+        self, path: Path, log: LogFormat, figures: Sequence[Column], times: Sequence[Column]
+    ) -> None:
+        self._file = path.name
+        self._log = log
+        self._figures = figures
+        self._wanted = [*figures, *times]
+        self._names = [column for column in self._wanted if isinstance(column, str)]
+        self._last = max((place for place in self._wanted if isinstance(place, int)), default=1)
+        self._comments, self._lines = self._head(path)
+        if not self._comments and not self._lines:
+            raise RecordingError(
+                f"{self._file}: the file is empty, or cut short in its first line; expected lines "
+                "of a log"
+            )
+
+    def layout(self) -> TextLayout:
+        """Return the likeliest layout."""
+        if self._lines:
+            refuse_other_formats(self._file, self._lines[0].raw)
+        split = max(self._splits(), key=self._likelihood)
+        comments, lines = self._parted(split)
+        if not lines:
+            raise RecordingError(f"{self._file}: no record after the comments; expected some")
+        header, first = self._header_and_first(split, comments, lines)
+        for line in lines[: first + 1]:
+            refuse_binary(self._file, line.number, line.raw)
+        record = lines[first]
+        rows = [split.cells(line.text) for line in lines[first:]]
+        if split.delimiter == "," and not (self._names or self._log.delimiter or self._log.decimal):
+            refuse_decimals_apart(self._file, record.number, record.text, rows)
+        names = self._column_names(split, header, rows[0])
+        if len(names) > MOST_COLUMNS:
+            raise RecordingError(
+                f"{self._file}, line {record.number}: more than {MOST_COLUMNS} columns with "
+                f"delimiter {split}; expected one record a line: write the log so, or mend "
+                "'delimiter' in the sensor file"
+            )
+        passed_over = self._passed_over(split, header, lines[:first])
+        return TextLayout(
+            file=self._file,
+            lines_before=record.number - 1,
+            bytes_before=record.start,
+            split=split,
+            quoted=any(split.quotes(line.text) for line in lines[first:]),
+            decimal=self._log.decimal or self._decimal(names, rows),
+            names=names,
+            rows=rows,
+            comments=self._signs(split),
+            header=b"" if header is None or (passed_over and not self._names) else header.raw,
+            preamble=tuple(
+                line.raw for line in [*comments, *lines[:first]] if line.number < record.number
+            ),
+            passed_over=tuple((line.number, line.text) for line in passed_over),
+            blank_is_missing=len(names) == 1
+            and not are_apart([line.number for line in lines[first:]]),
+        )
+
+    # --------------------------------------------------------------------- the first lines
+
+    def _signs(self, split: Split | None) -> tuple[str, ...]:
+        """Return the beginnings of comments; no delimiter is one."""
+        if self._log.comment is not None:
+            return (self._log.comment,)
+        delimiter = split.delimiter if split else self._log.delimiter
+        return tuple(sign for sign in _COMMENTS if sign != delimiter)
+
+    def _head(self, path: Path) -> tuple[list[_Line], list[_Line]]:
+        """Return the comments and the other lines of the beginning of a file."""
+        comments: deque[_Line] = deque(maxlen=_COMMENT_LINES)
+        lines: list[_Line] = []
+        start, held = 0, 0
+        # Whether a semicolon begins a comment or is the delimiter is not yet known.
+        signs = tuple(sign for sign in self._signs(None) if sign != ";")
+        for number, raw in enumerate(first_lines(path), start=1):
+            here, start = start, start + len(raw)
+            if number > _MOST_LINES_BEFORE + self._log.skip_lines:
+                if lines:
+                    break
+                raise RecordingError(
+                    f"{self._file}: no record in the first {number} lines, which are blank or "
+                    "comments; expected some: mend 'comment' in the sensor file"
+                )
+            if number <= self._log.skip_lines or not raw.strip(b"\0 \t\r\n"):
+                continue
+            line = _Line(number, here, raw.rstrip(b"\r\n"), _decoded(raw.rstrip(b"\r\n")))
+            if line.text.startswith(signs):
+                comments.append(line)
+                continue
+            lines.append(line)
+            held += len(raw)
+            if len(lines) >= _LINES or (held > _BYTES and len(lines) > _UNIT_LINES):
+                break
+        return list(comments), lines
+
+    def _parted(self, split: Split) -> tuple[list[_Line], list[_Line]]:
+        """Return the comments and the other lines, where this is the delimiter."""
+        if ";" not in self._signs(split):
+            return self._comments, self._lines
+        comments = [line for line in self._lines if line.text.startswith(";")]
+        lines = [line for line in self._lines if not line.text.startswith(";")]
+        return self._comments + comments, lines
+
+    # ------------------------------------------------------------------------- delimiter
+
+    def _splits(self) -> Sequence[Split]:
+        """Return the ways to divide a line that come into question."""
+        stated = self._log.delimiter
+        if stated is not None:
+            return [split for split in _SPLITS if split.delimiter == stated] or [Split(stated)]
+        if self._log.decimal != ",":
+            return _SPLITS
+        return [
+            split
+            for split in _SPLITS
+            if split.delimiter != "," or any(split.quotes(line.text) for line in self._lines)
+        ]
+
+    def _likelihood(self, split: Split) -> tuple[float, ...]:
+        """Return how likely a delimiter is; the first of equals is taken.
+
+        The right one shows the names that are wanted, then as many names as there are cells in
+        the records, then more than one column, then numbers in lines of one width.
+        """
+        comments, lines = self._parted(split)
+        rows = [split.cells(line.text) for line in lines[-_SCORED_LINES:]]
+        if not rows:
+            return (-1,)
+        width = Counter(map(len, rows)).most_common(1)[0][0]
+        even = [row for row in rows if len(row) == width]
+        shown, fits = 0, False
+        for line in [*lines, *comments] if self._names else []:
+            names = self._names_in(split, line, width)
+            held = sum(name in names for name in self._names)
+            if held > shown:
+                shown, fits = held, any(completed(names, row) for row in even)
+            if held == len(self._names):
+                break
+        cells = [cell for row in even for cell in row[:_SCORED_CELLS]]
+        alike = len(even) / len(rows) * sum(map(is_datum, cells)) / max(len(cells), 1)
+        return (shown, fits, width > 1, round(alike, 2))
+
+    # ---------------------------------------------------------------------- header, record
+
+    def _names_in(self, split: Split, line: _Line, width: int | None = None) -> list[str]:
+        """Return the names in a line; in a comment, those without its sign."""
+        names = split.names(line.text, width)
+        sign = next((sign for sign in self._signs(split) if line.text.startswith(sign)), None)
+        if sign is None or (names and names[0] in self._names):
+            return names
+        return split.names(line.text.lstrip(sign).lstrip(), width)
+
+    def _column_names(self, split: Split, header: _Line | None, record: list[str]) -> list[str]:
+        """Return the names of all columns; positions, where none are wanted and none fit."""
+        if header is not None:
+            names = self._names_in(split, header, len(record))
+            whole = completed(names, record)
+            if whole or self._names:
+                return whole or names
+        return [str(number) for number in range(1, len(record) + 1)]
+
+    def _header_and_first(
+        self, split: Split, comments: list[_Line], lines: list[_Line]
+    ) -> tuple[_Line | None, int]:
+        """Return the header, and the index of the line that is the first record."""
+        if self._log.header is False:
+            return None, 0
+        rows = [split.cells(line.text) for line in lines]
+        alike = [index for index, row in enumerate(rows) if self._is_record(row)]
+        widths = Counter(len(rows[index]) for index in alike[-_SCORED_LINES:])
+        width = widths.most_common(1)[0][0] if widths else 0
+        first = next((index for index in alike if len(rows[index]) == width), 1)
+        if not self._wanted:
+            return self._likely_header(split, comments, lines[: first + 1] if alike else []), first
+        if self._names:
+            header = self._named(split, [*lines, *reversed(comments)], width)
+            if header is not None and header in comments:
+                return header, 0
+            if header is not None:
+                first = self._after_units(split, header, rows, lines.index(header) + 1)
+        else:
+            header = None
+        if self._log.header and header is None and first == 0:
+            told = [line for line in comments if line.number < lines[0].number]
+            if told and len(self._names_in(split, told[-1])) == width:
+                return told[-1], 0
+            first = 1
+        if first >= len(lines):
+            raise RecordingError(
+                f"{self._file}: no record after the header {lines[-1].text[:80]!r}; expected some"
+            )
+        if header is None and (first > 0 or self._names):
+            header = lines[max(first - 1, 0)]
+        return header, first
+
+    def _likely_header(
+        self, split: Split, comments: list[_Line], lines: list[_Line]
+    ) -> _Line | None:
+        """Return the line of names before the first record, the last of the lines."""
+        if not lines:
+            raise RecordingError(f"{self._file}: no line of figures; expected the text of a log")
+        record = split.cells(lines[-1].text)
+        near = [line for line in comments if line.number < lines[-1].number] + lines[:-1]
+        named = [completed(self._names_in(split, line, len(record)), record) for line in near]
+        found = likely_header(named)
+        return None if found is None else near[found]
+
+    def _named(self, split: Split, lines: list[_Line], width: int) -> _Line | None:
+        """Return the line that has all names that are wanted."""
+        return next(
+            (x for x in lines if set(self._names).issubset(self._names_in(split, x, width))), None
+        )
+
+    def _is_record(self, row: list[str]) -> bool:
+        """Tell whether the figures that are wanted are in a line of which no names are known."""
+        if self._names or not self._wanted:
+            return 2 * sum(map(is_datum, row)) >= len(row)
+        cells = [row[int(column) - 1] for column in self._figures if int(column) <= len(row)]
+        return len(row) >= self._last and are_figures(cells)
+
+    def _after_units(self, split: Split, header: _Line, rows: list[list[str]], index: int) -> int:
+        """Return the index of the first line that is no line of units under the header."""
+        if index < len(rows):
+            places = self._places(self._names_in(split, header, len(rows[index])))
+            end = index + _UNIT_LINES
+            while index < min(end, len(rows)) and are_units(rows[index], places):
+                index += 1
+        return index
+
+    def _passed_over(self, split: Split, header: _Line | None, before: list[_Line]) -> list[_Line]:
+        """Return the lines right before the first record that are neither names nor units."""
+        rows = [split.cells(line.text) for line in before]
+        if self._names and header in before:
+            first = before.index(header) + 1
+            return [before[n] for n in range(first, len(rows)) if not is_heading(rows[n])]
+        if self._names or self._log.header:
+            return []
+        others = [number for number, row in enumerate(rows) if not are_figures(row)]
+        return before[max(others, default=-1) + 1 :]
+
+    def _places(self, names: list[str]) -> set[int]:
+        """Return the positions of the figures that are wanted, as far as they are there."""
+        return {
+            column - 1 if isinstance(column, int) else names.index(column)
+            for column in self._figures
+            if isinstance(column, int) or column in names
+        }
+
+    def _decimal(self, names: list[str], rows: list[list[str]]) -> Decimal:
+        """Return the sign of the decimal: that of the figures that are wanted, or of all."""
+        places = self._places(names)
+        wanted = [row[place] for row in rows for place in places if place < len(row)]
+        for cells in (wanted, [cell for row in rows for cell in row[:_SCORED_CELLS]]):
+            figures = [cell for cell in cells if is_number(cell)]
+            commas = sum("," in cell for cell in figures)
+            points = sum("." in cell for cell in figures)
+            if commas or points:
+                return "," if commas > points else "."
+        return "."
+
+
+def _decoded(raw: bytes) -> str:
+    """Return text that may be UTF-8, else is Latin-1."""
+    try:
+        return raw.decode()
+    except UnicodeDecodeError:
+        return raw.decode("latin-1")

@@ -1,0 +1,153 @@
+"""Lines of a text log -> records for a parser of columns, a block of lines at a time."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.tables.findings import RecordingError
+
+_IN_NUMBERS = frozenset(b"0123456789+-.,;:|\t \"'eEnNaAiIfFtT/\r")
+_NO_COMMENT = rb"(?!#(?i:n/a|na|value!|num!|div/0!)[;,|\t ])"
+"""What a spreadsheet writes into a cell without a number, which may be the first of a line."""
+
+_IN_BLANK = b" \t\r\n"
+_BLANK_LINES = re.compile(rb"^[ \t\r]*+\n", re.MULTILINE)
+_MISSING = b"nan\n"
+_MOST_BLANK = 1 << 24  # beside each other, for memory
+
+_TAB_TO_SPACE = bytes.maketrans(b"\t", b" ")
+
+
+class Records:
+    """Leaves out of the lines of a file what is no record.
+
+    Parameters
+    ----------
+    comments : collection of bytes
+        Beginnings of lines that are comments.
+    header : bytes
+        The line of names, without its line break; empty: none.
+    preamble : sequence of bytes
+        The lines before the first record, which a logger that starts again repeats.
+    runs : bool
+        Columns are divided by runs of spaces or tabs, which become one space.
+    blank_is_missing : bool
+        A blank line between two records is one whose only cell is empty.
+
+    Attributes
+    ----------
+    restarts : int
+        How often the header stood among the records.
+    cut : int
+        Records cut short, in the line of which the log begins again.
+    """
+
+    def __init__(
+        self,
+        comments: Collection[bytes],
+        header: bytes,
+        preamble: Sequence[bytes],
+        runs: bool,
+        blank_is_missing: bool = False,
+    ) -> None:
+        self._comments = tuple(comments)
+        alternatives = b"|".join(re.escape(sign) for sign in self._comments)
+        # A pattern that begins with the line break is searched for five times as fast as one
+        # that begins with ^.
+        self._comment_lines = re.compile(
+            rb"\n" + _NO_COMMENT + rb"(?:" + alternatives + rb")[^\n]*"
+        )
+        self._header = header
+        # One byte is found ten times as fast as several.
+        self._telling = bytes(b for b in header if b not in _IN_NUMBERS)[:1] or header[:1]
+        self._preamble = frozenset(preamble)
+        self._begins = tuple({*preamble[:1], header})
+        self._runs = runs
+        self._blank_is_missing = blank_is_missing
+        self._blank = 0
+        self.restarts = 0
+        self.cut = 0
+
+    def __call__(self, lines: bytes) -> bytes:
+        """Return the records of complete lines."""
+        # Before the comments, for a header may be one.
+        if self._header and self._telling in lines and self._header in lines:
+            lines = self._without_headers(lines)
+        for sign in self._comments:
+            if sign[:1] in lines and (lines.startswith(sign) or b"\n" + sign in lines):
+                lines = self._comment_lines.sub(b"", b"\n" + lines)[1:]
+                break
+        if self._runs:
+            lines = _single_spaces(lines)
+        if self._blank_is_missing and lines:
+            lines = self._with_missing(lines)
+        # pyarrow shows us a record of wrong width only if it is UTF-8.
+        return lines if lines.isascii() else lines.decode("utf-8", "replace").encode()
+
+    def _with_missing(self, lines: bytes) -> bytes:
+        """Return the lines with a cell in blank ones; those at the end wait for what follows."""
+        ended = lines.rstrip(_IN_BLANK)
+        after = lines[len(ended) :].count(b"\n")
+        if not ended:
+            self._blank += after
+            return b""
+        if self._blank > _MOST_BLANK:
+            raise RecordingError(
+                f"{self._blank} blank lines follow each other among the records; expected a log "
+                "without: cut the file there"
+            )
+        before = _MISSING * self._blank
+        self._blank = after - 1
+        return before + _BLANK_LINES.sub(_MISSING, ended) + b"\n"
+
+    def _without_headers(self, lines: bytes) -> bytes:
+        kept = []
+        for line in lines[:-1].split(b"\n"):
+            text = line.rstrip(b"\r")
+            if text == self._header:
+                self.restarts += 1
+            elif text in self._preamble:
+                continue
+            elif text.endswith(self._begins):
+                self.restarts += text.endswith(self._header)
+                self.cut += 1
+            else:
+                kept.append(line + b"\n")
+        return b"".join(kept)
+
+
+def are_apart(numbers: Sequence[int]) -> bool:
+    """Return whether blank lines are between all records, and only set these apart.
+
+    Parameters
+    ----------
+    numbers : sequence of int
+        The lines of the first records.
+    """
+    return all(later > sooner + 1 for sooner, later in pairwise(numbers))
+
+
+def _single_spaces(lines: bytes) -> bytes:
+    if not lines:
+        return lines
+    if b"\t" in lines:
+        lines = lines.translate(_TAB_TO_SPACE)
+    signs = np.frombuffer(lines, np.uint8)
+    is_space = signs == ord(" ")
+    signs = signs[~(is_space & _after(is_space | (signs == ord("\n"))))]
+    at_end = (signs[1:] == ord("\n")) | (signs[1:] == ord("\r"))
+    keep = np.ones(len(signs), bool)
+    keep[:-1] = ~((signs[:-1] == ord(" ")) & at_end)
+    return signs[keep].tobytes()
+
+
+def _after(here: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return where the sign before is one of these; the block begins after a line break."""
+    before = np.empty_like(here)
+    before[0], before[1:] = True, here[:-1]
+    return before

@@ -1,0 +1,175 @@
+"""Time stamps of a text log: numbers, ISO 8601, or text in a pattern; in one column or two."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from imubench_pipeline.readers.text.cells import is_missing
+
+DAY = 24 * 3600 * 10**9
+"""ns."""
+
+_ISO = re.compile(
+    r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(?P<seconds>:\d\d(?:\.\d{1,9})?)?(?P<zone>Z|[+-]\d\d(?::?\d\d)?)?"
+)
+_ISO_PATTERN = (
+    r"(?P<Y>\d{4})-(?P<m>\d\d)-(?P<d>\d\d)(?:(?:T|\s+)(?P<H>\d\d):(?P<M>\d\d)"
+    r"(?::(?P<S>\d\d)(?:[.,](?P<f>\d{1,9})\d*)?)?\s*(?P<z>Z|UTC|[+-]\d\d(?::?\d\d)?)?)?"
+)
+_FIELDS: Mapping[str, str] = {
+    "Y": r"(?P<Y>\d{4})",
+    "y": r"(?P<y>\d\d)",
+    "m": r"(?P<m>\d{1,2})",
+    "b": r"(?P<b>[A-Za-z]{3})",
+    "d": r"(?P<d>\d{1,2})",
+    "j": r"(?P<j>\d{1,3})",
+    "H": r"(?P<H>\d{1,2})",
+    "I": r"(?P<I>\d{1,2})",
+    "p": r"(?P<p>[AaPp][Mm])",
+    "M": r"(?P<M>\d{1,2})",
+    "S": r"(?P<S>\d{1,2})",
+    "f": r"(?P<f>\d{1,9})\d*",
+    "z": r"(?P<z>Z|UTC|[+-]\d\d(?::?\d\d)?)",
+    "%": "%",
+}
+_MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
+
+
+class StampError(Exception):
+    """A stamp that cannot be read: its place in the block, and its text."""
+
+    def __init__(self, row: int, text: str) -> None:
+        super().__init__(text)
+        self.row = row
+        self.text = text
+
+
+def arrow_type(texts: Collection[str]) -> pa.DataType | None:
+    """Return the type of ISO 8601 stamps that pyarrow reads by itself, much faster than we do.
+
+    None where it does not: a comma before the fraction, spaces around the stamp, a zone apart.
+    """
+    found = [_ISO.fullmatch(text) for text in texts]
+    zones = {bool(one["zone"]) for one in found if one}
+    if not all(found) or len(zones) != 1:
+        return None
+    return pa.timestamp("ns", "UTC" if zones.pop() else None)
+
+
+class TextStamps:
+    """Reads stamps that are text.
+
+    Parameters
+    ----------
+    form : str
+        ``iso8601`` or a pattern as for ``strptime``.
+
+    Attributes
+    ----------
+    dated : bool
+        Whether the stamps have a date; else they start again at midnight.
+    """
+
+    def __init__(self, form: str) -> None:
+        pattern = _ISO_PATTERN if form == "iso8601" else _expression(form)
+        self._expression = rf"^\s*{pattern}\s*$"
+        self._fields = re.compile(self._expression).groupindex
+        self.dated = "d" in self._fields or "j" in self._fields
+        self._zoned: bool | None = None
+
+    def nanoseconds(self, texts: pa.Array) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Return ns since 1970, or since midnight; and which stamps are there.
+
+        Raises
+        ------
+        StampError
+            If a stamp is neither in the pattern nor missing.
+        """
+        texts = pc.fill_null(texts, "")
+        found = pc.extract_regex(texts, self._expression)
+        time, sound = self._composed(found)
+        sound &= np.asarray(found.is_valid())
+        if "z" in self._fields:
+            # Local time among stamps with a zone would be off by hours.
+            zoned = np.asarray(pc.fill_null(pc.not_equal(found.field("z"), ""), False))
+            if self._zoned is None and sound.any():
+                self._zoned = bool(zoned[sound.argmax()])
+            sound &= zoned == self._zoned
+        for row in np.flatnonzero(~sound):
+            text = texts[int(row)].as_py()
+            if not is_missing(text):
+                raise StampError(int(row), text)
+        return time, sound
+
+    def _composed(self, found: pa.StructArray) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        def figures(name: str, default: int) -> NDArray[np.int64]:
+            if name not in self._fields:
+                return np.full(len(found), default, np.int64)
+            text = found.field(name)
+            if name == "f":
+                text = pc.utf8_rpad(text, 9, "0")
+            given = pc.if_else(pc.equal(text, ""), str(default), text)
+            return np.asarray(pc.fill_null(given, str(default)).cast(pa.int64()))
+
+        year = figures("Y", 1970)
+        if "y" in self._fields:
+            short = figures("y", 70)
+            year = np.where(short < 69, 2000, 1900) + short
+        month = figures("m", 1)
+        if "b" in self._fields:
+            names = pc.utf8_lower(pc.fill_null(found.field("b"), ""))
+            month = np.asarray(pc.fill_null(pc.index_in(names, pa.array(_MONTHS)), -1)) + 1
+        day = figures("d", 1)
+        hour = figures("H", 0)
+        if "I" in self._fields:
+            hour = figures("I", 12) % 12
+        if "p" in self._fields:
+            after_noon = pc.equal(pc.utf8_lower(pc.fill_null(found.field("p"), "")), "pm")
+            hour = hour + 12 * np.asarray(after_noon)
+        minute, second = figures("M", 0), figures("S", 0)
+        months = (year - 1970) * 12 + month - 1
+        first = months.astype("datetime64[M]").astype("datetime64[D]").astype(np.int64)
+        following = (months + 1).astype("datetime64[M]").astype("datetime64[D]").astype(np.int64)
+        sound = (month >= 1) & (month <= 12) & (day >= 1) & (first + day <= following)
+        sound &= (hour < 24) & (minute < 60) & (second <= 60)
+        sound &= (year > 1700) & (year < 2200)  # else ns overflow
+        days = first + day - 1 + figures("j", 1) - 1
+        seconds = days * 86_400 + hour * 3600 + minute * 60 + second - self._zone(found)
+        return seconds * 10**9 + figures("f", 0), sound
+
+    def _zone(self, found: pa.StructArray) -> NDArray[Any] | int:
+        """Return the offset of the zone from UTC, s."""
+        if "z" not in self._fields:
+            return 0
+        zones = pc.fill_null(found.field("z"), "").dictionary_encode()
+        offsets = np.array([_offset(zone) for zone in zones.dictionary.to_pylist()], np.int64)
+        return offsets[np.asarray(zones.indices)] if len(offsets) else 0
+
+
+def _offset(zone: str) -> int:
+    digits = zone.lstrip("+-").replace(":", "")
+    if not digits.isdigit():
+        return 0
+    offset = int(digits[:2]) * 3600 + int(digits[2:] or 0) * 60
+    return -offset if zone.startswith("-") else offset
+
+
+def _expression(form: str) -> str:
+    """Return the regular expression of a ``strptime`` pattern."""
+    form = form.replace("%T", "%H:%M:%S").replace("%F", "%Y-%m-%d").replace("%R", "%H:%M")
+    found = ""
+    for part in re.findall(r"[.,]%f|%.|\s+|[^%\s]", form):
+        if part[1:] == "%f":
+            found += rf"(?:[.,]{_FIELDS['f']})?"  # loggers leave out a fraction of zero
+        elif part.startswith("%"):
+            found += _FIELDS[part[1:]]
+        else:
+            found += r"\s+" if part.isspace() else re.escape(part)
+    return found

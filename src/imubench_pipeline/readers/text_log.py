@@ -1,0 +1,120 @@
+"""Simulated logs as text, written as the logger of their sensor would write them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pacsv
+from numpy.typing import DTypeLike, NDArray
+
+from imubench_pipeline.readers.batch import SECONDS
+from imubench_pipeline.settings.sensor import (
+    QUANTITIES,
+    TEMPERATURE,
+    ColumnSource,
+    LogFormat,
+    quantity_of,
+)
+from imubench_pipeline.settings.validation import ConfigError
+from imubench_pipeline.units import conversion
+
+_DECIMALS = 12
+"""The digits beyond are of the arithmetic, and twice the size of the file."""
+
+
+class TextLog:
+    """A text file that is written in the layout of a sensor's logs.
+
+    Parameters
+    ----------
+    path : Path
+    log : LogFormat
+        Delimiter, comments, lines to skip and stamps.
+    sources : mapping of str to ColumnSource
+        Column, unit, scale and offset of each channel, and of ``temperature``, of this file.
+    rate : float
+        Hz.
+    remarks : iterable of str
+        Comments at its top, where its layout has comments.
+    kind : dtype
+        Of the numbers: float32 has seven digits, far finer than the noise, and half the text.
+
+    Raises
+    ------
+    ConfigError
+        If its stamps are no plain numbers.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        log: LogFormat,
+        sources: Mapping[str, ColumnSource],
+        rate: float,
+        remarks: Iterable[str] = (),
+        kind: DTypeLike = np.float64,
+    ) -> None:
+        self._log, self._sources, self._rate, self._kind = log, sources, rate, kind
+        self._written = 0
+        self._seconds = self._stamped()
+        self._names = self._layout()
+        delimiter = log.delimiter or ","
+        self._options = pacsv.WriteOptions(
+            include_header=False, delimiter=delimiter, quoting_style="none"
+        )
+        self._file = path.open("wb")
+        if log.comment:
+            for line in remarks:
+                self._file.write(f"{log.comment} {line}\n".encode())
+        self._file.write(b"\n" * log.skip_lines)
+        if any(isinstance(source.column, str) for source in sources.values()):
+            self._file.write((delimiter.join(self._names) + "\n").encode())
+
+    def __enter__(self) -> TextLog:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
+
+    def write(self, block: Mapping[str, NDArray[np.float64]]) -> None:
+        """Write the next samples, given in SI (temperature: °C), shape (block,) each."""
+        count = len(next(iter(block.values())))
+        columns: dict[str, NDArray[Any]] = {}
+        if self._log.time is not None:
+            stamps = np.arange(self._written, self._written + count) / self._rate / self._seconds
+            columns[str(self._log.time.column)] = np.round(stamps, 9)
+        for name, source in self._sources.items():
+            dimension = "temperature" if name == TEMPERATURE else QUANTITIES[quantity_of(name)]
+            factor, zero = conversion(source.unit, dimension)
+            raw = (block[name] - zero) / (factor * source.scale) + source.offset
+            columns[str(source.column)] = np.round(raw, _DECIMALS).astype(self._kind)
+        empty = np.zeros(count, dtype=np.int8)
+        table = pa.table({name: columns.get(name, empty) for name in self._names})
+        pacsv.write_csv(table, self._file, self._options)
+        self._written += count
+
+    def _stamped(self) -> float:
+        """Return the unit of the stamps in s."""
+        time = self._log.time
+        if time is None:
+            return 1.0
+        if time.unit is None or time.unit == "samples" or time.wraps is not None:
+            raise ConfigError(
+                "simulated logs have numeric time stamps in s, ms, us or ns that never wrap"
+            )
+        return SECONDS[time.unit] * time.scale
+
+    def _layout(self) -> list[str]:
+        """Return the names of the columns of the file in order."""
+        placed: dict[str | int, str] = {}
+        if self._log.time is not None:
+            placed[self._log.time.column] = "time"
+        placed |= {source.column: name for name, source in self._sources.items()}
+        if any(isinstance(column, str) for column in placed):
+            return [str(column) for column in placed]
+        width = max(column for column in placed if isinstance(column, int))
+        return [str(number) for number in range(1, width + 1)]

@@ -1,0 +1,419 @@
+"""u-blox UBX logs: the inertial sensors of a receiver, in ESF-MEAS or ESF-RAW.
+
+Columns are ``gyro_x`` ``gyro_y`` ``gyro_z`` in deg/s, ``accel_x`` ``accel_y`` ``accel_z`` in
+m/s^2 and ``temperature`` in degC: state these units in the sensor file. A log that holds both
+messages needs ``variable: ESF-RAW`` or ``variable: ESF-MEAS`` with each column.
+
+The time column is ``time_tag``, with ``unit: ms``. ESF-MEAS writes ms (unless the receiver is
+set to another factor; the unit is then that). ESF-RAW writes ticks of a unit that u-blox does
+not state; they are taken as 1/25.6 ms, which is that of the sensor inside (Bosch), and given in
+ms. Where that is wrong, ``sTtag`` is the count as written. Tags start again from 0 at 32 bits,
+and at 24 bits where ESF-RAW passes the tag of the sensor through: both are seen by themselves
+unless ``wraps`` says otherwise.
+
+ESF-MEAS writes gyro and accelerometer in messages of their own, some ms apart. One of each makes
+a record, with the stamp of the first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import datetime, timedelta
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from imubench_pipeline.readers.batch import Batch, LogFile
+from imubench_pipeline.readers.ubx.frames import Frames
+from imubench_pipeline.readers.wrapping import WrapState, unwrapped
+from imubench_pipeline.tables.findings import Finding, RecordingError, Severity
+
+_MEAS, RAW, _NAV_PVT = b"\x10\x02", b"\x10\x03", b"\x01\x07"
+KINDS = {_MEAS: "ESF-MEAS", RAW: "ESF-RAW"}
+"""The messages that are read, by class and id."""
+
+COLUMNS: dict[str, tuple[int, float]] = {
+    "gyro_x": (14, 2.0**-12),
+    "gyro_y": (13, 2.0**-12),
+    "gyro_z": (5, 2.0**-12),
+    "accel_x": (16, 2.0**-10),
+    "accel_y": (17, 2.0**-10),
+    "accel_z": (18, 2.0**-10),
+    "temperature": (12, 1e-2),
+}
+"""Data type of each column, and what one count is in its unit."""
+
+UNITS = {"gyro": "deg/s", "accel": "m/s^2", "temperature": "degC"}
+"""Unit of each quantity."""
+
+TICK_MS = 5 / 128
+"""1/25.6, which float64 holds exactly."""
+
+_BATCH_WORDS = 1 << 17
+_LOOKED_AT = 1 << 20
+_LONGEST_HOLE_TICKS = 256_000
+_NEVER = 2.0**62
+_LONGEST_LOG = 1e9
+
+
+class UbxFile(LogFile):
+    """A log of a u-blox receiver."""
+
+    fixed_units, fixed_by = UNITS, "the format of u-blox"
+
+    def batches(self) -> Iterator[Batch]:
+        """Yield the records in the order of the file (see `LogFile.batches`)."""
+        self._check_columns()
+        kind = self._kind()
+        self._check_time(kind)
+        frames = Frames(self.path, self.findings)
+        words = Words(kind, self._columns())
+        clock = _Clock(self, kind)
+        records = _Records(len(self._columns()))
+        rows = 0
+        for key, payload in frames:
+            if key == kind:
+                words.add(payload)
+            elif key == _NAV_PVT:
+                clock.note_date(payload, len(words))
+            if len(words) >= _BATCH_WORDS:
+                for batch in self._batch(words, clock, records, ended=False):
+                    rows += len(batch)
+                    yield batch
+        for batch in self._batch(words, clock, records, ended=True):
+            rows += len(batch)
+            yield batch
+        self._report(kind, words, frames, rows)
+
+    def _batch(
+        self, words: Words, clock: _Clock, records: _Records, ended: bool
+    ) -> Iterator[Batch]:
+        columns, values, tags, places = words.taken()
+        table, stamps = records.grouped(columns, values, clock.stamps(tags, places), ended)
+        if len(table):
+            held = dict(zip(self._columns(), np.ascontiguousarray(table.T), strict=True))
+            yield Batch(
+                None if self.log.time is None else self.seconds(stamps, clock.first),
+                {
+                    name: self.to_si(name, held[str(source.column)])
+                    for name, source in self.sources.items()
+                },
+            )
+
+    # -------------------------------------------------------------- what the sensor file says
+
+    def _columns(self) -> list[str]:
+        """Return the columns that are wanted, each once."""
+        return list(dict.fromkeys(str(source.column) for source in self.sources.values()))
+
+    def _check_columns(self) -> None:
+        for name, source in self.sources.items():
+            if source.column not in COLUMNS:
+                raise RecordingError(
+                    f"{self.path.name}: no column {source.column!r} for {name}; a UBX log has "
+                    f"{', '.join(COLUMNS)}; mend 'column' of {name} in the sensor file"
+                )
+
+    def _check_time(self, kind: bytes) -> None:
+        time = self.log.time
+        if time is None:
+            return
+        known = ("time_tag", "sTtag") if kind == RAW else ("time_tag",)
+        if time.column not in known:
+            raise RecordingError(
+                f"{self.path.name}: no time column {time.column!r}; {KINDS[kind]} has "
+                f"{' and '.join(known)}; mend 'column' of 'time' in the sensor file"
+            )
+        in_ms = kind == RAW and time.column == "time_tag"
+        if time.format is not None or (in_ms and time.unit != "ms"):
+            raise RecordingError(
+                f"{self.path.name}: {time.column} of {KINDS[kind]} is "
+                f"{time.format or time.unit} in the sensor file; expected 'unit: ms' of 'time'"
+            )
+
+    def _kind(self) -> bytes:
+        """Return class and id of the one message that the columns are taken from."""
+        stated = {source.variable for source in self.sources.values()} - {None}
+        kinds = [key for key, name in KINDS.items() if name in stated]
+        if len(stated) > 1 or len(kinds) != len(stated):
+            raise RecordingError(
+                f"{self.path.name}: 'variable' is {', '.join(sorted(map(str, stated)))}; expected "
+                "ESF-RAW or ESF-MEAS, the same for every column"
+            )
+        if kinds:
+            return kinds[0]
+        words = {key: Words(key, self._columns()) for key in KINDS}
+        frames = Frames(self.path, [])
+        for number, (key, payload) in enumerate(frames):
+            if key in words:
+                words[key].add(payload)
+            if number % 1000 == 0 and self._told(frames, words):
+                break
+        self._told(frames, words)
+        held = [key for key in KINDS if words[key].present]
+        if len(held) == 1:
+            return held[0]
+        if held:
+            raise RecordingError(
+                f"{self.path.name}: both ESF-MEAS and ESF-RAW hold the columns; say which with "
+                "'variable: ESF-RAW' (every sample) or 'variable: ESF-MEAS' at each column"
+            )
+        others = ", ".join(
+            f"{key.hex(' ')} ({count})" for key, count in frames.right.most_common(10)
+        )
+        types = ", ".join(
+            f"{KINDS[key]} with data types {found.types()}"
+            for key, found in words.items()
+            if found.types()
+        )
+        raise RecordingError(
+            f"{self.path.name}: found {types or 'no ESF-MEAS and no ESF-RAW'} among "
+            f"{frames.right.total()} UBX messages (class and id {others or 'none'}), "
+            f"{frames.wrong.total()} with a wrong checksum; expected the data types of "
+            f"{_types_of(self._columns())}; switch ESF-RAW or ESF-MEAS on in the receiver, or "
+            "mend 'column' in the sensor file"
+        )
+
+    def _told(self, frames: Frames, words: dict[bytes, Words]) -> bool:
+        """Tell whether the log so far says where the columns are."""
+        for found in words.values():
+            found.taken()
+        return frames.read > _LOOKED_AT and any(found.present for found in words.values())
+
+    # ----------------------------------------------------------------------------- findings
+
+    def _report(self, kind: bytes, words: Words, frames: Frames, rows: int) -> None:
+        name = KINDS[kind]
+        absent = [column for column in self._columns() if not words.seen[COLUMNS[column][0]]]
+        if rows == 0 or absent:
+            raise RecordingError(
+                f"{self.path.name}: found {frames.right[kind]} {name} messages with data types "
+                f"{words.types() or 'none'}, {frames.wrong[kind]} with a wrong checksum; expected "
+                f"{_types_of(absent)}; mend 'column' or 'variable' in the sensor file"
+            )
+        shifts = (
+            ""
+            if self.log.time is not None
+            else "; state 'time' (column time_tag, unit ms), for without it what follows is "
+            "shifted in time"
+        )
+        found: tuple[tuple[int, str, Severity, str], ...] = (
+            (
+                frames.wrong[kind],
+                "wrong_checksum",
+                "warning",
+                f"{name} messages have a wrong checksum; left out{shifts}",
+            ),
+            (
+                frames.cut[kind],
+                "incomplete_last_record",
+                "note",
+                f"{name} messages are cut short by the end of the log; left out",
+            ),
+        )
+        self.findings += [
+            Finding(finding, severity, f"{self.path.name}: {count} {text}", count)
+            for count, finding, severity, text in found
+            if count
+        ]
+
+
+def _types_of(columns: list[str]) -> str:
+    return ", ".join(f"{COLUMNS[column][0]} ({column})" for column in columns)
+
+
+class Words:
+    """The measurements of the messages read so far that are not yet in a batch.
+
+    Parameters
+    ----------
+    kind : bytes
+        Class and id of the messages.
+    columns : list of str
+
+    Attributes
+    ----------
+    seen : ndarray of int64
+        How often each data type was there.
+    """
+
+    def __init__(self, kind: bytes, columns: list[str]) -> None:
+        self._raw = kind == RAW
+        self._place = np.full(256, -1, np.int64)
+        self._scale = np.array([COLUMNS[column][1] for column in columns])
+        for place, column in enumerate(columns):
+            self._place[COLUMNS[column][0]] = place
+        self._parts: list[bytes] = []
+        self._counts: list[int] = []
+        self._tags: list[int] = []
+        self._held = 0
+        self.seen = np.zeros(256, np.int64)
+
+    def __len__(self) -> int:
+        return self._held
+
+    @property
+    def present(self) -> bool:
+        """Whether a data type that is wanted was there."""
+        return bool(self.seen[self._place >= 0].any())
+
+    def types(self) -> str:
+        """Say which data types were there."""
+        return ", ".join(map(str, np.flatnonzero(self.seen)))
+
+    def add(self, payload: bytes) -> None:
+        """Take in the measurements of a message."""
+        if self._raw:
+            count = max(len(payload) - 4, 0) // 8
+            self._parts.append(payload[4 : 4 + 8 * count])
+        else:
+            flags = int.from_bytes(payload[4:6], "little")
+            available = max(len(payload) - 8, 0) // 4
+            # Behind the measurements there may be one more word, a time of the receiver.
+            count = min(flags >> 11 or available - (flags >> 3 & 1), available)
+            self._parts.append(payload[8 : 8 + 4 * max(count, 0)])
+            self._counts.append(max(count, 0))
+            self._tags.append(int.from_bytes(payload[:4], "little"))
+        self._held += max(count, 0)
+
+    def taken(
+        self,
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+        """Take out column, figure, tag and place of the measurements that are wanted."""
+        written = np.frombuffer(b"".join(self._parts), "<u4")
+        if self._raw:
+            words, tags = written[::2], written[1::2]
+            types = words >> 24
+        else:
+            words, tags = written, np.repeat(np.array(self._tags, np.int64), self._counts)
+            types = words >> 24 & 0x3F
+        self._parts, self._counts, self._tags, self._held = [], [], [], 0
+        self.seen += np.bincount(types, minlength=256)
+        columns = self._place[types]
+        wanted = np.flatnonzero(columns >= 0)
+        columns = columns[wanted]
+        signed = (words[wanted] << 8).view(np.int32) >> 8
+        return columns, signed * self._scale[columns], tags[wanted].astype(np.int64), wanted
+
+
+class _Clock:
+    """Makes the time tags go on, and finds the date."""
+
+    def __init__(self, file: UbxFile, kind: bytes) -> None:
+        self._file = file
+        self._time = file.log.time
+        self._tick = TICK_MS if kind == RAW and self._column() == "time_tag" else 1
+        self._wraps: float | None = 2.0**32 if kind == _MEAS else None
+        if self._time is not None and self._time.wraps is not None:
+            self._wraps = self._time.wraps / self._tick
+        self._state = WrapState()
+        self._date: tuple[datetime, int] | None = None
+        self.first: Any = None
+
+    def _column(self) -> str | int | None:
+        return None if self._time is None else self._time.column
+
+    def note_date(self, payload: bytes, place: int) -> None:
+        """Remember the date of a NAV-PVT message that comes before the word at a place."""
+        if self._time is None or self._file.started or self._date or len(payload) < 12:
+            return
+        year, (month, day, hour, minute, second, valid) = payload[4:6], payload[6:12]
+        if valid & 3 == 3:
+            try:
+                date = datetime(int.from_bytes(year, "little"), month, day, hour, minute, second)
+            except ValueError:
+                return
+            self._date = date, place
+
+    def stamps(self, tags: NDArray[np.int64], places: NDArray[np.int64]) -> NDArray[Any]:
+        """Return the stamps of tags, in the unit that the sensor file states."""
+        if not len(tags) or self._time is None:
+            return tags
+        if self._wraps is None:
+            self._wraps = _found_wrap(tags, self._state.last)
+        stamps = unwrapped(tags, self._wraps or _NEVER, self._state) * self._tick
+        if self.first is None:
+            self.first = stamps[0]
+        if self._date is not None:
+            date, place = self._date
+            index = min(int(np.searchsorted(places, place)), len(stamps) - 1)
+            passed = float(self._file.seconds(stamps[index : index + 1], self.first)[0])
+            self._date = None
+            if abs(passed) < _LONGEST_LOG:
+                started = date - timedelta(seconds=passed)
+                self._file.started = started.isoformat(timespec="milliseconds")
+        return stamps
+
+
+def _found_wrap(tags: NDArray[np.int64], last: int | None) -> float | None:
+    """Return where tags start again from 0; None where they do not, or it cannot be told."""
+    if tags.max() >= 1 << 24:
+        return 2.0**32
+    before = np.concatenate(([tags[0] if last is None else last], tags[:-1]))
+    falls = np.flatnonzero(tags - before < -(1 << 23))
+    # A receiver that was restarted has no reason to stop just short of 24 bits.
+    passed = tags[falls] + (1 << 24) - before[falls]
+    return 2.0**24 if len(falls) and passed[0] <= _LONGEST_HOLE_TICKS else None
+
+
+class _Records:
+    """Puts the measurements of one time into one record."""
+
+    def __init__(self, width: int) -> None:
+        self._open = np.full(width, np.nan)
+        self._stamp: Any = None
+        self._state = np.array([-1, 0], np.int64)
+
+    def grouped(
+        self,
+        columns: NDArray[np.int64],
+        values: NDArray[np.float64],
+        stamps: NDArray[Any],
+        ended: bool,
+    ) -> tuple[NDArray[np.float64], NDArray[Any]]:
+        """Return the records that are complete, and their stamps."""
+        if self._stamp is None:
+            self._stamp = np.zeros(1, stamps.dtype)
+        table = np.empty((len(columns) + 1, len(self._open)))
+        found = np.empty(len(columns) + 1, stamps.dtype)
+        count = _group(columns, values, stamps, self._open, self._stamp, self._state, table, found)
+        if ended and self._state[1]:
+            table[count], found[count] = self._open, self._stamp[0]
+            count += 1
+        return table[:count], found[:count]
+
+
+@njit(cache=True, nogil=True)
+def _group(
+    columns: NDArray[np.int64],
+    values: NDArray[np.float64],
+    stamps: NDArray[Any],
+    row: NDArray[np.float64],
+    row_stamp: NDArray[Any],
+    state: NDArray[np.int64],
+    table: NDArray[np.float64],
+    found: NDArray[Any],
+) -> int:
+    """Fill records; return how many are complete.
+
+    A record begins with the column that the log begins with, and with a column that comes again
+    (that one was lost then). ``state``: the leading column, and whether a record is open.
+    """
+    count = 0
+    for i in range(columns.size):
+        column = columns[i]
+        if state[0] < 0:
+            state[0] = column
+        if state[1] and (column == state[0] or not np.isnan(row[column])):
+            table[count] = row
+            found[count] = row_stamp[0]
+            count += 1
+            row[:] = np.nan
+            state[1] = 0
+        if not state[1]:
+            row_stamp[0] = stamps[i]
+            state[1] = 1
+        row[column] = values[i]
+    return count

@@ -1,0 +1,1 @@
+"""ASCII sentences of VectorNav."""

@@ -1,0 +1,253 @@
+"""VectorNav ASCII output: asynchronous sentences such as ``$VNYMR,...*68``.
+
+Columns are named as here, with or without the name of the sentence: ``gyro_x`` or
+``VNYMR.gyro_x``. The name is needed only in a log that holds several sentences with that column.
+
+========  ======================================================================
+Sentence  Fields, in their order
+========  ======================================================================
+VNYMR     yaw pitch roll, mag_x..z, accel_x..z, gyro_x..z
+VNQMR     quat_x quat_y quat_z quat_w, mag_x..z, accel_x..z, gyro_x..z
+VNMAR     mag_x..z, accel_x..z, gyro_x..z
+VNIMU     mag_x..z, accel_x..z, gyro_x..z, temperature, pressure
+VNCMV     mag_x..z, accel_x..z, gyro_x..z, temperature
+VNACC     accel_x..z
+VNGYR     gyro_x..z
+VNYBA     yaw pitch roll, linear_accel_x..z (without gravity), gyro_x..z
+VNYIA     yaw pitch roll, inertial_accel_x..z (in the frame of the Earth), gyro_x..z
+========  ======================================================================
+
+gyro is in rad/s, accel in m/s^2, temperature in degC as the device writes it. Time columns:
+``host_time``, what a logging host wrote before the ``$``; ``counter``, the figure after ``T``
+that the device appends on request (SerialCount).
+
+VNISL and VNISE are estimates of a filter, not measurements, and VNDTV holds increments: they are
+passed over.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from imubench_pipeline.readers.batch import SECONDS, Batch, LogFile
+from imubench_pipeline.readers.started import date_of
+from imubench_pipeline.readers.vectornav.sentences import (
+    FIELDS,
+    Row,
+    Sentences,
+    fields_of,
+    lines_of,
+    position_of,
+    right_checksums,
+)
+from imubench_pipeline.readers.wrapping import WrapState, unwrapped
+from imubench_pipeline.tables.findings import Finding, RecordingError, Severity
+
+_LOOKED_AT = 1000
+_NAMES, _LONGEST_NAME = 10, 12
+_ZONE = re.compile(rb"(Z|[+-]\d\d:?\d\d)$")
+AROUND_STAMP = b" \t,;:|[]()\"'\r\0"
+HOST, COUNTER = "host_time", "counter"
+"""The columns of time."""
+
+
+class VectorNavFile(LogFile):
+    """A log of VectorNav's ASCII sentences."""
+
+    fixed_units: ClassVar = {"gyro": "rad/s", "accel": "m/s^2"}
+    fixed_by: ClassVar = "the format of VectorNav"
+
+    def batches(self) -> Iterator[Batch]:
+        """Yield the records in the order of the file (see `LogFile.batches`)."""
+        self._check_time()
+        kind = self._kind()
+        records = Sentences(kind, self.log.time is not None)
+        positions = {
+            name: position_of(kind, source.column) for name, source in self.sources.items()
+        }
+        first: Any = None
+        wrap = WrapState()
+        for text in lines_of(self.path, self.findings):
+            rows = records.add(text)
+            if not rows:
+                continue
+            time = None
+            if self.log.time is not None:
+                stamps, missing = self._stamps(rows)
+                if first is None:
+                    first = self._first(stamps, missing, rows)
+                if self.log.time.wraps is not None:
+                    stamps[~missing] = unwrapped(stamps[~missing], self.log.time.wraps, wrap)
+                time = self.seconds(stamps, first)
+                time[missing] = np.nan
+            fields, unread = fields_of(kind, rows, set(positions.values()))
+            records.unread += unread
+            columns = {
+                name: self.to_si(name, fields[position]) for name, position in positions.items()
+            }
+            yield Batch(time, columns)
+        self._report(kind, records)
+
+    # ---------------------------------------------------------------- which sentence it is
+
+    def _kind(self) -> str:
+        """Return the one kind of sentence that the columns are taken from."""
+        wanted = [source.column for source in self.sources.values()]
+        able = [kind for kind in FIELDS if all(position_of(kind, c) >= 0 for c in wanted)]
+        if not able:
+            named = ", ".join(str(column) for column in wanted)
+            known = "; ".join(f"{kind}: {' '.join(FIELDS[kind])}" for kind in FIELDS)
+            raise RecordingError(
+                f"{self.path.name}: no VectorNav sentence has the columns {named} together; mend "
+                f"'column' in the sensor file, expected those of one sentence of {known}"
+            )
+        if len(able) == 1:
+            return able[0]
+        present = self._present()
+        held = [kind for kind in able if kind in present]
+        if len(held) == 1:
+            return held[0]
+        found = _listed(present) or "no sentence with a right checksum"
+        if not held:
+            raise RecordingError(
+                f"{self.path.name}: found {found}; expected one of {', '.join(able)}, each with "
+                "a checksum of 2 or 4 digits; mend 'column' in the sensor file, or set the "
+                "output of the device (registers 6 and 30)"
+            )
+        raise RecordingError(
+            f"{self.path.name}: {' and '.join(held)} both hold the columns; say which in the "
+            f"sensor file, as in 'column: {held[0]}.{FIELDS[held[0]][-1]}'"
+        )
+
+    def _present(self) -> set[str]:
+        """Return the names of the sentences at the beginning of the file."""
+        names: Counter[str] = Counter()
+        for text in lines_of(self.path, []):
+            pieces = [piece.rpartition(b"*") for piece in text.replace(b"\n", b"$").split(b"$")]
+            right = right_checksums([p[0] for p in pieces], [p[2].rstrip() for p in pieces])
+            names.update(
+                piece[0].partition(b",")[0].decode("ascii", "replace")
+                for good, piece in zip(right, pieces, strict=True)
+                if good and piece[0]
+            )
+            if names.total() >= _LOOKED_AT:
+                break
+        return set(names)
+
+    # --------------------------------------------------------------------------- stamps
+
+    def _check_time(self) -> None:
+        time = self.log.time
+        if time is not None and time.column not in (HOST, COUNTER):
+            raise RecordingError(
+                f"{self.path.name}: no time column {time.column!r}; a VectorNav log has "
+                f"{HOST!r}, a stamp before the '$', and {COUNTER!r}, the figure after 'T' at "
+                "the end; mend 'column' of 'time', or drop 'time' and state 'rate'"
+            )
+
+    def _stamps(self, rows: list[Row]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+        """Return the stamps of some records, and which of them are missing."""
+        assert self.log.time is not None
+        if self.log.time.column == COUNTER:
+            texts = [row.counter for row in rows]
+        else:
+            texts = [row.before.strip(AROUND_STAMP) for row in rows]
+        if self.log.time.format == "iso8601":
+            return _dates(texts)
+        whole = self.log.time.unit == "ns" or self.log.time.column == COUNTER
+        # Nanoseconds since 1970 do not fit into the 53 bits of a float64.
+        stamps = np.zeros(len(texts), np.int64 if whole else np.float64)
+        missing = np.zeros(len(texts), bool)
+        for number, text in enumerate(texts):
+            try:
+                stamps[number] = int(text) if whole else float(text)
+            except (ValueError, OverflowError):
+                missing[number] = True
+        if not whole:
+            missing |= ~np.isfinite(stamps)
+        return stamps, missing
+
+    def _first(self, stamps: NDArray[Any], missing: NDArray[np.bool_], rows: list[Row]) -> Any:
+        assert self.log.time is not None
+        present = stamps[~missing]
+        if not len(present):
+            where = (
+                "before the '$'" if self.log.time.column == HOST else "'T' and a count at the end"
+            )
+            raise RecordingError(
+                f"{self.path.name}: no stamp that can be read in the first {len(rows)} sentences; "
+                f"expected {where}, found {rows[0].before[:40].decode('ascii', 'replace')!r} "
+                f"before {rows[0].body[-40:].decode('ascii', 'replace')!r}; mend 'time' in the "
+                "sensor file, or drop it and state 'rate'"
+            )
+        if self.log.time.column == HOST and self.log.time.unit != "samples":
+            scale = SECONDS[self.log.time.unit or "ns"] * 1e9
+            first = present[0].item()
+            self.started = date_of(first if isinstance(first, int) else round(first * scale))
+        return present[0]
+
+    # ------------------------------------------------------------------------- findings
+
+    def _report(self, kind: str, records: Sentences) -> None:
+        if not records.right:
+            raise RecordingError(
+                f"{self.path.name}: no ${kind} sentence with a right checksum, {records.wrong} "
+                f"with a wrong one; expected ${kind},...* and 2 or 4 digits; is 'column' in the "
+                "sensor file right, and the checksum on (register 30)?"
+            )
+        fate = "left out" if self.log.time is not None else "missing samples"
+        others = _listed(records.others)
+        self._count(
+            records.wrong,
+            "wrong_checksum",
+            f"${kind} sentences are cut short or have a wrong checksum; {fate}",
+        )
+        self._count(
+            records.unread,
+            "unreadable_sentence",
+            f"${kind} sentences have a right checksum but not the {len(FIELDS[kind])} numbers "
+            "expected; their figures are missing",
+        )
+        self._count(
+            records.others.total(),
+            "other_sentences",
+            f"other sentences ({others}) passed over",
+            "note",
+        )
+        self._count(
+            records.garbage,
+            "not_sentences",
+            "lines or parts of lines are no sentence; passed over",
+            "note",
+        )
+
+    def _count(self, count: int, name: str, text: str, severity: Severity = "warning") -> None:
+        if count:
+            self.findings.append(
+                Finding(name, severity, f"{self.path.name}: {count} {text}", count)
+            )
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(name[:_LONGEST_NAME] for name in sorted(names)[:_NAMES])
+
+
+def _dates(texts: Sequence[bytes]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+    """Return ISO 8601 stamps as ns since 1970 (UTC), and which cannot be read."""
+    stamps = np.zeros(len(texts), np.int64)
+    missing = np.zeros(len(texts), bool)
+    for number, text in enumerate(texts):
+        zone = "UTC" if _ZONE.search(text) else None
+        try:
+            date = pa.scalar(text.decode("ascii")).cast(pa.timestamp("ns", zone))
+            stamps[number] = date.value
+        except (pa.ArrowInvalid, UnicodeDecodeError):
+            missing[number] = True
+    return stamps, missing

@@ -1,0 +1,147 @@
+"""The files of a recording put together: one Parquet file a clock, and no sample lost."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from imubench_pipeline.recordings import timebase
+from imubench_pipeline.recordings.parts import Part
+from imubench_pipeline.recordings.recording import LogWriter
+from imubench_pipeline.settings.quality import QualitySettings
+from imubench_pipeline.settings.sensor import quantity_of
+
+
+def names_of(parts: list[Part], groups: list[list[int]]) -> list[str]:
+    """Name the Parquet file of each clock after the quantity or the channels it holds."""
+    if len(groups) == 1:
+        return ["log.parquet"]
+    contents = [[name for index in group for name in parts[index].columns] for group in groups]
+    quantities = [sorted({quantity_of(name) for name in names}) for names in contents]
+    names = []
+    for held, kinds in zip(contents, quantities, strict=True):
+        alone = len(kinds) == 1 and quantities.count(kinds) == 1
+        names.append(f"log.{kinds[0] if alone else '+'.join(held)}.parquet")
+    return names
+
+
+def assemble(
+    parts: list[Part],
+    base: timebase.TimeBase,
+    settings: QualitySettings,
+    metadata: dict[str, Any],
+    path: Path,
+) -> tuple[Path, dict[str, int]]:
+    """Close the columns of files that share a clock into one Parquet file.
+
+    Parameters
+    ----------
+    parts : list of Part
+    base : TimeBase
+        Their clock.
+    settings : QualitySettings
+    metadata : dict
+        Goes into the file.
+    path : Path
+        Of the file, unless one of the parts is it already.
+
+    Returns
+    -------
+    path : Path
+    repeated : dict of str to int
+        Samples of each column that repeat a stamp, and are left out.
+    """
+    for part in parts:
+        part.writer.finish(metadata)
+        part.writer.__exit__(None, None, None)
+    if len(parts) == 1 and base.uniform:
+        return parts[0].data, {}
+    repeated: dict[str, int] = {}
+    columns: dict[str, pa.DataType] = {}
+    if not base.uniform:
+        columns["time"] = pa.float64()
+    if base.stamped and not base.uniform:
+        columns["sample"] = pa.int64()
+    for part in parts:
+        columns |= dict.fromkeys(part.columns, pa.float64())
+    blocks = _columns_of(parts)
+    with LogWriter(path, columns) as writer:
+        if base.uniform:
+            for block in blocks:
+                writer.write(block)
+        else:
+            first = None
+            places = timebase.positions(base, parts[0].stamps, settings)
+            for block, stamps, points in zip(blocks, parts[0].stamps(), places, strict=True):
+                first = stamps[0] if first is None else first
+                block["time"] = stamps - first
+                if base.stamped:
+                    block["sample"] = points
+                keep = points >= 0
+                for name in (name for part in parts for name in part.columns):
+                    left = int(np.isfinite(block[name][~keep]).sum())
+                    repeated[name] = repeated.get(name, 0) + left
+                writer.write({name: values[keep] for name, values in block.items()})
+        writer.finish(metadata)
+    return path, repeated
+
+
+def _columns_of(parts: list[Part]) -> Iterator[dict[str, NDArray[Any]]]:
+    """Yield the columns of several files side by side, a row group at a time."""
+    files = [pq.ParquetFile(part.data) for part in parts]
+    try:
+        for group in range(files[0].num_row_groups):
+            block: dict[str, NDArray[Any]] = {}
+            for file in files:
+                table = file.read_row_group(group, use_threads=False)
+                block |= {name: table.column(name).to_numpy() for name in table.column_names}
+            yield block
+    finally:
+        for file in files:
+            file.close()
+
+
+def counted(
+    path: Path, parts: list[Part], repeated: Mapping[str, int]
+) -> dict[str, dict[str, int]]:
+    """Return what became of the samples of each column; every one must be accounted for.
+
+    Parameters
+    ----------
+    path : Path
+        The file that was assembled.
+    parts : list of Part
+        What it was assembled from.
+    repeated : mapping of str to int
+        Samples of each column that repeat a stamp.
+
+    Raises
+    ------
+    RuntimeError
+        If a sample was lost or invented: a fault of this program.
+    """
+    file = pq.read_metadata(path)
+    kept = dict.fromkeys(file.schema.names, 0)
+    for group in range(file.num_row_groups):
+        for index, name in enumerate(file.schema.names):
+            column = file.row_group(group).column(index)
+            kept[name] += column.num_values - column.statistics.null_count
+    counts = {}
+    for part in parts:
+        for name, column in part.columns.items():
+            counts[name] = {
+                "present": column.present,
+                "used": kept[name],
+                "knocks": part.knocks.get(name, 0),
+                "repeated": repeated.get(name, 0),
+            }
+            present, *elsewhere = counts[name].values()
+            if present != sum(elsewhere):
+                raise RuntimeError(f"samples were lost or invented: {name} {counts[name]}")
+    return counts

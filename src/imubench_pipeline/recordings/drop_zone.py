@@ -1,0 +1,176 @@
+"""What lies in the folder of the logs: recordings, their files, and the content of these."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from imubench_pipeline.readers import log_files
+from imubench_pipeline.settings.validation import ConfigError
+
+PARTIAL = frozenset({".part", ".tmp", ".filepart", ".crdownload"})
+"""How the names of files end that are still being transferred."""
+
+COMPRESSED = frozenset({".gz", ".zst", ".xz", ".bz2", ".zip"})
+"""How the names of files end that are compressed."""
+
+_NOT_LOGS = {".yaml", ".yml", ".md"} | PARTIAL
+_UNUSABLE_IN_NAMES = re.compile(r"[^\w .+()-]")
+_LONGEST_NAME = 120
+_READ_WHOLE = 1 << 20  # bytes; of a larger file, blocks are read
+_BLOCKS = 16
+_BLOCK = 4096  # bytes
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One recording that was found, or is to be simulated.
+
+    Attributes
+    ----------
+    sensor, name : str
+    path : Path
+        The log file, or the folder of a recording that has several.
+    notes : Path or None
+        The file of notes beside it.
+    simulated : bool
+    error : str or None
+        Why the file cannot be used, where its name or its place says so already.
+    held_back : bool
+        The log is not read in this run: the results that are there stay.
+    """
+
+    sensor: str
+    name: str
+    path: Path
+    notes: Path | None
+    simulated: bool
+    error: str | None = None
+    held_back: bool = False
+
+    @property
+    def files(self) -> list[Path]:
+        """What the recording depends on."""
+        if self.held_back:
+            # No such file, but what would be made of it is there: Snakemake takes that as it is,
+            # whatever became of the log, the settings or the code since.
+            return [self.path / "held back"]
+        if self.error:
+            return []
+        logs = [self.path] if self.simulated else log_files(self.path)
+        return logs + ([self.notes] if self.notes else [])
+
+    @property
+    def inputs(self) -> list[Path]:
+        """Those of which the date says whether the recording is read again: no log, no notes.
+
+        They stand in the settings of the ingest, by their content. A log has any date: of the
+        future, where the clock of its logger was wrong, or of long ago, where it was moved here.
+        """
+        return self.files if self.held_back or self.simulated else []
+
+
+def found_logs(logs: Path) -> list[Recording]:
+    """Return the recordings of a drop zone, in order; two logs of one name are there twice."""
+    found = []
+    for folder in sorted(path for path in logs.iterdir() if path.is_dir()):
+        for path in sorted(folder.iterdir()):
+            if path.name.startswith(".") or path.name.endswith("~"):
+                continue
+            if path.is_file() and path.suffix.lower() in _NOT_LOGS:
+                continue
+            name = path.name if path.is_dir() else _stem(path)
+            notes = folder / f"{name}.yaml"
+            found.append(
+                Recording(
+                    folder.name,
+                    _usable(name),
+                    path,
+                    notes if notes.is_file() else None,
+                    simulated=False,
+                    error=_fault(path, name),
+                )
+            )
+    return found
+
+
+def name_of(file: str) -> str:
+    """Return the name of the recording whose log has this file name."""
+    return _usable(_stem(Path(file)))
+
+
+def _usable(name: str) -> str:
+    return _UNUSABLE_IN_NAMES.sub("_", name)[:_LONGEST_NAME]
+
+
+def _fault(path: Path, name: str) -> str | None:
+    """Return why a file of the drop zone cannot be used, if its name or place says so."""
+    shown = ascii(path.name)
+    if _UNUSABLE_IN_NAMES.search(name) or len(name) > _LONGEST_NAME:
+        return (
+            f"the file name {shown} cannot be used; expected at most {_LONGEST_NAME} letters, "
+            "digits, spaces and . _ - + ( ) in it: rename the file"
+        )
+    try:
+        if not log_files(path):
+            return f"the folder {shown} has no files"
+        for file in log_files(path):
+            file.stat()
+            with file.open("rb"):
+                pass
+    except OSError as error:
+        return f"{shown} cannot be read ({error.strerror})"
+    return None
+
+
+def fingerprint(path: Path) -> str:
+    """Return the size of a file and a digest of it; of a large file, of blocks spread over it.
+
+    The first and the last block are among them: what grew, was cut short or compressed anew has
+    another fingerprint, as has another log of the same size. A change that leaves the size and all
+    16 blocks of 4 kB as they are is not seen, in a file above 1 MB.
+
+    Parameters
+    ----------
+    path : Path
+        A file.
+    """
+    digest = hashlib.sha256()
+    with path.open("rb", buffering=0) as file:
+        size = os.fstat(file.fileno()).st_size
+        if size <= _READ_WHOLE:
+            digest.update(file.read(_READ_WHOLE + 1))
+        else:
+            for number in range(_BLOCKS):
+                place = (size - _BLOCK) * number // (_BLOCKS - 1)
+                digest.update(os.pread(file.fileno(), _BLOCK, place))
+    return f"{size} {digest.hexdigest()[:32]}"
+
+
+def fingerprints(recording: Recording) -> dict[str, str]:
+    """Return those of the files of a recording; of one that is to be simulated, none.
+
+    Raises
+    ------
+    ConfigError
+        If one of them has gone.
+    """
+    if recording.simulated:
+        return {}
+    path = recording.path
+    try:
+        files = log_files(path)
+        return {file.relative_to(path).as_posix(): fingerprint(file) for file in files}
+    except OSError as error:
+        raise ConfigError(f"{path.name!a} cannot be read ({error.strerror})") from None
+
+
+def _stem(path: Path) -> str:
+    name = path.name
+    for suffix in path.suffixes[::-1]:
+        if suffix.lower() in COMPRESSED:
+            name = name[: -len(suffix)]
+    return name.rsplit(".", maxsplit=1)[0] if "." in name else name

@@ -1,0 +1,336 @@
+"""Whether a recording may decide: what findings, statuses and verdicts on models cast doubt on.
+
+All doubts are derived here, from the rows that the steps leave, and what decides or is exported
+(ranking, pooling, exports) asks here. A doubt is *unfit* where the figures may be of something else
+than the noise of a sensor at rest in the unit that is stated: it was moved or turned, the unit is
+another, an axis is dead. Others leave the figures, and are said beside them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from imubench_pipeline.tables.findings import LEFT_OUT
+from imubench_pipeline.typing import Row
+
+Key = tuple[str, str]  # sensor, recording
+Fitness = Literal["fit", "fit with doubts", "unfit"]
+
+UNFIT = frozenset(
+    {
+        "motion",
+        "turning",
+        "suspicious_unit",
+        "unit_contradicts",
+        "rate_implausible",
+        "stuck",
+        "channel_twice",
+        "log_twice",
+        "joined",
+        "interleaved",
+    }
+)
+"""Findings after which a log need not be that of one sensor at rest in its unit."""
+
+_SLOW = frozenset({"B", "B_curve", "sigma_min", "tau_min", "T_B", "K", "R"})
+_WHITE = frozenset({"N", "Q"})
+_OF_UNIT = dict.fromkeys(("N", "Q", "B", "B_curve", "sigma_min", "K", "R", "bias"), 1.0)
+_OF_TIME = {"N": 0.5, "Q": 1.0, "T_B": 1.0, "tau_min": 1.0, "K": -0.5, "R": -1.0}
+
+SCALES: Mapping[str, Mapping[str, float]] = {
+    "suspicious_unit": _OF_UNIT,
+    "unit_contradicts": _OF_UNIT,
+    "rate_implausible": _OF_TIME,
+}
+"""Findings whose value is a factor that mends samples, or times, and the power of it that mends
+each parameter: N² = σ²(τ) τ, so that N goes with the root of time."""
+
+BEARS_ON: Mapping[str, frozenset[str]] = {
+    "knocks": _WHITE,
+    "held_samples": _WHITE,
+    "step": _SLOW | {"bias"},
+    "bias_step": _SLOW | {"bias"},
+    "warm_up": _SLOW | {"bias"},
+    "warm_up_drift": _SLOW | {"bias"},
+    "periodic_drift": _SLOW,
+    "telegraph_noise": _SLOW | {"bias"},
+    "K_differs": frozenset({"K", "R"}),
+    "slow_noise_differs": _SLOW,
+    "noise_grows": _WHITE,
+    "noise_varies": _WHITE,
+    "backtest_contradicts": _SLOW,
+    **{name: frozenset(powers) for name, powers in SCALES.items()},
+}
+"""The parameters on which a finding casts doubt; a warning that is not here, on all."""
+
+_SHOWN = 3
+"""Doubts of a recording that are named; of more the number."""
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """Why figures of a recording may be wrong.
+
+    Attributes
+    ----------
+    sensor, recording : str
+    channel : str or None
+        None: the whole recording.
+    code : str
+        The finding, ``not_explained`` (no model explains the spectrum), or the status of a
+        parameter.
+    parameters : tuple of str
+        On which it bears; none: on all.
+    unfit : bool
+        The figures may be of something else.
+    factor : float or None
+        By which it may change a value, where that is known.
+    start, end : float or None
+        The part of the recording that it concerns, s from the first sample; None: all of it.
+    reason : str
+    """
+
+    sensor: str
+    recording: str
+    channel: str | None
+    code: str
+    parameters: tuple[str, ...]
+    unfit: bool
+    factor: float | None
+    start: float | None
+    end: float | None
+    reason: str
+
+    @property
+    def of_recording(self) -> bool:
+        """Whether it is one of the log, and not only of a parameter that it tells badly."""
+        return self.code != "doubtful"
+
+    def row(self) -> dict[str, Any]:
+        """Return the row of the table ``doubts``."""
+        return {
+            **{name: getattr(self, name) for name in ("sensor", "recording", "channel", "code")},
+            "fitness": "unfit" if self.unfit else "fit with doubts",
+            "parameters": ", ".join(self.parameters) or None,
+            **{name: getattr(self, name) for name in ("factor", "start", "end", "reason")},
+        }
+
+
+def doubts(
+    findings: Iterable[Row], parameters: Iterable[Row], models: Iterable[Row]
+) -> Iterator[Doubt]:
+    """Yield what is doubted of recordings, the unfit first of each.
+
+    Parameters
+    ----------
+    findings : iterable of mapping
+        Rows of the table ``findings``.
+    parameters : iterable of mapping
+        Rows of the table ``parameters``, of the recommended methods.
+    models : iterable of mapping
+        Rows of the table ``models``.
+    """
+    found = [one for row in findings if _casts_doubt(row) for one in _of_finding(row)]
+    found += [
+        Doubt(
+            *_place(row),
+            code="not_explained",
+            parameters=(),
+            unfit=False,
+            factor=None,
+            start=None,
+            end=None,
+            reason=f"no model explains the spectrum of {row['channel']}",
+        )
+        for row in models
+        if row["chosen"] and row["verdict"] == "not explained"
+    ]
+    found += [
+        Doubt(
+            *_place(row),
+            code="doubtful",
+            parameters=(row["parameter"],),
+            unfit=False,
+            factor=None,
+            start=None,
+            end=None,
+            reason=row["reason"] or "its status is doubtful",
+        )
+        for row in parameters
+        if row["status"] == "doubtful"
+    ]
+    yield from sorted(found, key=lambda one: not one.unfit)
+
+
+def fitness(of_recording: Iterable[Doubt]) -> Fitness:
+    """Return the verdict on a recording.
+
+    Parameters
+    ----------
+    of_recording : iterable of Doubt
+        All of one recording.
+    """
+    there = [one for one in of_recording if one.of_recording]
+    if any(one.unfit for one in there):
+        return "unfit"
+    return "fit with doubts" if there else "fit"
+
+
+def judged(
+    recordings: Sequence[Row], found: Iterable[Doubt], included: Collection[str]
+) -> list[dict[str, Any]]:
+    """Return the rows of recordings with whether they decide, and their doubts.
+
+    Parameters
+    ----------
+    recordings : sequence of mapping
+        Rows of the table ``recordings``.
+    found : iterable of Doubt
+        Of all of them.
+    included : collection of str
+        Those that decide although they are unfit, as ``sensor/recording``.
+    """
+    by_recording: dict[Key, list[Doubt]] = {}
+    for one in found:
+        by_recording.setdefault((one.sensor, one.recording), []).append(one)
+    return [_judged(row, by_recording.get(_key(row), []), included) for row in recordings]
+
+
+def words(of_recording: Iterable[Doubt]) -> str:
+    """Return the doubts of a recording in a line, the unfit first; empty where there are none.
+
+    Parameters
+    ----------
+    of_recording : iterable of Doubt
+    """
+    channels: dict[str, dict[str, None]] = {}
+    for one in of_recording:
+        if one.of_recording:
+            channels.setdefault(one.code, {}).update({one.channel: None} if one.channel else {})
+    named = [
+        code.replace("_", " ") + (f" ({', '.join(where)})" if where else "")
+        for code, where in channels.items()
+    ]
+    more = len(named) - _SHOWN
+    return "; ".join(named[:_SHOWN]) + (f"; and {more} more" if more > 0 else "")
+
+
+def left_out(recordings: Iterable[Row]) -> dict[Key, str]:
+    """Return the recordings that were analysed and do not decide, each with the reason.
+
+    Parameters
+    ----------
+    recordings : iterable of mapping
+        Rows of the table ``recordings``.
+    """
+    return {
+        _key(row): f"{row['recording']} does not decide: {row['doubts']}"
+        for row in recordings
+        if row["status"] == "ok" and row["decides"] is False
+    }
+
+
+def undecided(rows: Iterable[Row], not_deciding: Collection[Key]) -> Iterator[dict[str, Any]]:
+    """Yield rows of estimates, without the values of recordings that do not decide.
+
+    Parameters
+    ----------
+    rows : iterable of mapping
+        With ``sensor``, ``recording``, ``value``, ``lower`` and ``upper``.
+    not_deciding : collection of (str, str)
+        Sensor and recording.
+    """
+    nothing = {"value": None, "lower": None, "upper": None}
+    for row in rows:
+        if _key(row) not in not_deciding:
+            yield dict(row)
+            continue
+        status = {"status": "does_not_decide"} if "status" in row else {}
+        yield {**row, **nothing, **status}
+
+
+def with_doubts(
+    rows: Iterable[Row],
+    recordings: Iterable[Row],
+    names: Sequence[tuple[str, str]] = (("sensor", "recording"),),
+) -> Iterator[dict[str, Any]]:
+    """Yield rows with the doubts of the recordings that they stand on.
+
+    Parameters
+    ----------
+    rows : iterable of mapping
+    recordings : iterable of mapping
+        Rows of the table ``recordings``.
+    names : sequence of (str, str)
+        The columns that name sensor and recording; several pairs, of several recordings.
+    """
+    found: dict[tuple[Any, Any], str] = {_key(row): row["doubts"] or "" for row in recordings}
+    for row in rows:
+        said = [found.get((row.get(of), row.get(name)), "") for of, name in names]
+        yield {**row, "doubts": "; ".join(filter(None, dict.fromkeys(said)))}
+
+
+def with_doubts_of_all(pools: Iterable[Row], recordings: Iterable[Row]) -> Iterator[dict[str, Any]]:
+    """Yield rows of the table ``pooled`` with the doubts of the recordings of sensor or device.
+
+    Parameters
+    ----------
+    pools, recordings : iterable of mapping
+        Rows of the tables.
+    """
+    listed = [row for row in recordings if row["decides"] and row["doubts"]]
+    for row in pools:
+        said = [
+            f"{one['recording']}: {one['doubts']}"
+            for one in listed
+            if one["sensor"] == row["sensor"] and row["device"] in (None, one["device"])
+        ]
+        more = len(said) - _SHOWN
+        text = "; ".join(said[:_SHOWN])
+        yield {**row, "doubts": text + (f"; and {more} more" if more > 0 else "")}
+
+
+def _judged(row: Row, found: Sequence[Doubt], included: Collection[str]) -> dict[str, Any]:
+    verdict = fitness(found) if row["status"] == "ok" else None
+    named = f"{row['sensor']}/{row['recording']}" in included
+    return {
+        **row,
+        "fitness": verdict,
+        "decides": verdict is not None and (verdict != "unfit" or named),
+        "doubts": words(found),
+    }
+
+
+def _casts_doubt(row: Row) -> bool:
+    if row["finding"] in LEFT_OUT:
+        return False
+    return row["severity"] == "warning" or row["finding"] in UNFIT
+
+
+def _of_finding(row: Row) -> Iterator[Doubt]:
+    """Yield the doubt of a finding, or one for each factor by which parameters may change."""
+    code = row["finding"]
+    by_factor: dict[float | None, list[str]] = {}
+    for name, power in SCALES.get(code, {}).items():
+        by_factor.setdefault(row["value"] ** power, []).append(name)
+    for factor, names in (by_factor or {None: [*BEARS_ON.get(code, ())]}).items():
+        yield Doubt(
+            *_place(row),
+            code=code,
+            parameters=tuple(sorted(names)),
+            unfit=code in UNFIT,
+            factor=factor,
+            start=row["start"],
+            end=row["end"],
+            reason=row["detail"],
+        )
+
+
+def _place(row: Row) -> tuple[str, str, str | None]:
+    return row["sensor"], row["recording"], row["channel"]
+
+
+def _key(row: Row) -> Key:
+    return row["sensor"], row["recording"]

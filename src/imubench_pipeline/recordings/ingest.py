@@ -1,0 +1,394 @@
+"""Log files -> Parquet in SI, with what was found wrong on the way; memory stays bounded."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+import tempfile
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from imubench_pipeline.readers import log_files, read
+from imubench_pipeline.recordings import timebase
+from imubench_pipeline.recordings.assembly import assemble, counted, names_of
+from imubench_pipeline.recordings.parts import Part, leave_out_knocks, read_part
+from imubench_pipeline.recordings.quality.columns import column_findings
+from imubench_pipeline.recordings.quality.copies import copied_channels
+from imubench_pipeline.recordings.quality.levels import kept_level
+from imubench_pipeline.recordings.quality.rotation import GravityTurn, gravity_turn
+from imubench_pipeline.recordings.quality.summary import ColumnSummary
+from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.recordings.recording import channel_logs, log_paths
+from imubench_pipeline.settings.quality import QualitySettings
+from imubench_pipeline.settings.sensor import (
+    POSITION,
+    TABLE_RATE,
+    TEMPERATURE,
+    LogFormat,
+    RecordingNotes,
+    UsedPart,
+)
+from imubench_pipeline.tables import write_json
+from imubench_pipeline.tables.failures import Failure
+from imubench_pipeline.tables.findings import Finding, RecordingError
+
+
+@dataclass(frozen=True)
+class Ingested:
+    """What was kept of a recording.
+
+    Attributes
+    ----------
+    summary : dict
+        A row of the table ``recordings`` without the names.
+    findings : list of Finding
+    channels : dict
+        Rate in Hz, points of the grid, segments and levels of each channel that goes on.
+    samples : str or None
+        Digest of the samples.
+    gravity : GravityTurn or None
+        How gravity turns against the sensor.
+    """
+
+    summary: dict[str, Any]
+    findings: list[Finding]
+    channels: dict[str, dict[str, Any]] = field(default_factory=dict)
+    samples: str | None = None
+    gravity: GravityTurn | None = None
+
+    def quality(self, names: dict[str, Any]) -> Quality:
+        """Return what ``quality.json`` says, with the names of the recording."""
+        status = "ok" if self.channels else "rejected"
+        sensor, recording = names["sensor"], names["recording"]
+        return Quality(
+            names | {"status": status} | self.summary,
+            [dict(finding.row(sensor, recording)) for finding in self.findings],
+            self.channels,
+            self.samples,
+            gravity=asdict(self.gravity) if self.gravity else None,
+        )
+
+
+def ingest(
+    source: Path,
+    log: LogFormat,
+    notes: RecordingNotes,
+    settings: QualitySettings,
+    folder: Path,
+    provenance: dict[str, Any],
+) -> Ingested:
+    """Read a recording and keep it as Parquet in ``folder``.
+
+    Parameters
+    ----------
+    source : Path
+        The log file, or the folder of a recording.
+    log : LogFormat
+    notes : RecordingNotes
+        The part to use, and when it started.
+    settings : QualitySettings
+    folder : Path
+        Where the Parquet files go; those of an earlier run are replaced.
+    provenance : dict
+        Goes into the metadata of every file, as it is. Its ``kind`` says whether the sensor was at
+        rest: knocks and changes are looked for then alone.
+
+    Raises
+    ------
+    RecordingError
+        If the recording cannot be used; nothing is left in ``folder`` then.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    remove_kept(folder)
+    scratch = Path(tempfile.mkdtemp(prefix=".ingest.", suffix=".part", dir=folder))
+    # The files are identified while they are read.
+    beside = ThreadPoolExecutor(1)
+    sources = beside.submit(_identified, source)
+    try:
+        found = _ingest(source, log, notes, settings, folder, scratch, provenance, sources)
+        end = max((f.end or 0.0 for f in found.findings if f.finding == "warm_up"), default=0.0)
+        if not (settings.trim_warm_up and end):
+            return found
+        later = notes.model_copy(update={"use": UsedPart(start=end, end=notes.use.end)})
+        trimmed = _ingest(source, log, later, settings, folder, scratch, provenance, sources)
+        detail = f"the first {end:.5g} s, a warm-up, are left out (quality.trim_warm_up)"
+        note = Finding("warm_up_trimmed", "note", detail, end, start=0.0, end=end)
+        return replace(trimmed, findings=[note, *trimmed.findings])
+    finally:
+        beside.shutdown()
+        shutil.rmtree(scratch)
+
+
+def remove_kept(folder: Path) -> None:
+    """Remove the log of an earlier run, and what a killed one left."""
+    for path in log_paths(folder):
+        path.unlink()
+    for path in folder.glob(".ingest.*.part"):
+        shutil.rmtree(path, ignore_errors=True)
+
+
+def _ingest(
+    source: Path,
+    log: LogFormat,
+    notes: RecordingNotes,
+    settings: QualitySettings,
+    folder: Path,
+    scratch: Path,
+    provenance: dict[str, Any],
+    sources: Future[list[dict[str, Any]]],
+) -> Ingested:
+    parts = [
+        read_part(file, notes.use, scratch, number) for number, file in enumerate(read(source, log))
+    ]
+    static = provenance.get("kind", "static") == "static"
+    findings = [finding for part in parts for finding in part.source.findings]
+    findings += [finding for part in parts for finding in part.source.contradicted_units()]
+    bases = [_base(part, log, settings) for part in parts]
+    for part, base in zip(parts, bases, strict=True):
+        findings += column_findings(part.columns, base.rate, settings, static=static)
+        if static:  # what is sensed of a turn looks like a knock
+            findings += _knock_findings(part, base.rate, settings, scratch)
+    beside = {TEMPERATURE, POSITION, TABLE_RATE}
+    findings += copied_channels(
+        {name: c for part in parts for name, c in part.columns.items() if name not in beside}
+    )
+    unusable = {finding.channel for finding in findings if finding.severity == "fatal"}
+    groups = _shared_bases(parts, bases)
+    if len({part.rows for part in parts if not part.stamped}) > 1:
+        lengths = ", ".join(f"{part.source.path.name} {part.rows}" for part in parts)
+        rows = [part.rows for part in parts]
+        findings.append(
+            Finding(
+                "unequal_length",
+                "warning",
+                f"files without stamps differ in length ({lengths} samples): the shorter ones may "
+                "be cut short",
+                max(rows) - min(rows),
+            )
+        )
+    duration = max(base.grid / base.rate for base in bases)
+    if static and duration < settings.short:
+        detail = (
+            f"the recording lasts {duration:.5g} s: it shows white noise, but bias instability and "
+            "random walk take hours"
+        )
+        findings.append(Finding("short_recording", "note", detail, duration))
+    names = names_of(parts, groups)
+    metadata = provenance | {
+        "sources": sources.result(),
+        "reader": log.reader,
+        "begins": notes.use.start,
+        "started": notes.started
+        or next((p.source.started for p in parts if p.source.started), None),
+    }
+    written: list[tuple[Path, Path]] = []
+    counts: dict[str, dict[str, int]] = {}
+    for name, group in zip(names, groups, strict=True):
+        base = bases[group[0]]
+        findings += [f for f in base.findings if f not in findings]
+        chosen = [parts[index] for index in group]
+        holes = {
+            channel: bool(
+                base.missing or column.missing or column.not_finite or part.knocks.get(channel)
+            )
+            for part in chosen
+            for channel, column in part.columns.items()
+        }
+        about = metadata | {
+            "rate": base.rate,
+            "rate_from": base.source,
+            "rows": base.rows,
+            "grid": base.grid,
+            "segments": [list(segment) for segment in base.segments],
+            "uniform": base.uniform,
+            "holes": holes,
+            "unusable": sorted(channel for channel in unusable if channel),
+        }
+        assembled, repeated = assemble(chosen, base, settings, about, scratch / name)
+        counts |= counted(assembled, chosen, repeated)
+        written.append((assembled, folder / name))
+    summary = _summary(parts, bases, metadata["started"])
+    if all(channel in unusable for channel in log.channels):
+        reasons = "; ".join(f.detail for f in findings if f.severity == "fatal")
+        raise RecordingError(f"no channel can be used: {reasons}")
+    for temporary, final in written:
+        temporary.replace(final)
+    column = {name: found for part in parts for name, found in part.columns.items()}
+    units = {str(name): source.unit for name, source in log.channels.items()}
+    channels = {
+        name: {"grid": kept.grid, "segments": kept.segments}
+        | counts[name]
+        | kept_level(column[name], kept.rate, units[name])
+        for name, kept in channel_logs(folder).items()
+    }
+    begin = notes.use.start
+    findings = [
+        f if f.start is None else replace(f, start=f.start + begin, end=(f.end or 0.0) + begin)
+        for f in findings
+    ]
+    return Ingested(summary, findings, channels, _digest(folder), _gravity(parts, bases))
+
+
+def _gravity(parts: list[Part], bases: list[timebase.TimeBase]) -> GravityTurn | None:
+    """Return how gravity turns against the sensor; None: it does not, or it is not seen."""
+    axes = [f"accel_{axis}" for axis in "xyz"]
+    place = {name: n for n, part in enumerate(parts) for name in part.columns if name in axes}
+    if len({(parts[n].digest(), parts[n].rows) for n in place.values()}) != 1 or len(place) < 3:
+        return None  # they have no clock in common
+    blocks = [parts[place[name]].columns[name].blocks() for name in axes]
+    return gravity_turn(blocks, bases[place[axes[0]]].rate)
+
+
+def _knock_findings(
+    part: Part, rate: float, settings: QualitySettings, scratch: Path
+) -> list[Finding]:
+    longest = round(settings.longest_knock * rate)
+    findings = []
+    for channel, found in leave_out_knocks(part, settings.knock, longest, scratch).items():
+        worst = max(found, key=lambda knock: knock.size)
+        at = ", ".join(f"{max(knock.first, 0) / rate:.5g}" for knock in found[:5])
+        more = " ..." if len(found) > 5 else ""
+        findings.append(
+            Finding(
+                "knocks",
+                "warning",
+                f"{channel} has {len(found)} knocks, up to {worst.size:.0f} standard deviations "
+                f"(at {at}{more} s); {part.knocks[channel]} samples about them are left out",
+                part.knocks[channel],
+                channel,
+                max(found[0].first, 0) / rate,
+                found[-1].last / rate,
+            )
+        )
+    return findings
+
+
+def _base(part: Part, log: LogFormat, settings: QualitySettings) -> timebase.TimeBase:
+    if not part.stamped:
+        assert log.rate_hz is not None  # checked with the sensor file
+        return timebase.without_stamps(part.rows, log.rate_hz)
+    try:
+        return timebase.from_stamps(part.stamps, log.rate_hz or part.source.rate, settings)
+    except RecordingError as error:
+        raise RecordingError(f"{part.source.path.name}: {error}") from None
+
+
+def _shared_bases(parts: list[Part], bases: list[timebase.TimeBase]) -> list[list[int]]:
+    """Group the files that have the same clock: the same stamps, or as many samples and none."""
+    if len(parts) == 1:
+        return [[0]]
+    groups: dict[tuple[object, ...], list[int]] = {}
+    for index, (part, base) in enumerate(zip(parts, bases, strict=True)):
+        groups.setdefault((part.digest(), part.rows, base.rate), []).append(index)
+    return list(groups.values())
+
+
+def _summary(
+    parts: list[Part], bases: list[timebase.TimeBase], started: str | None
+) -> dict[str, Any]:
+    beside = {TEMPERATURE, POSITION, TABLE_RATE}
+    measured = [i for i, part in enumerate(parts) if set(part.columns) - beside]
+    longest = max(measured, key=lambda index: bases[index].rows)
+    base = bases[longest]
+    temperature = next(
+        (part.columns[TEMPERATURE] for part in parts if TEMPERATURE in part.columns),
+        ColumnSummary(),
+    )
+    known = temperature.present > 0
+    return {
+        "started": started,
+        "rate": base.rate,
+        "rate_from": base.source,
+        "rate_error": base.rate_error,
+        "samples": base.samples,
+        "duration": base.grid / base.rate,
+        "temperature_min": temperature.low if known else None,
+        "temperature_max": temperature.high if known else None,
+    }
+
+
+def _digest(folder: Path) -> str:
+    """Return a digest of the samples that are kept in a folder."""
+    found = hashlib.sha256()
+    for path in log_paths(folder):
+        with path.open("rb") as file:
+            found.update(hashlib.file_digest(file, "sha256").digest())
+    return found.hexdigest()
+
+
+def _identified(source: Path) -> list[dict[str, Any]]:
+    """Return name, size and digest of each file of a recording."""
+    found = []
+    for path in log_files(source):
+        with path.open("rb") as file:
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+        found.append({"name": path.name, "size": path.stat().st_size, "sha256": digest})
+    return found
+
+
+def ingest_as_planned(
+    source: Path, settings: str, sensor: str, recording: str, folder: Path
+) -> Quality:
+    """Ingest a recording as the plan says; one that cannot be used is rejected, with its reason.
+
+    Parameters
+    ----------
+    source : Path
+        The log file, or the folder of a recording.
+    settings : str
+        As `imubench_pipeline.run.plan.Plan.ingest_settings` gives them.
+    sensor, recording : str
+    folder : Path
+        Where the Parquet files go.
+    """
+    given = json.loads(settings)
+    notes = RecordingNotes.model_validate(given.get("notes", {}))
+    names = {"sensor": sensor, "device": notes.device or recording, "recording": recording}
+    names |= {"kind": given.get("kind", "static"), "simulated": given["simulated"]}
+    try:
+        if "error" in given:
+            raise RecordingError(given["error"])
+        log = LogFormat.model_validate(given["log"])
+        limits = QualitySettings.model_validate(given["quality"])
+        kept = ingest(source, log, notes, limits, folder, names)
+    except RecordingError as error:
+        remove_kept(folder)
+        kept = rejected(error, notes)
+    return kept.quality(names | {"power_cycled": notes.power_cycled})
+
+
+def write_failed(settings: str, failure: Failure, path: Path) -> None:
+    """Write what is recorded of a recording of which the ingest failed, and keep nothing of it.
+
+    Parameters
+    ----------
+    settings : str
+        As of `ingest_as_planned`.
+    failure : Failure
+    path : Path
+        The ``quality.json`` of the recording.
+    """
+    given = json.loads(settings)
+    told = given.get("notes", {})
+    recording = {
+        "sensor": failure.sensor,
+        "device": told.get("device") or failure.recording,
+        "recording": failure.recording,
+        "kind": given.get("kind", "static"),
+        "simulated": given["simulated"],
+        "status": "failed",
+        "started": told.get("started"),
+        "reason": failure.reason,
+    }
+    finding = dict(failure.finding().row(failure.sensor, str(failure.recording)))
+    remove_kept(path.parent)
+    write_json(asdict(Quality(recording, [finding], {}, None, asdict(failure))), path)
+
+
+def rejected(error: RecordingError, notes: RecordingNotes) -> Ingested:
+    """Return what is recorded of a recording that cannot be used."""
+    summary = {"started": notes.started, "reason": str(error)}
+    return Ingested(summary, [Finding("rejected", "fatal", str(error), 1)])

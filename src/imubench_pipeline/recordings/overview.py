@@ -1,0 +1,262 @@
+"""What a recording looks like: each channel's envelope over time, and its histogram.
+
+A page draws 1e8 samples with them. Each channel is read twice, in bounded memory.
+
+Time is that of the uniform grid, from the first sample of the log: point i lies at i / rate after
+the first sample that was kept of the channel's file. A hole has its length. A pause that begins a
+segment has none: the segment follows at once. Samples whose stamps lie on no grid are taken as
+consecutive. Where channels have clocks of their own, each counts from its own first sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+from numba import njit
+from numpy.typing import NDArray
+
+from imubench_pipeline.recordings.recording import (
+    ChannelLog,
+    channel_logs,
+    log_paths,
+    read_metadata,
+    was_at_rest,
+)
+from imubench_pipeline.settings.sensor import TEMPERATURE
+from imubench_pipeline.tables.keys import Key
+from imubench_pipeline.typing import Array
+
+Row = dict[str, Any]
+
+BUCKETS = 400
+"""Stretches of time of an envelope, unless told otherwise."""
+
+BUCKETS_OF_TURNS = 2400
+"""The same of a recording with turns in it, which should be seen."""
+
+MOST_BINS = 120
+"""Bins of a histogram at most; at least half as many, where the samples have as many levels."""
+
+_BINS = 100  # where no steps show
+
+_DRAWN = 1 << 16
+"""Samples, spread over the recording, that tell the bins of a histogram."""
+
+_BEYOND = 0.8
+"""Widths of the middle that bins go beyond it: to 6 standard deviations, of Gaussian samples."""
+
+_SAME = 0.01
+"""Part of the mean gap between levels within which two are one, written in two ways."""
+
+_LOW, _HIGH, _TOTAL, _PRESENT = range(4)
+
+
+@dataclass(frozen=True)
+class Overview:
+    """Rows of the tables ``envelope`` and ``histogram`` of one recording."""
+
+    envelope: list[Row]
+    histogram: list[Row]
+
+
+def overview(folder: Path, sensor: str, recording: str, buckets: int | None = None) -> Overview:
+    """Return what the channels of a kept recording look like; no row, where it was rejected.
+
+    Channels that cannot be analysed are left out. The temperature has an envelope alone.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the recording, with its ``log*.parquet``.
+    sensor, recording : str
+    buckets : int, optional
+        Stretches of time of an envelope, at most; more where the sensor was turned.
+    """
+    found = Overview([], [])
+    logs = channel_logs(folder)
+    if buckets is None:
+        buckets = BUCKETS if was_at_rest(folder) else BUCKETS_OF_TURNS
+    for log in (*logs.values(), *_temperature(folder)):
+        names = asdict(Key(sensor, recording, log.channel))
+        edges = _bucket_edges(log.grid, buckets)
+        figures, drawn = _follow(log, edges)
+        if len(drawn) == 0:
+            continue
+        times = edges / log.rate + read_metadata(log.path).get("begins", 0.0)
+        found.envelope.extend(names | row for row in _envelope(times, figures))
+        if log.channel != TEMPERATURE:
+            low, high = float(figures[:, _LOW].min()), float(figures[:, _HIGH].max())
+            found.histogram.extend(names | row for row in _bins(log, bin_edges(drawn, low, high)))
+    return found
+
+
+def _temperature(folder: Path) -> Iterator[ChannelLog]:
+    """Yield the temperature as if it were a channel, where there is one."""
+    for path in log_paths(folder):
+        if TEMPERATURE in pq.read_schema(path).names:
+            about = read_metadata(path)
+            yield ChannelLog(path, TEMPERATURE, about["rate"], about["grid"], (), holes=True)
+
+
+def _bucket_edges(grid: int, buckets: int) -> NDArray[np.int64]:
+    """Return the points that begin the buckets of a grid, and one past the last."""
+    number = min(buckets, grid)
+    return np.array([grid * i // number for i in range(number + 1)], dtype=np.int64)
+
+
+def _follow(log: ChannelLog, edges: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Return the figures of each bucket, shape (b, 4), and samples drawn from all of them."""
+    stride = max(1.0, pq.read_metadata(log.path).num_rows / _DRAWN)
+    figures = np.tile([np.inf, -np.inf, 0.0, 0.0], (len(edges) - 1, 1))
+    drawn = []
+    reached = 0
+    for values in log.blocks():
+        _gather(values, reached, edges, figures)
+        reached += len(values)
+        drawn.append(_drawn(values[~np.isnan(values)] if log.holes else values, stride))
+    return figures, np.concatenate(drawn)
+
+
+def _drawn(values: Array, stride: float) -> Array:
+    """Return a sample out of so many, at distances that no oscillation has for its period."""
+    number = np.arange(np.ceil(len(values) / stride))
+    golden = 0.6180339887498949
+    at = (number + number * golden % 1.0) * stride
+    return values[at[at < len(values)].astype(np.int64)]
+
+
+def _envelope(times: Array, figures: Array) -> Iterator[Row]:
+    """Yield the rows of the table ``envelope``, without the names."""
+    spans = zip(times[:-1].tolist(), times[1:].tolist(), figures.tolist(), strict=True)
+    for start, end, (low, high, total, present) in spans:
+        row = {"start": start, "end": end, "samples": int(present)}
+        if present:
+            # Rounding can put the mean of equal samples beside them.
+            mean = min(max(total / present, low), high)
+            yield row | {"low": low, "high": high, "mean": mean}
+        else:
+            yield row | {"low": None, "high": None, "mean": None}
+
+
+def _bins(log: ChannelLog, edges: Array) -> Iterator[Row]:
+    """Yield the rows of the table ``histogram``, without the names."""
+    counts = np.zeros(len(edges) - 1, dtype=np.int64)
+    for values in log.blocks():
+        _count(values, edges, counts)
+    for lower, upper, count in zip(edges[:-1], edges[1:], counts, strict=True):
+        yield {"lower": float(lower), "upper": float(upper), "count": int(count)}
+
+
+def bin_edges(drawn: Array, low: float, high: float) -> Array:
+    """Return the edges of the bins of a histogram, the same for any order of the samples.
+
+    The bins are equally wide, over some 6 standard deviations either side. What lies further out
+    is in the first or the last bin, which ends at the lowest or the highest sample. Where the
+    samples have steps, a bin holds a whole number of levels, and no level is on an edge.
+
+    Parameters
+    ----------
+    drawn : ndarray
+        Samples that stand for all, SI.
+    low, high : float
+        Lowest and highest sample, SI.
+
+    Returns
+    -------
+    ndarray, shape (n + 1,)
+        Increasing; twice the same edge where all samples are equal.
+    """
+    if low == high:
+        return np.array([low, high])
+    middle = _middle(drawn)
+    beyond = _BEYOND * (middle[-1] - middle[0])
+    start, stop = max(middle[0] - beyond, low), min(middle[-1] + beyond, high)
+    lattice = _lattice(middle)
+    if lattice is None:
+        edges = np.linspace(start, stop, _BINS + 1)
+        edges[[0, -1]] = low, high
+    else:
+        step, level = lattice
+        if high - low < (MOST_BINS - 1) * step:
+            start, stop = low, high
+        lowest, highest = np.rint((np.array([start, stop]) - level) / step)
+        together = np.ceil((highest - lowest + 1.0) / MOST_BINS)
+        number = np.ceil((highest - lowest + 1.0) / together)
+        edges = level + (lowest - 0.5 + together * np.arange(number + 1.0)) * step
+        edges[0], edges[-1] = min(edges[0], low), max(edges[-1], high)
+    return np.unique(edges)  # the steps of float64 can be wider than a bin
+
+
+def _middle(drawn: Array) -> Array:
+    """Return the samples in order without the outermost, few of which may be astray."""
+    ordered = np.sort(drawn)
+    size = len(ordered)
+    for tail in (max(size // 100, 2), size // 1000, size // 10000, 0):
+        cut = min(tail, size // 4)
+        middle = ordered[cut : size - cut]
+        if middle[0] < middle[-1]:
+            break
+    return middle
+
+
+def _lattice(ordered: Array) -> tuple[float, float] | None:
+    """Return the step and one level of samples that are quantised; None where no steps show."""
+    levels = np.unique(ordered)
+    if not 1 < len(levels) <= 0.5 * len(ordered):
+        return None
+    gaps = np.diff(levels)
+    levels = levels[np.append(True, gaps > _SAME * gaps.mean())]
+    gaps = np.diff(levels)
+    centre = levels.mean()
+    # Steps of 0.0061 are printed as 0.006 or 0.007: their number tells, unless levels are missing.
+    counted = np.append(0.0, np.cumsum(np.rint(gaps / gaps.min())))
+    for number in (np.arange(float(len(levels))), counted):
+        centred = number - number.mean()
+        step = float(centred @ (levels - centre) / (centred @ centred))
+        if np.abs(levels - centre - step * centred).max() < 0.5 * step:
+            return step, float(centre - step * number.mean())
+    return None
+
+
+@njit(cache=True, nogil=True)
+def _gather(values: Array, reached: int, edges: NDArray[np.int64], figures: Array) -> None:
+    """Take consecutive grid points from ``reached`` on into their buckets; NaN is missing."""
+    bucket = np.searchsorted(edges, reached, side="right") - 1
+    begin = 0
+    while begin < values.size:
+        end = min(values.size, edges[bucket + 1] - reached)
+        low, high, total, present = figures[bucket]
+        for i in range(begin, end):
+            x = values[i]
+            if not np.isnan(x):
+                low, high = min(low, x), max(high, x)
+                total += x
+                present += 1.0
+        figures[bucket] = low, high, total, present
+        begin = end
+        bucket += 1
+
+
+@njit(cache=True, nogil=True)
+def _count(values: Array, edges: Array, counts: NDArray[np.int64]) -> None:
+    """Count samples by bin, as `numpy.histogram` does; NaN is missing."""
+    last = counts.size - 1
+    # The bins at the ends may be wider than the others.
+    width = (edges[last] - edges[1]) / max(last - 1, 1)
+    scale = 1.0 / width if width > 0.0 else 0.0
+    for i in range(values.size):
+        x = values[i]
+        if np.isnan(x):
+            continue
+        guess = 1.0 + (x - edges[1]) * scale
+        k = last if guess >= last else int(guess) if guess > 0.0 else 0
+        while k > 0 and x < edges[k]:
+            k -= 1
+        while k < last and x >= edges[k + 1]:
+            k += 1
+        counts[k] += 1

@@ -1,0 +1,215 @@
+"""One file of a recording on its way into Parquet: read, counted, freed of knocks."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from imubench_pipeline.readers import Batch, LogFile
+from imubench_pipeline.recordings.quality import levels
+from imubench_pipeline.recordings.quality.knocks import Knock, knocks, suspects
+from imubench_pipeline.recordings.quality.summary import ColumnSummary
+from imubench_pipeline.recordings.recording import LogWriter
+from imubench_pipeline.settings.sensor import UsedPart
+from imubench_pipeline.tables.findings import Finding, RecordingError
+
+_STAMP_BLOCK = 1 << 20
+
+
+@dataclass
+class Part:
+    """One file of a recording, read once into columns and stamps on the disk.
+
+    Attributes
+    ----------
+    source : LogFile
+    data, stamps_path : Path
+        Scratch files: the columns as Parquet, the stamps as they come.
+    writer : LogWriter
+        Of ``data``; open until it is known what belongs into the metadata.
+    columns : dict of str to ColumnSummary
+        What was counted of each column.
+    rows, not_used : int
+        Records kept, and those outside the part to use.
+    knocks : dict of str to int
+        Samples left out of each column, as part of a knock.
+    stamped : bool
+        Records have stamps.
+    """
+
+    source: LogFile
+    data: Path
+    stamps_path: Path
+    writer: LogWriter
+    rows: int = 0
+    not_used: int = 0
+    columns: dict[str, ColumnSummary] = field(default_factory=dict)
+    knocks: dict[str, int] = field(default_factory=dict)
+    stamped: bool = False
+
+    def stamps(self) -> Iterator[NDArray[np.float64]]:
+        """Yield the stamps in s, from the disk."""
+        for start in range(0, self.rows, _STAMP_BLOCK):
+            yield np.fromfile(self.stamps_path, np.float64, _STAMP_BLOCK, offset=8 * start)
+
+    def digest(self) -> str:
+        """Return a digest of the stamps: files with the same ones share a clock."""
+        digest = hashlib.blake2b()
+        for block in self.stamps():
+            digest.update(block.data)
+        return digest.hexdigest()
+
+
+def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
+    """Read one file of a recording, in bounded memory.
+
+    Parameters
+    ----------
+    file : LogFile
+    use : UsedPart
+    scratch : Path
+        Folder for the scratch files.
+    number : int
+        Of the file, for their names.
+
+    Raises
+    ------
+    RecordingError
+        If the file cannot be used, or no sample lies in the part to use.
+    """
+    data, stamps_path = scratch / f"part{number}.parquet", scratch / f"part{number}.stamps"
+    columns = list(file.sources)
+    writer = LogWriter(data, dict.fromkeys(columns, pa.float64()))
+    part = Part(
+        file, data, stamps_path, writer, columns={name: ColumnSummary() for name in columns}
+    )
+    rate = file.log.rate_hz
+    read_rows = 0
+    with stamps_path.open("wb") as stamps:
+        for batch in file.batches():
+            time = batch.time
+            part.stamped = time is not None
+            keep = _used(batch, use, read_rows, rate)
+            read_rows += len(batch)
+            if time is not None:
+                np.ascontiguousarray(time[keep]).tofile(stamps)
+            kept = {
+                name: part.columns[name].add(values[keep]) for name, values in batch.columns.items()
+            }
+            rows = len(next(iter(kept.values())))
+            part.not_used += len(batch) - rows
+            part.rows += rows
+            writer.write(kept)
+    if part.rows == 0:
+        raise RecordingError(
+            f"{file.path.name}: none of its {read_rows} samples lies in the part to use "
+            f"(use: start {use.start} s, end {use.end or 'open'})"
+        )
+    if part.not_used:
+        file.findings.append(
+            Finding(
+                "not_used",
+                "note",
+                f"{file.path.name}: {part.not_used} samples lie outside the part to use",
+                part.not_used,
+            )
+        )
+    return part
+
+
+def _used(
+    batch: Batch, use: UsedPart, before: int, rate: float | None
+) -> slice | NDArray[np.bool_]:
+    """Return which records of a batch lie in the part to use.
+
+    Parameters
+    ----------
+    batch : Batch
+    use : UsedPart
+    before : int
+        Records before the batch.
+    rate : float or None
+        The stated one, Hz; needed where there are no stamps.
+    """
+    if use.start == 0.0 and use.end is None:
+        return slice(None)
+    clock = batch.time
+    if clock is None:
+        assert rate is not None  # checked with the sensor file
+        clock = np.arange(before, before + len(batch)) / rate
+    # A record without a stamp is not known to lie outside.
+    keep = ~(clock < use.start)
+    if use.end is not None:
+        keep &= ~(clock > use.end)
+    return keep
+
+
+def leave_out_knocks(
+    part: Part, sigmas: float, longest: int, scratch: Path
+) -> dict[str, list[Knock]]:
+    """Make the samples of knocks missing; return the knocks by column.
+
+    Parameters
+    ----------
+    part : Part
+        Its scratch file is written again where there is a knock.
+    sigmas : float
+        Distance from the level that counts, in standard deviations.
+    longest : int
+        Records: what lasts longer is motion.
+    scratch : Path
+    """
+    blocks = {name: column.blocks() for name, column in part.columns.items()}
+    doubtful = [name for name, b in blocks.items() if len(suspects(b, sigmas)[0])]
+    steps = {name: levels.quantisation(part.columns[name]) for name in doubtful}
+    step = {name: found.step if found else None for name, found in steps.items()}
+    doubtful = [name for name in doubtful if len(suspects(blocks[name], sigmas, step[name])[0])]
+    if not doubtful:
+        return {}
+    part.writer.finish({})
+    part.writer.__exit__(None, None, None)
+    found = {}
+    for name in doubtful:
+        here = list(knocks(_pieces(part.data, name), blocks[name], sigmas, longest, step[name]))
+        if here:
+            found[name] = here
+    _write_again(part, found, scratch)
+    return found
+
+
+def _write_again(part: Part, found: dict[str, list[Knock]], scratch: Path) -> None:
+    """Write the columns again without the samples of knocks; the new writer stays open."""
+    old = part.data
+    part.data = scratch / f"{old.stem}.calm.parquet"
+    part.writer = LogWriter(part.data, dict.fromkeys(part.columns, pa.float64()))
+    part.knocks = dict.fromkeys(part.columns, 0)
+    reached = 0
+    with pq.ParquetFile(old) as file:
+        for number in range(file.num_row_groups):
+            table = file.read_row_group(number, use_threads=False)
+            columns = {}
+            for name in part.columns:
+                values = np.array(table.column(name).to_numpy(), dtype=np.float64)
+                before = int(np.isfinite(values).sum())
+                for knock in found.get(name, []):
+                    start = max(knock.first - reached, 0)
+                    values[start : max(knock.last - reached, 0)] = np.nan
+                part.knocks[name] += before - int(np.isfinite(values).sum())
+                columns[name] = values
+            reached += table.num_rows
+            part.writer.write(columns)
+    old.unlink()
+
+
+def _pieces(path: Path, name: str) -> Iterator[NDArray[np.float64]]:
+    with pq.ParquetFile(path) as file:
+        for number in range(file.num_row_groups):
+            table = file.read_row_group(number, columns=[name], use_threads=False)
+            yield np.asarray(table.column(name).to_numpy(), dtype=np.float64)

@@ -1,0 +1,158 @@
+"""Samples that are there twice: a channel in another one, a stretch of a log further on in it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from imubench_pipeline.recordings.quality import levels
+from imubench_pipeline.recordings.quality.excerpts import Excerpt, together
+from imubench_pipeline.recordings.quality.repeats import WINDOW, Stretch
+from imubench_pipeline.recordings.quality.summary import ColumnSummary
+from imubench_pipeline.tables.findings import Finding
+from imubench_pipeline.typing import Array
+
+_FEWEST = 64
+"""Increments of a piece that must not be 0."""
+
+_SAME = 1.0 - 1e-6
+"""Correlation of the increments of a copy; a vibration that both axes feel needs 1000 times
+the noise for it."""
+
+_ROUNDED = 0.999
+"""That of a copy that was rounded, if no sample is further off than its rounding."""
+
+_FEW_LEVELS = 64
+_LOW_ENTROPY = 4 * WINDOW
+"""Changes of a stretch that count where there are few levels. Of a sinusoid in steps of 20 to 100
+times its noise, up to 120 changes come again by chance in 600 000 samples; of white noise, random
+walks and low-passed noise in steps of 0.01 to 8 sigma not one window of 64 (24 kinds of noise)."""
+
+_TWICE = 0.1
+"""Part of the samples that occurred before from which the log is no record of a noise."""
+
+
+def copied_channels(columns: Mapping[str, ColumnSummary]) -> Iterator[Finding]:
+    """Yield the channels that hold the samples of another one, perhaps in another unit.
+
+    Parameters
+    ----------
+    columns : mapping of str to ColumnSummary
+        All channels of a recording; no other columns.
+    """
+    pieces = {
+        name: column.excerpts() for name, column in columns.items() if column.low < column.high
+    }
+    names = list(pieces)
+    told: set[str] = set()
+    for place, one in enumerate(names):
+        for other in names[place + 1 :]:
+            factor = _factor(pieces[one], pieces[other])
+            if factor is None:
+                continue
+            for channel, of, times in ((one, other, 1.0 / factor), (other, one, factor)):
+                if channel in told:
+                    continue
+                told.add(channel)
+                scaled = "" if abs(times - 1.0) < 1e-6 else f", times {times:.6g} in SI"
+                detail = (
+                    f"{channel} has the samples of {of}{scaled}: one column is used for both; "
+                    "give each channel its own column in the sensor file"
+                )
+                yield Finding("channel_twice", "warning", detail, times, channel)
+
+
+def _factor(one: list[Excerpt], other: list[Excerpt]) -> float | None:
+    """Return by what the samples of one column are multiplied in the other, or None.
+
+    The pieces vote: a knock, or a shaking that both feel, decides none but its own.
+    """
+    slopes, alike = [], []
+    for x, y in together(one, other):
+        dx, dy = np.diff(x), np.diff(y)
+        if min(np.count_nonzero(dx), np.count_nonzero(dy)) < _FEWEST:
+            continue
+        xx, yy, xy = float(dx @ dx), float(dy @ dy), float(dx @ dy)
+        correlation = abs(xy) / (np.sqrt(xx) * np.sqrt(yy))
+        slopes.append(xy / xx)
+        rounded = correlation > _ROUNDED and _within_rounding(x, y, xy / xx)
+        alike.append(correlation > _SAME or rounded)
+    if not alike or 2 * sum(alike) <= len(alike):
+        return None
+    return float(np.median(slopes))
+
+
+def _within_rounding(x: Array, y: Array, slope: float) -> bool:
+    """Tell whether two columns differ by no more than the steps of both."""
+    left = y - slope * x
+    steps = _step(y) + abs(slope) * _step(x)
+    return bool(np.ptp(left) <= 1.02 * steps)
+
+
+def _step(values: Array) -> float:
+    """Return the least distance of values that differ by more than an error of the arithmetic."""
+    gaps = np.diff(np.unique(values))
+    return float(np.min(gaps[gaps > 1e-12 * np.abs(values).max()], initial=np.inf))
+
+
+def repeated_stretches(
+    columns: Mapping[str, ColumnSummary],
+    steps: Mapping[str, levels.Quantisation | None],
+    rate: float,
+) -> Iterator[Finding]:
+    """Yield the stretches of a log that occurred before in it, bit for bit.
+
+    Parameters
+    ----------
+    columns : mapping of str to ColumnSummary
+        Usable channels of one file.
+    steps : mapping of str to Quantisation or None
+        Of each of them.
+    rate : float
+        Hz.
+    """
+    found = {name: _told(column, steps[name]) for name, column in columns.items()}
+    channels = Counter(lag for told in found.values() for lag in {one.lag for one in told})
+    # In most channels at once: the records themselves are there twice. A coarse channel may be
+    # unable to tell.
+    common = {lag for lag, count in channels.items() if 2 * count > len(found) > 1}
+    shared = {
+        lag: next(name for name, told in found.items() if any(one.lag == lag for one in told))
+        for lag in sorted(common)
+    }
+    if shared:
+        stretches = [one for lag, name in shared.items() for one in found[name] if one.lag == lag]
+        yield _repeated(None, stretches, max(c.present for c in columns.values()), rate)
+    for name, told in found.items():
+        alone = [one for one in told if one.lag not in common]
+        if alone:
+            yield _repeated(name, alone, columns[name].present, rate)
+
+
+def _told(column: ColumnSummary, steps: levels.Quantisation | None) -> list[Stretch]:
+    """Return the stretches that are no accident."""
+    few = steps is not None and steps.levels < _FEW_LEVELS
+    fewest = _LOW_ENTROPY if few else WINDOW
+    return [stretch for stretch in column.repeated.stretches() if stretch.changes >= fewest]
+
+
+def _repeated(channel: str | None, stretches: list[Stretch], present: int, rate: float) -> Finding:
+    longest = max(stretches, key=lambda stretch: stretch.last - stretch.first)
+    total = sum(stretch.last - stretch.first for stretch in stretches)
+    often = f"{len(stretches)} times; the longest stretch, " if len(stretches) > 1 else ""
+    begin, end = longest.first / rate, longest.last / rate
+    detail = (
+        f"{channel or 'the log'} repeats itself bit for bit: {often}{begin:.5g} s to {end:.5g} s "
+        f"is what was from {begin - longest.lag / rate:.5g} s on"
+    )
+    share = total / present
+    if share > _TWICE:
+        detail += (
+            f"; {100 * share:.0f} % of the log are copies, as of one that was appended to itself; "
+            "use the part before them ('use:' beside the log)"
+        )
+        return Finding("log_twice", "warning", detail, total, channel, begin, end)
+    detail += "; find what wrote them twice (a buffer, a paste), or use a part without them"
+    return Finding("repeated_stretch", "warning", detail, total, channel, begin, end)

@@ -1,0 +1,118 @@
+"""Samples that repeat the one before at a regular distance: every third, every hundredth."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from imubench_pipeline.recordings.quality.excerpts import PIECE, Excerpt
+from imubench_pipeline.recordings.quality.summary import ColumnSummary
+from imubench_pipeline.tables.findings import Finding
+
+_LONGEST = 256
+"""Records between two repeats, at most."""
+
+_PIECES = 8
+"""Pieces that are looked at: they are looked at for every distance."""
+
+_ALWAYS = 0.98
+"""Share of the samples of a phase that repeat; of all others not one phase may reach `_OTHERS`."""
+_OTHERS = 0.9
+
+_SURE = -12.0
+"""Decimal logarithm of the chance of so many repeats, below which they are none."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """Samples that repeat at a regular distance.
+
+    Attributes
+    ----------
+    every : int
+        Records from one to the next.
+    share : float
+        Part of the other samples that repeat.
+    """
+
+    every: int
+    share: float
+
+
+def held(pieces: list[Excerpt]) -> Held | None:
+    """Return at which distance samples repeat the one before; None where by chance alone.
+
+    Parameters
+    ----------
+    pieces : list of Excerpt
+    """
+    whole = [piece.values for piece in pieces if len(piece.values) >= PIECE // 4]
+    whole = whole[:: max(1, len(whole) // _PIECES)][:_PIECES]
+    found: list[Held] = []
+    for values in whole:
+        repeats = np.flatnonzero(values[1:] == values[:-1])
+        one = _regular(repeats, len(values) - 1)
+        if one is not None:
+            found.append(one)
+    if not found or 2 * len(found) <= len(whole):
+        return None
+    every = int(np.median([one.every for one in found]))
+    return Held(every, float(np.median([one.share for one in found])))
+
+
+def _regular(repeats: NDArray[np.int64], records: int) -> Held | None:
+    counts = np.zeros((_LONGEST + 1, 2), dtype=np.int64)
+    _fold(repeats, counts)
+    every = np.arange(3, _LONGEST + 1)
+    turns = records // every
+    most, second = counts[3:].T
+    share = (len(repeats) - most) / (records - turns)
+    # All phases of all distances could have been the one.
+    chance = most * np.log10(share + 1.0 / records) + np.log10(every * _LONGEST)
+    found = (most >= _ALWAYS * turns) & (second <= _OTHERS * turns) & (chance < _SURE)
+    if not found.any():
+        return None
+    first = int(np.argmax(found))
+    return Held(int(every[first]), float(share[first]))
+
+
+@njit(cache=True, nogil=True)
+def _fold(repeats: NDArray[np.int64], counts: NDArray[np.int64]) -> None:
+    """Count the repeats in the fullest phase, and in the next, of each distance."""
+    phases = np.zeros(counts.shape[0], dtype=np.int64)
+    for every in range(3, counts.shape[0]):
+        phases[:every] = 0
+        for k in range(repeats.size):
+            phases[repeats[k] % every] += 1
+        most, second = 0, 0
+        for k in range(every):
+            if phases[k] > most:
+                most, second = phases[k], most
+            elif phases[k] > second:
+                second = phases[k]
+        counts[every, 0], counts[every, 1] = most, second
+
+
+def held_samples(channel: str, column: ColumnSummary) -> Iterator[Finding]:
+    """Yield whether every n-th sample of a channel repeats the one before.
+
+    Parameters
+    ----------
+    channel : str
+    column : ColumnSummary
+    """
+    if column.repeats < column.present / (2 * _LONGEST):
+        return
+    found = held(column.excerpts())
+    if found is None:
+        return
+    detail = (
+        f"one sample in {found.every} of {channel} repeats the one before, in regular turn (of "
+        f"the others {100 * found.share:.2g} % do by chance): the logger asks more often than the "
+        "sensor samples, or fills in what it lost; record each sample once"
+    )
+    yield Finding("held_samples", "warning", detail, found.every, channel)

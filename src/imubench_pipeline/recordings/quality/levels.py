@@ -1,0 +1,158 @@
+"""What the values of a column tell by themselves: stuck, saturated, repeated, coarse; how noisy."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.recordings.quality.register import hidden_step
+from imubench_pipeline.recordings.quality.summary import ColumnSummary
+
+_SURE = 1e-9
+"""Chance of a run by accident below which it is none."""
+
+_FEWEST_STEPS = 8
+"""Steps between block means that tell an Allan deviation to a third."""
+
+_NORMAL_MEDIAN = 0.4549
+"""Median of the square of a standard normal variable."""
+
+
+@dataclass(frozen=True)
+class Quantisation:
+    """The steps of a quantised column.
+
+    Attributes
+    ----------
+    step : float
+        Least significant bit, SI.
+    levels : float
+        Steps between the lowest and the highest sample, and one.
+    over_noise : float
+        Step over the standard deviation of the samples.
+    hidden : bool
+        The figures were rounded again, so that their differences are no multiples of it.
+    """
+
+    step: float
+    levels: float
+    over_noise: float
+    hidden: bool = False
+
+
+def quantisation(column: ColumnSummary) -> Quantisation | None:
+    """Return the steps of a column, or None where none show."""
+    spread = noise_of(column)
+    if not (0.0 < column.step < np.inf and spread > 0.0):
+        return None
+    hidden = hidden_step(column.excerpts())
+    step = column.step if hidden is None else hidden
+    # Two neighbours of n continuous samples come as close as spread / n.
+    if step < 20.0 * spread / column.present:
+        return None
+    return Quantisation(
+        step, (column.high - column.low) / step + 1.0, step / spread, hidden is not None
+    )
+
+
+def noise_of(column: ColumnSummary) -> float:
+    """Return the usual standard deviation of the samples of a block, SI."""
+    return _median(column.blocks().spread)
+
+
+def kept_level(column: ColumnSummary, rate: float, unit: str) -> dict[str, Any]:
+    """Return what is kept of the level of a channel, to be judged beside its datasheet.
+
+    Parameters
+    ----------
+    column : ColumnSummary
+    rate : float
+        Hz.
+    unit : str
+        In which the log is said to be written.
+
+    Returns
+    -------
+    dict
+        ``mean``, SI; ``density``, see `density_of`; ``unit``; ``rate``.
+    """
+    density = density_of(column, rate)
+    return {"mean": level_of(column), "density": density, "unit": unit, "rate": rate}
+
+
+def density_of(column: ColumnSummary, rate: float) -> tuple[float, float | None]:
+    """Return between which limits the white noise density of a column lies, roughly.
+
+    The spread within blocks over √rate is too small behind a low-pass, the Allan deviation of the
+    block means times √τ too large where slow noise reaches τ, and both where it is of a register.
+
+    Parameters
+    ----------
+    column : ColumnSummary
+    rate : float
+        Hz.
+
+    Returns
+    -------
+    (least, most) : float, float or None
+        SI/√Hz, two-sided: N. None: there are too few blocks to tell how large it may be.
+    """
+    blocks = column.blocks()
+    spread = noise_of(column) / math.sqrt(rate)
+    steps = np.diff(np.where(blocks.count > 0.9 * blocks.size, blocks.mean, np.nan))
+    steps = steps[np.isfinite(steps)]
+    if len(steps) < _FEWEST_STEPS:
+        return spread, None
+    variance = float(np.median(steps**2)) / (2.0 * _NORMAL_MEDIAN)
+    slow = math.sqrt(variance * blocks.size / rate)
+    least_bit = column.step if np.isfinite(column.step) else 0.0
+    return min(spread, slow), max(spread, slow, least_bit / math.sqrt(12.0 * rate))
+
+
+def level_of(column: ColumnSummary) -> float:
+    """Return the usual mean of a block, SI: a knock does not move it."""
+    return _median(column.blocks().mean)
+
+
+def _median(values: NDArray[np.float64]) -> float:
+    there = values[np.isfinite(values)]
+    return float(np.median(there)) if len(there) else float("nan")
+
+
+def longest_by_chance(column: ColumnSummary) -> float:
+    """Return how long a run of one value may be by chance, in samples."""
+    share = min(column.repeats / max(column.present - 1, 1), 0.999)
+    if share == 0.0:
+        return 1.0
+    return 1.0 + math.log(_SURE / column.present) / math.log(share)
+
+
+def saturated(
+    column: ColumnSummary, steps: Quantisation | None, share: float
+) -> tuple[str, int] | None:
+    """Tell whether samples pile up at an extreme.
+
+    Parameters
+    ----------
+    column : ColumnSummary
+    steps : Quantisation or None
+        Of the column.
+    share : float
+        Part of the samples at an extreme that counts.
+
+    Returns
+    -------
+    (side, number) or None
+        ``lowest`` or ``highest``, and the samples there.
+    """
+    if steps is not None and steps.levels < 10:
+        return None  # so few levels that an extreme is nothing special
+    for side, number in zip(("lowest", "highest"), column.at_extremes, strict=True):
+        # A Gaussian leaves a few samples at its last level, whatever the step.
+        if number > max(share * column.present, 10):
+            return side, number
+    return None

@@ -1,0 +1,264 @@
+"""A recording as it is kept: Parquet files in SI, one a time base, with its provenance.
+
+The columns of ``log.parquet`` are the channels, and ``temperature`` in °C. Where the stamps
+are needed there is ``time`` (s from the first sample); where samples are missing there is also
+``sample``, the position on the uniform grid. A sample that is missing in one channel only is
+null. Where channels have clocks of their own, each clock has a file: ``log.gyro.parquet``.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from imubench_pipeline.settings.sensor import POSITION, TABLE_RATE, TEMPERATURE
+from imubench_pipeline.typing import Array
+
+ROW_GROUP = 1 << 20
+"""Rows of a row group."""
+
+_METADATA = b"imubench"
+_NOT_CHANNELS = {"time", "sample", TEMPERATURE, POSITION, TABLE_RATE}
+
+
+class LogWriter:
+    """Writes columns to one Parquet file, in row groups of `ROW_GROUP` rows."""
+
+    def __init__(self, path: Path, columns: Mapping[str, pa.DataType]) -> None:
+        self._schema = pa.schema([pa.field(name, kind) for name, kind in columns.items()])
+        floats = [name for name, kind in columns.items() if pa.types.is_floating(kind)]
+        integers = [name for name in columns if name not in floats]
+        self._writer = pq.ParquetWriter(
+            path,
+            self._schema,
+            compression="zstd",
+            compression_level=1,
+            use_dictionary=False,
+            use_byte_stream_split=floats,
+            column_encoding={name: "DELTA_BINARY_PACKED" for name in integers} or None,
+        )
+        self._waiting: list[pa.RecordBatch] = []
+        self._rows = 0
+
+    def __enter__(self) -> LogWriter:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._writer.close()
+
+    def write(self, columns: Mapping[str, NDArray[Any]]) -> None:
+        """Take consecutive rows; NaN is kept as null."""
+        rows = len(next(iter(columns.values())))
+        if rows == 0:
+            return
+        self._waiting.append(self._batch(columns))
+        self._rows += rows
+        while self._rows >= ROW_GROUP:
+            self._flush(ROW_GROUP)
+
+    def finish(self, metadata: Mapping[str, Any]) -> None:
+        """Write what is waiting, and the metadata of the file."""
+        if self._rows:
+            self._flush(self._rows)
+        self._writer.add_key_value_metadata({_METADATA: json.dumps(metadata)})
+
+    def _flush(self, rows: int) -> None:
+        """Write the first rows of what is waiting, which is not copied for it."""
+        waiting = pa.Table.from_batches(self._waiting, schema=self._schema)
+        self._writer.write_table(waiting.slice(0, rows), row_group_size=ROW_GROUP)
+        self._waiting = waiting.slice(rows).to_batches()
+        self._rows -= rows
+
+    def _batch(self, columns: Mapping[str, NDArray[Any]]) -> pa.RecordBatch:
+        arrays = [_to_arrow(columns[field.name], field.type) for field in self._schema]
+        return pa.RecordBatch.from_arrays(arrays, schema=self._schema)
+
+
+def _to_arrow(values: NDArray[Any], kind: pa.DataType) -> pa.Array:
+    """Return numbers as Arrow keeps them, null for NaN; not copied where there is none."""
+    holes = values.dtype.kind == "f" and np.isnan(values.sum())
+    return pa.array(values, type=kind, from_pandas=bool(holes))
+
+
+def _to_numpy(column: pa.ChunkedArray) -> NDArray[Any]:
+    """Return a column of numbers, NaN where it is null.
+
+    Its own ``to_numpy`` imports pandas, where that is installed: 40 MB in memory.
+    """
+    array = column.chunk(0) if column.num_chunks == 1 else pa.concat_arrays(column.chunks)
+    held, data = array.buffers()
+    part = slice(array.offset, array.offset + len(array))
+    values = np.frombuffer(data, array.type.to_pandas_dtype())[part]
+    if array.null_count:
+        bits = np.unpackbits(np.frombuffer(held, np.uint8), bitorder="little")[part]
+        values = np.where(bits, values, np.nan)
+    return values
+
+
+@dataclass(frozen=True)
+class ChannelLog:
+    """One channel of a kept recording.
+
+    Attributes
+    ----------
+    path : Path
+        Its Parquet file.
+    channel : str
+    rate : float
+        Hz.
+    grid : int
+        Points of the uniform grid.
+    segments : tuple of (int, int)
+        Grid points that begin and end each segment.
+    holes : bool
+        Samples are missing: blocks have NaN in their place.
+    temperature : bool
+        There are readings of the temperature on the same grid.
+    position : bool
+        There is a column on the same grid that says how the sensor stood.
+    table_rate : bool
+        There is a column on the same grid with the rate of the table that the sensor stood on.
+    """
+
+    path: Path
+    channel: str
+    rate: float
+    grid: int
+    segments: tuple[tuple[int, int], ...]
+    holes: bool
+    temperature: bool = False
+    position: bool = False
+    table_rate: bool = False
+
+    def blocks(self) -> Iterator[NDArray[np.float64]]:
+        """Yield the samples on the uniform grid in SI, in consecutive blocks; NaN where missing."""
+        with pq.ParquetFile(self.path) as file:
+            placed = "sample" in file.schema_arrow.names
+            columns = [self.channel, *(["sample"] if placed else [])]
+            reached = 0
+            for number in range(file.num_row_groups):
+                table = file.read_row_group(number, columns=columns, use_threads=False)
+                values = _to_numpy(table.column(self.channel))
+                if not placed:
+                    yield values
+                    continue
+                points = _to_numpy(table.column("sample"))
+                start = 0
+                while start < len(points):
+                    # Long holes: a row group can stand for many times its rows on the grid.
+                    stop = int(np.searchsorted(points, max(reached, points[start]) + ROW_GROUP))
+                    block = np.full(int(points[stop - 1]) + 1 - reached, np.nan)
+                    block[points[start:stop] - reached] = values[start:stop]
+                    reached = int(points[stop - 1]) + 1
+                    start = stop
+                    yield block
+
+    def temperatures(self) -> Iterator[NDArray[np.float64]]:
+        """Yield the readings of the temperature, °C, in blocks like those of the samples."""
+        return replace(self, channel=TEMPERATURE).blocks()
+
+    def positions(self) -> Iterator[NDArray[np.float64]]:
+        """Yield how the sensor stood, as written, in blocks like those of the samples."""
+        return replace(self, channel=POSITION).blocks()
+
+    def table_rates(self) -> Iterator[NDArray[np.float64]]:
+        """Yield the rate of the table, rad/s, in blocks like those of the samples."""
+        return replace(self, channel=TABLE_RATE).blocks()
+
+    @property
+    def position_elsewhere(self) -> bool:
+        """How the sensor stood is kept too, but on another clock than this channel."""
+        others = (path for path in log_paths(self.path.parent) if path != self.path)
+        return any(POSITION in pq.read_schema(path).names for path in others)
+
+    def mean(self) -> float:
+        """Return the mean of the samples present, SI."""
+        total, number = 0.0, 0
+        for values in self.blocks():
+            there = values[np.isfinite(values)]
+            total += float(there.sum(dtype=np.float64))
+            number += len(there)
+        return total / number
+
+
+def read_metadata(path: Path) -> dict[str, Any]:
+    """Return the metadata that `LogWriter.finish` wrote."""
+    found = pq.read_metadata(path).metadata or {}
+    data: dict[str, Any] = json.loads(found[_METADATA])
+    return data
+
+
+def log_paths(folder: Path) -> list[Path]:
+    """Return the Parquet files of a kept recording, one a time base."""
+    return sorted(folder.glob("log*.parquet"))
+
+
+def static_logs(folder: Path) -> dict[str, ChannelLog]:
+    """Return the channels that were at rest all the time: none of a sensor that was turned."""
+    return channel_logs(folder) if was_at_rest(folder) else {}
+
+
+def was_at_rest(folder: Path) -> bool:
+    """Return whether the sensor of a kept recording was to be at rest all the time."""
+    return all(read_metadata(path).get("kind", "static") == "static" for path in log_paths(folder))
+
+
+def channel_logs(folder: Path) -> dict[str, ChannelLog]:
+    """Return the channels of a kept recording that can be analysed, by name, in order."""
+    logs: dict[str, ChannelLog] = {}
+    for path in log_paths(folder):
+        metadata = read_metadata(path)
+        columns = pq.read_schema(path).names
+        for channel in columns:
+            if channel in _NOT_CHANNELS or channel in metadata["unusable"]:
+                continue
+            logs[channel] = ChannelLog(
+                path,
+                channel,
+                metadata["rate"],
+                metadata["grid"],
+                tuple((start, stop) for start, stop in metadata["segments"]),
+                bool(metadata["holes"].get(channel, True)),
+                TEMPERATURE in columns,
+                POSITION in columns,
+                TABLE_RATE in columns,
+            )
+    order = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
+    return {name: logs[name] for name in order if name in logs}
+
+
+def on_grid(blocks: Iterable[Array], grid: int) -> Array:
+    """Return a column on the whole grid of a log.
+
+    Parameters
+    ----------
+    blocks : iterable of ndarray
+        In order, in any unit.
+    grid : int
+        L, samples of the log.
+
+    Returns
+    -------
+    ndarray, shape (L,)
+        In the unit of the blocks, NaN where nothing is.
+    """
+    values = np.full(grid, np.nan)
+    reached = 0
+    for block in blocks:
+        values[reached : reached + len(block)] = block
+        reached += len(block)
+    return values

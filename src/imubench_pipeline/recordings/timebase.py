@@ -1,0 +1,369 @@
+"""The time base of a recording: its rate, its missing samples and its segments.
+
+Samples are put on a uniform grid. Stamps that lie on a grid give every sample its position,
+and the positions without a sample are holes. Stamps that scatter by more than half a sampling
+interval (stamped at arrival in a host, for instance) say only how long the recording was: then
+the samples are taken as consecutive, and that is a finding.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.recordings.stamps import Stamps, Track, tracked, typical_interval
+from imubench_pipeline.settings.quality import QualitySettings
+from imubench_pipeline.tables.findings import Finding, RecordingError
+
+_SHARED = 0.2
+"""Part of the records that repeat a stamp beyond which a stamp belongs to a group of samples."""
+
+_SAME = 1e-5
+"""Relative difference of two intervals at which stamps are put on the same grid points."""
+
+
+@dataclass(frozen=True)
+class TimeBase:
+    """The uniform grid that the samples of a file lie on.
+
+    Attributes
+    ----------
+    rate : float
+        Hz.
+    source : str
+        Where the rate is from: ``stated`` or ``stamps``.
+    rows : int
+        Records in the file.
+    grid : int
+        Grid points from the first to the last sample, all segments together.
+    segments : tuple of (int, int)
+        First and one-past-last grid point of each; no difference may span two segments.
+    uniform : bool
+        The samples are the grid points: stamps need not be kept.
+    stamped : bool
+        The stamps say which grid point each sample is.
+    findings : tuple of Finding
+    tracking_interval : float or None
+        Interval with which the stamps were put on the grid, s.
+    repeated : int
+        Records left out, since an earlier one has their grid point.
+    rate_error : float or None
+        Standard deviation of the rate, as far as the scatter of the stamps tells, Hz; None for
+        a stated rate.
+    """
+
+    rate: float
+    source: str
+    rows: int
+    grid: int
+    segments: tuple[tuple[int, int], ...]
+    uniform: bool
+    stamped: bool
+    findings: tuple[Finding, ...] = ()
+    tracking_interval: float | None = None
+    repeated: int = 0
+    rate_error: float | None = None
+
+    @property
+    def missing(self) -> int:
+        """Grid points without a sample."""
+        return self.grid - self.samples
+
+    @property
+    def samples(self) -> int:
+        """Records that have a grid point of their own."""
+        return self.rows - self.repeated
+
+
+def without_stamps(rows: int, rate: float) -> TimeBase:
+    """Return the time base of a file that has no stamps: the rate is the one stated."""
+    return TimeBase(rate, "stated", rows, rows, ((0, rows),), uniform=True, stamped=False)
+
+
+def from_stamps(stamps: Stamps, stated: float | None, settings: QualitySettings) -> TimeBase:
+    """Find the time base of stamps.
+
+    Parameters
+    ----------
+    stamps : callable
+        Gives the stamps in s, in blocks; called several times.
+    stated : float or None
+        The rate that the sensor file states, Hz.
+    settings : QualitySettings
+
+    Raises
+    ------
+    RecordingError
+        If the stamps do not advance.
+    """
+    typical = typical_interval(stamps)
+    if typical is None:
+        raise RecordingError("the time stamps do not advance; is the right column named?")
+    interval = typical.mean
+    if typical.with_losses is not None and _is(stated, typical.with_losses, settings):
+        interval = typical.with_losses
+    found = tracked(stamps, interval, settings.longest_hole)
+    mean = found.mean_interval or interval
+    if abs(mean / interval - 1.0) > _SAME:
+        # The mean over the recording is far better known than the typical interval: once more.
+        found = tracked(stamps, mean, settings.longest_hole)
+    # Many holes that are together longer than the log are pauses of the host, not losses.
+    bursts = found.grid > 2 * found.rows and found.holes > 0.05 * found.rows
+    shared = found.duplicates > _SHARED * found.rows
+    if found.off_grid > settings.jitter * found.rows or bursts or shared:
+        return _arrival_order(stamps, found, stated, settings)
+    exact = found.mean_interval or interval
+    findings = _grid_findings(found, exact)
+    rate = 1.0 / exact
+    if typical.with_losses is not None and stated is None:
+        findings.append(_coarse(rate, 1.0 / typical.with_losses))
+    findings += _rate_findings(rate, stated, settings)
+    findings += _drift_findings(found, settings)
+    jitter = math.sqrt(found.scatter / max(found.steps, 1))
+    uniform = found.grid == found.rows and len(found.starts) == 1 and not found.duplicates
+    return TimeBase(
+        rate,
+        "stamps",
+        found.rows,
+        found.grid,
+        found.segments,
+        uniform,
+        True,
+        tuple(findings),
+        found.interval,
+        found.duplicates,
+        rate * math.sqrt(2.0) * jitter / max(found.elapsed, exact),
+    )
+
+
+def positions(
+    base: TimeBase, stamps: Stamps, settings: QualitySettings
+) -> Iterator[NDArray[np.int64]]:
+    """Yield the grid point of each record, block by block; -1 for a repeated stamp."""
+    if not base.stamped:
+        start = 0
+        for block in stamps():
+            yield np.arange(start, start + len(block), dtype=np.int64)
+            start += len(block)
+        return
+    assert base.tracking_interval is not None  # as from_stamps makes it
+    track = Track(base.tracking_interval, settings.longest_hole)
+    for block in stamps():
+        yield track.follow(block)
+
+
+def _is(stated: float | None, interval: float, settings: QualitySettings) -> bool:
+    """Return whether a stated rate is that of an interval."""
+    return stated is not None and abs(interval * stated - 1.0) <= settings.rate_tolerance
+
+
+def _coarse(rate: float, lossy: float) -> Finding:
+    """Return the finding of stamps that advance by one step and two, in regular turn."""
+    return Finding(
+        "coarse_stamps",
+        "warning",
+        f"the stamps advance by one step or two in regular turn: taken as rounded, at {rate:.6g} "
+        f"Hz; if samples are lost so regularly instead, the rate is {lossy:.6g} Hz and N is "
+        f"{100 * (1.0 - math.sqrt(rate / lossy)):.2g} % less; state 'rate' in the sensor file",
+        rate,
+    )
+
+
+def _grid_findings(found: Track, interval: float) -> list[Finding]:
+    findings = []
+    missing = found.grid - (found.rows - found.duplicates)
+    if missing:
+        begin, end = (
+            point * interval for point in (found.longest_at, found.longest_at + found.longest)
+        )
+        findings.append(
+            Finding(
+                "missing_samples",
+                "note" if missing < 0.01 * found.grid else "warning",
+                f"{missing} of {found.grid} samples are missing ({found.holes} holes, the "
+                f"longest {end - begin:.3g} s, from {begin:.5g} s on); they are left out of the "
+                "clusters",
+                missing,
+                start=begin,
+                end=end,
+            )
+        )
+    if len(found.starts) > 1:
+        findings.append(
+            _segments(
+                "the clock jumps or stops",
+                [point * interval for point in found.starts[1:]],
+                found.jumps[1:],
+            )
+        )
+    if found.duplicates:
+        findings.append(
+            Finding(
+                "repeated_stamps",
+                "note",
+                f"{found.duplicates} records repeat a stamp or fall on an earlier one; left out",
+                found.duplicates,
+            )
+        )
+    if found.unstamped:
+        findings.append(
+            Finding(
+                "missing_stamps",
+                "warning",
+                f"{found.unstamped} records have no time stamp, or one far astray; taken as "
+                "consecutive",
+                found.unstamped,
+            )
+        )
+    return findings
+
+
+def _segments(what: str, times: list[float], jumps: list[float]) -> Finding:
+    """Return the finding of pauses, with the place of the longest one.
+
+    Parameters
+    ----------
+    what : str
+        What the clock does.
+    times : list of float
+        s of samples before each.
+    jumps : list of float
+        Step of the stamps at each, s; below 0: backwards.
+    """
+    longest = max(range(len(jumps)), key=lambda k: abs(jumps[k]))
+    jump, at = jumps[longest], times[longest]
+    direction = "backwards" if jump < 0 else "forward"
+    return Finding(
+        "segments",
+        "warning",
+        f"{what} {len(jumps)} times, by up to {abs(jump):.5g} s {direction}, after {at:.5g} s of "
+        f"samples; the recording is analysed as {len(jumps) + 1} segments",
+        len(jumps) + 1,
+        start=at,
+        end=at,
+    )
+
+
+def _rate_findings(rate: float, stated: float | None, settings: QualitySettings) -> list[Finding]:
+    if stated is None or abs(rate / stated - 1.0) <= settings.rate_tolerance:
+        return []
+    thousands = np.log10(rate / stated) / 3.0
+    if abs(thousands) > 0.9 and abs(thousands - round(thousands)) < 0.01:
+        raise RecordingError(
+            f"the stamps say {rate:.6g} Hz, stated are {stated:.6g} Hz: 'unit' of "
+            "'time' is probably another one of s, ms, us, ns"
+        )
+    return [
+        Finding(
+            "rate_contradicts_stamps",
+            "warning",
+            f"stated are {stated:.6g} Hz, in the sensor file or in the log itself; the stamps say "
+            f"{rate:.6g} Hz, which is used; mend 'rate', or drop it",
+            rate,
+        )
+    ]
+
+
+def _drift_findings(found: Track, settings: QualitySettings) -> list[Finding]:
+    """Tell whether the interval between samples is another in the second half of the log."""
+    if len(found.starts) > 1 or len(found.marks) < 8:
+        return []
+    points, stamps = np.array(found.marks, dtype=np.float64).T
+    half = len(points) // 2
+    early, late = (
+        (stamps[b] - stamps[a]) / (points[b] - points[a])
+        for a, b in ((0, half), (half, len(points) - 1))
+    )
+    drift = late / early - 1.0
+    if abs(drift) < settings.rate_drift:
+        return []
+    return [
+        Finding(
+            "rate_drifts",
+            "warning",
+            f"the interval between samples is {1e6 * drift:+.0f} ppm longer in the second half of "
+            "the recording: the clock of the sensor or of the host drifts; one rate is used",
+            drift,
+        )
+    ]
+
+
+def _arrival_order(
+    stamps: Stamps, found: Track, stated: float | None, settings: QualitySettings
+) -> TimeBase:
+    """Return the time base of stamps that lie on no grid: consecutive samples at the mean rate."""
+    # A pause is long against the mean interval and against the steps of stamps that are shared.
+    mean = _span(stamps) / max(found.rows - 1, 1)
+    gap = max(1.0, 100 * mean, 10 * found.interval) * (1 + 1e-6)
+    rows, last, worst, worst_at = 0, np.nan, 0.0, 0
+    starts, jumps = [0], []
+    # Between the records with which a stamp changes: samples that share one are counted whole.
+    changed_at, changed_stamp = 0, np.nan
+    samples, elapsed = 0, 0.0
+    for block in stamps():
+        # A missing stamp stands for no time: the step after it covers it.
+        held = np.concatenate(([last], block))
+        good = np.maximum.accumulate(np.where(np.isnan(held), 0, np.arange(len(held))))
+        held = held[good]
+        steps = np.diff(held)
+        cut = np.abs(steps) > gap
+        starts += [rows + int(i) for i in np.flatnonzero(cut)]
+        jumps += steps[cut].tolist()
+        usual = np.where(np.isfinite(steps) & ~cut, steps, 0.0)
+        if usual.max(initial=0.0) > worst:
+            worst, worst_at = float(usual.max()), rows + int(usual.argmax())
+        changes = np.flatnonzero((steps != 0) & np.isfinite(steps))
+        if len(changes):
+            at = np.concatenate(([changed_at], rows + changes))
+            when = np.concatenate(([changed_stamp], held[changes + 1]))
+            inside = ~cut[changes] & np.isfinite(when[:-1])
+            samples += int(np.diff(at)[inside].sum())
+            elapsed += float(np.diff(when)[inside].sum())
+            changed_at, changed_stamp = int(at[-1]), float(when[-1])
+        rows += len(block)
+        last = held[-1]
+    if elapsed <= 0:
+        raise RecordingError("the time stamps do not advance; is the right column named?")
+    rate = samples / elapsed
+    findings = [
+        Finding(
+            "jittered_stamps",
+            "warning",
+            f"the stamps lie on no uniform grid ({100 * found.off_grid / found.rows:.0f} % of them "
+            f"off it, {found.holes} pauses, intervals up to {1e3 * worst:.3g} ms, at "
+            f"{worst_at / rate:.5g} s); the samples are taken as consecutive at the mean rate of "
+            f"{rate:.6g} Hz, so lost samples cannot be seen",
+            worst,
+            start=worst_at / rate,
+            end=worst_at / rate,
+        ),
+        *_rate_findings(rate, stated, settings),
+    ]
+    segments = tuple(zip(starts, [*starts[1:], rows], strict=True))
+    if len(segments) > 1:
+        times = [start / rate for start in starts[1:]]
+        findings.append(_segments("the stamps stop or run backwards", times, jumps))
+    return TimeBase(
+        rate,
+        "stamps",
+        rows,
+        rows,
+        segments,
+        False,
+        False,
+        tuple(findings),
+        rate_error=rate * worst / elapsed,
+    )
+
+
+def _span(stamps: Stamps) -> float:
+    """Return the time from the earliest to the latest stamp, s."""
+    low, high = np.inf, -np.inf
+    for block in stamps():
+        if np.isfinite(block).any():
+            low, high = min(low, float(np.nanmin(block))), max(high, float(np.nanmax(block)))
+    return high - low

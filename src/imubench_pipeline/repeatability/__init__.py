@@ -1,1 +1,0 @@
-"""How the fixed bias differs from one turn-on to the next, against what vendors print."""

@@ -1,0 +1,223 @@
+"""What a run says at its end: what became of the recordings, and which sensor suits what."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+from imubench_pipeline.navigation.suitability.conditions import in_words
+from imubench_pipeline.tables import read
+from imubench_pipeline.tables.findings import LEFT_OUT
+from imubench_pipeline.typing import Row
+
+_NEEDED = ("recordings", "findings", "ranking", "failures")
+_MOST_LINES = 10
+_MOST_LETTERS = 200
+
+_FAILED = re.compile(r"^Error in rule (\w+):\n((?:    .*\n)*)", re.MULTILINE)
+"""A step that failed, as Snakemake writes it into its log."""
+
+_FAILED_GROUP = re.compile(
+    r"^    message: Error in group .*\n(?:    log: (.+) \(check .*\n)?    jobs:\n((?: {8}.*\n)*)",
+    re.MULTILINE,
+)
+"""Steps that are one job of a cluster, which failed: its log says which of them did."""
+
+_JOB = re.compile(r"^ +jobid: (\d+)$", re.MULTILINE)
+_OUTPUT = re.compile(r"^ +output: (.+)$", re.MULTILINE)
+_RULE = re.compile(r"^ +rule (\w+):$", re.MULTILINE)
+_DONE = re.compile(r"^Finished jobid: (\d+) ", re.MULTILINE)
+_INTERRUPTED = "Terminating processes on user request"
+
+
+def summary(results: Path) -> str:
+    """Return what a finished run says; nothing where there are no tables.
+
+    Parameters
+    ----------
+    results : Path
+        Folder of the results.
+    """
+    tables = {name: results / f"tables/{name}.parquet" for name in _NEEDED}
+    if not all(path.is_file() for path in tables.values()):
+        return ""
+    try:
+        recordings, findings, ranking, failures = (
+            read(name, [path]).to_pylist() for name, path in tables.items()
+        )
+    except (OSError, ValueError) as error:
+        # A run for one file alone may stand beside older tables: it succeeded all the same.
+        return one_line(f"no summary: {error}")
+    rejected = list(rejections(recordings))
+    warned = list(warnings(findings))
+    simulated = sum(row["simulated"] for row in recordings)
+    failed = list(left_out(failures))
+    analysed = sum(row["status"] == "ok" for row in recordings)
+    lines = [f"{_counted(analysed, 'recording')} analysed, {len(rejected)} rejected"]
+    lines[0] += f", {len(recordings) - analysed - len(rejected)} failed" * bool(failed)
+    lines[0] += f"; {simulated} of all are simulated, not measured" * (simulated > 0)
+    lines += _bounded(f"  failed: {line}" for line in failed)
+    lines += _bounded(f"  rejected: {line}" for line in rejected)
+    if warned:
+        lines.append(f"warnings in {len(warned)} of the recordings:")
+        lines += _bounded(f"  {line}" for line in warned)
+    lines += _bounded(leaders(ranking, recordings))
+    lines.append(f"report: {results / 'report/index.html'}")
+    return "\n".join(lines)
+
+
+def failure(logs: Sequence[str], results: Path) -> str:
+    """Return what a run says that did not come to its end: what failed, and how to go on.
+
+    Parameters
+    ----------
+    logs : sequence of str
+        Files that Snakemake logs to.
+    results : Path
+        Folder of the results.
+    """
+    texts = [Path(log).read_text(encoding="utf-8", errors="replace") for log in logs]
+    steps = dict.fromkeys(step for text in texts for step in _failed_steps(text, results))
+    again = "run the same command again: it goes on where this run stopped"
+    if any(_INTERRUPTED in text for text in texts):
+        lines = [f"stopped before its end; to go on, {again}"]
+    else:
+        lines = [f"{_counted(len(steps), 'step') if steps else 'a step'} failed; why stands above"]
+        lines += _bounded(f"  {step}" for step in steps)
+        lines.append(f"all that does not need them is done; to go on, mend it and {again}")
+    lines += [f"log: {log}" for log in logs]
+    return "\n".join(lines)
+
+
+def _failed_steps(log: str, results: Path) -> Iterator[str]:
+    """Yield step and recording of what failed, by a log of Snakemake, each time it was tried."""
+    of_one = re.compile(rf"{re.escape(str(results))}/(?:recordings|simulated)/([^/]+/[^/,]+)")
+    done = set(_DONE.findall(log))
+
+    def recording(about: str) -> str | None:
+        named = map(of_one.match, _OUTPUT.findall(about))
+        return next((match[1] for match in named if match), None)
+
+    for rule, about in _FAILED.findall(log):
+        if done.isdisjoint(_JOB.findall(about)):
+            of = recording(about)
+            yield f"{rule} of {of}" if of else rule
+    last: dict[str, str] = {}
+    for cluster_log, about in _FAILED_GROUP.findall(log):
+        if done.isdisjoint(_JOB.findall(about)):
+            of = recording(about)
+            last[f"a step of {of}" if of else " or ".join(_RULE.findall(about))] = cluster_log
+    for what, cluster_log in last.items():
+        yield what + f" ({cluster_log})" * bool(cluster_log)
+
+
+def rejections(recordings: Iterable[Row]) -> Iterator[str]:
+    """Yield a line for each rejected recording: its name and the reason.
+
+    Parameters
+    ----------
+    recordings : iterable of mapping
+        The table ``recordings``.
+    """
+    for row in recordings:
+        if row["status"] == "rejected":
+            yield one_line(f"{row['sensor']}/{row['recording']}: {row['reason']}")
+
+
+def left_out(failures: Iterable[Row]) -> Iterator[str]:
+    """Yield a line for each step that failed: what is left out for it, and why.
+
+    Parameters
+    ----------
+    failures : iterable of mapping
+        The table ``failures``.
+    """
+    for row in failures:
+        of = f"{row['sensor']}/{row['recording']}" if row["recording"] else row["sensor"]
+        yield one_line(f"{of}: {row['reason']}")
+
+
+def warnings(findings: Iterable[Row]) -> Iterator[str]:
+    """Yield a line for each recording that has warnings, the one with the worst first.
+
+    Parameters
+    ----------
+    findings : iterable of mapping
+        The table ``findings``; notes, and that a recording is left out, are not.
+    """
+    found: dict[str, Counter[str]] = {}
+    left_out: Counter[str] = Counter()
+    for row in serious(findings):
+        name = f"{row['sensor']}/{row['recording']}"
+        found.setdefault(name, Counter())[row["finding"].replace("_", " ")] += 1
+        left_out[name] += row["severity"] == "fatal"
+    for name in sorted(found, key=lambda name: (-left_out[name], -found[name].total())):
+        kinds = ", ".join(
+            kind + f" ({count})" * (count > 1) for kind, count in found[name].most_common()
+        )
+        yield one_line(f"{name}: {_counted(found[name].total(), 'warning')}: {kinds}")
+
+
+def serious(findings: Iterable[Row]) -> Iterator[Row]:
+    """Yield the findings that put results in doubt.
+
+    Parameters
+    ----------
+    findings : iterable of mapping
+        The table ``findings``; notes, and that a recording is left out, are not.
+    """
+    for row in findings:
+        if row["severity"] != "note" and row["finding"] not in LEFT_OUT:
+            yield row
+
+
+def leaders(ranking: Iterable[Row], recordings: Iterable[Row]) -> Iterator[str]:
+    """Yield a line for each requirement: the sensor that comes first, and whether it passes.
+
+    Parameters
+    ----------
+    ranking, recordings : iterable of mapping
+        The tables of these names.
+    """
+    deciding = [row for row in ranking if row["decides"]]
+    simulated = {(row["sensor"], row["recording"]) for row in recordings if row["simulated"]}
+    for name in dict.fromkeys(row["requirement"] for row in deciding):
+        first = [row for row in deciding if row["requirement"] == name and row["rank"] == 1]
+        if not first:
+            yield one_line(f"{name}: no sensor can be ranked")
+            continue
+        best = max(first, key=lambda row: row["margin"])
+        shown = best["sensor"] + " (simulated)" * ((best["sensor"], best["recording"]) in simulated)
+        if best["verdict"].endswith("fails"):
+            shown = f"no sensor fulfils it; nearest is {shown}"
+        tied = f", tied with {best['tied_with']}" if best["tied_with"] else ""
+        weak = ", on weak evidence" * (best["evidence"] == "weak")
+        yield one_line(f"{name}: {shown}: {in_words(best)}{weak}{tied}")
+
+
+def one_line(text: str, longest: int = _MOST_LETTERS) -> str:
+    """Return a text on one line, without what a terminal takes for a command.
+
+    Parameters
+    ----------
+    text : str
+        May hold names and values as they stand in logs.
+    longest : int
+        Letters; the rest becomes an ellipsis.
+    """
+    shown = "".join(letter if letter.isprintable() else " " for letter in text)
+    shown = " ".join(shown.split())
+    return shown if len(shown) <= longest else shown[: longest - 1] + "…"
+
+
+def _bounded(lines: Iterable[str]) -> list[str]:
+    """Return the first lines, and how many more there are."""
+    listed = list(lines)
+    more = len(listed) - _MOST_LINES
+    return listed if more <= 1 else [*listed[:_MOST_LINES], f"  and {more} more"]
+
+
+def _counted(number: int, noun: str) -> str:
+    return f"{number} {noun}{'s' * (number != 1)}"

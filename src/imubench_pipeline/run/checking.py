@@ -1,0 +1,61 @@
+"""`imubench check`: is last night's log good? Everything but the estimation, nothing kept."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+
+from imubench_pipeline.datasheets.plausibility import implausible_of
+from imubench_pipeline.estimators.frame import FEWEST_BINS, frame_of
+from imubench_pipeline.estimators.likelihood import explaining
+from imubench_pipeline.estimators.spectral_findings import band_finding, line_findings
+from imubench_pipeline.estimators.spectrum import spectra
+from imubench_pipeline.recordings.ingest import ingest_as_planned
+from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.recordings.recording import ChannelLog, static_logs
+from imubench_pipeline.run.plan import Plan
+from imubench_pipeline.tables.findings import Finding
+
+
+def check(plan: Plan) -> Iterator[tuple[str, str, Quality]]:
+    """Yield sensor, recording and quality of each recording that a plan finds.
+
+    Parameters
+    ----------
+    plan : Plan
+        Its simulated recordings are passed over.
+    """
+    for (sensor, name), recording in plan.recordings.items():
+        if recording.simulated:
+            continue
+        with tempfile.TemporaryDirectory(prefix="imubench.") as folder:
+            settings = plan.ingest_settings(sensor, name)
+            quality = ingest_as_planned(recording.path, settings, sensor, name, Path(folder))
+            quality.findings.extend(implausible_of(quality, plan.sensors.get(sensor)))
+            for channel, log in static_logs(Path(folder)).items():
+                for finding in spectral_findings(channel, log, plan.bandwidth(sensor, name)):
+                    quality.findings.append(dict(finding.row(sensor, name)))
+        yield sensor, name, quality
+
+
+def spectral_findings(channel: str, log: ChannelLog, bandwidth: float | None) -> list[Finding]:
+    """Return lines and the end of the band of a channel, if its spectrum can be taken.
+
+    Parameters
+    ----------
+    channel : str
+    log : ChannelLog
+    bandwidth : float or None
+        Cut-off of the sensor's own filter, where it is known, Hz.
+    """
+    if log.holes:
+        # Filling holes takes a model: that is the estimation's.
+        return []
+    spectrum, line_spectra = spectra(log.blocks(), log.grid, log.rate, log.segments)
+    frame = frame_of(spectrum, line_spectra, bandwidth=bandwidth)
+    if frame.used.sum() >= FEWEST_BINS:
+        frame, _, _ = explaining(spectrum, frame)
+    rows = [asdict(line) | {"channel": channel} for line in frame.lines]
+    return [*line_findings(rows), *band_finding(channel, frame.band.highest, frame.band.source)]

@@ -1,0 +1,114 @@
+"""The records of steps that failed for one recording or one sensor, in the folder ``faults``."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from imubench_pipeline.tables.failures import Failure
+
+Of = tuple[str, str, str | None]
+"""Step, sensor and recording; None: a step of the whole sensor."""
+
+TOLD = "IMUBENCH_FAILURES_TOLD"
+"""The environment variable of a run whose caller looks itself for what is left out."""
+
+_FOLDER = "faults"
+
+
+class Faults:
+    """The records of the steps that failed, in the folder ``faults`` of the results.
+
+    What was there when this was made says how often each step was tried; a step that failed at
+    its last attempt has another one now.
+
+    Parameters
+    ----------
+    results : Path
+    """
+
+    def __init__(self, results: Path) -> None:
+        self._folder = results / _FOLDER
+        self._before = dict(self._records())
+
+    def attempt(self, of: Of, *, again: bool = True) -> int:
+        """Return the number of the attempt of this run, 0 where none has ever failed.
+
+        Parameters
+        ----------
+        of : tuple of str, str and str or None
+        again : bool
+            False: a step that failed is not tried again.
+        """
+        record = self._before.get(of)
+        return record["attempt"] + (record["failed"] and again) if record else 0
+
+    def failed(self, failure: Failure, attempt: int, trace: str) -> None:
+        """Keep that a step failed.
+
+        Parameters
+        ----------
+        failure : Failure
+        attempt : int
+            Its number.
+        trace : str
+            What it said, for its log.
+        """
+        from imubench_pipeline.tables import write_content, write_json
+
+        path = self._path((failure.step, failure.sensor, failure.recording))
+        said = f"{failure.name}, {failure.step}: {failure.reason}\n\n{trace}"
+        write_content(said.rstrip() + "\n", log_of(path))
+        write_json({"attempt": attempt, "failed": True, **asdict(failure)}, path)
+
+    def succeeded(self, of: Of, attempt: int) -> None:
+        """Keep that a step which had failed did not any more."""
+        path = self._path(of)
+        if path.is_file():
+            from imubench_pipeline.tables import write_json
+
+            step, sensor, recording = of
+            about = {"step": step, "sensor": sensor, "recording": recording}
+            write_json({"attempt": attempt, "failed": False, **about}, path)
+            log_of(path).unlink(missing_ok=True)
+
+    def now(self) -> Iterator[tuple[Failure, Path]]:
+        """Yield what has failed in this run, with the log of it."""
+        for of, record in self._records():
+            if record["failed"] and record["attempt"] >= self.attempt(of):
+                names = ("sensor", "recording", "step", "cause", "reason")
+                yield Failure(**{name: record[name] for name in names}), log_of(self._path(of))
+
+    def left_out(self) -> str:
+        """Return what a run says that left something out; nothing where its caller looks itself."""
+        from imubench_pipeline.report.run_summary import one_line
+
+        told = [
+            f"  {one_line(f'{found.name}: {found.reason}')}\n    log: {log}"
+            for found, log in self.now()
+        ]
+        if not told or TOLD in os.environ:
+            return ""
+        title = "what failed is left out, and tried again by the next run; the report is there"
+        return "\n".join([title, *told])
+
+    def _path(self, of: Of) -> Path:
+        step, sensor, recording = of
+        place = Path("recordings", sensor, recording) if recording else Path("sensors", sensor)
+        return self._folder / place / f"{step}.json"
+
+    def _records(self) -> Iterator[tuple[Of, dict[str, Any]]]:
+        for path in sorted(self._folder.glob("*/**/*.json")):
+            with contextlib.suppress(OSError, ValueError, KeyError):  # one that was cut off
+                record = json.loads(path.read_text(encoding="utf-8"))
+                yield (record["step"], record["sensor"], record["recording"]), record
+
+
+def log_of(record: Path) -> Path:
+    """Return the log beside a record."""
+    return record.with_suffix(".log")

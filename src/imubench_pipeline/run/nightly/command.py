@@ -1,0 +1,87 @@
+"""`imubench nightly`: what a timer calls, while loggers write."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from imubench_pipeline.units import UnitError, quantity_to_si
+
+_EPILOG = (
+    "Exit status: 0 fine; 1 a log was rejected, a warning is new or a device has changed since the "
+    "last run; 2 failed, for one recording at least, or another run goes on."
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command is given."""
+    parser.epilog = _EPILOG
+    parser.add_argument(
+        "--project", type=Path, default=Path(), help="folder of the Snakefile; default: this one"
+    )
+    parser.add_argument(
+        "-c", "--cores", default="all", metavar="N", help="cores for Snakemake; default: all"
+    )
+    parser.add_argument(
+        "--config", nargs="+", default=[], metavar="KEY=VALUE", help="settings, as for snakemake"
+    )
+    parser.add_argument(
+        "--settle",
+        type=_seconds,
+        default="10 s",
+        metavar="TIME",
+        help="a log is complete when nothing of it has changed for so long; default: 10 s",
+    )
+    parser.add_argument(
+        "--wait",
+        type=_seconds,
+        default="0 s",
+        metavar="TIME",
+        help="how long to wait for a run that goes on; default: not at all",
+    )
+    parser.add_argument(
+        "--quiet", action="store_true", help="print the summary only if the exit status is not 0"
+    )
+    parser.add_argument(
+        "flags", nargs="*", metavar="-- FLAG", help="further flags of snakemake, after --"
+    )
+
+
+def run(given: argparse.Namespace) -> int:
+    """Run the workflow on the logs that are complete; return the exit status."""
+    try:
+        from imubench_pipeline.run.nightly.night import Night, TakenError
+    except ModuleNotFoundError as error:
+        print(f"imubench nightly needs a system such as Linux: {error}", file=sys.stderr)
+        return 2
+    from imubench_pipeline.run.nightly.summary import STATUS, in_words
+    from imubench_pipeline.settings.validation import ConfigError
+
+    try:
+        night = Night(given.project, given.config, given.flags)
+        summary = night.run(given.cores, given.settle, given.wait)
+    except KeyboardInterrupt:
+        print("stopped by a signal before Snakemake began", file=sys.stderr)
+        return 2
+    except (ConfigError, TakenError, OSError) as error:
+        print(f"imubench nightly: {error}", file=sys.stderr)
+        return 2
+    status = STATUS[summary.outcome]
+    if status or not given.quiet:
+        print(in_words(summary), end="", file=sys.stderr if status == 2 else sys.stdout)
+    return status
+
+
+def _seconds(text: str) -> float:
+    """Return a time in s, written with its unit or without."""
+    try:
+        found = float(text)
+    except ValueError:
+        try:
+            found = quantity_to_si(text, "time")
+        except UnitError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+    if not 0.0 <= found < float("inf"):
+        raise argparse.ArgumentTypeError(f"found {text}; expected a time, such as 10 s")
+    return found

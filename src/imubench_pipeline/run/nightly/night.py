@@ -1,0 +1,256 @@
+"""One nightly run: lock, put right, hold back, run, compare, say."""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from shutil import disk_usage
+from types import FrameType
+from typing import Any
+
+import yaml
+
+from imubench_pipeline.run.nightly import recovery
+from imubench_pipeline.run.nightly.lock import Lock, TakenError
+from imubench_pipeline.run.nightly.running import errors, last_lines, run_snakemake
+from imubench_pipeline.run.nightly.settling import Found, Skip, look, moved, settled
+from imubench_pipeline.run.nightly.state import State, load_tables, read_state, state_of
+from imubench_pipeline.run.nightly.summary import Skipped, Summary, compared, in_words
+from imubench_pipeline.settings.config import Run, read_run
+from imubench_pipeline.settings.validation import ConfigError, read_yaml
+from imubench_pipeline.tables import write_content, write_json
+
+__all__ = ["Night", "TakenError"]
+
+_PATHS = ("logs", "results", "held_back")
+_OWN_FLAGS = {"--config", "-C", "--configfile", "--configfiles"}
+_LITTLE = 200e6  # bytes
+_MOST_ERRORS = 5
+_PAUSE = 5.0  # s between two looks at a Snakemake that somebody else runs
+_WRITTEN_TO = "it was written to while it was read: what the results say is of a part of it"
+
+
+class Night:
+    """A run of the workflow of a project.
+
+    Parameters
+    ----------
+    project : Path
+        Folder of the Snakefile.
+    config : sequence of str
+        Settings ``key=value`` beyond its file, as Snakemake takes them.
+    flags : sequence of str
+        Further flags of Snakemake.
+
+    Raises
+    ------
+    ConfigError
+        If there is no Snakefile, or the settings cannot be read.
+    """
+
+    def __init__(self, project: Path, config: Sequence[str], flags: Sequence[str] = ()) -> None:
+        self.project = project.absolute()
+        if not (self.project / "Snakefile").is_file():
+            raise ConfigError(f"{project}: no Snakefile; expected --project with the folder of it")
+        if own := set(flags) & _OWN_FLAGS:
+            raise ConfigError(f"{', '.join(own)}: expected --config of imubench nightly instead")
+        run = _settings(self.project / "config/config.yaml", config)
+        self.logs = self.project / run.logs
+        self.results = self.project / run.results
+        self.folder = self.results / "nightly"
+        self._always_held_back = run.held_back
+        self._config = [entry for entry in config if not entry.startswith("held_back=")]
+        self._flags = flags
+        self._began = datetime.now(UTC)
+        self._put_right: list[str] = []
+
+    def run(self, cores: str, settle: float, wait: float) -> Summary:
+        """Run the workflow once.
+
+        Parameters
+        ----------
+        cores : str
+        settle : float
+            How long nothing of a complete log has changed, s.
+        wait : float
+            For another run that goes on, s.
+
+        Returns
+        -------
+        Summary
+            It is kept in the folder ``nightly`` of the results, too.
+
+        Raises
+        ------
+        TakenError
+            If another run still goes on.
+        """
+        until = time.monotonic() + wait
+        with Lock(self.folder / "lock") as lock, _stopped_by_signals():
+            lock.acquire(wait)
+            self._began = datetime.now(UTC)
+            self._wait_for_others(until)
+            before = read_state(self.folder / "state.json")
+            self._recover(lock)
+            seen, skips = settled(self.logs, settle, before.logs if before else {})
+            try:
+                failure = self._snakemake(cores, skips, lock)
+            except OSError as error:
+                failure = [str(error)]
+            except KeyboardInterrupt:
+                failure = ["it was stopped by a signal; the next run goes on where it was"]
+            summary, after = self._summary(before, seen, skips, failure)
+            try:
+                self._keep(summary, after)
+            except OSError as error:
+                why = [*summary.failure, f"the summary cannot be kept: {error}", *self._space()]
+                return summary.model_copy(update={"outcome": "failed", "failure": why})
+        return summary
+
+    @property
+    def _log(self) -> Path:
+        return self.folder / f"{self._began:%Y%m%dT%H%M%SZ}.log"
+
+    def _wait_for_others(self, until: float) -> None:
+        """Wait for a Snakemake that somebody runs on these results by hand."""
+        while locks := recovery.snakemake_locks(self.project, self.results):
+            process = recovery.owner(locks, self.project, self.results)
+            if process is None:
+                return
+            if time.monotonic() >= until:
+                raise TakenError(f"Snakemake (process {process}) works on {self.results}")
+            time.sleep(min(_PAUSE, max(until - time.monotonic(), 0.0)))
+
+    def _recover(self, lock: Lock) -> None:
+        locks = recovery.snakemake_locks(self.project, self.results)
+        note = lock.left_over
+        if locks and not note:
+            since = datetime.fromtimestamp(locks[0].stat().st_mtime, UTC)
+            note = {"since": since.isoformat(timespec="seconds")}  # a run by hand
+        if note:
+            self._put_right.append(f"the run of {note.get('since')} did not reach its end")
+        if ended := recovery.end_left_over(note, self.project):
+            self._put_right.append(f"steps that still ran, and were ended: {ended}")
+        for path in locks:
+            path.unlink(missing_ok=True)
+        if recovery.restarted(note) and (doubtful := recovery.remove_doubtful(self.results)):
+            self._put_right.append(
+                f"the machine was restarted: files of its last minute made again: {doubtful}"
+            )
+        number, size = recovery.remove_temporary(self.results, lock.since)
+        if number:
+            self._put_right.append(f"temporary files removed: {number} ({size / 1e6:.1f} MB)")
+        lock.left_over = {}
+
+    def _snakemake(self, cores: str, skips: Sequence[Skip], lock: Lock) -> list[str]:
+        """Run Snakemake; return why it failed, if it did."""
+        arguments = [f"-c{cores}", "--rerun-incomplete", *self._flags, *self._held_back(skips)]
+        status = run_snakemake(arguments, self.project, self._log, lock)
+        if status == 0:
+            return []
+        said = [f"a step said: {error}" for error in errors(self._log)[:_MOST_ERRORS]]
+        why = f"Snakemake ended with exit status {status}; the last lines of its log:"
+        return [*said, why, *last_lines(self._log)]
+
+    def _held_back(self, skips: Sequence[Skip]) -> list[str]:
+        """Return the flags that hold logs back."""
+        names = {*self._always_held_back, *(skip.recording for skip in skips if skip.held_back)}
+        file = self.folder / "held_back.yaml"
+        write_json({"held_back": sorted(names)}, file)
+        return ["--configfile", str(file), *(["--config", *self._config] if self._config else [])]
+
+    def _summary(
+        self,
+        before: State | None,
+        seen: Mapping[str, Found],
+        skips: Sequence[Skip],
+        failure: Sequence[str],
+    ) -> tuple[Summary, State | None]:
+        finished = datetime.now(UTC)
+        found: dict[str, Any] = {"outcome": "failed"}
+        after, known = None, before.recordings if before else {}
+        try:
+            tables = {} if failure else load_tables(self.results)
+        except (OSError, ValueError) as error:
+            failure = [f"the tables cannot be read: {error}"]
+        held_back = {skip.recording for skip in skips if skip.held_back}
+        late = sorted(moved(seen, look(self.logs)) - held_back)
+        skips = [*skips, *(Skip(name, _WRITTEN_TO, held_back=False) for name in late)]
+        was_skipped = before.skipped if before else {}
+        since = {skip.recording: was_skipped.get(skip.recording, self._began) for skip in skips}
+        if not failure:
+            logs = {name: one.files for name, one in seen.items() if name not in held_back}
+            after = state_of(tables, finished, logs, since)
+            found = compared(before, after, tables, late)
+            known = after.recordings
+            after = after.without(late, before)
+        found["skipped"] = [
+            Skipped(
+                recording=skip.recording,
+                reason=skip.reason,
+                keeps_results=skip.held_back and skip.recording in known,
+                since=since[skip.recording],
+            )
+            for skip in skips
+        ]
+        summary = Summary(
+            began=self._began,
+            finished=finished,
+            seconds=(finished - self._began).total_seconds(),
+            put_right=self._put_right,
+            failure=[*failure, *(self._space() if failure else [])],
+            report=str(self.results / "report/index.html"),
+            log=str(self._log),
+            **found,
+        )
+        return summary, after
+
+    def _space(self) -> list[str]:
+        free = disk_usage(self.results).free
+        return [f"the disk of the results has only {free / 1e6:.0f} MB left"] * (free < _LITTLE)
+
+    def _keep(self, summary: Summary, after: State | None) -> None:
+        for name in (self._log.stem, "latest"):
+            write_content(summary.model_dump_json(indent=1) + "\n", self.folder / f"{name}.json")
+            write_content(in_words(summary), self.folder / f"{name}.txt")
+        # Last: what could not be said is said by the next run.
+        if after is not None:
+            after.write(self.folder / "state.json")
+
+
+def _settings(file: Path, config: Sequence[str]) -> Run:
+    """Return where the logs and the results are; the rest is Snakemake's to read."""
+    found = read_yaml(file) if file.is_file() else {}
+    settings = found if isinstance(found, dict) else {}
+    for entry in config:
+        key, equals, value = entry.partition("=")
+        if not equals:
+            raise ConfigError(f"--config: found {entry!r}; expected KEY=VALUE")
+        settings |= {key: yaml.load(value, Loader=yaml.BaseLoader)}
+    return read_run(
+        {key: settings[key] for key in _PATHS if key in settings}, f"{file} or --config"
+    )
+
+
+@contextmanager
+def _stopped_by_signals() -> Iterator[None]:
+    """Turn the signal that ends a service into that of Ctrl-C, so that all is left in order."""
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    numbers = [signal.SIGTERM, signal.SIGHUP]
+    replaced = {
+        number: signal.signal(number, stop)
+        for number in numbers
+        if signal.getsignal(number) is not signal.SIG_IGN  # as nohup wants it
+    }
+    try:
+        yield
+    finally:
+        for number, handler in replaced.items():
+            signal.signal(number, handler)

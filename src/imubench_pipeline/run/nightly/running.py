@@ -1,0 +1,147 @@
+"""Snakemake as a process of its own: what it says goes to a file, and to the terminal if any."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import select
+import signal
+import subprocess
+import sys
+import termios
+from collections.abc import Sequence
+from pathlib import Path
+from typing import IO
+
+from imubench_pipeline.run.faults import TOLD
+from imubench_pipeline.run.nightly.lock import Lock
+from imubench_pipeline.run.nightly.recovery import end_group
+
+_PATIENCE = 60.0  # s; for Snakemake to stop its steps
+_SHOWN = 20  # last lines
+_ERROR = re.compile(r"^Traceback \(most recent call last\):\n(?:[ \t].*\n)*(\S.*)", re.MULTILINE)
+_REDRAWN = re.compile(rb".*\x1b\[2K", re.DOTALL)
+_WIPES = b"\x1b[1A\x1b[2K"
+_SIGNS = re.compile(rb"\x1b\[[0-9;?]*[A-Za-z]|\r")
+
+
+def run_snakemake(arguments: Sequence[str], project: Path, output: Path, lock: Lock) -> int:
+    """Run Snakemake; return its exit status, negative where a signal ended it.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        Of the command line.
+    project : Path
+        Folder of the Snakefile.
+    output : Path
+        File for all that it says.
+    lock : Lock
+        Held by Snakemake, too: it may outlive this process.
+    """
+    command = [sys.executable, "-m", "snakemake", *arguments]
+    with output.open("ab", buffering=0) as file:
+        terminal = _Terminal(file) if sys.stderr.isatty() else None
+        process = subprocess.Popen(
+            command,
+            cwd=project,
+            stdin=subprocess.DEVNULL,
+            stdout=file,
+            stderr=terminal.end if terminal else subprocess.STDOUT,
+            pass_fds=(lock.descriptor,),
+            env=os.environ | {TOLD: "1"},
+            start_new_session=True,  # all its steps can be ended together
+        )
+        try:
+            lock.note(snakemake=process.pid)
+            if terminal:
+                terminal.follow(process)
+            return process.wait()
+        except BaseException:
+            # As Ctrl-C in a terminal does: Snakemake and its steps take away what is half-done.
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGINT)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(_PATIENCE)
+            raise
+        finally:
+            end_group(process.pid)
+            process.wait()
+            if terminal:
+                terminal.close()
+
+
+class _Terminal:
+    """A terminal for Snakemake, which shows its progress there as it does when called by hand.
+
+    What it writes goes on to the real one as it is, and to a file without what is drawn over.
+    """
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self._file = file
+        self._pending = b""
+        self._last: bytes | None = None
+        self._begin, self.end = os.openpty()
+        with contextlib.suppress(termios.error):
+            termios.tcsetwinsize(self.end, termios.tcgetwinsize(sys.stderr.fileno()))
+
+    def follow(self, process: subprocess.Popen[bytes]) -> None:
+        """Pass on what a process writes, until it ends."""
+        while True:
+            ended = process.poll() is not None
+            while select.select([self._begin], [], [], 0.0 if ended else 0.2)[0]:
+                self._pass_on(os.read(self._begin, 65536))
+            if ended:
+                self._keep(self._pending)
+                self._keep(b"")
+                return
+
+    def close(self) -> None:
+        """Close both ends."""
+        os.close(self._begin)
+        os.close(self.end)
+
+    def _pass_on(self, written: bytes) -> None:
+        sys.stderr.buffer.write(written)
+        sys.stderr.buffer.flush()
+        *lines, self._pending = (self._pending + written).split(b"\n")
+        for line in lines:
+            self._keep(line)
+
+    def _keep(self, line: bytes) -> None:
+        """Keep a line once the next one does not wipe it out, as a display does that ends."""
+        if self._last is not None and _WIPES not in line:
+            with contextlib.suppress(OSError):  # a full disk: the steps say so themselves
+                self._file.write(self._last + b"\n")
+        text = _SIGNS.sub(b"", _REDRAWN.sub(b"", line)).rstrip()
+        self._last = text if text or not _REDRAWN.match(line) else None
+
+
+def errors(path: Path) -> list[str]:
+    """Return the errors of the steps that failed in a run, each once.
+
+    Parameters
+    ----------
+    path : Path
+        File of what it said.
+    """
+    return list(dict.fromkeys(_ERROR.findall(_text(path))))
+
+
+def last_lines(path: Path) -> list[str]:
+    """Return the last lines that a run said, without empty ones.
+
+    Parameters
+    ----------
+    path : Path
+        File of what it said.
+    """
+    return [line.rstrip() for line in _text(path).splitlines() if line.strip()][-_SHOWN:]
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ""

@@ -1,0 +1,254 @@
+"""Which logs are complete, and which are still being written.
+
+A log is taken when nothing of it has changed for a while. Three signs say that it is not complete:
+a stamp of its last change that is too young, a size or a stamp that moves between two looks (stamps
+alone may be wrong: clocks of network disks and of copied files), and a process on this machine that
+has it open for writing (a logger may write its buffer every few minutes only).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import psutil
+
+from imubench_pipeline.recordings.drop_zone import PARTIAL, Recording, found_logs, name_of
+from imubench_pipeline.report.run_summary import one_line
+
+Signature = tuple[tuple[str, int, int], ...]
+"""Path, size in bytes and last change in ns of each file of a recording."""
+
+_LONGEST_PAUSE = 10.0  # s; what writes less often is known by its stamps, or as an open file
+_GIVEN_UP = 86400.0  # s without a byte; a partial file that is older is not being transferred now
+_OF_RSYNC = re.compile(r"\.(.+)\.[A-Za-z0-9]{6}")
+_GONE = -1
+
+
+@dataclass(frozen=True)
+class Found:
+    """What the drop zone has of one recording.
+
+    Attributes
+    ----------
+    files : Signature
+        Its files, and the notes beside them; those still being transferred apart.
+    partial : tuple or None
+        Path below the sensor's folder, size and last change of a file of it that is still being
+        transferred.
+    incomplete : bool
+        The partial file is a part of it, not a later version that will replace it.
+    """
+
+    files: Signature = ()
+    partial: tuple[str, int, int] | None = None
+    incomplete: bool = False
+
+
+@dataclass(frozen=True)
+class Skip:
+    """A log, or a part of one, that is not read in this run.
+
+    Attributes
+    ----------
+    recording : str
+        Sensor and name, such as ``mti_7/night``.
+    reason : str
+    held_back : bool
+        False: nothing to hold back. A complete log beside the partial one is read; where there
+        is none, the partial one was given up long ago.
+    """
+
+    recording: str
+    reason: str
+    held_back: bool = True
+
+
+def look(logs: Path) -> dict[str, Found]:
+    """Return what is in a drop zone, by sensor and name of the recording.
+
+    Parameters
+    ----------
+    logs : Path
+        Folder that holds ``<sensor>/<recording>``; none is an empty one.
+    """
+    found: dict[str, Found] = {}
+    if not logs.is_dir():
+        return found
+    for log in found_logs(logs):
+        key = f"{log.sensor}/{log.name}"
+        before = found.get(key, Found())
+        partial = next(_partial_inside(log.path), before.partial)
+        found[key] = Found(before.files + _signature(log), partial, partial is not None)
+    for path in sorted(logs.glob("*/*")):
+        whole = complete_name(path.name)
+        if whole is not None and path.is_file():
+            key = f"{path.parent.name}/{name_of(whole)}"
+            there = found.get(key, Found())
+            if not there.incomplete:
+                found[key] = Found(there.files, _stamped(path, path.parent))
+    return found
+
+
+def complete_name(name: str) -> str | None:
+    """Return the name that a file will have once it is complete; None if it is complete.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``run.csv.part``, ``.run.csv.Xy12Zq`` (rsync) or ``.run.csv``.
+    """
+    if name.startswith("._"):
+        return None  # what macOS keeps beside a file
+    whole = name.lstrip(".")
+    if whole != name and (of_rsync := _OF_RSYNC.fullmatch(name)):
+        return of_rsync[1]
+    if Path(whole).suffix.lower() in PARTIAL:
+        return Path(whole).stem
+    # Systems keep hidden files in folders too; those have no ending.
+    return whole if whole != name and Path(whole).suffix else None
+
+
+def settled(
+    logs: Path, settle: float, known: Mapping[str, Signature]
+) -> tuple[dict[str, Found], list[Skip]]:
+    """Look at a drop zone, twice where logs are new, for what is still being written.
+
+    Parameters
+    ----------
+    logs : Path
+    settle : float
+        How long nothing of a complete log has changed, s.
+    known : mapping of str to Signature
+        The logs as they were at an earlier run: one that is as it was then needs no second look.
+
+    Returns
+    -------
+    found : dict of str to Found
+        The last look.
+    skips : list of Skip
+        What is still being written.
+    """
+    first = look(logs)
+    second = first
+    if settle and any(known.get(key) != found.files for key, found in first.items()):
+        pause = min(settle, _LONGEST_PAUSE)
+        time.sleep(pause)
+        second = look(logs)
+    return second, list(unsettled(first, second, settle, time.time(), writers(second)))
+
+
+def unsettled(
+    first: Mapping[str, Found],
+    second: Mapping[str, Found],
+    settle: float,
+    now: float,
+    writing: Mapping[Path, str],
+) -> Iterator[Skip]:
+    """Yield the logs that are still being written.
+
+    Parameters
+    ----------
+    first, second : mapping of str to Found
+        Two looks.
+    settle : float
+        How long nothing of a complete log has changed, s.
+    now : float
+        When the second look was, s since 1970.
+    writing : mapping of Path to str
+        Files that are open for writing, and by what.
+    """
+    for key in sorted(first.keys() | second.keys()):
+        was, found = first.get(key, Found()), second.get(key, Found())
+        by = next((writing[real] for real in _real(found) if real in writing), None)
+        age = now - max((stamp for _, _, stamp in found.files), default=_GONE) * 1e-9
+        if found.partial and found.incomplete:
+            yield Skip(key, _transferred(found.partial, now))
+        elif was.files != found.files:
+            yield Skip(key, "it changed while it was looked at")
+        elif by is not None:
+            yield Skip(key, f"{by} has it open for writing")
+        # A stamp far in the future comes from a clock that was never set, and says nothing.
+        elif abs(age) < settle:
+            yield Skip(key, f"last written to {max(age, 0.0):.0f} s ago")
+        elif found.partial:
+            replaces = not found.files and now - found.partial[2] * 1e-9 < _GIVEN_UP
+            yield Skip(key, _transferred(found.partial, now), held_back=replaces)
+
+
+def _transferred(partial: tuple[str, int, int], now: float) -> str:
+    path, _, stamp = partial
+    days = (now - stamp * 1e-9) / _GIVEN_UP
+    if days < 1.0:
+        return one_line(f"{path} is still being transferred")
+    return one_line(f"{path} is not complete, and nothing was written to it for {days:.0f} days")
+
+
+def writers(found: Mapping[str, Found]) -> dict[Path, str]:
+    """Return the files of recordings that processes have open for writing, and which these are.
+
+    Parameters
+    ----------
+    found : mapping of str to Found
+
+    Returns
+    -------
+    dict
+        Of the processes that may be looked into: one's own, or all for an administrator.
+    """
+    looked_for = {real for one in found.values() for real in _real(one)}
+    writing: dict[Path, str] = {}
+    for process in psutil.process_iter() if looked_for else ():
+        with contextlib.suppress(psutil.Error, OSError):
+            for file in process.open_files():
+                if getattr(file, "mode", "r") != "r" and Path(file.path) in looked_for:
+                    said = f"process {process.pid} ({process.name()})"
+                    writing[Path(file.path)] = one_line(said)
+    return writing
+
+
+def moved(before: Mapping[str, Found], after: Mapping[str, Found]) -> set[str]:
+    """Return the recordings whose logs changed, or appeared, between two looks.
+
+    Parameters
+    ----------
+    before, after : mapping of str to Found
+    """
+    return {key for key, one in after.items() if before.get(key, Found()).files != one.files}
+
+
+def _real(found: Found) -> Iterable[Path]:
+    return (Path(path).resolve() for path, _, _ in found.files)
+
+
+def _signature(log: Recording) -> Signature:
+    try:
+        files = log.files or [log.path]
+    except OSError:
+        files = [log.path]
+    return tuple(_stamped(path) for path in files)
+
+
+def _stamped(path: Path, below: Path | None = None) -> tuple[str, int, int]:
+    shown = str(path.relative_to(below) if below else path)
+    try:
+        about = path.stat()
+    except OSError:
+        return shown, _GONE, _GONE
+    return shown, about.st_size, about.st_mtime_ns
+
+
+def _partial_inside(path: Path) -> Iterator[tuple[str, int, int]]:
+    """Yield the partial files of a recording that is a folder; the folder itself may be one."""
+    if path.is_dir():
+        if path.suffix.lower() in PARTIAL:
+            yield _stamped(path, path.parent)
+        for file in sorted(path.rglob("*")):
+            # Other hidden files are no part of a recording.
+            named = file.suffix.lower() in PARTIAL or _OF_RSYNC.fullmatch(file.name)
+            if named and complete_name(file.name) and file.is_file():
+                yield _stamped(file, path.parent)

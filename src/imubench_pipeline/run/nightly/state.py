@@ -1,0 +1,231 @@
+"""What a run found, in short: the next one tells by it what is new."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Collection, Iterable, Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from imubench_pipeline.report.run_summary import serious
+from imubench_pipeline.run.nightly.settling import Signature
+from imubench_pipeline.tables import read, write_content
+
+Rows = list[dict[str, Any]]
+
+_OF_A_RECORDING = ("recordings", "parameters", "fixed_bias")
+"""The tables whose rows tell whether a recording was analysed again with another outcome."""
+
+
+class Warned(NamedTuple):
+    """What names a finding: its size may change from run to run."""
+
+    recording: str
+    channel: str | None
+    finding: str
+
+
+class Drifted(NamedTuple):
+    """What names a change of a device."""
+
+    sensor: str
+    device: str
+    channel: str
+    parameter: str
+    recording: str
+
+    @property
+    def name(self) -> str:
+        """Sensor and name of the recording."""
+        return f"{self.sensor}/{self.recording}"
+
+
+class Leader(NamedTuple):
+    """The sensor that comes first for a requirement."""
+
+    sensor: str
+    fulfils: bool
+
+
+class Known(NamedTuple):
+    """A recording, in short."""
+
+    digest: str
+    rejected: str | None = None
+
+
+class State(BaseModel):
+    """What a successful run found.
+
+    Attributes
+    ----------
+    finished : datetime
+    logs : dict
+        Size and stamps of each log that was read.
+    recordings : dict
+    warned, drifted : list
+        Findings that put results in doubt, and changes of devices.
+    leaders : dict
+        By requirement.
+    skipped : dict
+        Since when a log has been skipped, run by run.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    finished: datetime
+    logs: dict[str, Signature] = {}
+    recordings: dict[str, Known] = {}
+    warned: list[Warned] = []
+    drifted: list[Drifted] = []
+    leaders: dict[str, Leader | None] = {}
+    skipped: dict[str, datetime] = {}
+
+    def write(self, path: Path) -> None:
+        """Keep it, atomically."""
+        write_content(self.model_dump_json(indent=1) + "\n", path)
+
+    def without(self, names: Collection[str], before: State | None) -> State:
+        """Return a state in which some recordings are as they were before, if they were.
+
+        Parameters
+        ----------
+        names : collection of str
+        before : State or None
+        """
+        was = before or State(finished=self.finished)
+        old = {name: was.recordings[name] for name in names if name in was.recordings}
+        return self.model_copy(
+            update={
+                "logs": {name: log for name, log in self.logs.items() if name not in names},
+                "recordings": {
+                    **{name: one for name, one in self.recordings.items() if name not in names},
+                    **old,
+                },
+                "warned": [one for one in self.warned if one.recording not in names]
+                + [one for one in was.warned if one.recording in names],
+                "drifted": [one for one in self.drifted if one.name not in names]
+                + [one for one in was.drifted if one.name in names],
+            }
+        )
+
+
+def read_state(path: Path) -> State | None:
+    """Return the state that a run has kept; None where there is none that can be read.
+
+    Parameters
+    ----------
+    path : Path
+    """
+    try:
+        return State.model_validate_json(path.read_bytes())
+    except (OSError, ValidationError):
+        return None
+
+
+def load_tables(results: Path) -> dict[str, Rows]:
+    """Return the rows of the tables that a state is made of.
+
+    Parameters
+    ----------
+    results : Path
+
+    Raises
+    ------
+    OSError, ValueError
+        If one is not there, or is of another form.
+    """
+    found: dict[str, Rows] = {}
+    for name in (*_OF_A_RECORDING, "failures", "findings", "drift", "ranking"):
+        table = read(name, [results / f"tables/{name}.parquet"])
+        if name == "parameters":
+            table = table.filter(table["recommended"])
+        found[name] = table.to_pylist()
+    return found
+
+
+def state_of(
+    tables: Mapping[str, Rows],
+    finished: datetime,
+    logs: Mapping[str, Signature],
+    skipped: Mapping[str, datetime],
+) -> State:
+    """Return the state after a run.
+
+    Parameters
+    ----------
+    tables : mapping
+        As `load_tables` returns them.
+    finished : datetime
+    logs : mapping
+        Of the logs that were read.
+    skipped : mapping
+    """
+    rejected = {
+        name_in(row): row["reason"] for row in tables["recordings"] if row["status"] == "rejected"
+    }
+    return State(
+        finished=finished,
+        logs=dict(logs),
+        recordings={
+            name: Known(digest, rejected.get(name)) for name, digest in _digests(tables).items()
+        },
+        warned=sorted({warned(row) for row in serious(tables["findings"])}, key=str),
+        drifted=sorted({drifted(row) for row in changes(tables["drift"])}),
+        leaders=leading(tables["ranking"]),
+        skipped=dict(skipped),
+    )
+
+
+def name_in(row: Mapping[str, Any]) -> str:
+    """Return sensor and name of the recording of a row."""
+    return f"{row['sensor']}/{row['recording']}"
+
+
+def warned(row: Mapping[str, Any]) -> Warned:
+    """Return what names a row of the table ``findings``."""
+    return Warned(name_in(row), row["channel"], row["finding"])
+
+
+def changes(drift: Iterable[dict[str, Any]]) -> Rows:
+    """Return the rows of the table ``drift`` that say that a device has changed."""
+    return [row for row in drift if row["verdict"] == "changed"]
+
+
+def drifted(row: Mapping[str, Any]) -> Drifted:
+    """Return what names a row of the table ``drift``."""
+    return Drifted(*(row[column] for column in Drifted._fields))
+
+
+def leading(ranking: Iterable[Mapping[str, Any]]) -> dict[str, Leader | None]:
+    """Return the sensor that comes first for each requirement; None where none can be ranked.
+
+    Parameters
+    ----------
+    ranking : iterable of mapping
+        The table of this name.
+    """
+    first: dict[str, Leader | None] = {}
+    margins: dict[str, float] = {}
+    for row in ranking:
+        if row["decides"]:
+            name = row["requirement"]
+            first.setdefault(name, None)
+            margin = row["margin"] or 0.0
+            if row["rank"] == 1 and (name not in margins or margin > margins[name]):
+                first[name] = Leader(row["sensor"], not row["verdict"].endswith("fails"))
+                margins[name] = margin
+    return first
+
+
+def _digests(tables: Mapping[str, Rows]) -> dict[str, str]:
+    """Return a digest of what the tables say of each recording."""
+    digests = {name_in(row): hashlib.sha256() for row in tables["recordings"]}
+    for table in _OF_A_RECORDING:
+        for row in tables[table]:
+            digests[name_in(row)].update(json.dumps(row, sort_keys=True).encode())
+    return {name: digest.hexdigest()[:16] for name, digest in digests.items()}

@@ -1,0 +1,314 @@
+"""What a nightly run says: what is new since the last one, as data and in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from datetime import datetime
+from typing import Any, Literal
+
+from pydantic import BaseModel
+
+from imubench_pipeline.report.run_summary import leaders, one_line, serious
+from imubench_pipeline.report.run_summary import left_out as told
+from imubench_pipeline.run.nightly.state import (
+    Known,
+    Leader,
+    Rows,
+    State,
+    changes,
+    drifted,
+    name_in,
+    warned,
+)
+
+Outcome = Literal["fine", "flagged", "failed"]
+
+STATUS: Mapping[Outcome, int] = {"fine": 0, "flagged": 1, "failed": 2}
+"""Exit status of each outcome."""
+
+_MOST_LINES = 20
+
+
+class Changed(BaseModel):
+    """A recording whose outcome is another one than at the last run."""
+
+    recording: str
+    because: str
+
+
+class Skipped(BaseModel):
+    """A log that was not read, being written."""
+
+    recording: str
+    reason: str
+    keeps_results: bool
+    since: datetime
+
+
+class Rejected(BaseModel):
+    """A recording that cannot be used; ``new``: it was not so at the last run."""
+
+    recording: str
+    reason: str
+    new: bool
+
+
+class Failed(BaseModel):
+    """A step that failed for a recording, or for a whole sensor, which is left out."""
+
+    sensor: str
+    recording: str | None
+    step: str
+    cause: str
+    reason: str
+
+
+class NewWarning(BaseModel):
+    """A finding that puts results in doubt."""
+
+    recording: str
+    channel: str | None
+    finding: str
+    detail: str
+
+
+class Drift(BaseModel):
+    """A parameter of a device that has left the interval that its earlier recordings give."""
+
+    sensor: str
+    device: str
+    channel: str
+    parameter: str
+    recording: str
+    value: float | None
+    expected_lower: float | None
+    expected_upper: float | None
+    unit: str
+    reason: str | None
+
+
+class First(BaseModel):
+    """The sensor that comes first for a requirement, where that has changed."""
+
+    requirement: str
+    sensor: str | None
+    before: str | None
+    said: str
+
+
+class Summary(BaseModel):
+    """What a nightly run found since the last one that succeeded.
+
+    Attributes
+    ----------
+    outcome : {"fine", "flagged", "failed"}
+    began, finished : datetime
+    seconds : float
+        How long it took.
+    since : datetime or None
+        The end of the run that this one is compared with; None: there is none.
+    recordings : int
+        How many there are in the tables.
+    put_right : list of str
+        What an earlier run left behind.
+    failure : list of str
+        Why it failed: the last lines of its log.
+    report, log : str
+    """
+
+    outcome: Outcome
+    began: datetime
+    finished: datetime
+    seconds: float
+    since: datetime | None = None
+    recordings: int = 0
+    new: list[str] = []
+    changed: list[Changed] = []
+    removed: list[str] = []
+    skipped: list[Skipped] = []
+    failed: list[Failed] = []
+    rejected: list[Rejected] = []
+    warnings: list[NewWarning] = []
+    drift: list[Drift] = []
+    first: list[First] = []
+    put_right: list[str] = []
+    failure: list[str] = []
+    report: str = ""
+    log: str = ""
+
+
+def compared(
+    before: State | None, after: State, tables: Mapping[str, Rows], without: Iterable[str]
+) -> dict[str, Any]:
+    """Return what is new in a state, as fields of the summary.
+
+    Parameters
+    ----------
+    before : State or None
+        At the last successful run.
+    after : State
+    tables : mapping
+        That ``after`` is of.
+    without : iterable of str
+        Recordings of which nothing is said: their logs were written to while they were read.
+    """
+    was = before or State(finished=after.finished)
+    left_out = set(without)
+    now = {name: known for name, known in after.recordings.items() if name not in left_out}
+    both = [name for name in now if name in was.recordings]
+    known_warnings, known_drift = set(was.warned), set(was.drifted)
+    found: dict[str, Any] = {
+        "since": before and before.finished,
+        "recordings": len(after.recordings),
+        "new": [name for name in now if name not in was.recordings],
+        "changed": [
+            Changed(recording=name, because=_because(name, was, after))
+            for name in both
+            if now[name].digest != was.recordings[name].digest
+        ],
+        "removed": [name for name in was.recordings if name not in after.recordings],
+        "failed": [
+            Failed(**row)
+            for row in tables["failures"]
+            if row["recording"] is None or name_in(row) not in left_out
+        ],
+        "rejected": [
+            Rejected(
+                recording=name,
+                reason=known.rejected,
+                new=was.recordings.get(name, Known("")).rejected != known.rejected,
+            )
+            for name, known in now.items()
+            if known.rejected is not None
+        ],
+        "warnings": [
+            NewWarning(recording=name_in(row), **{name: row[name] for name in _OF_WARNING})
+            for row in serious(tables["findings"])
+            if name_in(row) not in left_out and warned(row) not in known_warnings
+        ],
+        "drift": [
+            Drift(**{name: row[name] for name in Drift.model_fields})
+            for row in changes(tables["drift"])
+            if name_in(row) not in left_out and drifted(row) not in known_drift
+        ],
+        "first": list(_first(was, after, tables)),
+    }
+    flagged = any(one.new for one in found["rejected"]) or found["warnings"] or found["drift"]
+    outcome = "failed" if found["failed"] else "flagged" if flagged else "fine"
+    return found | {"outcome": outcome}
+
+
+_OF_WARNING = ("channel", "finding", "detail")
+
+
+def _because(name: str, was: State, now: State) -> str:
+    if was.logs.get(name) != now.logs.get(name):
+        return "its log changed"
+    return "settings, or the code of the analysis, changed"
+
+
+def _first(was: State, now: State, tables: Mapping[str, Rows]) -> Iterator[First]:
+    for name, leader in now.leaders.items():
+        if name in was.leaders and leader == was.leaders[name]:
+            continue
+        of_it = [row for row in tables["ranking"] if row["requirement"] == name]
+        yield First(
+            requirement=name,
+            sensor=leader and leader.sensor,
+            before=_shown(was.leaders.get(name)),
+            said=next(leaders(of_it, tables["recordings"])),
+        )
+
+
+def _shown(leader: Leader | None) -> str | None:
+    return leader and (leader.sensor if leader.fulfils else f"{leader.sensor}, which failed it")
+
+
+def in_words(summary: Summary) -> str:
+    """Return a summary as text.
+
+    Parameters
+    ----------
+    summary : Summary
+    """
+    new = sum(one.new for one in summary.rejected)
+    counts = (
+        f"{len(summary.new)} new, {len(summary.changed)} analysed again, "
+        f"{len(summary.removed)} removed, {len(summary.skipped)} skipped; "
+        f"{summary.recordings} in all, {len(summary.rejected)} of them rejected"
+        + f"; {len(summary.failed)} failed"
+        * bool(summary.failed)
+    )
+    since = f"since {_time(summary.since)}" if summary.since else "the first run"
+    lines = [
+        f"imubench nightly: {summary.outcome}, {_time(summary.finished)}, "
+        f"took {_duration(summary.seconds)}"
+    ]
+    if summary.failure:
+        lines += ["", "why it failed:", *(f"  {one_line(line, 500)}" for line in summary.failure)]
+    else:
+        lines.append(f"recordings, {since}: {counts}")
+    failed = [row.model_dump() for row in summary.failed]
+    sections: list[tuple[str, list[str]]] = [
+        ("failed, left out of a report that is there, and tried again next time", [*told(failed)]),
+        ("new", summary.new),
+        ("analysed again", [f"{one.recording}: {one.because}" for one in summary.changed]),
+        ("removed", summary.removed),
+        ("skipped, and looked at again next time", list(map(_skip, summary.skipped))),
+        (
+            f"rejected ({new or 'none'} of them new)",
+            [
+                f"{one.recording}{' (new)' * one.new}: {one.reason}"
+                for one in sorted(summary.rejected, key=lambda one: not one.new)
+            ],
+        ),
+        ("new warnings", [_warning(one) for one in summary.warnings]),
+        ("devices that have changed", list(map(_drift, summary.drift))),
+        (
+            "first for a requirement",
+            [one.said + f" (before: {one.before})" * bool(one.before) for one in summary.first],
+        ),
+        ("put right after an earlier run", summary.put_right),
+    ]
+    for title, found in sections:
+        if found:
+            lines += ["", f"{title}:", *_bounded(found)]
+    lines += ["", f"report: {summary.report}", f"log: {summary.log}"]
+    return "\n".join(lines) + "\n"
+
+
+def _skip(one: Skipped) -> str:
+    kept = "; its results stay" * one.keeps_results
+    return f"{one.recording}: {one.reason}{kept} (since {_time(one.since)})"
+
+
+def _warning(one: NewWarning) -> str:
+    channel = f"{one.channel}: " if one.channel else ""
+    return f"{one.recording}: {channel}{one.finding.replace('_', ' ')}: {one.detail}"
+
+
+def _drift(one: Drift) -> str:
+    value = f" {one.value:.4g} {one.unit}" if one.value is not None else ""
+    expected = ""
+    if one.expected_lower is not None and one.expected_upper is not None:
+        expected = f", expected {one.expected_lower:.4g} to {one.expected_upper:.4g}"
+    return (
+        f"{one.sensor}, device {one.device}: {one.channel} {one.parameter}{value} in "
+        f"{one.recording}{expected}" + f" ({one.reason})" * bool(one.reason)
+    )
+
+
+def _bounded(lines: list[str]) -> list[str]:
+    more = len(lines) - _MOST_LINES
+    shown = lines if more <= 1 else [*lines[:_MOST_LINES], f"and {more} more"]
+    return [f"  {one_line(line, 300)}" for line in shown]
+
+
+def _time(stamp: datetime) -> str:
+    return stamp.astimezone().strftime("%Y-%m-%d %H:%M %Z")
+
+
+def _duration(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes} min" if hours else f"{minutes} min {rest} s"

@@ -1,0 +1,420 @@
+"""What a run consists of: the recordings found and the settings of each step.
+
+This is all that the Snakefile asks of the package. Settings are handed to a rule as JSON text
+of what the rule depends on, so that an edit runs again what it touches and nothing else.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from functools import cached_property
+from itertools import chain
+from pathlib import Path
+
+from pydantic import BaseModel
+
+from imubench_pipeline.navigation.suitability.abilities import abilities
+from imubench_pipeline.recordings.drop_zone import Recording, fingerprint, fingerprints, found_logs
+from imubench_pipeline.run.faults import Faults
+from imubench_pipeline.run.step_modules import STEPS
+from imubench_pipeline.settings.config import Run, given_beside, read_run
+from imubench_pipeline.settings.printed import IN_USE
+from imubench_pipeline.settings.requirements import Requirement, read_requirements
+from imubench_pipeline.settings.sensor import (
+    Kind,
+    LogFormat,
+    RecordingNotes,
+    Sensor,
+    kind_of,
+    merged_log,
+    read_sensors,
+)
+from imubench_pipeline.settings.simulated_recordings import (
+    Board,
+    SimulatedRecording,
+    layout,
+    profile_files,
+    read_simulated,
+)
+from imubench_pipeline.settings.validation import ConfigError, parse, read_yaml
+from imubench_pipeline.tables.provenance import source_digest
+from imubench_pipeline.units import quantity_to_si
+
+_OF_INGEST = ("quality.json", "envelope.parquet", "histogram.parquet")
+_EXPERIMENTS = ("two_position", "rate_table", "pointing")
+"""Keys of the notes that the ingest does not depend on."""
+
+_OF_RANKING = ("price_class", "must")
+"""Keys of a requirement that no error follows from."""
+
+_ANY_LOG = {"rate": "1 Hz", "channels": {"gyro_x": {"column": 1, "unit": "rad/s"}}}
+"""Stands for the layout of a sensor's logs where that does not matter."""
+
+
+class Plan:
+    """The plan of a run.
+
+    Raises
+    ------
+    ConfigError
+        If the configuration, a sensor file or the list of simulated recordings cannot be used,
+        or two logs would make one recording.
+    """
+
+    def __init__(self, config: Mapping[str, object]) -> None:
+        self.run: Run = read_run(config)
+        self.faults = Faults(self.run.results)
+        self.sensors: dict[str, Sensor] = read_sensors(self.run.sensors)
+        self.requirements: dict[str, Requirement] = read_requirements(self.run.requirements)
+        simulated = read_simulated(self.run.simulated, self.sensors)
+        self.boards: dict[str, Board] = simulated.boards
+        self._simulated = {(entry.sensor, entry.recording): entry for entry in simulated.recordings}
+        self._of_ingest: dict[tuple[str, str], str] = {}
+        self._read_notes: dict[Path, object] = {}
+        self.recordings: dict[tuple[str, str], Recording] = {}
+        for found in [*self._found_logs(), *self._to_simulate()]:
+            other = self.recordings.setdefault((found.sensor, found.name), found)
+            if other is not found:
+                raise ConfigError(
+                    f"{other.path} and {found.path} would both be the recording "
+                    f"{found.sensor}/{found.name}; rename or remove one"
+                )
+
+    def _found_logs(self) -> list[Recording]:
+        if not self.run.logs.is_dir():
+            if self.run.simulated is None:
+                raise ConfigError(
+                    f"logs: found {str(self.run.logs)!r}, which is no folder; expected the folder "
+                    "that holds <sensor>/<recording>"
+                )
+            return []
+        found: dict[str, list[Recording]] = {}
+        for log in found_logs(self.run.logs):
+            found.setdefault(f"{log.sensor}/{log.name}", []).append(log)
+        for key in self.run.held_back:
+            found[key] = self._as_it_is(key, found.get(key, []))
+        return sorted(chain.from_iterable(found.values()), key=lambda log: log.path)
+
+    def _as_it_is(self, key: str, logs: list[Recording]) -> list[Recording]:
+        """Return a recording that is held back, if its results are there; its log may be not."""
+        sensor, _, name = key.partition("/")
+        folder = self.run.results / "recordings" / sensor / name
+        if (sensor, name) in self._simulated or not all(
+            (folder / file).is_file() for file in _OF_INGEST
+        ):
+            return []
+        path = logs[0].path if logs else self.run.logs / sensor / name
+        notes = logs[0].notes if logs else path.with_name(f"{name}.yaml")
+        there = notes if notes and notes.is_file() else None
+        return [Recording(sensor, name, path, there, simulated=False, held_back=True)]
+
+    def _to_simulate(self) -> list[Recording]:
+        return [
+            Recording(
+                sensor, name, self.run.results / "simulated" / sensor / name, None, simulated=True
+            )
+            for sensor, name in self._simulated
+        ]
+
+    def attempt(self, step: str, sensor: str, name: str | None = None) -> int:
+        """Return how often a step had failed and was tried again, with this run: what failed is.
+
+        Of a recording that is held back nothing is.
+        """
+        held_back = name is not None and self.recordings[sensor, name].held_back
+        return self.faults.attempt((step, sensor, name), again=not held_back)
+
+    def ingest_settings(self, sensor: str, name: str) -> str:
+        """Return what the ingest of a recording depends on, its error where it cannot be read.
+
+        The log is known by its `fingerprint`, which is taken once a run.
+        """
+        key = (sensor, name)
+        if key not in self._of_ingest:
+            self._of_ingest[key] = _text(self._ingest(self.recordings[key]))
+        return self._of_ingest[key]
+
+    def _ingest(self, recording: Recording) -> dict[str, object]:
+        settings: dict[str, object] = {
+            "simulated": recording.simulated,
+            "kind": self.kind(recording.sensor, recording.name),
+            "quality": self.run.quality.model_dump(mode="json"),
+        }
+        try:
+            log, notes = self._written(recording)
+            if recording.simulated:
+                log = layout(self._simulated[recording.sensor, recording.name], log)
+            else:
+                try:
+                    notes.check_gyro(log)
+                except ValueError as error:
+                    raise ConfigError(f"{recording.notes}: {error}") from None
+            if settings["kind"] != "rate_table":
+                log = log.model_copy(update={"table_rate": None})
+            written = log.model_dump(mode="json", exclude={"bandwidth"})
+            said = notes.model_dump(mode="json", exclude={"log", *_EXPERIMENTS})
+            return settings | {"notes": said, "log": written, "files": fingerprints(recording)}
+        except ConfigError as error:
+            return settings | {"error": str(error)}
+
+    def kind(self, sensor: str, name: str) -> Kind:
+        """Return what was done with the sensor; what its notes were to say, if they are wrong."""
+        recording = self.recordings[sensor, name]
+        if recording.simulated:
+            return self._simulated[sensor, name].kind
+        try:
+            return kind_of(self._notes(recording))
+        except ConfigError:
+            return "static"
+
+    def _notes(self, recording: Recording) -> object:
+        """Return what the file of notes beside a log holds, which is read once a run."""
+        if recording.notes is None:
+            return {}
+        if recording.notes not in self._read_notes:
+            self._read_notes[recording.notes] = read_yaml(recording.notes) or {}
+        return self._read_notes[recording.notes]
+
+    @cached_property
+    def turned(self) -> list[tuple[str, str]]:
+        """Sensor and name of the recordings of gyros that were turned."""
+        return [key for key in self.recordings if self.kind(*key) == "two_position"]
+
+    def static_of(self, sensor: str) -> list[str]:
+        """Return the static recordings of a sensor."""
+        return self._at_rest.get(sensor, [])
+
+    @cached_property
+    def _at_rest(self) -> dict[str, list[str]]:
+        found: dict[str, list[str]] = {}
+        for sensor, name in self.recordings:
+            if self.kind(sensor, name) == "static":
+                found.setdefault(sensor, []).append(name)
+        return found
+
+    @cached_property
+    def calibrated(self) -> list[tuple[str, str]]:
+        """Sensor and name of the recordings on a rate table, or with a direction that is stated."""
+        return [key for key in self.recordings if self._calibrates(*key)]
+
+    def _calibrates(self, sensor: str, name: str) -> bool:
+        if self.kind(sensor, name) == "rate_table":
+            return True
+        recording = self.recordings[sensor, name]
+        if recording.simulated:
+            return self._simulated[sensor, name].pointing is not None
+        try:
+            notes = self._notes(recording)
+        except ConfigError:
+            return False
+        return isinstance(notes, Mapping) and notes.get("pointing") is not None
+
+    def experiment_settings(self, sensor: str, name: str) -> str:
+        """Return what is found of a turned or a stated axis depends on beside the samples."""
+        recording = self.recordings[sensor, name]
+        known = self.sensors.get(sensor)
+        settings: dict[str, object] = {
+            "earth_rate": self.run.earth_rate.model_dump(mode="json"),
+            "sensor": known.model_dump(mode="json", exclude_unset=True) if known else None,
+        }
+        if recording.simulated:
+            entry = self._simulated[sensor, name]
+            published = {"channels": {"__all__": {"published", "figures"}}}
+            return _text(settings | {"simulated": entry.model_dump(mode="json", exclude=published)})
+        try:
+            notes = self._written(recording)[1]
+        except ConfigError:
+            return _text(settings)  # it is rejected, and says why
+        told = notes.model_dump(mode="json", include=set(_EXPERIMENTS), exclude_none=True)
+        return _text(settings | told)
+
+    def outlook_settings(self, sensor: str) -> str:
+        """Return what is predicted of a sensor at rest depends on beside its noise."""
+        known = self.sensors.get(sensor)
+        biases = {key: {"bias_repeatability", "offset"} for key in ("gyro", "accel")}
+        printed = known.datasheet.model_dump(mode="json", include=biases) if known else {}
+        settings = self.run.earth_rate.model_dump(mode="json")
+        return _text({"earth_rate": settings, "datasheet": printed})
+
+    def _written(self, recording: Recording) -> tuple[LogFormat, RecordingNotes]:
+        """Return how the log of a recording is written, and the notes beside it.
+
+        Raises
+        ------
+        ConfigError
+            If it cannot be used.
+        """
+        if recording.error:
+            raise ConfigError(recording.error)
+        notes = RecordingNotes()
+        if recording.notes:
+            notes = parse(RecordingNotes, self._notes(recording), str(recording.notes))
+        if recording.sensor not in self.sensors:
+            expected = self.run.sensors / f"{recording.sensor}.yaml"
+            raise ConfigError(
+                f"no sensor file {expected} for the logs in {self.run.logs / recording.sensor}; "
+                "write one, or move the logs to the folder of their sensor"
+            )
+        sensor = self.sensors[recording.sensor]
+        return merged_log(sensor, notes, str(recording.notes or recording.sensor)), notes
+
+    def estimate_settings(self, sensor: str, name: str) -> str:
+        """Return what the estimates of a recording depend on."""
+        return _text(
+            {
+                "estimate": self.run.estimate.model_dump(mode="json"),
+                "bandwidth": self.bandwidth(sensor, name),
+            }
+        )
+
+    def bandwidth(self, sensor: str, name: str) -> float | None:
+        """Return the stated cut-off of the sensor's own filter, Hz."""
+        try:
+            stated = self._written(self.recordings[sensor, name])[0].bandwidth
+        except ConfigError:
+            return None
+        return quantity_to_si(stated, "frequency") if stated else None
+
+    def simulated_settings(self, sensor: str, name: str) -> str:
+        """Return the parameters of a simulated recording and the layout that it is written in."""
+        recording = self._simulated[sensor, name]
+        written = layout(recording, self.sensors[sensor].log)
+        return _text(
+            {
+                "recording": recording.model_dump(
+                    mode="json", exclude={"channels": {"__all__": {"published", "figures"}}}
+                ),
+                "log": written.model_dump(mode="json", exclude={"bandwidth"}),
+                "profiles": self._profiles(recording),
+            }
+        )
+
+    @staticmethod
+    def _profiles(recording: SimulatedRecording) -> dict[str, str]:
+        try:
+            return {str(path): fingerprint(path) for path in profile_files(recording)}
+        except OSError as error:
+            raise ConfigError(
+                f"{recording.sensor}/{recording.recording}: {error.filename} cannot be read "
+                f"({error.strerror}); expected the file of a profile of temperature or motion"
+            ) from None
+
+    def settings(self, section: str) -> str:
+        """Return one section of the run's configuration."""
+        value = getattr(self.run, section)
+        return _text(value.model_dump(mode="json") if isinstance(value, BaseModel) else value)
+
+    def datasheet_settings(self, sensor: str) -> str:
+        """Return what the comparison with the datasheet of a sensor depends on."""
+        known = self.sensors.get(sensor)
+        return _text(
+            {
+                "datasheet": known.datasheet.model_dump(mode="json") if known else {},
+                "tolerance": self.run.datasheet.tolerance,
+                "longest": self.run.estimate.longest,
+            }
+        )
+
+    def error_budget_settings(self, sensor: str) -> str:
+        """Return the errors that are asked of a sensor's recordings, and what is printed of it."""
+        known = self.sensors.get(sensor)
+        return _text(
+            {
+                "error_budget": self.run.error_budget.model_dump(mode="json"),
+                "requirements": self._requirements(*_OF_RANKING, "title", "note", "example"),
+                "datasheet": known.datasheet.only(IN_USE) if known else {},
+            }
+        )
+
+    def ranking_settings(self) -> str:
+        """Return what the ranking depends on: requirements, and what the sensors have."""
+        sensors = self._described("price_class")
+        for name, about in sensors.items():
+            about["abilities"] = abilities(self.sensors[name]).model_dump(mode="json")
+        requirements = self._requirements("title", "note", "example", "environment")
+        return _text({"requirements": requirements, "sensors": sensors})
+
+    def _requirements(self, *unused: str) -> dict[str, object]:
+        """Return what applications need, without what a step does not use of it."""
+        return {
+            name: {"title": name} | one.model_dump(mode="json", exclude=set(unused))
+            for name, one in self.requirements.items()
+        }
+
+    def _described(self, *keys: str) -> dict[str, dict[str, object]]:
+        """Return what the files of the sensors that have recordings say."""
+        used = {sensor for sensor, _ in self.recordings}
+        return {
+            name: sensor.model_dump(mode="json", include=set(keys))
+            for name, sensor in self.sensors.items()
+            if name in used
+        }
+
+    def report_settings(self) -> str:
+        """Return what the report shows beside the tables."""
+        return _text(
+            {
+                "report": self.run.report.model_dump(mode="json"),
+                "results": str(self.run.results),
+                "given": given_beside(self.run, Path("config/config.yaml")),
+                "settings": {
+                    section: getattr(self.run, section).model_dump(mode="json")
+                    for section in (
+                        "allan",
+                        "estimate",
+                        "reconstruction",
+                        "quality",
+                        "datasheet",
+                        "error_budget",
+                        "fusion",
+                        "earth_rate",
+                    )
+                },
+                "sensors": self._described("vendor", "model", "price_class"),
+                "boards": {name: self._board(board) for name, board in self.boards.items()},
+                "requirements": self._requirements(),
+            }
+        )
+
+    @staticmethod
+    def _board(board: Board) -> dict[str, object]:
+        """Return what the report says of a board beside its tables."""
+        return {
+            "title": board.title,
+            "note": board.note,
+            "sensors": {
+                sensor.sensor: {name: one.figures for name, one in sensor.channels.items()}
+                for sensor in board.sensors
+            },
+            "temperature": board.temperature is not None,
+            "motion": sorted(board.motion),
+        }
+
+    def figures_settings(self) -> str:
+        """Return what the figures of all sensors show beside the tables."""
+        return _text({"report": {"units": self.run.report.units}})
+
+    def catalogue(self, *more: str) -> str:
+        """Return the datasheets of all sensor files, with vendor and model, and more keys."""
+        keys = {"vendor", "model", "datasheet", *more}
+        return _text(
+            {
+                name: sensor.model_dump(mode="json", include=keys) | {"log": _ANY_LOG}
+                for name, sensor in self.sensors.items()
+            }
+        )
+
+    def truths(self, sensor: str) -> str:
+        """Return the true parameters of the simulated recordings of a sensor."""
+        entries = (entry for (of, _), entry in self._simulated.items() if of == sensor)
+        return _text([entry.model_dump(mode="json") for entry in entries])
+
+    @staticmethod
+    def code(step: str) -> str:
+        """Return the digest of the code that a step runs."""
+        return source_digest(*STEPS[step])
+
+
+def _text(value: object) -> str:
+    return json.dumps(value, sort_keys=True, ensure_ascii=False)

@@ -1,0 +1,73 @@
+"""`imubench shortlist`: which sensors are worth logging for a requirement."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command to its parser."""
+    parser.add_argument(
+        "requirement", help="name of a file under --requirements, or such a file: robot.yaml"
+    )
+    parser.add_argument(
+        "--sensors",
+        type=Path,
+        default=Path("config/sensors"),
+        help="folder of the sensor files; default: config/sensors",
+    )
+    parser.add_argument(
+        "--requirements",
+        type=Path,
+        default=Path("config/requirements"),
+        help="folder of the requirements; default: config/requirements",
+    )
+    parser.add_argument(
+        "--results",
+        type=Path,
+        help="of a run: what is measured, and what stands for figures that nobody publishes",
+    )
+
+
+def run(given: argparse.Namespace) -> int:
+    """Print the shortlist; return the exit status."""
+    # Only this command draws and computes: the others answer at once.
+    from rich.console import Console
+
+    from imubench_pipeline.report.shortlist import cells, notes
+    from imubench_pipeline.report.terminal_table import fitting
+    from imubench_pipeline.settings.requirements import Requirement, read_requirements
+    from imubench_pipeline.settings.sensor import read_sensors
+    from imubench_pipeline.settings.validation import ConfigError, parse, read_yaml
+    from imubench_pipeline.steps.shortlist import NEEDED, rows_of_run
+
+    try:
+        path = Path(given.requirement)
+        if path.suffix in (".yaml", ".yml"):
+            name, asked = path.stem, parse(Requirement, read_yaml(path), str(path))
+        else:
+            known = read_requirements(given.requirements)
+            if given.requirement not in known:
+                there = ", ".join(known) or "none"
+                raise ConfigError(f"no requirement {given.requirement!r}; there are: {there}")
+            name, asked = given.requirement, known[given.requirement]
+        sensors = read_sensors(given.sensors)
+        tables = {}
+        if given.results is not None:
+            folder = given.results / "tables"
+            folder = folder if folder.is_dir() else given.results
+            tables = {table: folder / f"{table}.parquet" for table in NEEDED}
+        rows = list(rows_of_run({name: asked}, sensors, tables))
+    except (ConfigError, OSError, ValueError) as error:
+        print(error, file=sys.stderr)
+        return 2
+    console = Console(highlight=False, markup=False, emoji=False)
+    margins = [f"Margin\n{which}" for which in ("at best", "at worst", "measured")]
+    heads = ["Sensor", "Verdict", *margins, "Limit"]
+    lines = [cells(row) for row in rows]
+    console.print(fitting(asked.title, heads, lines, console.width, names=0))
+    for note in notes(rows):
+        console.print(note, soft_wrap=True)
+    return 0

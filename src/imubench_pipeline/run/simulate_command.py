@@ -1,0 +1,319 @@
+"""`imubench simulate`: a log of a sensor, to test a filter on."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from imubench_pipeline.settings.validation import ConfigError, parse, read_yaml
+from imubench_pipeline.units import UnitError, naming, quantity_to_si
+
+if TYPE_CHECKING:
+    from imubench_pipeline.simulate.profiles import Profile
+    from imubench_pipeline.simulate.sources import Origin
+
+_YAML = (".yaml", ".yml")
+_MOST = 1 << 36
+_WORTH_SAYING = 1.02
+_PATIENCE = 3.0
+"""Seconds between two lines of progress where there is no terminal."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command to its parser."""
+    parser.add_argument(
+        "sensor", help="name of a sensor file, whose datasheet is taken, or a file of models"
+    )
+    parser.add_argument("--out", type=Path, required=True, help="log to write: .parquet or .csv")
+    length = parser.add_mutually_exclusive_group(required=True)
+    length.add_argument("--hours", type=float, help="length of the log")
+    length.add_argument("--duration", metavar="TIME", help="length with its unit, such as 90 s")
+    parser.add_argument("--rate", metavar="FREQUENCY", help="default: that of the sensor file")
+    parser.add_argument(
+        "--temperature",
+        metavar="PROFILE",
+        help="a temperature such as '25 degC', a YAML file with a formula, or a CSV or Parquet "
+        "file with columns 'time [s]' and 'temperature [degC]'",
+    )
+    parser.add_argument(
+        "--motion",
+        metavar="PROFILE",
+        type=Path,
+        help="a YAML file with a formula for each channel, or a CSV or Parquet file with columns "
+        "'time [s]' and 'gyro_x [deg/s]' to 'accel_z [m/s^2]'; default: at rest, and no gravity",
+    )
+    parser.add_argument("--seed", type=int, default=1, help="of the noise; default: 1")
+    parser.add_argument(
+        "--results", type=Path, help="folder of a run: its estimates replace printed figures"
+    )
+    parser.add_argument("--recording", help="of --results; default: the longest of the sensor")
+    parser.add_argument(
+        "--sensors", type=Path, default=Path("config/sensors"), help="folder of the sensor files"
+    )
+    parser.add_argument("--channels", help="comma between them; default: all of the sensor")
+
+
+def run(given: argparse.Namespace) -> int:
+    """Simulate the log; return the exit status."""
+    try:
+        _run(given)
+    except (ConfigError, UnitError) as error:
+        print(error, file=sys.stderr)
+        return 2
+    except OSError as error:
+        print(f"{given.out}: {error.strerror or error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+def _run(given: argparse.Namespace) -> None:
+    # Numerics are loaded for this command only: the others answer at once.
+    from imubench_pipeline.settings.sensor import TEMPERATURE
+    from imubench_pipeline.simulate.imu import simulate_imu
+    from imubench_pipeline.simulate.writing import MARK, layout, notes_path, write_log, write_notes
+
+    origin, sensor = _origin(given)
+    log = None if sensor is None else sensor.log
+    rate = _rate(given.rate, log)
+    duration = _duration(given.duration, given.hours, rate)
+    samples = round(duration * rate)
+    motion, temperature = _profiles(given, origin)
+    columns = [*origin.imu.axes, *([TEMPERATURE] if temperature is not None else [])]
+    form = layout(given.out, columns, rate, log)
+    notes_path(given.out)
+    if temperature is None and any(axis.drift for axis in origin.imu.axes.values()):
+        origin.assume("drift", "no drift with temperature: none is given (--temperature)")
+    for text in (*_ended(duration, motion, temperature), *_folded(origin, rate)):
+        origin.assume("log", text)
+    if not motion:
+        origin.assume("log", "at rest, and no gravity (--motion)")
+    remarks = [MARK, f"from {origin.said}"]
+    figures = {name: [one.text for one in said] for name, said in origin.figures.items()}
+    assumed = [one.text for one in origin.assumed]
+    remarks += [f"{name}: {line}" for name, lines in figures.items() for line in lines]
+    remarks += [f"assumed: {line}" for line in _short(assumed)]
+    print(f"{remarks[0]}: {samples:,} samples of {', '.join(columns)} at {rate:g} Hz")
+    print("\n".join(_short(remarks[1:])), flush=True)
+    name = given.out.stem
+    known = origin.sensor or Path(given.sensor).stem
+    metadata = {
+        "sensor": known,
+        "device": "simulated",
+        "recording": name,
+        "kind": "static" if not motion else "in_motion",
+        "simulated": True,
+        "sources": [],
+        "reader": None,
+        "begins": 0.0,
+        "started": None,
+        "rate": rate,
+        "rate_from": "stated",
+        "uniform": True,
+        "holes": dict.fromkeys(columns, False),
+        "unusable": [],
+        "simulation": {
+            "from": origin.said,
+            "figures": figures,
+            "assumed": assumed,
+            "seed": given.seed,
+            "model": {channel: repr(axis) for channel, axis in origin.imu.axes.items()},
+            "temperature": given.temperature,
+            "motion": None if given.motion is None else str(given.motion),
+        },
+    }
+    # A name of its own in the stream: the same seed gives every sensor its own noise.
+    blocks = simulate_imu(
+        origin.imu,
+        rate,
+        samples,
+        given.seed,
+        (known,),
+        motion=motion,
+        temperature=temperature,
+        threads=os.cpu_count() or 1,
+    )
+    with _progress(samples) as said:
+        write_log(given.out, blocks, columns, form, metadata, remarks, said)
+    write_notes(given.out, form, log, f"from {origin.said}")
+    size = given.out.stat().st_size / 1e6
+    print(f"{given.out}: {size:.1f} MB; {given.out.with_suffix('.yaml')} says how it is written")
+
+
+def _origin(given: argparse.Namespace) -> tuple[Origin, Any]:
+    """Return the model, and the sensor file where there is one."""
+    from imubench_pipeline.settings.sensor import CHANNELS, Sensor
+    from imubench_pipeline.simulate import sources
+    from imubench_pipeline.simulate.from_datasheet import from_datasheet
+    from imubench_pipeline.simulate.from_estimates import with_estimates
+    from imubench_pipeline.simulate.imu import ImuModel
+
+    asked = [name.strip() for name in given.channels.split(",")] if given.channels else None
+    if unknown := [name for name in asked or [] if name not in CHANNELS]:
+        raise ConfigError(f"no channel {unknown[0]!r}; expected of {', '.join(CHANNELS)}")
+    path = Path(given.sensor)
+    if path.suffix in _YAML:
+        if given.results:
+            raise ConfigError("--results are for a sensor by name; the file of models has its own")
+        origin = sources.from_file(path)
+        own = origin.sensor and given.sensors / f"{origin.sensor}.yaml"
+        sensor = parse(Sensor, read_yaml(own), str(own)) if own else None
+    else:
+        file = given.sensors / f"{given.sensor}.yaml"
+        if not file.is_file():
+            there = ", ".join(sorted(one.stem for one in given.sensors.glob("*.yaml"))) or "none"
+            raise ConfigError(
+                f"{file}: no such sensor file; there are: {there}; or name a file of models"
+            )
+        sensor = parse(Sensor, read_yaml(file), str(file))
+        try:
+            origin = from_datasheet(given.sensor, sensor, given.seed)
+        except ConfigError:
+            if not given.results:
+                raise
+            origin = sources.Origin(ImuModel(axes={}), "", sensor=given.sensor)
+        if given.results:
+            origin = with_estimates(origin, given.results, given.sensor, given.recording)
+    if asked:
+        origin = sources.only(origin, asked)
+    return origin, sensor
+
+
+def _rate(text: str | None, log: Any) -> float:
+    if text is not None:
+        with naming("--rate: "):
+            rate = quantity_to_si(text, "frequency")
+        if rate <= 0:
+            raise ConfigError(f"--rate {text}: expected a frequency above 0")
+        return rate
+    if log is None or log.rate_hz is None:
+        raise ConfigError("the sensor file states no rate; expected --rate such as '100 Hz'")
+    return float(log.rate_hz)
+
+
+def _duration(text: str | None, hours: float | None, rate: float) -> float:
+    """Return the length of the log in s."""
+    if text is not None:
+        with naming("--duration: "):
+            duration = quantity_to_si(text, "time")
+        option = f"--duration {text}"
+    else:
+        assert hours is not None  # one of them is required
+        duration, option = 3600.0 * hours, f"--hours {hours:g}"
+    if not math.isfinite(duration):
+        raise ConfigError(f"{option}: expected a length of 1 to {_MOST} samples")
+    samples = round(duration * rate)
+    if not 1 <= samples <= _MOST:
+        raise ConfigError(
+            f"{option}: {duration:g} s at {rate:g} Hz are {samples} samples; expected 1 to {_MOST}"
+        )
+    return duration
+
+
+def _profiles(
+    given: argparse.Namespace, origin: Origin
+) -> tuple[dict[str, Profile], Profile | None]:
+    from imubench_pipeline.settings.profile_forms import Surroundings
+    from imubench_pipeline.simulate.profile_files import FileSeries
+    from imubench_pipeline.simulate.profiles import profiles_of
+
+    forms: dict[str, Any] = {}
+    folder = Path()
+    if given.motion is not None:
+        if given.motion.suffix in _YAML:
+            read = read_yaml(given.motion)
+            forms["motion"] = read.get("motion", read) if isinstance(read, dict) else read
+            folder = given.motion.parent
+        else:
+            names = [n for n in FileSeries(given.motion).names if n.startswith(("gyro_", "accel_"))]
+            if not names:
+                raise ConfigError(f"{given.motion}: no column gyro_x to accel_z")
+            forms["motion"] = {n: {"form": "file", "file": str(given.motion)} for n in names}
+    motion, _ = profiles_of(parse(Surroundings, forms, str(given.motion)), folder)
+    if given.temperature is None:
+        return motion, None
+    path, folder = Path(given.temperature), Path()
+    if path.suffix in _YAML:
+        read = read_yaml(path)
+        warm = read.get("temperature", read) if isinstance(read, dict) else read
+        folder = path.parent
+    elif path.suffix in (".csv", ".parquet", ".txt"):
+        warm = {"form": "file", "file": str(path)}
+    else:
+        with naming("--temperature: "):
+            quantity_to_si(given.temperature, "temperature")
+        warm = given.temperature
+    around = parse(Surroundings, {"temperature": warm}, given.temperature)
+    _, temperature = profiles_of(around, folder)
+    return motion, temperature
+
+
+def _ended(
+    duration: float, motion: Mapping[str, Profile], temperature: Profile | None
+) -> list[str]:
+    """Say which files end before the log."""
+    from imubench_pipeline.simulate.profiles import FileColumn
+
+    profiles = [*motion.values(), *([] if temperature is None else [temperature])]
+    series = dict.fromkeys(one.series for one in profiles if isinstance(one, FileColumn))
+    spans = {one.path: one.span() for one in series}
+    return [
+        f"{path} is from {first:g} to {last:g} s: its ends are held before and after"
+        for path, (first, last) in spans.items()
+        if first > 0 or last < 0.999 * duration
+    ]
+
+
+def _folded(origin: Origin, rate: float) -> list[str]:
+    """Say how much of the white noise beyond Nyquist sampling folds into the log."""
+    from imubench_pipeline.simulate.noise_in_log import folding
+
+    found = []
+    for channel, axis in origin.imu.axes.items():
+        more = folding(axis, rate)
+        if more > _WORTH_SAYING:
+            found.append(
+                f"{channel}: N is the density before the low-pass; sampled at {rate:g} Hz the log "
+                f"shows {math.sqrt(more):.3g} N, for noise beyond {rate / 2:g} Hz is folded into it"
+            )
+    return found
+
+
+def _short(lines: list[str]) -> list[str]:
+    """Say once what holds for several channels."""
+    found: dict[str, list[str]] = {}
+    for line in lines:
+        name, colon, rest = line.partition(": ")
+        if colon and name.startswith(("gyro_", "accel_")) and " " not in name:
+            found.setdefault(rest, []).append(name)
+        else:
+            found[line] = []
+    return [f"{', '.join(names)}: {line}" if names else line for line, names in found.items()]
+
+
+@contextmanager
+def _progress(samples: int) -> Iterator[Callable[[int], None]]:
+    """Give what is told how many samples there are, and shows it."""
+    if sys.stderr.isatty():
+        from rich.console import Console
+        from rich.progress import Progress
+
+        with Progress(console=Console(stderr=True), transient=True) as bar:
+            task = bar.add_task("simulating", total=samples)
+            yield lambda done: bar.update(task, completed=done)
+        return
+    last = time.monotonic()
+
+    def said(done: int) -> None:
+        nonlocal last
+        if time.monotonic() - last >= _PATIENCE and done < samples:
+            last = time.monotonic()
+            print(f"{100 * done / samples:.0f} % simulated", file=sys.stderr, flush=True)
+
+    yield said

@@ -1,0 +1,167 @@
+"""The process that forks for each step of the workflow; started by `run.processes`."""
+
+from __future__ import annotations
+
+import fcntl
+import gc
+import importlib
+import json
+import os
+import pickle
+import resource
+import runpy
+import select
+import signal
+import socket
+import sys
+import traceback
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from types import FrameType, SimpleNamespace
+from typing import Any
+
+from numba import njit
+
+from imubench_pipeline.report.run_summary import one_line
+from imubench_pipeline.run.processes import BEGUN, DONE, FAILED, KILLED, LENGTH
+
+_LONGEST = 300
+"""Letters of an error in one line."""
+
+
+def serve(requests: socket.socket) -> None:
+    """Fork for each connection that comes through a socket, until the other end is closed.
+
+    Parameters
+    ----------
+    requests : socket
+        Brings a connection for each step: through it come the path of the script and the
+        attributes of the object ``snakemake``, and it is told how the step ended.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the forks end, and that the run ends is seen
+    signal.signal(signal.SIGCHLD, _reap)
+    ready: dict[str, bool] = {}
+    while True:
+        _, descriptors, _, _ = socket.recv_fds(requests, 1, 1)
+        if not descriptors:
+            return
+        with socket.socket(fileno=descriptors[0]) as connection:
+            with connection.makefile("rb") as stream:
+                size = int.from_bytes(stream.read(8), "big")
+                script, given = pickle.loads(stream.read(size))
+            if script not in ready:
+                ready[script] = _import_what_it_needs(script)
+            # Until a fork is known, that it has ended must not be heard of.
+            signal.pthread_sigmask(signal.SIG_BLOCK, _ENDED)
+            fork = os.fork()
+            if fork == 0:
+                requests.close()
+                _run(connection, script, given, imported=ready[script])
+            _running[fork] = connection.dup()
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDED)
+
+
+_ENDED = {signal.SIGCHLD}
+
+_running: dict[int, socket.socket] = {}
+"""The connection of each fork, by its process."""
+
+
+def _reap(signal_number: int, frame: FrameType | None) -> None:
+    """Say of the forks that were killed, by what: they cannot."""
+    with suppress(ChildProcessError):
+        while True:
+            process, status = os.waitpid(-1, os.WNOHANG)
+            if not process:
+                return
+            connection = _running.pop(process, None)
+            if connection is None:
+                continue
+            with connection, suppress(OSError):
+                if os.WIFSIGNALED(status):
+                    connection.sendall(_message(KILLED, {"signal": os.WTERMSIG(status)}))
+
+
+def _message(how: bytes, told: Mapping[str, Any]) -> bytes:
+    text = json.dumps(told).encode()
+    return how + len(text).to_bytes(LENGTH, "big") + text
+
+
+def _import_what_it_needs(script: str) -> bool:
+    """Import what a script does; return whether that was possible."""
+    try:
+        runpy.run_path(script, run_name="imports")
+        # What two libraries put off until they are first used: half of what imports cost.
+        importlib.import_module("pyarrow.dataset")
+        _nothing()
+    except (Exception, SystemExit):
+        return False  # the fork meets the same error, and says it
+    gc.collect()
+    gc.freeze()  # what the forks share stays shared
+    return True
+
+
+@njit(cache=True)
+def _nothing() -> None:
+    """Make numba load what every function needs that it has compiled before."""
+
+
+def _run(
+    connection: socket.socket, script: str, given: Mapping[str, Any], *, imported: bool
+) -> None:
+    """Run a script in this fork, say how it ended, and end."""
+    how, told = FAILED, {"imported": imported, "error": "", "trace": "", "errno": None}
+    try:
+        for other in _running.values():
+            other.close()
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDED)
+        if sys.platform == "linux":
+            _end_with_who_asked(connection)
+            Path("/proc/self/comm").write_text(Path(script).stem)  # for ps and top
+        connection.sendall(BEGUN)
+        runpy.run_path(
+            script, init_globals={"snakemake": SimpleNamespace(**given)}, run_name="__main__"
+        )
+        how = DONE
+    except BaseException as error:
+        told["trace"] = _said(error, script)
+        told["error"] = one_line("".join(traceback.format_exception_only(error)), _LONGEST)
+        told["errno"] = error.errno if isinstance(error, OSError) else None
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        used = resource.getrusage(resource.RUSAGE_SELF)
+        cost = {"cpu": used.ru_utime + used.ru_stime, "memory": used.ru_maxrss * 1024 / 1e6}  # KiB
+        connection.sendall(_message(how, cost if how == DONE else told))
+        os._exit(how != DONE)
+
+
+def _end_with_who_asked(connection: socket.socket) -> None:
+    """Have the system end this process as soon as the other end of a connection is closed.
+
+    That the server ends would tell later: it may be importing what another step needs, while the
+    next run begins.
+    """
+    signal.signal(signal.SIGIO, signal.SIG_DFL)
+    fcntl.fcntl(connection, fcntl.F_SETOWN, os.getpid())
+    fcntl.fcntl(connection, fcntl.F_SETFL, fcntl.fcntl(connection, fcntl.F_GETFL) | os.O_ASYNC)
+    if select.select([connection], [], [], 0.0)[0]:  # closed before; nothing more is ever sent
+        os._exit(1)
+
+
+def _said(error: BaseException, script: str) -> str:
+    """Print where the script failed, without how it was started, and return it."""
+    trace = error.__traceback__
+    while trace is not None and trace.tb_frame.f_code.co_filename != script:
+        trace = trace.tb_next
+    text = "".join(traceback.format_exception(error.with_traceback(trace or error.__traceback__)))
+    sys.stderr.write(text)
+    return text
+
+
+if __name__ == "__main__":
+    with socket.socket(fileno=int(sys.argv[1])) as given_requests:
+        serve(given_requests)

@@ -1,1 +1,0 @@
-"""The model of a sensor, and logs simulated from it."""

@@ -1,0 +1,295 @@
+"""The configuration of one run."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, field_validator
+
+from imubench_pipeline.settings.known_rates import AccelerationFromZero, RateFromZero
+from imubench_pipeline.settings.quality import QualitySettings
+from imubench_pipeline.settings.requirements import Axis, Latitude, Time
+from imubench_pipeline.settings.two_position import TimeFromZero
+from imubench_pipeline.settings.validation import (
+    ConfigError,
+    Duration,
+    FractionOfLog,
+    Frequency,
+    Strict,
+    Text,
+    parse,
+    read_yaml,
+)
+
+_OF_NO_RECORDING = {"held_back", "exports", "limits", "report"}
+
+
+class AllanSettings(Strict):
+    """The grid of tau and the kernel."""
+
+    overlap: Literal["full", "octave"] = Field(
+        "octave",
+        description="octave: clusters that start 1/48 of their length apart, fast and as sure; "
+        "full: every cluster",
+    )
+    per_decade: int = Field(10, ge=1, le=100, description="cluster sizes per decade of tau")
+    longest: FractionOfLog = Field(0.5, description="longest tau, as a part of the log")
+
+
+HeldBack = Annotated[Text, Field(pattern=r"^[^/]+/[^/]+$", examples=["my_sensor/run_7"])]
+
+Method = Literal["likelihood", "likelihood_gm", "compensated", "curve", "paper", "weighted"]
+
+
+class EstimateSettings(Strict):
+    """How the noise parameters are estimated."""
+
+    methods: tuple[Method, ...] = Field(
+        ("likelihood", "likelihood_gm", "compensated", "curve", "paper", "weighted"), min_length=1
+    )
+
+    longest: FractionOfLog = Field(
+        1 / 9, description="longest tau of a fit to the curve, as a part of the log"
+    )
+    band: Frequency | None = Field(
+        None,
+        description="highest frequency in the likelihood; null: all, behind the low-pass that the "
+        "spectrum shows",
+    )
+    seed: int = Field(
+        20260101, ge=0, description="of the draws that give the intervals, and fill holes"
+    )
+
+    @field_validator("methods")
+    @classmethod
+    def _once(cls, methods: tuple[Method, ...]) -> tuple[Method, ...]:
+        if len(set(methods)) < len(methods):
+            raise ValueError(f"{', '.join(methods)}: a method stands twice")
+        if methods == ("compensated",):
+            raise ValueError("compensated stands beside another method, such as likelihood")
+        return methods
+
+
+class ReconstructionSettings(Strict):
+    """The simulated logs that a model is judged by."""
+
+    members: int = Field(1, ge=1, description="full-length logs per channel and method")
+    band_members: int = Field(200, ge=200, description="members of the 95 % band")
+    keep_series: bool = Field(False, description="keep the full-length logs as Parquet")
+    seed: int = Field(20260101, ge=0)
+
+
+class DatasheetSettings(Strict):
+    """The comparison with printed figures."""
+
+    tolerance: float = Field(
+        0.1, gt=0, description="relative difference that still counts as 'as printed'"
+    )
+
+
+class ErrorBudgetSettings(Strict):
+    """What the noise means for dead reckoning, for every recording."""
+
+    times: tuple[Time, ...] = Field(
+        ("1 s", "10 s", "60 s", "600 s"), min_length=1, description="of dead reckoning, and of rest"
+    )
+    static_window: Time = Field(
+        "60 s", description="at rest right before, from which biases and tilt are taken"
+    )
+    latitude: Latitude = Field("45 deg", description="where gyros look for north")
+    axes: tuple[Axis, ...] = Field(("worst", "median"), min_length=1)
+    draws: int = Field(200, ge=20, description="noise models that give the interval of an error")
+    seed: int = Field(20260101, ge=0)
+
+
+class DecideSettings(Strict):
+    """Which recordings decide although something speaks against it."""
+
+    include: tuple[HeldBack, ...] = Field(
+        (),
+        description="unfit recordings that enter rankings, pools and exports all the same",
+    )
+
+
+class ExportSettings(Strict):
+    """The files that filters and simulators load, of every sensor."""
+
+    targets: tuple[Text, ...] = Field(
+        ("kalibr", "json"), description="programs; `imubench export` knows their names"
+    )
+    axis: Text = Field("worst", description="worst or median axis, a device or a recording")
+    horizon: Time = Field(
+        "60 s", description="of coasting, for which terms that a program lacks are mapped"
+    )
+    inflation: float = Field(1.0, ge=1, description="multiplies every deviation")
+    because: Text | None = Field(
+        None,
+        description="reason of the inflation, or of the use of unfit recordings, for the files",
+    )
+    overbound: bool = Field(
+        False, description="the smallest model above the upper limit of the curve instead"
+    )
+    most_excess: float = Field(
+        3.0, gt=1, description="an overbound so many times its limit (Allan deviation) is refused"
+    )
+
+
+class CommonSettings(Strict):
+    """Part of the variance that specimens of one sensor have in common, 0 to 1."""
+
+    N: float = Field(0.0, ge=0, le=1, description="of the white noise, such as of a shared supply")
+    B: float = Field(0.0, ge=0, le=1, description="of flicker noise and Gauss-Markov processes")
+    K: float = Field(0.0, ge=0, le=1, description="of the random walk, such as of temperature")
+    R: float = Field(0.0, ge=0, le=1, description="of the ramp, such as of ageing")
+
+
+class FusionSettings(Strict):
+    """How many of one sensor equal one of another."""
+
+    tau: tuple[Time, ...] = Field(
+        ("1 s", "10 s", "100 s", "1000 s"), min_length=1, description="where they are compared"
+    )
+    common: CommonSettings = Field(
+        CommonSettings(), description="part of the variance that specimens share: not averaged away"
+    )
+    longest: FractionOfLog = Field(
+        1 / 9, description="longest tau that a log tells, as a part of it"
+    )
+    draws: int = Field(200, ge=100, description="noise models that give the interval of a number")
+    seed: int = Field(20260101, ge=0)
+
+
+class EarthRateSettings(Strict):
+    """The Earth's rate from gyros that were turned, and what it would take."""
+
+    margin: TimeFromZero = Field(
+        "0.5 s", description="left out on both sides of a turn that is seen"
+    )
+    goals: tuple[float, ...] = Field(
+        (1.0, 0.1, 0.01),
+        min_length=1,
+        description="standard deviations that are asked for, as a part of the Earth's rate",
+    )
+    run_time: Time = Field("1 h", description="of a run, for which the best dwell is sought")
+    latitude: Latitude = Field(
+        "45 deg", description="where sensors at rest are to find the Earth's rate, and north"
+    )
+    gyro_bias: RateFromZero = Field(
+        "0.5 deg/s",
+        description="standard deviation of the fixed bias of gyros whose datasheet prints none",
+    )
+    accelerometer_bias: AccelerationFromZero = Field(
+        "20 mg",
+        description="standard deviation of that of accelerometers, likewise",
+    )
+    draws: int = Field(60, ge=20, description="noise models that give the range of a sigma")
+
+    @field_validator("goals")
+    @classmethod
+    def _above_zero(cls, goals: tuple[float, ...]) -> tuple[float, ...]:
+        if min(goals) <= 0:
+            raise ValueError("expected parts above 0, such as 0.01 for 1 %")
+        return goals
+
+
+class LimitSettings(Strict):
+    """How long a step may take of one recording or sensor, which is left out beyond."""
+
+    recording: Duration = Field("10 min", description="each step of a recording")
+    million_values: Duration = Field(
+        "30 s", description="of it more for each million values of the log"
+    )
+    sensor: Duration = Field("10 min", description="each step of a sensor")
+    each_recording: Duration = Field(
+        "2 s", description="of it more for each of the sensor's recordings"
+    )
+
+
+class ReportSettings(Strict):
+    """The report."""
+
+    title: str = "Inertial sensor benchmark"
+    units: Literal["practical", "si"] = Field(
+        "practical", description="practical: deg/sqrt(h), deg/h, ug; si: rad/s, m/s^2"
+    )
+
+
+def _path_or_none(value: object) -> object:
+    return None if str(value).strip().lower() in {"false", "none", "null", ""} else value
+
+
+class Run(Strict):
+    """One run: where the logs are, and the settings of each step."""
+
+    logs: Path = Field(Path("logs"), description="the drop zone: logs/<sensor>/<recording>")
+    results: Path = Field(Path("results"), description="where a run leaves its results")
+    sensors: Path = Field(Path("config/sensors"), description="folder of the sensor files")
+    simulated: Annotated[
+        Path | None, BeforeValidator(_path_or_none, json_schema_input_type=str | bool | None)
+    ] = Field(Path("config/simulated.yaml"), description="simulated recordings; false: none")
+    requirements: Annotated[
+        Path | None, BeforeValidator(_path_or_none, json_schema_input_type=str | bool | None)
+    ] = Field(
+        Path("config/requirements"), description="what applications need, a file each; false: none"
+    )
+    held_back: tuple[HeldBack, ...] = Field(
+        (), description="recordings whose logs are not read; results that are there stay"
+    )
+    allan: AllanSettings = AllanSettings()
+    estimate: EstimateSettings = EstimateSettings()
+    reconstruction: ReconstructionSettings = ReconstructionSettings()
+    quality: QualitySettings = QualitySettings()
+    datasheet: DatasheetSettings = DatasheetSettings()
+    error_budget: ErrorBudgetSettings = ErrorBudgetSettings()
+    decide: DecideSettings = DecideSettings()
+    exports: ExportSettings = ExportSettings()
+    fusion: FusionSettings = FusionSettings()
+    earth_rate: EarthRateSettings = EarthRateSettings()
+    limits: LimitSettings = LimitSettings()
+    report: ReportSettings = ReportSettings()
+
+
+def read_run(config: Mapping[str, object], file: str = "config/config.yaml or --config") -> Run:
+    """Validate the configuration of a run, as Snakemake hands it over (numbers may be text)."""
+    return parse(Run, config, file)
+
+
+def given_beside(run: Run, file: Path) -> list[str]:
+    """Return what a run was given beside its file, as ``snakemake --config`` takes it.
+
+    What does not matter to the results of a recording is left out.
+
+    Parameters
+    ----------
+    run : Run
+    file : Path
+        The configuration that Snakemake reads by itself.
+    """
+    try:
+        written = parse(Run, read_yaml(file), str(file))
+    except ConfigError:
+        written = Run()
+    here, there = (one.model_dump(mode="json", exclude=_OF_NO_RECORDING) for one in (run, written))
+    return [f"{key}={_as_given(value)}" for key, value in _differing(here, there).items()]
+
+
+def _differing(here: Mapping[str, Any], there: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what is not there, or otherwise."""
+    found: dict[str, Any] = {}
+    for key, value in here.items():
+        other = there.get(key)
+        if isinstance(value, Mapping) and isinstance(other, Mapping):
+            if inner := _differing(value, other):
+                found[key] = inner
+        elif value != other:
+            found[key] = value
+    return found
+
+
+def _as_given(value: object) -> str:
+    if value is None:
+        return "false"  # files that are left out: no other entry outside of a group may be null
+    return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)

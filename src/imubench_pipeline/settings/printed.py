@@ -1,0 +1,328 @@
+"""What vendors print of a sensor, as it stands in the file of that sensor."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterator, Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    BeforeValidator,
+    Field,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
+
+from imubench_pipeline.settings.conversions import Filter
+from imubench_pipeline.settings.validation import Duration, Frequency, Strict, Text
+from imubench_pipeline.units import UnitError, dimension_of, quantity_to_si, to_si
+
+Value = float | tuple[float, ...] | dict[str, float]
+Kind = Literal["typ", "max", "min", "range", "choices", "1sigma", "derived"]
+
+
+def _number(value: object) -> float:
+    """Return a finite number; YAML reads 5e-3 as text."""
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise ValueError
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError
+    return number
+
+
+def _printed_value(value: object) -> Value | None:
+    try:
+        if value is None:
+            return None
+        if isinstance(value, Mapping):
+            axes = {str(key).lower(): _number(number) for key, number in value.items()}
+            named = "".join(axes)
+            if not named or not set(named) <= set("xyz") or len(set(named)) < len(named):
+                raise ValueError
+            return axes
+        if isinstance(value, (list, tuple)):
+            return tuple(_number(number) for number in value)
+        return _number(value)
+    except ValueError:
+        found = f"found {dict(value)}; " if isinstance(value, Mapping) else ""
+        raise ValueError(
+            f"{found}expected a number, one for each axis such as {{xy: 60, z: 80}}, a list "
+            "[low, high], or null: not published"
+        ) from None
+
+
+class PrintedFigure(Strict):
+    """One figure of a datasheet, as printed."""
+
+    value: Annotated[
+        Value | None,
+        BeforeValidator(
+            _printed_value, json_schema_input_type=float | list[float] | dict[str, float] | None
+        ),
+    ] = Field(
+        description="as printed, ± left out; by axis: {xy: 60, z: 80}; [low, high] of a range; "
+        "null: not published"
+    )
+    unit: str | None = Field(None, description="as the vendor writes it")
+    kind: Kind = Field(
+        "typ", description="choices: what can be selected; derived: computed from another figure"
+    )
+    sidedness: Literal["one-sided", "two-sided", "unknown"] = Field(
+        "unknown", description="of a noise density: N is the one-sided density over sqrt(2)"
+    )
+    bandwidth: Frequency | None = Field(
+        None, description="of an rms: the band, from 0, that it is stated for"
+    )
+    filter: Filter = Field(
+        "stated",
+        description="of an rms: stated, the bandwidth is the noise bandwidth, as Bosch, TDK and "
+        "ST compute; or it is the cut-off of a filter of first or second order",
+    )
+    tau: Duration | None = Field(None, description="of an Allan deviation: its averaging time")
+    option: Text | None = Field(
+        None,
+        description="grade, range or mode of the sensor that alone has this figure; which of "
+        "them the logged ones have, 'options' of the datasheet says",
+    )
+    condition: str | None = Field(None, description="temperature, supply and the like, as printed")
+    evidence: str | None = Field(None, description="where the figure or its sidedness is from")
+    source: Literal["primary", "secondary"] | None = Field(
+        None, description="null: that of the datasheet"
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> PrintedFigure:
+        if self.value is None:
+            return self
+        if self.unit is None:
+            raise ValueError("'unit' is missing; expected the unit of the figure as printed")
+        if isinstance(self.value, tuple):
+            if self.kind not in ("range", "choices"):
+                raise ValueError(
+                    f"value {list(self.value)} with kind {self.kind!r}; expected kind range with "
+                    "[low, high], or choices"
+                )
+            ordered = len(self.value) == 2 and self.value[0] < self.value[1]
+            if self.kind == "range" and not ordered:
+                raise ValueError(f"value {list(self.value)}; expected [low, high] of the range")
+        elif self.kind == "range":
+            raise ValueError(f"value {self.value} with kind 'range'; expected [low, high]")
+        else:
+            numbers = self.value.values() if isinstance(self.value, dict) else [self.value]
+            if any(number <= 0 for number in numbers):
+                raise ValueError(f"value {self.value}; expected a figure above 0, ± left out")
+        return self
+
+    def on_axis(self, axis: str) -> float | tuple[float, ...] | None:
+        """Return what is printed for an axis, ``x``, ``y`` or ``z``; None: nothing."""
+        if isinstance(self.value, dict):
+            return next((v for axes, v in self.value.items() if axis in axes), None)
+        return self.value
+
+    @property
+    def tau_s(self) -> float | None:
+        """The averaging time of an Allan deviation, s."""
+        return None if self.tau is None else quantity_to_si(self.tau, "time")
+
+    @property
+    def bandwidth_hz(self) -> float | None:
+        """The bandwidth of an rms, Hz."""
+        return None if self.bandwidth is None else quantity_to_si(self.bandwidth, "frequency")
+
+
+def _listed(value: Any) -> Any:
+    """Return a figure that stands alone as a list of one."""
+    if isinstance(value, Mapping):
+        return (PrintedFigure.model_validate(value),)
+    listed = value if isinstance(value, (list, tuple)) else [value]
+    if value is not None and not all(isinstance(each, (Mapping, PrintedFigure)) for each in listed):
+        raise ValueError(
+            "expected a figure such as {value: 3, unit: deg/h, kind: typ}, a list of them, or "
+            "null: not published"
+        )
+    return value
+
+
+Figures = Annotated[
+    tuple[PrintedFigure, ...] | None,
+    BeforeValidator(_listed, json_schema_input_type=PrintedFigure | list[PrintedFigure] | None),
+]
+"""A figure, or several where a vendor prints several; null: the vendor does not publish it."""
+
+
+class QuantityDatasheet(Strict):
+    """What a datasheet says of one quantity; what is null is not published."""
+
+    noise_density: Figures = Field(None, description="density, .../sqrt(Hz), or squared, .../Hz")
+    random_walk: Figures = Field(
+        None, description="angle or velocity random walk, deg/sqrt(h) or m/s/sqrt(h): N itself"
+    )
+    rms_noise: Figures = Field(None, description="standard deviation over a bandwidth")
+    bias_instability: Figures = Field(
+        None, description="in-run bias: the minimum of the curve of Allan deviation"
+    )
+    allan_deviation: Figures = Field(None, description="of the averaging time 'tau'")
+    drift: Figures = Field(None, description="a drift that the document does not define further")
+    rate_random_walk: Figures = Field(None, description="K")
+    correlation_time: Figures = Field(None, description="T_B")
+    offset: Figures = Field(
+        None, description="zero-rate or zero-g offset, ±: the turn-on bias as it is delivered"
+    )
+    bias_repeatability: Figures = Field(None, description="offset from one run to another")
+    temperature_coefficient: Figures = Field(None, description="offset per kelvin")
+    temperature_total: Figures = Field(
+        None, description="change of the offset over the range of temperature of 'condition'"
+    )
+    temperature_rms: Figures = Field(
+        None, description="rms of the offset while the temperature changes slowly"
+    )
+    scale_factor_error: Figures = Field(
+        None, description="± of the scale factor or sensitivity, as % or ppm of itself"
+    )
+    nonlinearity: Figures = Field(
+        None, description="departure from the straight line, as % or ppm of full scale"
+    )
+    g_sensitivity: Figures = Field(None, description="of a gyro's offset to acceleration")
+    vibration_rectification: Figures = Field(
+        None, description="change of the mean in vibration, per square of its rms acceleration"
+    )
+    full_scale: Figures = Field(None, description="±, of the sensor or to choose from")
+    sensitivity: Figures = Field(None, description="unit per LSB, or LSB per unit")
+    resolution: Figures = Field(None, description="least change that shows, such as deg/h")
+    bandwidth: Figures = Field(None, description="-3 dB, of the sensor")
+
+    @model_serializer(mode="wrap")
+    def _as_written(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out what the file leaves out: it is not looked up, and null is not published."""
+        return {name: v for name, v in handler(self).items() if name in self.model_fields_set}
+
+    def printed(self, name: str) -> tuple[PrintedFigure, ...]:
+        """Return the figures of a name that the vendor publishes."""
+        figures: tuple[PrintedFigure, ...] = getattr(self, name) or ()
+        return tuple(figure for figure in figures if figure.value is not None)
+
+    def looked_up(self, name: str) -> bool:
+        """Return whether the file says anything of a name, if only that it is not published."""
+        return name in self.model_fields_set
+
+
+def _dimensions(quantity: str, plain: str) -> dict[str, tuple[str, ...]]:
+    return {
+        "noise_density": (f"{quantity}_density", f"{quantity}_power_density"),
+        "random_walk": (f"{quantity}_density",),
+        "rms_noise": (plain,),
+        "bias_instability": (plain,),
+        "allan_deviation": (plain,),
+        "drift": (plain,),
+        "rate_random_walk": (f"{quantity}_random_walk",),
+        "correlation_time": ("time",),
+        "offset": (plain,),
+        "bias_repeatability": (plain,),
+        "temperature_coefficient": (f"{quantity}_temperature_coefficient",),
+        "temperature_total": (plain,),
+        "temperature_rms": (plain,),
+        "scale_factor_error": ("ratio",),
+        "nonlinearity": ("ratio",),
+        "vibration_rectification": (f"{quantity}_vibration_coefficient",),
+        "full_scale": (plain,),
+        "sensitivity": (f"{quantity}_step", f"{quantity}_sensitivity"),
+        "resolution": (plain,),
+        "bandwidth": ("frequency",),
+    }
+
+
+FIGURE_DIMENSIONS: dict[str, dict[str, tuple[str, ...]]] = {
+    "gyro": _dimensions("gyro", "angular_rate")
+    | {"g_sensitivity": ("gyro_acceleration_coefficient",)},
+    "accel": _dimensions("accel", "acceleration"),
+}
+"""Dimensions that each datasheet figure may have, the usual one first, by quantity."""
+
+IN_USE = (
+    "offset",
+    "bias_repeatability",
+    "temperature_coefficient",
+    "scale_factor_error",
+    "nonlinearity",
+    "g_sensitivity",
+    "vibration_rectification",
+)
+"""Figures of errors that come in use and are in no static log."""
+
+_LARGEST_ACCELERATION_NOISE = 1.0
+
+
+class Datasheet(Strict):
+    """What a vendor prints of a sensor."""
+
+    document: str | None = None
+    revision: Text | None = Field(None, description="of the document, with its date")
+    source: Literal["primary", "secondary"] | None = Field(
+        None,
+        description="primary: read in the vendor's document; secondary: quoted by somebody else",
+    )
+    options: tuple[Text, ...] = Field(
+        (), description="grades, ranges and modes that the logged sensors have, such as [30 g]"
+    )
+    gyro: QuantityDatasheet | None = Field(
+        default=QuantityDatasheet(), description="null: the sensor has no gyro"
+    )
+    accel: QuantityDatasheet | None = Field(
+        default=QuantityDatasheet(), description="null: the sensor has no accelerometer"
+    )
+
+    @model_validator(mode="after")
+    def _units(self) -> Datasheet:
+        for key, quantity, name, figure in self._figures():
+            dimensions = FIGURE_DIMENSIONS[quantity].get(name)
+            if dimensions is None:
+                raise ValueError(f"{key}: found under {quantity}; expected under gyro alone")
+            if figure.value is None or figure.unit is None:
+                continue
+            try:
+                dimension = dimension_of(figure.unit, dimensions)
+            except UnitError as error:
+                mend = "; a figure by LSB is the 'sensitivity'" * ("LSB" in figure.unit)
+                raise ValueError(f"{key}.unit: {error}{mend}") from error
+            if name in ("noise_density", "bias_instability") and quantity == "accel":
+                for axis in "xyz":
+                    printed = figure.on_axis(axis)
+                    if isinstance(printed, float):
+                        _check_micro(printed, figure.unit, dimension, key)
+        return self
+
+    def only(self, names: Collection[str]) -> dict[str, Any]:
+        """Return what the file says of some figures, and of the options that they hold for.
+
+        Parameters
+        ----------
+        names : collection of str
+            Such as `IN_USE`.
+        """
+        written = self.model_dump(mode="json", include={"options", *FIGURE_DIMENSIONS})
+        for quantity in FIGURE_DIMENSIONS:
+            sheet = written[quantity] or {}
+            kept = {name: figures for name, figures in sheet.items() if name in names}
+            written[quantity] = kept if written[quantity] is not None else None
+        return written
+
+    def _figures(self) -> Iterator[tuple[str, str, str, PrintedFigure]]:
+        """Yield key, quantity, name and figure of everything that is printed."""
+        for quantity in FIGURE_DIMENSIONS:
+            sheet: QuantityDatasheet | None = getattr(self, quantity)
+            for name in QuantityDatasheet.model_fields if sheet else ():
+                figures: tuple[PrintedFigure, ...] = getattr(sheet, name) or ()
+                for number, figure in enumerate(figures):
+                    place = f".{number}" * (len(figures) > 1)
+                    yield f"{quantity}.{name}{place}", quantity, name, figure
+
+
+def _check_micro(value: float, unit: str, dimension: str, key: str) -> None:
+    """Refuse 400 g/√Hz, which a document has where its text lost the sign of micro."""
+    if to_si(value, unit, dimension) > _LARGEST_ACCELERATION_NOISE:
+        raise ValueError(
+            f"{key}: found {value:g} {unit}, which no accelerometer has; was the sign of micro or "
+            f"milli lost? expected such as {value:g} u{unit}"
+        )

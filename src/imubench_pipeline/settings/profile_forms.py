@@ -1,0 +1,184 @@
+"""Motion and temperature over time as a YAML file has them: a formula, or columns of a file.
+
+    temperature: {form: warm_up, start: 22 degC, end: 35 degC, time_constant: 10 min}
+    motion:
+      gyro_z: {form: steps, times: [0 s, 60 s, 90 s], values: [0 deg/s, 20 deg/s, 0 deg/s]}
+      accel_z: 1 g
+
+A figure has its unit with it, and is converted to SI when `profiles` makes a profile of it. Here is
+nothing that computes: the configuration of a run, which has such forms, is read at once.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import BeforeValidator, Field, field_validator, model_validator
+
+from imubench_pipeline.settings.sensor import QUANTITIES, Channel, quantity_of
+from imubench_pipeline.settings.validation import Strict, Text
+from imubench_pipeline.units import UnitError, difference_to_si, quantity_to_si
+
+
+def _time(text: str) -> str:
+    quantity_to_si(text, "time")
+    return text
+
+
+def _positive(text: str, what: str) -> float:
+    seconds = quantity_to_si(text, "time")
+    if seconds <= 0:
+        raise ValueError(f"{what} is {text}, expected a time above 0")
+    return seconds
+
+
+class ConstantForm(Strict):
+    """One value."""
+
+    form: Literal["constant"]
+    value: Text
+
+
+class StepsForm(Strict):
+    """Values that hold from their times on."""
+
+    form: Literal["steps"]
+    times: tuple[Text, ...] = Field(min_length=1)
+    values: tuple[Text, ...] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> StepsForm:
+        if len(self.times) != len(self.values):
+            raise ValueError(
+                f"{len(self.times)} times and {len(self.values)} values; expected as many"
+            )
+        times = [quantity_to_si(time, "time") for time in self.times]
+        if times != sorted(set(times)):
+            raise ValueError("the times do not ascend; expected each later than the one before")
+        return self
+
+
+class DayCycleForm(Strict):
+    """A cosine about a mean."""
+
+    form: Literal["day_cycle"]
+    mean: Text
+    amplitude: Text = Field(description="a difference: 5 degC and 5 K are the same")
+    period: Text = "24 h"
+    highest: Text = Field("0 s", description="time of the highest value")
+
+    @model_validator(mode="after")
+    def _times(self) -> DayCycleForm:
+        _positive(self.period, "period")
+        _time(self.highest)
+        return self
+
+
+class WarmUpForm(Strict):
+    """An exponential from one value to another."""
+
+    form: Literal["warm_up"]
+    start: Text
+    end: Text
+    time_constant: Text
+    begin: Text = "0 s"
+
+    @model_validator(mode="after")
+    def _times(self) -> WarmUpForm:
+        _positive(self.time_constant, "time_constant")
+        _time(self.begin)
+        return self
+
+
+class FileForm(Strict):
+    """A column of a CSV or Parquet file with a column ``time``."""
+
+    form: Literal["file"]
+    file: Path
+    column: str | None = Field(None, description="null: what it is a profile of")
+
+
+Part = Annotated[ConstantForm | StepsForm | DayCycleForm | WarmUpForm, Field(discriminator="form")]
+
+
+class SumForm(Strict):
+    """Several formulas together, such as a warm-up and the cycle of a day.
+
+    The first is a value, what the others add to it are differences: 0 K is no difference.
+    """
+
+    form: Literal["sum"]
+    parts: tuple[Part, ...] = Field(min_length=2)
+
+
+Formula = ConstantForm | StepsForm | DayCycleForm | WarmUpForm | SumForm
+Form = Annotated[Formula | FileForm, Field(discriminator="form")]
+
+
+def _form(value: Any) -> Any:
+    """Return a quantity that stands alone as a constant."""
+    return {"form": "constant", "value": value} if isinstance(value, (str, int, float)) else value
+
+
+ProfileForm = Annotated[Form, BeforeValidator(_form)]
+"""A profile as YAML has it: a form with its figures, or a quantity such as 25 degC."""
+
+
+class Surroundings(Strict):
+    """What the sensors of a board have in common, as a YAML file has it."""
+
+    temperature: ProfileForm | None = None
+    motion: dict[Channel, ProfileForm] = Field(default_factory=dict)
+
+    @field_validator("temperature")
+    @classmethod
+    def _of_temperature(cls, form: Form | None) -> Form | None:
+        if form is not None:
+            _check_units(form, "temperature")
+        return form
+
+    @field_validator("motion")
+    @classmethod
+    def _of_motion(cls, motion: dict[Channel, Form]) -> dict[Channel, Form]:
+        for channel, form in motion.items():
+            try:
+                _check_units(form, QUANTITIES[quantity_of(channel)])
+            except UnitError as error:
+                raise ValueError(f"{channel}: {error}") from error
+        return motion
+
+
+def _check_units(form: Form, dimension: str) -> None:
+    """Raise UnitError if a figure of a form has a unit of another dimension."""
+    match form:
+        case ConstantForm():
+            quantity_to_si(form.value, dimension)
+        case StepsForm():
+            for value in form.values:
+                quantity_to_si(value, dimension)
+        case DayCycleForm():
+            quantity_to_si(form.mean, dimension)
+            difference_to_si(form.amplitude, dimension)
+        case WarmUpForm():
+            quantity_to_si(form.start, dimension)
+            quantity_to_si(form.end, dimension)
+        case SumForm():
+            for part in form.parts:
+                _check_units(part, dimension)
+
+
+FormOrNone = TypeVar("FormOrNone", bound=Form | None)
+
+
+def found_from(form: FormOrNone, folder: Path) -> FormOrNone:
+    """Return the same form, whose file is named from a folder.
+
+    Parameters
+    ----------
+    form : Form or None
+    folder : Path
+    """
+    if isinstance(form, FileForm):
+        return form.model_copy(update={"file": folder / form.file})
+    return form

@@ -1,0 +1,227 @@
+"""What an application needs of a sensor: limits of its errors after a time of dead reckoning."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from statistics import NormalDist
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field, model_validator
+
+from imubench_pipeline.settings.validation import (
+    Between,
+    ConfigError,
+    Frequency,
+    Strict,
+    Text,
+    of_size,
+    parse,
+    read_yaml,
+)
+from imubench_pipeline.units import difference_to_si, quantity_to_si
+
+Error = Literal["attitude", "heading", "velocity", "position", "north"]
+"""What is limited; ``north`` is the heading that a gyro at rest finds from the Earth's rate."""
+
+DIMENSIONS: Mapping[Error, str] = {
+    "attitude": "angle",
+    "heading": "angle",
+    "velocity": "velocity",
+    "position": "length",
+    "north": "angle",
+}
+"""The dimension of each error."""
+
+Axis = Literal["worst", "median"]
+"""The axis of a sensor that a requirement is held against."""
+
+
+def _time(text: str) -> str:
+    if quantity_to_si(text, "time") <= 0:
+        raise ValueError("expected a time above zero")
+    return text
+
+
+def _latitude(text: str) -> str:
+    if not abs(quantity_to_si(text, "angle")) < 1.5707:
+        raise ValueError(
+            "expected a latitude between the poles: there cos φ is 0, and a gyro in a horizontal "
+            "axis senses nothing of the Earth's rate"
+        )
+    return text
+
+
+Time = Annotated[Text, AfterValidator(_time), Field(examples=["60 s"])]
+Latitude = Annotated[Text, AfterValidator(_latitude), Field(examples=["45 deg"])]
+
+
+class Limit(Strict):
+    """The largest error that is allowed after a time."""
+
+    error: Error
+    after: Time = Field(description="of dead reckoning; of rest, for north")
+    at_most: Text = Field(description="with its unit, such as 1 deg or 5 m")
+
+    @model_validator(mode="after")
+    def _size_is_right(self) -> Limit:
+        if self.size <= 0:
+            raise ValueError(f"at_most is {self.at_most}; expected more than zero")
+        return self
+
+    @property
+    def seconds(self) -> float:
+        """The time in s."""
+        return quantity_to_si(self.after, "time")
+
+    @property
+    def size(self) -> float:
+        """The largest error in SI."""
+        return quantity_to_si(self.at_most, DIMENSIONS[self.error])
+
+    @property
+    def text(self) -> str:
+        """The limit in words."""
+        return f"{self.error} within {self.at_most} after {self.after}"
+
+
+def _change(text: str) -> str:
+    if not difference_to_si(text, "temperature") > 0:
+        raise ValueError("expected a difference above zero, such as 20 K")
+    return text
+
+
+def _axes(text: str) -> str:
+    _, _, axes = text.partition("_")
+    if not re.fullmatch("(gyro|accel)_[xyz]+", text) or len(set(axes)) < len(axes):
+        raise ValueError("expected a quantity with its axes, such as gyro_xyz or accel_z")
+    return text
+
+
+Rate = Annotated[Text, AfterValidator(of_size("angular_rate")), Field(examples=["300 deg/s"])]
+Acceleration = Annotated[Text, AfterValidator(of_size("acceleration")), Field(examples=["8 g"])]
+
+
+class TurnOn(Strict):
+    """Standard deviations of the biases with which dead reckoning begins."""
+
+    gyro: Text | None = Field(
+        None, description="with its unit, such as 0.2 deg/s; null: that of the datasheet"
+    )
+    accel: Text | None = Field(
+        None, description="with its unit, such as 20 mg; null: that of the datasheet"
+    )
+    on_time: Time = Field("60 s", description="since the sensor was switched on")
+
+    @model_validator(mode="after")
+    def _units(self) -> TurnOn:
+        if self.gyro is not None:
+            quantity_to_si(self.gyro, "angular_rate")
+        if self.accel is not None:
+            quantity_to_si(self.accel, "acceleration")
+        return self
+
+
+class Environment(Strict):
+    """What a sensor meets in use that a static log does not show; what is left out is not there."""
+
+    temperature_change: Annotated[Text, AfterValidator(_change)] | None = Field(
+        None,
+        examples=["20 K"],
+        description="±, from the static window to the end; with turn_on, from where its bias holds",
+    )
+    turns: Annotated[Text, AfterValidator(of_size("angle"))] | None = Field(
+        None, examples=["360 deg"], description="± about the axis of the gyro, by the end"
+    )
+    speed_change: Annotated[Text, AfterValidator(of_size("velocity"))] | None = Field(
+        None, examples=["10 m/s"], description="± along the axis of the accelerometer, by the end"
+    )
+    vibration: Acceleration | None = Field(None, description="rms of one axis")
+
+
+class FullScale(Strict):
+    """What must not be beyond the range of a sensor."""
+
+    gyro: Rate | None = Field(None, description="±")
+    accel: Acceleration | None = Field(None, description="±, gravity included")
+
+
+class Must(Strict):
+    """What a sensor must have, as far as its file tells; what is left out is not asked for."""
+
+    full_scale: FullScale = FullScale()
+    bandwidth: Frequency | None = Field(None, description="-3 dB, of each quantity, at least")
+    rate: Frequency | None = Field(None, description="of samples, at least")
+    temperature: Between | None = Field(None, description="of operation, at least")
+    axes: tuple[Annotated[str, AfterValidator(_axes)], ...] = Field(
+        (), description="such as [gyro_xyz, accel_xyz]"
+    )
+    mass: Annotated[Text, AfterValidator(of_size("mass"))] | None = Field(
+        None, examples=["30 g"], description="at most"
+    )
+    power: Annotated[Text, AfterValidator(of_size("power"))] | None = Field(
+        None, examples=["1 W"], description="at most"
+    )
+
+
+class Requirement(Strict):
+    """What one application needs."""
+
+    title: Text
+    example: bool = Field(False, description="made up, to show how a requirement is written")
+    note: Text | None = None
+    limits: tuple[Limit, ...] = Field(min_length=1)
+    static_window: Time | None = Field(
+        None, description="at rest right before, from which biases and tilt are taken"
+    )
+    turn_on: TurnOn | None = Field(None, description="instead: biases that nothing has taken off")
+    latitude: Latitude | None = Field(None, description="for limits of north")
+    environment: Environment = Field(
+        Environment(), description="what happens in use; datasheets say what errors it causes"
+    )
+    must: Must = Field(Must(), description="without it a sensor is excluded")
+    confidence: float = Field(
+        0.95, gt=0, lt=1, description="chance of an error within its limit, on one axis"
+    )
+    axis: Axis = Field("worst", description="the axis of a sensor that must fulfil it")
+    price_class: tuple[Text, ...] | None = Field(
+        None, description="words of which the price class of a sensor must have one; null: any"
+    )
+
+    @model_validator(mode="after")
+    def _whole(self) -> Requirement:
+        if (self.static_window is None) == (self.turn_on is None):
+            raise ValueError("expected either 'static_window' or 'turn_on'")
+        if self.latitude is None and any(limit.error == "north" for limit in self.limits):
+            raise ValueError("a limit of north needs 'latitude', such as 45 deg")
+        return self
+
+    @property
+    def sigmas(self) -> float:
+        """How many standard deviations a limit is, at the confidence that is asked for."""
+        return NormalDist().inv_cdf((1.0 + self.confidence) / 2.0)
+
+    def admits(self, price_class: str | None) -> bool:
+        """Tell whether sensors of a price class may be chosen."""
+        if self.price_class is None:
+            return True
+        return any(word.lower() in (price_class or "").lower() for word in self.price_class)
+
+
+def read_requirements(folder: Path | None) -> dict[str, Requirement]:
+    """Read every requirement of a folder, by the name of its file; none without a folder.
+
+    Raises
+    ------
+    ConfigError
+        If the folder is not there or a file cannot be used.
+    """
+    if folder is None:
+        return {}
+    if not folder.is_dir():
+        raise ConfigError(f"{folder}: no such folder; expected one YAML file a requirement")
+    return {
+        path.stem: parse(Requirement, read_yaml(path), str(path))
+        for path in sorted(folder.glob("*.yaml"))
+    }

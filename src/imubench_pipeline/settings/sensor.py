@@ -1,0 +1,385 @@
+"""The file of one sensor: how its logs are written and what its datasheet says."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field, model_validator
+
+from imubench_pipeline.settings.known_rates import AtRest, OnRateTable
+from imubench_pipeline.settings.printed import Datasheet
+from imubench_pipeline.settings.two_position import TwoPosition
+from imubench_pipeline.settings.validation import (
+    Between,
+    ConfigError,
+    Frequency,
+    Strict,
+    Text,
+    of_size,
+    parse,
+    read_yaml,
+)
+from imubench_pipeline.units import UnitError, conversion, quantity_to_si
+
+QUANTITIES: dict[str, str] = {"gyro": "angular_rate", "accel": "acceleration"}
+"""The measured quantities and the dimension of each."""
+
+CHANNELS: tuple[str, ...] = tuple(f"{q}_{axis}" for q in QUANTITIES for axis in "xyz")
+"""Every channel: one axis of one quantity."""
+
+TEMPERATURE = "temperature"
+"""Name of the temperature column of a recording."""
+
+POSITION = "position"
+"""Name of the column that says how a sensor that is turned stands."""
+
+TABLE_RATE = "table_rate"
+"""Name of the column with the rate of the table that a sensor stands on."""
+
+Kind = Literal["static", "two_position", "rate_table"]
+"""What was done with a sensor during a recording."""
+
+Channel = Literal["gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"]
+
+
+def quantity_of(channel: str) -> str:
+    """Return the quantity, ``gyro`` or ``accel``, that a channel is an axis of."""
+    return channel.split("_", maxsplit=1)[0]
+
+
+class ColumnSource(Strict):
+    """Where one column of a recording is found, and the unit it is written in."""
+
+    column: str | int = Field(
+        description="name in the header, or position counted from 1 (as spreadsheets, awk and "
+        "MATLAB count)"
+    )
+    unit: str = Field(description="unit of the figures as written, after scale and offset")
+    file: str | None = Field(
+        None, description="file inside a recording that is a folder; null: the only one"
+    )
+    variable: str | None = Field(
+        None,
+        description="variable or dataset of a MATLAB, NumPy or HDF5 file, topic of a ROS bag, "
+        "message of a UBX log; null: the only one of the file",
+    )
+    scale: float = Field(1.0, description="unit per count or volt")
+    offset: float = Field(0.0, description="counts or volts at zero: scale * (raw - offset)")
+
+    @model_validator(mode="after")
+    def _from_one(self) -> ColumnSource:
+        if isinstance(self.column, int) and self.column < 1:
+            raise ValueError(f"column {self.column}: columns are counted from 1")
+        if self.scale == 0:
+            raise ValueError("scale is 0; expected unit per count")
+        return self
+
+
+class PositionSource(ColumnSource):
+    """Where the column is found that says how a sensor that is turned stands."""
+
+    unit: str = Field(
+        "1", description="of no importance: two positions are told apart by any two numbers"
+    )
+
+
+class TimeSource(Strict):
+    """Where the time stamps are found, and how they are written."""
+
+    column: str | int = Field(description="name in the header, or position counted from 1")
+    unit: Literal["s", "ms", "us", "ns", "samples"] | None = Field(
+        None,
+        description="unit of numeric stamps; samples: the column counts samples, and 'rate' "
+        "says how long one lasts",
+    )
+    date: str | int | None = Field(
+        None, description="column of the date, where 'column' holds the time of day alone"
+    )
+    scale: float = Field(
+        1.0, gt=0, description="unit per tick, such as 0.1 for a clock that counts 0.1 ms in ms"
+    )
+    format: str | None = Field(
+        None,
+        description="of stamps in text: iso8601, or a pattern as for strptime such as "
+        "%d.%m.%Y %H:%M:%S.%f; of date and time of day with a space between them",
+        examples=["iso8601", "%d.%m.%Y %H:%M:%S.%f"],
+    )
+    wraps: float | None = Field(
+        None,
+        gt=0,
+        description="where the stamps start again from 0, as written, such as 65536 for a "
+        "counter of 16 bits; null: they never do",
+    )
+
+    @model_validator(mode="after")
+    def _one_way(self) -> TimeSource:
+        if (self.unit is None) == (self.format is None):
+            raise ValueError(
+                "expected either 'unit' (s, ms, us, ns, samples) or 'format' (iso8601)"
+            )
+        for column in (self.column, self.date):
+            if isinstance(column, int) and column < 1:
+                raise ValueError(f"column {column}: columns are counted from 1")
+        if self.date is not None and self.format is None:
+            raise ValueError("'date' is given without 'format'; expected the format of both")
+        if self.format is not None:
+            _check_stamp_format(self.format)
+            if self.wraps is not None or self.scale != 1:
+                raise ValueError("'wraps' and 'scale' are for numeric stamps; expected 'unit'")
+        return self
+
+
+_STAMP_FIELDS = "YymbdjHIpMSfzTFR%"
+
+
+def _check_stamp_format(form: str) -> None:
+    if form == "iso8601":
+        return
+    fields = re.findall(r"%(.?)", form)
+    if unknown := [field for field in fields if field not in _STAMP_FIELDS or not field]:
+        raise ValueError(
+            f"format {form!r} has %{unknown[0]}; expected fields of %{' %'.join(_STAMP_FIELDS)}"
+        )
+    if not set(fields) & set("HITR"):
+        raise ValueError(
+            f"found format {form!r}; expected iso8601, or a pattern with the hour such as "
+            "%d.%m.%Y %H:%M:%S.%f"
+        )
+    if repeated := [field for field in fields if field != "%" and fields.count(field) > 1]:
+        raise ValueError(f"format {form!r} has %{repeated[0]} twice")
+
+
+Reader = Literal["csv", "vectornav", "ubx", "rosbag", "matlab", "numpy", "arrow", "hdf5"]
+
+
+class LogFormat(Strict):
+    """How the logs of a sensor are written."""
+
+    reader: Reader | None = Field(
+        None, description="format of the files; null: found in the file by its first bytes"
+    )
+    rate: Frequency | None = Field(
+        None, description="sampling rate with its unit; needed where there are no stamps"
+    )
+    time: TimeSource | None = Field(None, description="null: no time stamps")
+    channels: dict[Channel, ColumnSource] = Field(min_length=1)
+    temperature: ColumnSource | None = None
+    position: PositionSource | None = Field(
+        None,
+        description="of a sensor that is turned between two positions: angle, 0 and 1, or +1 where "
+        "the axis points north and -1 south; null: the log does not say",
+    )
+    table_rate: ColumnSource | None = Field(
+        None,
+        description="of a sensor on a rate table: the rate of the table, of the gyro's sign; null: "
+        "the notes beside the log have the steps",
+    )
+    bandwidth: Frequency | None = Field(
+        None, description="cut-off of the sensor's own low-pass filter, where known"
+    )
+    delimiter: str | None = Field(
+        None, min_length=1, max_length=1, description="of text files; null: found in the file"
+    )
+    header: bool | None = Field(
+        None, description="is there a line of column names? null: found in the file"
+    )
+    skip_lines: int = Field(0, ge=0, description="lines at the top to pass over")
+    comment: str | None = Field(
+        None,
+        min_length=1,
+        description="lines that start so are passed over; null: those that start with # // % ; !",
+    )
+    decimal: Literal[".", ","] | None = Field(
+        None, description="sign before the decimals; null: found in the file"
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> LogFormat:
+        if self.rate is None and self.time is None:
+            raise ValueError("expected 'rate' (such as 100 Hz) or 'time': neither is there")
+        if self.time is not None and self.time.unit == "samples" and self.rate is None:
+            raise ValueError("'time' counts samples; expected 'rate' (such as 100 Hz) with it")
+        if self.decimal is not None and self.decimal == self.delimiter:
+            raise ValueError(f"'delimiter' and 'decimal' are both {self.decimal!r}")
+        for channel, source in self.channels.items():
+            _check_unit(source.unit, QUANTITIES[quantity_of(channel)], f"channels.{channel}.unit")
+        if self.temperature is not None:
+            _check_unit(self.temperature.unit, "temperature", "temperature.unit")
+        if self.table_rate is not None:
+            _check_unit(self.table_rate.unit, "angular_rate", "table_rate.unit")
+        beside = (self.temperature, self.position, self.table_rate)
+        sources = [*self.channels.values(), *(one for one in beside if one is not None)]
+        if any(source.file for source in sources) and not all(source.file for source in sources):
+            raise ValueError("some channels name a 'file' and others do not; expected all or none")
+        return self
+
+    @property
+    def rate_hz(self) -> float | None:
+        """The stated sampling rate in Hz."""
+        return None if self.rate is None else quantity_to_si(self.rate, "frequency")
+
+
+def _check_unit(unit: str, dimension: str, key: str) -> None:
+    try:
+        conversion(unit, dimension)
+    except UnitError as error:
+        raise ValueError(f"{key}: {error}") from error
+
+
+class Sensor(Strict):
+    """One IMU model: its logs, what it needs of a vehicle, and its datasheet."""
+
+    vendor: str
+    model: str
+    price_class: str | None = None
+    price: Text | None = Field(None, description="with its currency and number, such as 12 EUR")
+    mass: Annotated[Text, AfterValidator(of_size("mass"))] | None = Field(
+        None, examples=["15 g"], description="null: not known"
+    )
+    power: Annotated[Text, AfterValidator(of_size("power"))] | None = Field(
+        None, examples=["0.2 W"], description="that it takes; null: not known"
+    )
+    temperature_range: Between | None = Field(
+        None, description="of operation, such as [-40 degC, 85 degC]; null: not known"
+    )
+    rate: Frequency | None = Field(
+        None, description="the highest that it gives samples at; null: not known"
+    )
+    interface: Text | None = Field(None, description="such as SPI, I2C, UART or CAN")
+    log: LogFormat
+    datasheet: Datasheet = Datasheet()
+
+
+class UsedPart(Strict):
+    """The part of a recording to analyse, in s from its first sample."""
+
+    start: float = Field(0.0, ge=0)
+    end: float | None = None
+
+    @model_validator(mode="after")
+    def _ordered(self) -> UsedPart:
+        if self.end is not None and self.end <= self.start:
+            raise ValueError(f"end {self.end} s is not after start {self.start} s")
+        return self
+
+
+class RecordingNotes(Strict):
+    """What may stand in ``<recording>.yaml`` beside a log."""
+
+    device: Text | None = Field(None, description="serial number; default: the recording's name")
+    started: Text | None = Field(None, description="date and time of the first sample")
+    power_cycled: bool | None = Field(
+        None,
+        description="whether the sensor was without power between this recording and the one "
+        "before it of the same device; null: not known",
+    )
+    use: UsedPart = UsedPart()
+    two_position: TwoPosition | None = Field(
+        None,
+        description="a gyro that was turned between north and south to find the Earth's rate; "
+        "null: the sensor was at rest all the time",
+    )
+    rate_table: OnRateTable | None = Field(
+        None,
+        description="a gyro on a rate table, for scale factor and bias; null: it was on none",
+    )
+    pointing: AtRest | None = Field(
+        None,
+        description="where the axis of a gyro at rest points, for its bias without what the Earth "
+        "adds; null: not known",
+    )
+    log: dict[str, Any] = Field(default=dict(), description="merged over the sensor's log")
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> RecordingNotes:
+        stated = [
+            key
+            for key in ("two_position", "rate_table", "pointing")
+            if getattr(self, key) is not None
+        ]
+        if len(stated) > 1:
+            raise ValueError(
+                f"found {' and '.join(stated)}; expected one of them: a recording is of one kind"
+            )
+        return self
+
+    def check_gyro(self, log: LogFormat) -> None:
+        """Check that the gyro of an experiment is in the log, and all that it takes.
+
+        Parameters
+        ----------
+        log : LogFormat
+            How the log is written.
+
+        Raises
+        ------
+        ValueError
+            If it is not; the text begins with the key.
+        """
+        channels = [str(name) for name in log.channels]
+        for key in ("two_position", "rate_table", "pointing"):
+            try:
+                if key == "two_position" and self.two_position is not None:
+                    self.two_position.turned(channels)
+                if key == "rate_table" and self.rate_table is not None:
+                    self.rate_table.gyro(channels, column=log.table_rate is not None)
+                if key == "pointing" and self.pointing is not None:
+                    self.pointing.gyro(channels)
+            except ValueError as error:
+                raise ValueError(f"{key}.{error}") from None
+
+
+def kind_of(notes: object) -> Kind:
+    """Return what notes make of a recording, though they may be wrong otherwise.
+
+    Parameters
+    ----------
+    notes : object
+        What the file beside the log holds.
+    """
+    if isinstance(notes, Mapping):
+        if notes.get("two_position") is not None:
+            return "two_position"
+        if notes.get("rate_table") is not None:
+            return "rate_table"
+    return "static"
+
+
+def read_sensors(folder: Path) -> dict[str, Sensor]:
+    """Read every sensor file of a folder, by name.
+
+    Raises
+    ------
+    ConfigError
+        If the folder is not there or a file cannot be used.
+    """
+    if not folder.is_dir():
+        raise ConfigError(f"{folder}: no such folder; expected one YAML file a sensor")
+    return {
+        path.stem: parse(Sensor, read_yaml(path), str(path))
+        for path in sorted(folder.glob("*.yaml"))
+    }
+
+
+def sensors_of(catalogue: str) -> dict[str, Sensor]:
+    """Return the sensors as the plan wrote them."""
+    return {name: Sensor.model_validate(one) for name, one in json.loads(catalogue).items()}
+
+
+def merged_log(sensor: Sensor, notes: RecordingNotes, file: str) -> LogFormat:
+    """Return the log format of one recording: the keys of its notes over the sensor's."""
+    merged = _merge(sensor.log.model_dump(exclude_unset=True), notes.log)
+    return parse(LogFormat, merged, f"{file}: log")
+
+
+def _merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """Return ``base`` with the keys of ``over``; a key that is null there is taken out."""
+    merged = dict(base)
+    for key, value in over.items():
+        both = isinstance(value, Mapping) and isinstance(merged.get(key), Mapping)
+        merged[key] = _merge(merged[key], value) if both else value
+    return {key: value for key, value in merged.items() if value is not None}

@@ -1,0 +1,364 @@
+"""What is simulated before a run: single recordings, and boards of sensors that share a place."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, Self, TypeVar
+
+from pydantic import Field, model_validator
+
+from imubench_pipeline.settings.profile_forms import FileForm, Surroundings, found_from
+from imubench_pipeline.settings.sensor import (
+    QUANTITIES,
+    Channel,
+    ColumnSource,
+    Kind,
+    LogFormat,
+    Sensor,
+    TimeSource,
+    kind_of,
+    quantity_of,
+)
+from imubench_pipeline.settings.simulated_experiments import (
+    SimulatedRest,
+    SimulatedTable,
+    SimulatedTurns,
+)
+from imubench_pipeline.settings.simulated_sensor import AxisSettings, ImuSettings, check_axes
+from imubench_pipeline.settings.validation import (
+    ConfigError,
+    Duration,
+    Frequency,
+    Strict,
+    Text,
+    parse,
+    read_yaml,
+)
+from imubench_pipeline.units import naming, quantity_to_si
+
+_Around = TypeVar("_Around", bound=Surroundings)
+
+_NAMES = r"^sim_[A-Za-z0-9_.-]+$"
+
+
+class PublishedFigure(Strict):
+    """A figure that the source prints, and what it stands for in the conventions of the project."""
+
+    where: Text = Field(description="such as Table 5")
+    figure: Text = Field(description="its name there")
+    printed: Text = Field(description="with its unit, as printed")
+    of: Literal["log", "datasheet"] = Field("log", description="what it says something of")
+    parameter: Literal["N", "B", "bias", "sensitivity"]
+    means: Text = Field(description="the same as that parameter: N two-sided, B the floor / 0.664")
+    why: Text | None = Field(None, description="why it differs from what an estimate gives")
+
+    def si(self, quantity: str) -> float:
+        """Return what it stands for in SI."""
+        dimensions = {
+            "N": f"{quantity}_density",
+            "sensitivity": f"{quantity}_temperature_coefficient",
+        }
+        return quantity_to_si(self.means, dimensions.get(self.parameter, QUANTITIES[quantity]))
+
+
+class SimulatedChannel(AxisSettings):
+    """The truth of one simulated channel, with units as published."""
+
+    assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
+    published: tuple[PublishedFigure, ...] = ()
+    figures: Text | None = Field(None, description="figures of the source that show this channel")
+
+    def check(self, channel: str) -> None:
+        """Raise UnitError if a unit has another dimension than its figure."""
+        super().check(channel)
+        for number, figure in enumerate(self.published):
+            with naming(f"published.{number}.means: "):
+                figure.si(quantity_of(channel))
+
+    @model_validator(mode="after")
+    def _known(self) -> Self:
+        stated = {name for name in AxisSettings.model_fields if getattr(self, name) is not None}
+        if unknown := set(self.assumed) - stated:
+            raise ValueError(f"assumed: {min(unknown)!r} is no figure of this channel")
+        return self
+
+
+class OfASensor(ImuSettings):
+    """What is simulated of one sensor."""
+
+    sensor: str = Field(description="name of the sensor file whose log format it is written in")
+    duration: Duration = Field(description="length with its unit, such as 10 h")
+    rate: Frequency
+    source: Text = Field(description="where the figures are published")
+    channels: dict[Channel, SimulatedChannel] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _samples_and_units(self) -> Self:
+        if self.samples < 1:
+            raise ValueError(f"duration: {self.duration} at {self.rate} hold no sample")
+        check_axes(self.channels, "channels")
+        return self
+
+    @property
+    def samples(self) -> int:
+        """Length of the log."""
+        rate = quantity_to_si(self.rate, "frequency")
+        return round(quantity_to_si(self.duration, "time") * rate)
+
+
+class SimulatedRecording(OfASensor, Surroundings):
+    """A recording that is made before the run, from known figures."""
+
+    recording: str = Field(pattern=_NAMES, description="starts with sim_")
+    seed: int
+    two_position: SimulatedTurns | None = None
+    rate_table: SimulatedTable | None = None
+    pointing: SimulatedRest | None = None
+
+    @model_validator(mode="after")
+    def _one_experiment(self) -> Self:
+        stated = [key for key, one in self._experiments.items() if one is not None]
+        if len(stated) > 1:
+            raise ValueError(f"found {' and '.join(stated)}; expected one of them")
+        for key in stated:
+            try:
+                gyro = self.experimental
+            except ValueError as error:
+                raise ValueError(f"{key}.{error}") from error
+            if gyro in self.motion:
+                raise ValueError(f"motion.{gyro}: {key} says how it moves; expected one of the two")
+        return self
+
+    @property
+    def _experiments(self) -> dict[str, object]:
+        return {
+            "two_position": self.two_position,
+            "rate_table": self.rate_table,
+            "pointing": self.pointing,
+        }
+
+    @property
+    def experimental(self) -> str | None:
+        """The gyro of its experiment; None where it has none.
+
+        Raises
+        ------
+        ValueError
+            If it is not stated, or not simulated.
+        """
+        channels = [str(name) for name in self.channels]
+        if self.two_position is not None:
+            return self.two_position.turned(channels)
+        if self.rate_table is not None:
+            return self.rate_table.gyro(channels, column=False)
+        return None if self.pointing is None else self.pointing.gyro(channels)
+
+    @property
+    def kind(self) -> Kind:
+        """What is done with the sensor."""
+        return kind_of(self._experiments)
+
+
+class Simulated(Strict):
+    """The file that lists what is simulated."""
+
+    recordings: tuple[SimulatedRecording, ...] = ()
+    boards: tuple[Path, ...] = Field((), description="files of boards, from the folder of this one")
+
+
+class Board(Surroundings):
+    """Several sensors that share one motion and one temperature."""
+
+    title: Text
+    note: Text | None = None
+    seed: int
+    why: dict[str, Text] = Field(
+        default_factory=dict,
+        description="by the name of a published figure: why it differs from what an estimate gives",
+    )
+    sensors: tuple[OfASensor, ...] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _explains_what_there_is(self) -> Self:
+        channels = (one for sensor in self.sensors for one in sensor.channels.values())
+        figures = {figure.figure for channel in channels for figure in channel.published}
+        if unknown := self.why.keys() - figures:
+            expected = ", ".join(sorted(figures)) or "none: nothing is published"
+            raise ValueError(
+                f"why: {min(unknown)!r} names no published figure; expected {expected}"
+            )
+        return self
+
+    def recordings(self, name: str) -> Iterator[SimulatedRecording]:
+        """Yield the recording of each sensor.
+
+        Parameters
+        ----------
+        name : str
+            Of the board.
+        """
+        around = {key: getattr(self, key) for key in Surroundings.model_fields}
+        for sensor in self.sensors:
+            own = {key: getattr(sensor, key) for key in OfASensor.model_fields}
+            own["channels"] = {key: self._explained(one) for key, one in sensor.channels.items()}
+            yield SimulatedRecording(**own, **around, recording=f"sim_{name}", seed=self.seed)
+
+    def _explained(self, channel: SimulatedChannel) -> SimulatedChannel:
+        figures = tuple(
+            figure.model_copy(update={"why": figure.why or self.why.get(figure.figure)})
+            for figure in channel.published
+        )
+        return channel.model_copy(update={"published": figures})
+
+
+@dataclass(frozen=True)
+class ToSimulate:
+    """What a run simulates.
+
+    Attributes
+    ----------
+    recordings : list of SimulatedRecording
+        Those of the boards are among them.
+    boards : dict of str to Board
+        By name.
+    """
+
+    recordings: list[SimulatedRecording]
+    boards: dict[str, Board]
+
+
+def read_simulated(path: Path | None, sensors: Mapping[str, Sensor]) -> ToSimulate:
+    """Read what is simulated; nothing where ``path`` is None.
+
+    Parameters
+    ----------
+    path : Path or None
+    sensors : mapping of str to Sensor
+
+    Raises
+    ------
+    ConfigError
+        If the file or a board's cannot be used.
+    """
+    if path is None:
+        return ToSimulate([], {})
+    given = parse(Simulated, read_yaml(path), str(path))
+    recordings = []
+    for number, entry in enumerate(given.recordings):
+        _check(entry, sensors, f"{path}: recordings.{number}")
+        recordings.append(_found_from(entry, path, f"recordings.{number}."))
+    boards: dict[str, Board] = {}
+    for file in given.boards:
+        if not (path.parent / file).is_file():
+            raise ConfigError(
+                f"{path}: boards: {path.parent / file}: no such file; expected the file of a "
+                "board, named from the folder of the file that names it"
+            )
+        board = _board(path.parent / file, sensors)
+        if file.stem in boards:
+            raise ConfigError(f"{path}: boards: two are named {file.stem}; expected other names")
+        if not re.match(_NAMES, f"sim_{file.stem}"):
+            raise ConfigError(
+                f"{path}: boards: found {str(file)!r}; expected a name of letters, digits and . _ -"
+            )
+        boards[file.stem] = board
+        recordings += board.recordings(file.stem)
+    names = [f"{entry.sensor}/{entry.recording}" for entry in recordings]
+    if twice := next((name for name in names if names.count(name) > 1), None):
+        raise ConfigError(f"{path}: {twice} is simulated twice; expected each once")
+    return ToSimulate(recordings, boards)
+
+
+def _board(path: Path, sensors: Mapping[str, Sensor]) -> Board:
+    board = parse(Board, read_yaml(path), str(path))
+    for number, entry in enumerate(board.sensors):
+        _check(entry, sensors, f"{path}: sensors.{number}")
+    names = [entry.sensor for entry in board.sensors]
+    if twice := next((name for name in names if names.count(name) > 1), None):
+        raise ConfigError(f"{path}: sensors: {twice} stands twice; expected each once")
+    return _found_from(board, path)
+
+
+def _check(entry: OfASensor, sensors: Mapping[str, Sensor], key: str) -> None:
+    if entry.sensor not in sensors:
+        raise ConfigError(
+            f"{key}.sensor: found {entry.sensor!r}; expected one of the sensor "
+            f"files: {', '.join(sensors)}"
+        )
+    unknown = set(entry.channels) - set(sensors[entry.sensor].log.channels)
+    if unknown:
+        raise ConfigError(
+            f"{key}.channels: {', '.join(sorted(unknown))} not channels "
+            f"of {entry.sensor}: {', '.join(sensors[entry.sensor].log.channels)}"
+        )
+
+
+def _found_from(around: _Around, path: Path, key: str = "") -> _Around:
+    """Return the same, with the files of its profiles named from the folder of its own file."""
+    forms = {"temperature": around.temperature} | {
+        f"motion.{c}": f for c, f in around.motion.items()
+    }
+    for name, form in forms.items():
+        if isinstance(form, FileForm) and not (path.parent / form.file).is_file():
+            raise ConfigError(
+                f"{path}: {key}{name}.file: {path.parent / form.file}: no such file; expected a "
+                "CSV or Parquet file, named from the folder of the file that names it"
+            )
+    return around.model_copy(
+        update={
+            "temperature": found_from(around.temperature, path.parent),
+            "motion": {name: found_from(form, path.parent) for name, form in around.motion.items()},
+        }
+    )
+
+
+def profile_files(recording: SimulatedRecording) -> list[Path]:
+    """Return the files that its temperature and motion are read from.
+
+    Parameters
+    ----------
+    recording : SimulatedRecording
+    """
+    forms = (recording.temperature, *recording.motion.values())
+    return sorted({form.file for form in forms if isinstance(form, FileForm)})
+
+
+def layout(recording: SimulatedRecording, log: LogFormat) -> LogFormat:
+    """Return how the log of a simulated recording is written: with its columns and its rate.
+
+    Parameters
+    ----------
+    recording : SimulatedRecording
+    log : LogFormat
+        The sensor's. Where it has no temperature, and the recording has one, that gets a column
+        (or a file, where each channel has one) of its own, in degC.
+    """
+    channels = {name: log.channels[name] for name in recording.channels}
+    temperature = None
+    if recording.temperature is not None:
+        temperature = log.temperature or _free_column(list(channels.values()), log.time)
+    # Where the sensor's logs are read with a stated rate, this one is read with its own.
+    rate = None if log.rate is None else recording.rate
+    return log.model_copy(
+        update={
+            "channels": channels,
+            "temperature": temperature,
+            "position": None,
+            "table_rate": None,
+            "rate": rate,
+        }
+    )
+
+
+def _free_column(channels: Sequence[ColumnSource], time: TimeSource | None) -> ColumnSource:
+    file = None if channels[0].file is None else "temperature.csv"
+    stamps = [time.column] if time else []
+    places = stamps + [source.column for source in channels]
+    if any(isinstance(place, str) for place in places):
+        return ColumnSource(file=file, column="temperature", unit="degC")
+    # In a file of its own it stands beside the stamps alone.
+    beside = [int(place) for place in (stamps if file else places)]
+    return ColumnSource(file=file, column=max(beside, default=0) + 1, unit="degC")

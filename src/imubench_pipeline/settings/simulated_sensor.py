@@ -1,0 +1,201 @@
+"""A sensor model as a YAML file has it, with its units; `models` makes it.
+
+sensor: bno055                       # the sensor file that its logs go with, if any
+temperature_step: 1 K
+misalignment: {gyro: [[1, 0.01, 0], [0, 1, 0], [0, 0, 1]]}
+axes:
+  gyro_x:
+    N: 0.0103 deg/s/sqrt(Hz)
+    B: 10 deg/h
+    T_B: 200 s
+    K: 2 deg/h/sqrt(h)
+    bias: -5.4 deg/s
+    drift: {sensitivity: 0.015 deg/s/K, reference: 25 degC, lag: 5 min}
+    low_pass: {cutoff: 64 Hz}
+    resolution: 0.0625 deg/s
+    full_scale: 2000 deg/s
+
+Here is nothing that computes: the configuration of a run has such axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Self
+
+from pydantic import AfterValidator, Field, model_validator
+
+from imubench_pipeline.settings.sensor import QUANTITIES, Channel, quantity_of
+from imubench_pipeline.settings.validation import Frequency, Strict, Text
+from imubench_pipeline.units import UnitError, difference_to_si, naming, quantity_to_si
+
+
+class ProcessSettings(Strict):
+    """A Gauss-Markov process."""
+
+    B: Text
+    T_B: Text
+
+    def si(self, quantity: str) -> dict[str, float]:
+        """Return its figures in SI."""
+        return _in_si({"B": (self.B, QUANTITIES[quantity]), "T_B": (self.T_B, "time")})
+
+
+class LineSettings(Strict):
+    """A sinusoid."""
+
+    amplitude: Text
+    frequency: Frequency
+
+    def si(self, quantity: str) -> dict[str, float]:
+        """Return its figures in SI."""
+        return _in_si(
+            {
+                "amplitude": (self.amplitude, QUANTITIES[quantity]),
+                "frequency": (self.frequency, "frequency"),
+            }
+        )
+
+
+class DriftSettings(Strict):
+    """The drift with temperature."""
+
+    sensitivity: Text
+    reference: Text = "25 degC"
+    quadratic: Text | None = None
+    lag: Text = "0 s"
+
+    def si(self, quantity: str) -> dict[str, float]:
+        """Return its figures in SI, the reference in degC."""
+        return _in_si(
+            {
+                "sensitivity": (self.sensitivity, f"{quantity}_temperature_coefficient"),
+                "reference": (self.reference, "temperature"),
+                "quadratic": (self.quadratic, f"{quantity}_temperature_curvature"),
+                "lag": (self.lag, "time"),
+            }
+        )
+
+
+class LowPassSettings(Strict):
+    """The low-pass."""
+
+    cutoff: Frequency
+    order: int = Field(1, ge=1, le=10, description="above 1: Butterworth")
+
+
+class AxisSettings(Strict):
+    """One axis: its noise (N is two-sided, before the low-pass), and what else it does."""
+
+    N: Text | None = Field(None, description="white noise density, two-sided")
+    B: Text | None = Field(
+        None, description="bias instability (the curve's peak is 0.664 B); without T_B: flicker"
+    )
+    T_B: Text | None = Field(None, description="correlation time of the Gauss-Markov process")
+    K: Text | None = Field(None, description="rate or acceleration random walk")
+    R: Text | None = Field(None, description="ramp")
+    Q: Text | None = Field(None, description="quantization noise")
+    further: tuple[ProcessSettings, ...] = ()
+    sinusoids: tuple[LineSettings, ...] = ()
+    bias: Text | None = Field(None, description="constant bias")
+    drift: DriftSettings | None = None
+    low_pass: LowPassSettings | None = None
+    scale_error: float = Field(0.0, description="relative: 0.01 is 1 %")
+    resolution: Text | None = Field(None, description="step of the register")
+    full_scale: Text | None = None
+
+    @model_validator(mode="after")
+    def _of_a_process(self) -> Self:
+        if self.T_B is not None and self.B is None:
+            raise ValueError("T_B is the correlation time of B, which is missing")
+        return self
+
+    def si(self, channel: str) -> dict[str, float]:
+        """Return the figures of the noise, the bias, the resolution and the full scale, in SI."""
+        quantity = quantity_of(channel)
+        plain = QUANTITIES[quantity]
+        dimensions = {
+            "N": f"{quantity}_density",
+            "B": plain,
+            "T_B": "time",
+            "K": f"{quantity}_random_walk",
+            "R": f"{quantity}_ramp",
+            "Q": f"{quantity}_quantization",
+            "bias": plain,
+            "resolution": plain,
+            "full_scale": plain,
+        }
+        return _in_si({name: (getattr(self, name), of) for name, of in dimensions.items()})
+
+    def check(self, channel: str) -> None:
+        """Raise UnitError, with the key, if a unit has another dimension than its figure."""
+        quantity = quantity_of(channel)
+        self.si(channel)
+        for number, process in enumerate(self.further):
+            with naming(f"further.{number}."):
+                process.si(quantity)
+        for number, line in enumerate(self.sinusoids):
+            with naming(f"sinusoids.{number}."):
+                line.si(quantity)
+        if self.drift is not None:
+            with naming("drift."):
+                self.drift.si(quantity)
+
+
+def _matrix(rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
+    if len(rows) != 3 or any(len(row) != 3 for row in rows):
+        raise ValueError("expected three rows of three numbers")
+    return rows
+
+
+Matrix = Annotated[tuple[tuple[float, ...], ...], AfterValidator(_matrix)]
+
+
+class ImuSettings(Strict):
+    """What belongs to a sensor as a whole."""
+
+    misalignment: dict[str, Matrix] = Field(
+        default_factory=dict,
+        description="by quantity, gyro or accel: what x, y, z sense of the true x, y, z",
+    )
+    temperature_step: Text | None = Field(None, description="of the register of temperature")
+
+    @model_validator(mode="after")
+    def _of_the_sensor(self) -> Self:
+        if unknown := set(self.misalignment) - set(QUANTITIES):
+            raise ValueError(f"misalignment of {min(unknown)!r}; expected gyro or accel")
+        if self.temperature_step is not None:
+            difference_to_si(self.temperature_step, "temperature")
+        return self
+
+
+class ModelSettings(ImuSettings):
+    """The file of a sensor model."""
+
+    sensor: Text | None = Field(None, description="name of the sensor file its logs go with")
+    source: Text | None = Field(None, description="where the figures are from")
+    axes: dict[Channel, AxisSettings] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _of_the_axes(self) -> Self:
+        check_axes(self.axes, "axes")
+        return self
+
+
+def check_axes(axes: Mapping[Channel, AxisSettings], key: str) -> None:
+    """Raise ValueError, with the key of the figure, if a unit has another dimension than it."""
+    for channel, axis in axes.items():
+        try:
+            axis.check(channel)
+        except UnitError as error:
+            raise ValueError(f"{key}.{channel}.{error}") from error
+
+
+def _in_si(figures: Mapping[str, tuple[str | None, str]]) -> dict[str, float]:
+    """Return the figures that are there in SI, of text and dimension by their keys."""
+    found = {}
+    for key, (text, dimension) in figures.items():
+        if text is not None:
+            with naming(f"{key}: "):
+                found[key] = quantity_to_si(text, dimension)
+    return found

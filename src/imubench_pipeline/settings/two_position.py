@@ -1,0 +1,151 @@
+"""What is declared beside a log of a gyro that was turned between north and south."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import AfterValidator, Field, field_validator, model_validator
+
+from imubench_pipeline.settings.requirements import Latitude, Time
+from imubench_pipeline.settings.stated_gyro import Gyro, stated_gyro
+from imubench_pipeline.settings.validation import Strict, Text
+from imubench_pipeline.units import quantity_to_si
+
+
+def _not_negative(text: str) -> str:
+    if quantity_to_si(text, "time") < 0:
+        raise ValueError("expected a time from 0")
+    return text
+
+
+def _deviation_of_rate(text: str) -> str:
+    if quantity_to_si(text, "angular_rate") < 0:
+        raise ValueError("expected a standard deviation from 0")
+    return text
+
+
+def _deviation_of_slope(text: str) -> str:
+    if quantity_to_si(text, "gyro_ramp") < 0:
+        raise ValueError("expected a standard deviation from 0")
+    return text
+
+
+TimeFromZero = Annotated[Text, AfterValidator(_not_negative), Field(examples=["2 s"])]
+
+_NEEDED = {
+    "latitude": "where the log was recorded, such as latitude: 45.1 deg (south: negative)",
+    "dwell": "the time from one turn to the next, such as dwell: 30 s",
+}
+
+
+class TwoPosition(Strict):
+    """A log in which one gyro was turned end for end, between north and south, again and again.
+
+    Raises
+    ------
+    ValueError
+        If latitude or dwell is missing, a figure has a unit of another dimension or is out of
+        range, or turning takes half of the dwell or more.
+    """
+
+    latitude: Latitude = Field(
+        description="of the place, with its unit; south is negative, to no effect"
+    )
+    dwell: Time = Field(description="nominal, from the start of one turn to the start of the next")
+    channel: Gyro | None = Field(
+        None, description="that was turned; null: the only gyro of the log"
+    )
+    turning: TimeFromZero = Field("2 s", description="that a turn takes, where it is not seen")
+    start: TimeFromZero = Field(
+        "0 s", description="when the first dwell of the schedule begins, from the first sample used"
+    )
+    first: Literal["north", "south"] | None = Field(
+        None, description="where the axis points in the first dwell; null: not known"
+    )
+    trust_schedule: bool = Field(
+        False, description="take the schedule's word where nothing of the turns is seen"
+    )
+    turn_on_bias: Annotated[Text, AfterValidator(_deviation_of_rate)] | None = Field(
+        None,
+        description="standard deviation of the fixed bias, such as 0.1 deg/s; null: not known",
+    )
+    drift: Annotated[Text, AfterValidator(_deviation_of_slope)] | None = Field(
+        None,
+        description="standard deviation of a steady drift beside the noise, such as 20 deg/h/h "
+        "while the sensor warms up; null: none",
+    )
+    last: tuple[Time, ...] = Field(
+        (), description="of the log, which are estimated by themselves as well, such as 13 min"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _said(cls, data: Any) -> Any:
+        if isinstance(data, dict):
+            for key, needed in _NEEDED.items():
+                if data.get(key) is None:
+                    raise ValueError(f"{key} is missing; expected {needed}")
+        return data
+
+    @field_validator("latitude")
+    @classmethod
+    def _sees_rotation(cls, latitude: str) -> str:
+        if abs(quantity_to_si(latitude, "angle")) > quantity_to_si("89 deg", "angle"):
+            raise ValueError(
+                "expected at most 89 deg: at a pole a horizontal axis sees nothing of the Earth's "
+                "rate"
+            )
+        return latitude
+
+    @model_validator(mode="after")
+    def _turns_fit(self) -> Self:
+        if 2.0 * self.seconds("turning") >= self.seconds("dwell"):
+            raise ValueError(
+                f"turning is {self.turning}; expected less than half of the dwell of {self.dwell}"
+            )
+        return self
+
+    def seconds(self, name: Literal["dwell", "turning", "start"]) -> float:
+        """Return one of its times in s.
+
+        Parameters
+        ----------
+        name : str
+        """
+        return quantity_to_si(getattr(self, name), "time")
+
+    @property
+    def latitude_si(self) -> float:
+        """Latitude, rad."""
+        return quantity_to_si(self.latitude, "angle")
+
+    @property
+    def first_sense(self) -> int | None:
+        """Sense of the first dwell: 1 north, -1 south; None where it is not known."""
+        return None if self.first is None else {"north": 1, "south": -1}[self.first]
+
+    @property
+    def turn_on_bias_si(self) -> float | None:
+        """Standard deviation of the fixed bias, rad/s; None where it is not known."""
+        return quantity_to_si(self.turn_on_bias, "angular_rate") if self.turn_on_bias else None
+
+    @property
+    def drift_si(self) -> float:
+        """Standard deviation of a steady drift, rad/s^2."""
+        return quantity_to_si(self.drift, "gyro_ramp") if self.drift else 0.0
+
+    def turned(self, channels: list[str]) -> str:
+        """Return the channel that was turned.
+
+        Parameters
+        ----------
+        channels : list of str
+            Those that the log has.
+
+        Raises
+        ------
+        ValueError
+            If it is not among them, or is not stated and the log has another number of gyros
+            than one; the text begins with the key.
+        """
+        return stated_gyro(self.channel, channels, "was turned")

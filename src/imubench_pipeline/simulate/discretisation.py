@@ -1,0 +1,275 @@
+"""From continuous time to samples, exactly: slow noise states, and what a low-pass lacks of them.
+
+A slow state x (a Gauss-Markov process, or a random walk with 1/T = 0) and the states v of a filter
+that it drives are one linear system. It is written in x and e = v - p x, where p are the states of
+the filter at rest under a unit input:
+
+    dx = -x/T dt + dw,    de = (F e + p x/T) dt - p dw,    y = x + c e.
+
+e is small where x is slow, so that nothing is lost between a correlation time of days and a filter
+of milliseconds. The covariances over a sampling interval are integrated over a short step by
+Gauss-Legendre quadrature, exact to rounding, and doubled to the interval as triangular factors: no
+difference is formed, no exponential overflows, and the covariance cannot become indefinite.
+(Van Loan 1978 in one step would do both with a filter far faster than the sampling.)
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import expm, solve_continuous_lyapunov
+
+from imubench_pipeline.noise.low_pass import LowPass
+from imubench_pipeline.typing import Array
+
+_NODES = 14
+"""Quadrature nodes of a step that is short beside all time constants."""
+
+_SERIES = 20
+"""Terms of the exponential over such a step: 1 / 21! is left out."""
+
+
+@dataclass(frozen=True)
+class SlowSources:
+    """Slow states and the filter's lack of each, over one sampling interval.
+
+    The density of every driving noise is 1; all arrays are for n sources and a filter of order m.
+
+    Attributes
+    ----------
+    decay : ndarray, shape (n,)
+        e^(-interval / T); 1 of a random walk.
+    lost : ndarray, shape (n,)
+        1 - decay, without loss of digits.
+    own : ndarray, shape (n,)
+        Standard deviation of the noise of x.
+    coupling : ndarray, shape (n, m)
+        What e gains from x.
+    shared : ndarray, shape (n, m)
+        What e gains from the noise of x of unit variance.
+    residual : ndarray, shape (n, m, m)
+        Factors of the rest of the noise of e: its covariance is ``residual.T @ residual``.
+    """
+
+    decay: Array
+    lost: Array
+    own: Array
+    coupling: Array
+    shared: Array
+    residual: Array
+
+
+def filter_transition(low_pass: LowPass, interval: float) -> Array:
+    """Return what becomes of the states of a filter without input, e^(F interval).
+
+    Parameters
+    ----------
+    low_pass : LowPass
+    interval : float
+        s.
+
+    Returns
+    -------
+    ndarray, shape (m, m)
+    """
+    return np.asarray(expm(low_pass.transition * interval))
+
+
+def slow_sources(times: Array, interval: float, low_pass: LowPass | None) -> SlowSources:
+    """Discretise Gauss-Markov processes and random walks, and the filter that they drive.
+
+    Parameters
+    ----------
+    times : ndarray, shape (n,)
+        Correlation time of each, s; infinite for a random walk.
+    interval : float
+        Sampling interval, s.
+    low_pass : LowPass or None
+        None: m = 0.
+
+    Returns
+    -------
+    SlowSources
+    """
+    n, m = len(times), low_pass.order if low_pass else 0
+    x = interval / times
+    lost = -np.expm1(-x)
+    decay = np.exp(-x)
+    # interval (1 - e^(-2x)) / (2x), which is the interval itself for a random walk.
+    slow = x < 1e-300
+    ratio = -np.expm1(-2.0 * x) / np.where(slow, 1.0, 2.0 * x)
+    own = np.sqrt(interval * np.where(slow, 1.0, ratio))
+    if low_pass is None or not n:
+        none = np.zeros((n, m))
+        return SlowSources(decay, lost, own, none, none, np.zeros((n, m, m)))
+    system = np.zeros((n, 1 + m, 1 + m))
+    system[:, 0, 0] = -1.0 / times
+    system[:, 1:, 0] = low_pass.steady_state / times[:, None]
+    system[:, 1:, 1:] = low_pass.transition
+    impulse = np.concatenate(([1.0], -low_pass.steady_state))
+    transition, factor = _integrated(system, np.broadcast_to(impulse, (n, 1 + m)), interval)
+    sign = np.sign(factor[:, 0, 0])
+    return SlowSources(
+        decay,
+        lost,
+        own,
+        transition[:, 1:, 0],
+        factor[:, 0, 1:] * sign[:, None],
+        factor[:, 1:, 1:],
+    )
+
+
+def white_factor(low_pass: LowPass, interval: float) -> Array:
+    """Return a factor of the noise that white noise of density 1 leaves in the filter.
+
+    Parameters
+    ----------
+    low_pass : LowPass
+    interval : float
+        s.
+
+    Returns
+    -------
+    ndarray, shape (m, m)
+        R; the covariance is R.T @ R.
+    """
+    _, factor = _integrated(low_pass.transition[None], low_pass.input[None], interval)
+    return np.asarray(factor[0])
+
+
+def _integrated(system: Array, impulse: Array, interval: float) -> tuple[Array, Array]:
+    """Return transitions, and factors of the integral of g g' with g = e^(system t) impulse.
+
+    Parameters
+    ----------
+    system : ndarray, shape (n, k, k)
+    impulse : ndarray, shape (n, k)
+    interval : float
+    """
+    fastest = float(np.abs(system).sum(axis=2).max()) * interval
+    doublings = max(0, math.ceil(math.log2(max(fastest, 1.0))))
+    step = interval / 2.0**doublings
+    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+    # (system step)^k / k!, and the same of the impulse: over a short step their sums converge at
+    # once and lose no digit, and they are far cheaper than an exponential a node.
+    transition = np.broadcast_to(np.eye(system.shape[1]), system.shape)
+    part, response = transition, impulse
+    responses = np.repeat(impulse[:, None, :], _NODES, axis=1)
+    for k in range(1, _SERIES + 1):
+        part = part @ system * (step / k)
+        transition = transition + part
+        response = np.einsum("nij,nj->ni", system, response) * (step / k)
+        responses = responses + ((nodes + 1.0) / 2.0)[:, None] ** k * response[:, None, :]
+    rows = responses * np.sqrt(step / 2.0 * weights)[:, None]
+    factor: Array = np.asarray(np.linalg.qr(rows, mode="r"))
+    for _ in range(doublings):
+        later = factor @ transition.swapaxes(1, 2)
+        factor = np.asarray(np.linalg.qr(np.concatenate([later, factor], axis=1), mode="r"))
+        transition = transition @ transition
+    return transition, factor
+
+
+@dataclass(frozen=True)
+class Held:
+    """What a filter lacks of an input that is linear between samples, over one interval.
+
+    Attributes
+    ----------
+    step : ndarray, shape (m,)
+        e gains ``step`` times the change of the input.
+    lag_decay, lag_step : float
+        The lag ε = lagged - input of a first-order lag becomes ``lag_decay * ε + lag_step *
+        change``.
+    lag_coupling, lagged_step : ndarray, shape (m,)
+        e gains ``lag_coupling * ε + lagged_step * change`` of an input that is lagged.
+    """
+
+    step: Array
+    lag_decay: float
+    lag_step: float
+    lag_coupling: Array
+    lagged_step: Array
+
+
+def held_input(low_pass: LowPass | None, lag: float, interval: float) -> Held:
+    """Discretise filter and thermal lag for an input with first-order hold, exactly.
+
+    Parameters
+    ----------
+    low_pass : LowPass or None
+    lag : float
+        Time constant, s; 0: none.
+    interval : float
+        s.
+
+    Returns
+    -------
+    Held
+    """
+    m = low_pass.order if low_pass else 0
+    x = interval / lag if lag > 0 else math.inf
+    decay = math.exp(-x)
+    # ε' = -ε/lag - slope, with the slope of the input that is held.
+    lag_step = math.expm1(-x) / x if lag > 0 else 0.0
+    if low_pass is None:
+        return Held(np.zeros(0), decay, lag_step, np.zeros(0), np.zeros(0))
+    steady_state, transition = low_pass.steady_state, low_pass.transition
+    # Columns of e^(system interval): e from ε and from a slope of 1 / interval.
+    plain = np.zeros((m + 1, m + 1))
+    plain[:m, :m] = transition
+    plain[:m, m] = -steady_state / interval
+    step = expm(plain * interval)[:m, m]
+    if lag <= 0:
+        return Held(step, decay, lag_step, np.zeros(m), step)
+    lagged = np.zeros((m + 2, m + 2))
+    lagged[:m, :m] = transition
+    lagged[:m, m] = steady_state / lag
+    lagged[m, m] = -1.0 / lag
+    lagged[m, m + 1] = -1.0 / interval
+    whole = expm(lagged * interval)
+    return Held(step, decay, lag_step, whole[:m, m], whole[:m, m + 1])
+
+
+def stationary(
+    times: Array, densities: Array, white: float, low_pass: LowPass
+) -> tuple[Array, Array]:
+    """Return how the filter's lack e is distributed while all runs on for ever.
+
+    Parameters
+    ----------
+    times : ndarray, shape (n,)
+        Correlation times, s; infinite for a random walk, whose x starts at 0.
+    densities : ndarray, shape (n,)
+        Of the driving noises.
+    white : float
+        Density of white noise at the input, N^2.
+    low_pass : LowPass
+
+    Returns
+    -------
+    mean_given_x : ndarray, shape (n, m)
+        Mean of e is ``x @ mean_given_x``.
+    covariance_given_x : ndarray, shape (m, m)
+        Covariance of e for a given x.
+    """
+    # In units of the filter's own time, for the sake of the equations' condition.
+    unit = low_pass.angular_cutoff
+    F, p = low_pass.transition / unit, low_pass.steady_state
+    b = low_pass.input / unit
+    rates = 1.0 / (times * unit)
+    # With P the variance of x: F r - r/T - p P/T = 0, so r / P has no P; 0 for a random walk.
+    means = np.array([np.linalg.solve(F - rate * np.eye(len(p)), p * rate) for rate in rates])
+    means = means.reshape(len(times), len(p))
+    drive = white * unit * np.outer(b, b)
+    left = np.zeros_like(drive)
+    for rate, density, mean in zip(rates, densities, means, strict=True):
+        drive = drive + density / unit * np.outer(p, p)
+        if rate > 0:
+            variance = density / unit / (2.0 * rate)
+            cross = np.outer(p, mean) * variance * rate
+            drive = drive + cross + cross.T
+            left = left + variance * np.outer(mean, mean)
+    whole = solve_continuous_lyapunov(F, -drive)
+    return means, np.asarray((whole + whole.T) / 2.0 - left)

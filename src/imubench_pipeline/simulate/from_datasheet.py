@@ -1,0 +1,219 @@
+"""The model of a sensor that its datasheet describes; what it leaves open is assumed, and said."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from imubench_pipeline.datasheets.comparable import Comparable, comparables
+from imubench_pipeline.noise import FLOOR, NoiseModel
+from imubench_pipeline.noise.low_pass import LowPass
+from imubench_pipeline.noise.simulate import channel_rng
+from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, PrintedFigure, QuantityDatasheet
+from imubench_pipeline.settings.sensor import CHANNELS, Sensor, quantity_of
+from imubench_pipeline.settings.validation import ConfigError
+from imubench_pipeline.simulate.imu import ImuModel
+from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift
+from imubench_pipeline.simulate.sources import Origin, Remark, Topic
+from imubench_pipeline.units import dimension_of, quantity_to_si, to_si
+
+_REGISTER = 1 << 15
+"""Steps of a register of 16 bits on each side of 0."""
+
+
+def from_datasheet(name: str, sensor: Sensor, seed: int) -> Origin:
+    """Build the model that a datasheet describes.
+
+    Typical figures are taken. The bias is the printed offset with a sign that is drawn, and so is
+    the coefficient of temperature; bias instability is flicker noise where no correlation time is
+    printed.
+
+    Parameters
+    ----------
+    name : str
+        Of the sensor file.
+    sensor : Sensor
+    seed : int
+        For the signs.
+
+    Raises
+    ------
+    ConfigError
+        If no noise is printed for any channel of its log format.
+    """
+    document = sensor.datasheet.document or "the sensor file"
+    found = Origin(ImuModel(axes={}), f"the datasheet of {name}: {document}", sensor=name)
+    axes: dict[str, SensorModel] = {}
+    for channel in (name for name in CHANNELS if name in sensor.log.channels):
+        axis = _Printed(sensor, channel, found)
+        noise = axis.noise()
+        if noise is None:
+            found.figures.pop(channel)
+            found.assume("noise", f"{channel} is left out: no noise is printed of it")
+            continue
+        drawn = channel_rng(seed, name, channel, "signs").choice([-1.0, 1.0], 2)
+        signs = (float(drawn[0]), float(drawn[1]))
+        axes[channel] = axis.model(noise, signs)
+    if not axes:
+        raise ConfigError(
+            f"{name}: the datasheet prints no noise density, random walk or rms noise of any "
+            "channel; expected one, or --results, or a file of models"
+        )
+    found.imu = ImuModel(axes=axes)
+    return found
+
+
+class _Printed:
+    """What a datasheet prints of one axis."""
+
+    def __init__(self, sensor: Sensor, channel: str, origin: Origin) -> None:
+        self._sensor, self._channel = sensor, channel
+        self._quantity, self._axis = quantity_of(channel), channel[-1]
+        sheet: QuantityDatasheet | None = getattr(sensor.datasheet, self._quantity)
+        self._sheet = sheet or QuantityDatasheet()
+        self._said = origin.figures.setdefault(channel, [])
+        self._assume = origin.assume
+
+    def noise(self) -> NoiseModel | None:
+        rows = [row for row in comparables(self._sensor.datasheet, self._channel) if row.value]
+        density = _best([row for row in rows if row.statistic == "N"])
+        if density is None or density.value is None:
+            return None
+        self._say("N", density)
+        if density.figure and density.quantity == "N" and "assumed" in (density.reason or ""):
+            self._assume(
+                "noise",
+                f"{self._quantity}: the printed noise density is one-sided (N is it / sqrt(2))",
+            )
+        B = T_B = K = None
+        floor = _best([row for row in rows if row.statistic == "adev_minimum"])
+        time = _best([row for row in rows if row.statistic == "T_B"])
+        walk = _best([row for row in rows if row.statistic == "K"])
+        if floor is not None and floor.value:
+            self._say("bias instability", floor)
+            B, T_B = floor.value / FLOOR, time.value if time else None
+            self._assume(
+                "noise",
+                f"{self._quantity}: B is the printed bias instability / {FLOOR:.3f}"
+                + ("" if T_B else ", as flicker noise: no correlation time is printed"),
+            )
+        else:
+            self._assume("noise", f"{self._quantity}: no bias instability, it is not printed")
+        if walk is not None and walk.value:
+            self._say("K", walk)
+            K = walk.value
+        else:
+            self._assume("noise", f"{self._quantity}: no random walk K, it is not printed")
+        return NoiseModel(N=density.value, B=B or 0.0, T_B=T_B, K=K or 0.0)
+
+    def model(self, noise: NoiseModel, signs: Sequence[float]) -> SensorModel:
+        bias = self._single("offset", "bias", "bias")
+        if bias is not None:
+            self._assume("bias", f"{self._quantity}: the sign of the bias is drawn")
+        slope = self._single("temperature_coefficient", "drift", "temperature sensitivity")
+        drift = None
+        if slope is not None:
+            drift = TemperatureDrift(sensitivity=signs[1] * slope)
+            self._assume(
+                "drift",
+                f"{self._quantity}: no drift at 25 degC, and no thermal lag; its sign is drawn",
+            )
+        else:
+            self._assume(
+                "drift", f"{self._quantity}: no drift with temperature, no coefficient is printed"
+            )
+        step = self._step()
+        return SensorModel(
+            noise=noise,
+            bias=signs[0] * bias if bias else 0.0,
+            drift=drift,
+            low_pass=self._low_pass(),
+            resolution=step or 0.0,
+            full_scale=self._full_scale(step),
+        )
+
+    def _low_pass(self) -> LowPass | None:
+        stated = self._sensor.log.bandwidth
+        printed = self._single("bandwidth", "low-pass", "cut-off") if stated is None else None
+        if stated is not None:
+            self._said.append(Remark("low-pass", f"cut-off {stated}: of the log format"))
+            printed = quantity_to_si(stated, "frequency")
+        if printed is None:
+            self._assume("low-pass", f"{self._quantity}: no low-pass, its cut-off is not known")
+            return None
+        self._assume("low-pass", f"{self._quantity}: the low-pass is of first order")
+        return LowPass(printed)
+
+    def _step(self) -> float | None:
+        for name in ("sensitivity", "resolution"):
+            for figure in self._typical(name):
+                value = figure.on_axis(self._axis)
+                if not isinstance(value, float) or figure.unit is None:
+                    continue
+                dimension = dimension_of(figure.unit, FIGURE_DIMENSIONS[self._quantity][name])
+                found = to_si(value, figure.unit, dimension)
+                text = f"{name} {value:g} {figure.unit}: {figure.kind}, datasheet"
+                self._said.append(Remark("register", text))
+                return 1.0 / found if dimension.endswith("sensitivity") else found
+        self._assume("register", f"{self._quantity}: not rounded, no sensitivity is printed")
+        return None
+
+    def _full_scale(self, step: float | None) -> float | None:
+        (dimension,) = FIGURE_DIMENSIONS[self._quantity]["full_scale"]
+        for figure in self._typical("full_scale", choices=True):
+            value = figure.on_axis(self._axis)
+            if value is None or figure.unit is None:
+                continue
+            values = [value] if isinstance(value, float) else list(value)
+            ranges = [to_si(each, figure.unit, dimension) for each in values]
+            chosen = len(ranges) - 1
+            if step is not None and len(ranges) > 1:
+                # The sensitivity is printed for the range that a register of 16 bits then has.
+                chosen = int(np.argmin(np.abs(np.log(np.array(ranges) / (step * _REGISTER)))))
+            text = f"full scale {values[chosen]:g} {figure.unit}: datasheet"
+            self._said.append(Remark("register", text))
+            if len(ranges) > 1:
+                self._assume(
+                    "register", f"{self._quantity}: range {values[chosen]:g} {figure.unit}"
+                )
+            return ranges[chosen]
+        self._assume("register", f"{self._quantity}: no saturation, no full scale is printed")
+        return None
+
+    def _single(self, name: str, topic: Topic, label: str) -> float | None:
+        """Return a figure that is one number, in SI."""
+        (dimension,) = FIGURE_DIMENSIONS[self._quantity][name]
+        for figure in self._typical(name):
+            value = figure.on_axis(self._axis)
+            if isinstance(value, float) and figure.unit is not None:
+                text = f"{label} {value:g} {figure.unit}: {figure.kind}, datasheet"
+                self._said.append(Remark(topic, text))
+                return to_si(value, figure.unit, dimension)
+        return None
+
+    def _typical(self, name: str, *, choices: bool = False) -> list[PrintedFigure]:
+        """Return the figures of a name for the logged options, typical ones first."""
+        options = self._sensor.datasheet.options
+        printed = self._sheet.printed(name)
+        logged = [one for one in printed if one.option is None or one.option in options] or printed
+        usable = [one for one in logged if choices or one.kind not in ("choices", "range")]
+        return sorted(usable, key=lambda one: one.kind not in ("typ", "1sigma"))
+
+    def _say(self, name: str, row: Comparable) -> None:
+        assert row.figure is not None  # it has a value
+        why = f" ({row.reason})" if row.reason else ""
+        text = f"{name} {row.printed:g} {row.figure.unit}: {row.figure.kind}, datasheet{why}"
+        self._said.append(Remark("noise", text))
+
+
+def _best(rows: Sequence[Comparable]) -> Comparable | None:
+    """Return the figure that leaves least to assume: typical, and of a stated side."""
+
+    def doubt(row: Comparable) -> tuple[bool, bool, bool]:
+        assert row.figure is not None  # it has a value
+        unsure = row.figure.sidedness == "unknown" and row.sidedness is not None
+        rms = (row.reason or "").startswith("rms")
+        return (row.figure.kind not in ("typ", "1sigma", "derived"), unsure and not rms, rms)
+
+    return min(rows, key=doubt, default=None)

@@ -1,0 +1,185 @@
+"""The model of a sensor as a run has estimated it, in the place of what its datasheet prints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from imubench_pipeline.estimators.rows import estimate_of
+from imubench_pipeline.noise.low_pass import LowPass
+from imubench_pipeline.settings.sensor import CHANNELS, quantity_of
+from imubench_pipeline.settings.validation import ConfigError
+from imubench_pipeline.simulate.imu import ImuModel
+from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift
+from imubench_pipeline.simulate.noise_in_log import before_the_filter
+from imubench_pipeline.simulate.sources import Origin, Remark, Topic
+from imubench_pipeline.tables import read
+
+Rows = list[dict[str, Any]]
+_NEEDED = ("recordings", "parameters", "fixed_bias", "temperature", "low_pass")
+
+
+def with_estimates(found: Origin, results: Path, name: str, recording: str | None = None) -> Origin:
+    """Put what a run has estimated in the place of printed figures.
+
+    They are those of the longest recording: the noise, by the recommended method, and the bias;
+    where temperature was taken out, the noise that it leaves, the bias and the drift; the cut-off
+    where it is told. Resolution and full scale stay as the datasheet has them.
+
+    Parameters
+    ----------
+    found : Origin
+        What is known without them; its channels may be none.
+    results : Path
+        Folder of the results of a run.
+    name : str
+        Of the sensor file.
+    recording : str, optional
+
+    Raises
+    ------
+    ConfigError
+        If there is no estimate of the sensor, or of the recording.
+    """
+    folder = results / "tables" if (results / "tables").is_dir() else results
+    try:
+        tables = {one: read(one, [folder / f"{one}.parquet"]) for one in _NEEDED}
+    except (OSError, ValueError) as error:
+        raise ConfigError(f"{folder}: not the tables of a run: {error}") from error
+    about = _recording(tables["recordings"], folder, name, recording)
+    chosen = about["recording"]
+    of_log = {
+        table: tables[table].filter(
+            (pc.field("sensor") == name) & (pc.field("recording") == chosen)
+        )
+        for table in _NEEDED[1:]
+    }
+    axes: dict[str, SensorModel] = {}
+    figures: dict[str, list[Remark]] = {}
+    told: list[set[Topic]] = []
+    for channel in CHANNELS:
+        of_channel = {
+            table: rows.filter(pc.field("channel") == channel).to_pylist()
+            for table, rows in of_log.items()
+        }
+        if of_channel["parameters"]:
+            axis = _Axis(found, channel, of_channel, f"{name}/{chosen}")
+            axes[channel] = axis.model(float(about["rate"]))
+            told.append({remark.topic for remark in axis.said})
+            of_datasheet = found.figures.get(channel, [])
+            figures[channel] = [
+                *axis.said,
+                *(one for one in of_datasheet if one.topic not in told[-1]),
+            ]
+    if not axes:
+        raise ConfigError(f"{folder}: no estimate of {name}/{chosen}")
+    known = set[Topic].intersection(*told)
+    origin = Origin(
+        ImuModel(axes=axes),
+        f"the estimates of a run in {results}, from the recording {name}/{chosen}",
+        figures,
+        [remark for remark in found.assumed if remark.topic not in known],
+        name,
+    )
+    if about["simulated"]:
+        origin.assume("log", f"{name}/{chosen} is itself simulated")
+    if any(quantity_of(channel) == "accel" for channel in axes):
+        text = "accel: the mean of a recording is mostly gravity, so it is no bias here"
+        origin.assume("bias", text)
+    return origin
+
+
+def _recording(
+    recordings: pa.Table, folder: Path, name: str, asked: str | None
+) -> Mapping[str, Any]:
+    """Return the row of the recording to take: that asked for, or the longest."""
+    mine = recordings.filter(pc.field("sensor") == name).to_pylist()
+    usable = {row["recording"]: row for row in mine if row["status"] == "ok"}
+    if not usable:
+        there = ", ".join(sorted(set(recordings["sensor"].to_pylist()))) or "none"
+        raise ConfigError(f"{folder}: no estimate of sensor {name!r}; there are: {there}")
+    if asked is not None and asked not in usable:
+        raise ConfigError(
+            f"{folder}: no recording {asked!r} of {name}; there are: {', '.join(usable)}"
+        )
+    longest = max(usable, key=lambda key: (usable[key]["duration"], key))
+    return usable[asked or longest]
+
+
+class _Axis:
+    """What a run has found of one channel."""
+
+    def __init__(self, found: Origin, channel: str, tables: Mapping[str, Rows], log: str) -> None:
+        self._printed = found.imu.axes.get(channel) or SensorModel()
+        self._gravity = quantity_of(channel) == "accel"
+        self._tables, self._log = tables, log
+        self._temperature = {row["parameter"]: row for row in tables["temperature"]}
+        self._low_pass = {row["parameter"]: row for row in tables["low_pass"]}
+        self.said: list[Remark] = []
+
+    def model(self, rate: float) -> SensorModel:
+        """Return the model; ``said`` then has what its figures are from. The rate is in Hz."""
+        printed = replace(self._printed, low_pass=self._filter(), drift=self._drift())
+        method = "compensated" if self._compensated else None
+        rows = [
+            row
+            for row in self._tables["parameters"]
+            if (row["method"] == method if method else row["recommended"])
+        ]
+        estimate = estimate_of(rows[0]["method"], rows)
+        self._say(
+            "noise",
+            f"noise {estimate.model.name}: estimated by {estimate.method} from {self._log}, N "
+            "taken back to before low-pass and rounding",
+        )
+        noise = before_the_filter(printed, estimate.model, rate)
+        return replace(printed, noise=noise, bias=self._bias())
+
+    @property
+    def _compensated(self) -> bool:
+        return any(row["compensated"] for row in self._temperature.values())
+
+    def _say(self, topic: Topic, text: str) -> None:
+        self.said.append(Remark(topic, text))
+
+    def _filter(self) -> LowPass | None:
+        cutoff = self._low_pass.get("cutoff")
+        if cutoff is None or cutoff["value"] is None:
+            return self._printed.low_pass
+        self._say("low-pass", f"cut-off {cutoff['value']:.4g} Hz: estimated from {self._log}")
+        return LowPass(cutoff["value"], cutoff["order"])
+
+    def _drift(self) -> TemperatureDrift | None:
+        if not self._compensated:
+            return self._printed.drift
+        found = {
+            name: row["value"] if row["value"] is not None else row["fitted"]
+            for name, row in self._temperature.items()
+        }
+        slope, unit = found["sensitivity"] or 0.0, self._temperature["sensitivity"]["unit"]
+        self._say(
+            "drift", f"temperature sensitivity {slope:.4g} {unit}: estimated from {self._log}"
+        )
+        return TemperatureDrift(
+            sensitivity=slope,
+            reference=found["T_0"],
+            quadratic=found["quadratic"] or 0.0,
+            lag=found["lag"] or 0.0,
+        )
+
+    def _bias(self) -> float:
+        if self._gravity:
+            return self._printed.bias
+        if self._compensated and self._temperature["bias"]["value"] is not None:
+            bias = float(self._temperature["bias"]["value"])
+            self._say("bias", f"bias {bias:g} rad/s at T_0: estimated from {self._log}")
+            return bias
+        for row in self._tables["fixed_bias"]:
+            self._say("bias", f"bias {row['value']:g} rad/s: mean of {self._log}")
+            return float(row["value"])
+        return self._printed.bias

@@ -1,0 +1,176 @@
+"""Several axes that share one motion and one temperature, simulated side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from imubench_pipeline.noise.simulate import channel_rng
+from imubench_pipeline.settings.sensor import CHANNELS, TEMPERATURE, quantity_of
+from imubench_pipeline.simulate.model import SensorModel
+from imubench_pipeline.simulate.profiles import Profile
+from imubench_pipeline.simulate.simulation import CHUNK, Signal, simulate_blocks
+from imubench_pipeline.typing import Array
+
+BLOCK = 8 * CHUNK
+"""Samples that `simulate_imu` gives at a time."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImuModel:
+    """The axes of one sensor.
+
+    Parameters
+    ----------
+    axes : mapping of str to SensorModel
+        By channel, ``gyro_x`` to ``accel_z``, as many as the sensor has.
+    misalignment : mapping of str to ndarray, shape (3, 3)
+        By quantity: what the axes x, y, z sense of a unit rate or specific force along the true
+        x, y, z, their scale errors apart. The unit matrix where a quantity is not named.
+    temperature_step : float
+        Step of the register of temperature, K; 0: not rounded.
+
+    Raises
+    ------
+    ValueError
+        If a channel is not known, or a matrix is not of finite numbers, 3 by 3.
+    """
+
+    axes: Mapping[str, SensorModel]
+    misalignment: Mapping[str, Array] = field(default_factory=dict)
+    temperature_step: float = 0.0
+
+    def __post_init__(self) -> None:
+        if unknown := [name for name in self.axes if name not in CHANNELS]:
+            raise ValueError(f"no channel {unknown[0]!r}; expected {', '.join(CHANNELS)}")
+        for quantity, matrix in self.misalignment.items():
+            if np.shape(matrix) != (3, 3) or not np.isfinite(matrix).all():
+                raise ValueError(f"misalignment of {quantity}: expected 3 by 3 finite numbers")
+        if not self.temperature_step >= 0:
+            raise ValueError(f"temperature_step is {self.temperature_step}, expected from 0")
+
+    def sensed(self, channel: str) -> dict[str, float]:
+        """Return which true channels an axis senses, and how much of each.
+
+        Parameters
+        ----------
+        channel : str
+            Such as ``gyro_x``.
+
+        Returns
+        -------
+        dict of str to float
+            By channel; those of which it senses nothing are left out.
+        """
+        quantity, row = quantity_of(channel), "xyz".index(channel[-1])
+        matrix = np.asarray(self.misalignment.get(quantity, np.eye(3)))
+        parts = {f"{quantity}_{axis}": float(matrix[row, i]) for i, axis in enumerate("xyz")}
+        return {name: part for name, part in parts.items() if part != 0.0}
+
+
+def simulate_imu(
+    imu: ImuModel,
+    rate: float,
+    samples: int,
+    seed: int,
+    names: tuple[str, ...] = (),
+    *,
+    motion: Mapping[str, Profile] | None = None,
+    temperature: Profile | None = None,
+    threads: int = 1,
+) -> Iterator[dict[str, Array]]:
+    """Yield the log of a sensor in blocks of `BLOCK` samples; memory does not grow with it.
+
+    Parameters
+    ----------
+    imu : ImuModel
+    rate : float
+        Hz.
+    samples : int
+    seed : int
+        With the names it determines every sample: an axis does not depend on which others are
+        simulated, nor on the number of threads.
+    names : tuple of str
+        Such as sensor and recording.
+    motion : mapping of str to Profile, optional
+        True rate, rad/s, and specific force, m/s², by channel; 0 where there is none.
+    temperature : Profile, optional
+        °C. Without one there is no drift.
+    threads : int
+        Axes that are simulated at the same time.
+
+    Yields
+    ------
+    dict of str to ndarray, shape (block,)
+        The channels in SI; ``temperature`` in °C, as its register has it, where it is given.
+    """
+    shared = _Shared(rate, motion or {}, temperature)
+    streams = {
+        channel: simulate_blocks(
+            model,
+            rate,
+            samples,
+            channel_rng(seed, *names, channel),
+            true=shared.along(imu.sensed(channel)),
+            temperature=shared.temperature_signal,
+            block=BLOCK,
+        )
+        for channel, model in imu.axes.items()
+    }
+    with ThreadPoolExecutor(max(1, threads)) as pool:
+        for start in range(0, samples, BLOCK):
+            shared.advance(start, min(start + BLOCK, samples))
+            blocks = dict(zip(streams, pool.map(next, streams.values()), strict=True))
+            if shared.temperature is not None:
+                block, step = shared.temperature, imu.temperature_step
+                blocks[TEMPERATURE] = np.rint(block / step) * step if step else block
+            yield blocks
+
+
+class _Shared:
+    """Motion and temperature of the block that is being simulated."""
+
+    def __init__(
+        self, rate: float, motion: Mapping[str, Profile], temperature: Profile | None
+    ) -> None:
+        self._rate, self._profiles, self._temperature = rate, motion, temperature
+        self._start = 0
+        self._motion: dict[str, Array] = {}
+        self.temperature: Array | None = None
+
+    def advance(self, start: int, stop: int) -> None:
+        """Go to the block of samples ``start`` to ``stop``."""
+        times = np.arange(start, stop) / self._rate
+        self._start = start
+        self._motion = {name: profile.at(times) for name, profile in self._profiles.items()}
+        self.temperature = None if self._temperature is None else self._temperature.at(times)
+
+    def along(self, sensed: Mapping[str, float]) -> Signal | None:
+        """Return the signal along an axis; None where it senses no motion."""
+        parts = {name: part for name, part in sensed.items() if name in self._profiles}
+        if not parts:
+            return None
+
+        def true(start: int, stop: int) -> Array:
+            here = slice(start - self._start, stop - self._start)
+            found = np.zeros(stop - start)
+            for name, part in parts.items():
+                found += part * self._motion[name][here]
+            return found
+
+        return true
+
+    @property
+    def temperature_signal(self) -> Signal | None:
+        """The temperature as a signal; None where none is given."""
+        if self._temperature is None:
+            return None
+
+        def temperature(start: int, stop: int) -> Array:
+            assert self.temperature is not None  # `advance` has been called
+            return self.temperature[start - self._start : stop - self._start]
+
+        return temperature

@@ -1,0 +1,243 @@
+"""The model of one axis of a sensor: from the true rate or specific force to what is logged.
+
+    u(t) = (1 + scale error) true + bias + drift(temperature, lagged) + noise(t)
+    y(t) = low-pass of u, in continuous time
+    logged = rounding of the saturation of (y at the sampling times + quantization noise)
+
+What passes the low-pass is everything in front of it: white noise (N is its density before the
+filter), Gauss-Markov processes, flicker noise, random walk, ramp, lines, bias, drift and motion.
+Quantization noise Q stands behind it: it is what a converter that counts increments of angle or
+velocity leaves, -dq/dt over a sampling interval. It is not the rounding to the resolution (LSB) of
+a register of rate, which is done as such, to the nearest step; with noise of at least half a step
+it adds LSB^2 / 12 to the variance of each sample, and that is what spectrum and Allan variance
+count for it. A sensor has one of the two, seldom both: an estimate of N from a log that is rounded
+contains the rounding already.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise.low_pass import LowPass
+from imubench_pipeline.noise.terms import (
+    Flicker,
+    GaussMarkov,
+    Quantization,
+    Ramp,
+    RandomWalk,
+    Sinusoid,
+    WhiteNoise,
+)
+from imubench_pipeline.simulate import flicker_band, spectra
+from imubench_pipeline.typing import Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class TemperatureDrift:
+    """The drift of the bias with temperature.
+
+    drift = sensitivity (θ - reference) + quadratic (θ - reference)^2, where θ follows the
+    temperature with a first-order lag: dθ/dt = (temperature - θ) / lag. There is no hysteresis.
+
+    Parameters
+    ----------
+    sensitivity : float
+        rad/s/K or m/s^2/K.
+    reference : float
+        Temperature without drift, °C.
+    quadratic : float
+        rad/s/K^2 or m/s^2/K^2.
+    lag : float
+        s; 0: none.
+
+    Raises
+    ------
+    ValueError
+        If a figure is not finite, or the lag is below 0.
+    """
+
+    sensitivity: float
+    reference: float = 25.0
+    quadratic: float = 0.0
+    lag: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("sensitivity", "reference", "quadratic", "lag"):
+            if not math.isfinite(getattr(self, name)):
+                raise ValueError(f"{name} is {getattr(self, name)}, expected a finite number")
+        if self.lag < 0:
+            raise ValueError(f"lag is {self.lag} s, expected a time from 0")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorModel:
+    """One axis of a sensor.
+
+    Parameters
+    ----------
+    noise : NoiseModel
+        N is the density before the low-pass.
+    bias : float
+        Fixed bias, rad/s or m/s^2.
+    drift : TemperatureDrift, optional
+    low_pass : LowPass, optional
+    scale_error : float
+        Relative error of the scale factor.
+    resolution : float
+        Step of the register (LSB), rad/s or m/s^2; 0: not rounded.
+    full_scale : float, optional
+        Largest magnitude that is logged, rad/s or m/s^2.
+
+    Raises
+    ------
+    ValueError
+        If a figure is out of its range.
+    """
+
+    noise: NoiseModel = field(default_factory=NoiseModel)
+    bias: float = 0.0
+    drift: TemperatureDrift | None = None
+    low_pass: LowPass | None = None
+    scale_error: float = 0.0
+    resolution: float = 0.0
+    full_scale: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("bias", "scale_error"):
+            if not math.isfinite(getattr(self, name)):
+                raise ValueError(f"{name} is {getattr(self, name)}, expected a finite number")
+        if not (math.isfinite(self.resolution) and self.resolution >= 0):
+            raise ValueError(f"resolution is {self.resolution}, expected a step from 0")
+        if self.full_scale is not None and not self.full_scale > self.resolution:
+            raise ValueError(
+                f"full_scale is {self.full_scale}, expected more than the resolution, "
+                f"{self.resolution}"
+            )
+
+    def psd(self, frequency: ArrayLike) -> Array:
+        """Return the two-sided power spectral density of the noise behind the low-pass.
+
+        Parameters
+        ----------
+        frequency : array_like
+            Hz, not 0.
+
+        Returns
+        -------
+        ndarray
+            (rad/s)²/Hz or (m/s²)²/Hz, in the shape of ``frequency``: in continuous time, before
+            sampling folds it and adds quantization and rounding. Lines and a ramp have none.
+        """
+        f = np.asarray(frequency, dtype=np.float64)
+        left_out = (Quantization, Ramp, Sinusoid)
+        parts = [term.psd(f) for term in self.noise.terms if not isinstance(term, left_out)]
+        density = np.asarray(np.sum(parts, axis=0)) if parts else np.zeros_like(f)
+        return density * self.low_pass.power(f) if self.low_pass else density
+
+    def sampled_spectrum(self, omega: ArrayLike, rate: float) -> Array:
+        """Return the spectrum of the samples, with everything that sampling folds into it.
+
+        Parameters
+        ----------
+        omega : array_like
+            rad a sample, not 0.
+        rate : float
+            Hz.
+
+        Returns
+        -------
+        ndarray
+            SI^2; its mean over -pi..pi is the variance of the samples. Rounding counts as white.
+        """
+        w = np.asarray(omega, dtype=np.float64)
+        rounding = self.resolution**2 / 12.0
+        if self.low_pass is None:
+            return self.noise.sampled_spectrum(w, rate) + rounding
+        behind = [t for t in self.noise.terms if isinstance(t, Quantization)]
+        found = np.sum([t.sampled_spectrum(w, 1.0 / rate) for t in behind], axis=0) + rounding
+        return np.asarray(found + spectra.sampled_spectrum(self.sources, self.low_pass, w, rate))
+
+    def allan_variance(self, tau: ArrayLike, rate: float) -> Array:
+        """Return the Allan variance of the samples, exactly.
+
+        Parameters
+        ----------
+        tau : array_like
+            Cluster lengths, s; taken to the nearest whole number of samples, at least one.
+        rate : float
+            Hz.
+
+        Returns
+        -------
+        ndarray
+            (rad/s)² or (m/s²)², in the shape of ``tau``. Rounding counts as white noise; drift
+            and motion are not in it.
+        """
+        t = np.asarray(tau, dtype=np.float64)
+        n = np.maximum(np.rint(t * rate), 1.0)
+        rounding = self.resolution**2 / 12.0 / n
+        if self.low_pass is None:
+            return self.noise.allan_variance(n / rate, rate) + rounding
+        found = rounding + spectra.allan_variance(self.sources, self.low_pass, n, rate)
+        for term in self.noise.terms:
+            if isinstance(term, Sinusoid):
+                gain = float(self.low_pass.power(term.frequency))
+                found = found + gain * term.sampled_allan_variance(n, 1.0 / rate)
+            elif not isinstance(term, (WhiteNoise, Flicker, GaussMarkov, RandomWalk)):
+                found = found + term.sampled_allan_variance(n, 1.0 / rate)
+        return found
+
+    @property
+    def sources(self) -> spectra.Sources:
+        """The noise that a low-pass is driven by, with flicker noise as a number of its own."""
+        return sources_of(self.noise.terms)
+
+
+def sources_of(terms: Sequence[object]) -> spectra.Sources:
+    """Return the terms that drive a filter with a density.
+
+    Parameters
+    ----------
+    terms : sequence of Term
+
+    Returns
+    -------
+    Sources
+        White and flicker noise, Gauss-Markov processes and random walks; others have no density.
+    """
+    white = sum(term.N**2 for term in terms if isinstance(term, WhiteNoise))
+    flicker = sum(term.B**2 for term in terms if isinstance(term, Flicker))
+    slow = [(term.T_B, term.density) for term in terms if isinstance(term, GaussMarkov)]
+    slow += [(math.inf, term.K**2) for term in terms if isinstance(term, RandomWalk)]
+    times, densities = np.array(slow, dtype=np.float64).reshape(-1, 2).T
+    return spectra.Sources(white, flicker, times, densities)
+
+
+def bank_for(model: SensorModel, rate: float, duration: float) -> list[GaussMarkov]:
+    """Return the processes that stand for flicker noise in front of the model's filter.
+
+    Parameters
+    ----------
+    model : SensorModel
+    rate : float
+        Hz.
+    duration : float
+        s; the density is followed down to 1 / (2 duration).
+
+    Returns
+    -------
+    list of GaussMarkov
+        None without flicker noise, or without a filter.
+    """
+    found: list[GaussMarkov] = []
+    for term in model.noise.terms:
+        if isinstance(term, Flicker) and model.low_pass is not None:
+            highest = flicker_band.ABOVE * max(model.low_pass.cutoff, rate / 2.0)
+            found += flicker_band.bank(term.B, 0.5 / duration, highest)
+    return found

@@ -1,0 +1,244 @@
+"""Profiles in CSV or Parquet files: columns over time, read as a stream.
+
+A column is named for what it holds, with its unit in brackets: ``time [s]``, ``temperature
+[degC]``, ``gyro_z [deg/s]``. Without a unit it is in SI, and temperature in °C. Only the rows about
+the times that are asked for are in memory.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pacsv
+import pyarrow.parquet as pq
+
+from imubench_pipeline.settings.validation import ConfigError
+from imubench_pipeline.typing import Array
+from imubench_pipeline.units import SI_UNITS, UnitError, conversion
+
+_HEADING = re.compile(r"^\s*(\w+)\s*(?:[\[(]\s*(.+?)\s*[\])])?\s*$")
+_TIME = "time"
+_ROWS = 1 << 16
+_AS_TEXT = "commas between columns, points before decimals, and one line of names"
+
+
+class FileSeries:
+    """Columns over time in a file.
+
+    Parameters
+    ----------
+    path : Path
+        CSV with a line of names, or Parquet.
+
+    Raises
+    ------
+    ConfigError
+        If the file is not there, cannot be read, or has no column ``time``.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._headings = self._read_headings()
+        self._taken: dict[str, tuple[str, float, float]] = {}
+        self.take(_TIME, "time")
+        self._batches: Iterator[tuple[int, pa.RecordBatch]] | None = None
+        self._window: dict[str, Array] = {}
+        self._trimmed = False
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What the file has columns of, time apart."""
+        return tuple(name for name in self._headings if name != _TIME)
+
+    def take(self, name: str, dimension: str) -> None:
+        """Say that a column will be asked for.
+
+        Parameters
+        ----------
+        name : str
+            Without its unit.
+        dimension : str
+            A key of `imubench_pipeline.units.SI_UNITS`.
+
+        Raises
+        ------
+        ConfigError
+            If there is no such column, or its unit has another dimension.
+        """
+        if name not in self._headings:
+            raise ConfigError(
+                f"{self.path}: no column {name!r}; it has {', '.join(self._headings) or 'none'}; "
+                f"expected such as '{name} [{SI_UNITS[dimension]}]'"
+            )
+        heading, unit = self._headings[name]
+        try:
+            factor, offset = conversion(unit or SI_UNITS[dimension], dimension)
+        except UnitError as error:
+            raise ConfigError(f"{self.path}: column {heading!r}: {error}") from error
+        self._taken[name] = (heading, factor, offset)
+        self._batches = None
+
+    def span(self) -> tuple[float, float]:
+        """Return the first and the last time, s; the whole file is read for it.
+
+        Raises
+        ------
+        ConfigError
+            If the file has no rows, a number is missing in it, or its times do not ascend.
+        """
+        first, last = np.nan, np.nan
+        for row, batch in self._read():
+            times = self._columns(batch, row, last)[_TIME]
+            if len(times):
+                first = times[0] if np.isnan(first) else first
+                last = times[-1]
+        if np.isnan(first):
+            raise ConfigError(f"{self.path}: has no rows")
+        return float(first), float(last)
+
+    def at(self, name: str, times: Array) -> Array:
+        """Return a column, linear between rows, its ends held.
+
+        Parameters
+        ----------
+        name : str
+            That was taken (`take`).
+        times : ndarray, shape (k,)
+            s, ascending.
+
+        Returns
+        -------
+        ndarray, shape (k,)
+            In SI; temperature in °C.
+
+        Raises
+        ------
+        ConfigError
+            If a number is missing in the file, or its times do not ascend.
+        """
+        if not len(times):
+            return np.empty(0)
+        self._reach(float(times[0]), float(times[-1]))
+        return np.interp(times, self._window[_TIME], self._window[name])
+
+    def _reach(self, first: float, last: float) -> None:
+        """Have in memory the rows from the one before ``first`` to the one after ``last``."""
+        if self._batches is None or (self._trimmed and first < self._window[_TIME][0]):
+            self._batches = self._read()
+            self._window = {name: np.empty(0) for name in self._taken}
+            self._trimmed = False
+        parts = [self._window]
+        reached = float(self._window[_TIME][-1]) if len(self._window[_TIME]) else -np.inf
+        while not reached >= last:
+            found = next(self._batches, None)
+            if found is None:
+                break
+            row, batch = found
+            columns = self._columns(batch, row, reached)
+            if len(columns[_TIME]):
+                parts.append(self._from(columns, first))
+                reached = float(columns[_TIME][-1])
+        joined = {name: np.concatenate([part[name] for part in parts]) for name in self._taken}
+        if not len(joined[_TIME]):
+            raise ConfigError(f"{self.path}: has no rows")
+        self._window = self._from(joined, first)
+
+    def _from(self, columns: dict[str, Array], first: float) -> dict[str, Array]:
+        """Leave out the rows that are no longer needed."""
+        begin = max(0, int(np.searchsorted(columns[_TIME], first, side="right")) - 1)
+        self._trimmed = self._trimmed or begin > 0
+        return {name: values[begin:] for name, values in columns.items()}
+
+    def _columns(self, batch: pa.RecordBatch, row: int, before: float) -> dict[str, Array]:
+        """Return the columns of a batch in SI; ``row`` is the number of its first row."""
+        found = {}
+        for name, (heading, factor, offset) in self._taken.items():
+            column = batch.column(heading)
+            if pa.types.is_string(column.type) or pa.types.is_binary(column.type):
+                raise ConfigError(f"{self.path}: column {heading!r} is text; expected numbers")
+            raw = column.cast(pa.float64()).to_numpy(zero_copy_only=False)
+            if not np.isfinite(raw).all():
+                at = row + int(np.argmin(np.isfinite(raw)))
+                raise ConfigError(
+                    f"{self.path}: column {heading!r}: a number is missing in row {at}; expected "
+                    "one a row: leave out the row, or fill it in"
+                )
+            found[name] = raw * factor + offset
+        times = np.concatenate(([before if np.isfinite(before) else -np.inf], found[_TIME]))
+        rises = np.diff(times) > 0
+        if not rises.all():
+            at = int(np.argmin(rises))
+            raise ConfigError(
+                f"{self.path}: the times do not ascend in row {row + at}: {times[at + 1]:g} s "
+                f"after {times[at]:g} s; expected each row later than the one before: put the rows "
+                "in order, each time once"
+            )
+        return found
+
+    def _read_headings(self) -> dict[str, tuple[str, str | None]]:
+        found = {}
+        for heading, unit in self._schema():
+            if self.path.suffix != ".parquet" and (";" in heading or "\t" in heading):
+                raise ConfigError(
+                    f"{self.path}: found the line of names {heading!r}; expected {_AS_TEXT}"
+                )
+            match = _HEADING.match(heading)
+            if match:
+                found[match[1]] = (heading, match[2] or unit)
+        if _TIME not in found:
+            raise ConfigError(
+                f"{self.path}: no column 'time'; it has {', '.join(found) or 'none'}; expected "
+                "such as 'time [s]'"
+            )
+        return found
+
+    def _schema(self) -> list[tuple[str, str | None]]:
+        """Return headings, and the units that stand in the metadata of Parquet columns."""
+        try:
+            if self.path.suffix == ".parquet":
+                schema = pq.read_schema(self.path)
+            else:
+                with pacsv.open_csv(self.path) as reader:
+                    schema = reader.schema
+        except FileNotFoundError:
+            raise ConfigError(
+                f"{self.path}: no such file; expected a CSV or Parquet file with columns such as "
+                "'time [s]': mend its name"
+            ) from None
+        except (OSError, pa.ArrowException) as error:
+            raise self._unreadable(error) from error
+        stated = [(field.metadata or {}).get(b"unit") for field in schema]
+        units = [None if unit is None else unit.decode("utf-8", "replace") for unit in stated]
+        return list(zip(schema.names, units, strict=True))
+
+    def _unreadable(self, error: Exception) -> ConfigError:
+        text = self.path.suffix != ".parquet" and isinstance(error, pa.ArrowException)
+        expected = f"; expected {_AS_TEXT}" if text else ""
+        return ConfigError(f"{self.path}: cannot be read: {error}{expected}")
+
+    def _read(self) -> Iterator[tuple[int, pa.RecordBatch]]:
+        """Yield batches, each with the number of its first row, the one under the names being 1."""
+        row = 1
+        for batch in self._batches_of_file():
+            yield row, batch
+            row += len(batch)
+
+    def _batches_of_file(self) -> Iterator[pa.RecordBatch]:
+        headings = [heading for heading, _, _ in self._taken.values()]
+        try:
+            if self.path.suffix == ".parquet":
+                with pq.ParquetFile(self.path) as file:
+                    yield from file.iter_batches(_ROWS, columns=headings, use_threads=False)
+            else:
+                chosen = pacsv.ConvertOptions(
+                    include_columns=headings,
+                    column_types=dict.fromkeys(headings, pa.float64()),
+                )
+                with pacsv.open_csv(self.path, convert_options=chosen) as reader:
+                    yield from reader
+        except (OSError, pa.ArrowException) as error:
+            raise self._unreadable(error) from error

@@ -1,0 +1,287 @@
+"""Logs from the model of an axis, exactly, block by block.
+
+True motion and temperature are given at the sampling times and are linear in between (first-order
+hold); a step is a ramp over one sampling interval. Filter and thermal lag are exact for that; so
+is the linear part of the drift with temperature behind both, while its quadratic part is linear
+between samples. Before the first sample everything was for ever as it is there: the filter and
+the lag are at rest, the ramp has always been rising, Gauss-Markov processes and what the filter
+does with all noise are in their stationary distribution. The random walk is 0 at the first
+sample, and the filter knows where it came from.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from imubench_pipeline.noise.flicker import bank as sampled_bank
+from imubench_pipeline.noise.terms import Flicker, Quantization, Sinusoid, Term
+from imubench_pipeline.simulate.discretisation import (
+    Held,
+    SlowSources,
+    filter_transition,
+    held_input,
+    slow_sources,
+    stationary,
+    white_factor,
+)
+from imubench_pipeline.simulate.kernel import run
+from imubench_pipeline.simulate.model import SensorModel, bank_for, sources_of
+from imubench_pipeline.typing import Array
+
+CHUNK = 1 << 14
+"""Samples that are worked on at a time, whatever blocks are asked for: the last digit of a sample
+must not depend on these."""
+
+Signal = Callable[[int, int], Array]
+"""Gives the values at samples ``start`` to ``stop``."""
+
+
+def simulate(
+    model: SensorModel,
+    rate: float,
+    samples: int,
+    rng: np.random.Generator,
+    *,
+    true: Signal | None = None,
+    temperature: Signal | None = None,
+) -> Array:
+    """Return a simulated log of one axis, in memory (see `simulate_blocks`).
+
+    Returns
+    -------
+    ndarray, shape (samples,)
+        rad/s or m/s².
+    """
+    blocks = simulate_blocks(model, rate, samples, rng, true=true, temperature=temperature)
+    return np.concatenate([*blocks, np.empty(0)])
+
+
+def simulate_blocks(
+    model: SensorModel,
+    rate: float,
+    samples: int,
+    rng: np.random.Generator,
+    *,
+    true: Signal | None = None,
+    temperature: Signal | None = None,
+    block: int = CHUNK,
+) -> Iterator[Array]:
+    """Yield a simulated log of one axis in blocks; the log does not depend on their size.
+
+    Parameters
+    ----------
+    model : SensorModel
+    rate : float
+        Hz.
+    samples : int
+        Length of the log.
+    rng : numpy.random.Generator
+        Such as `imubench_pipeline.noise.simulate.channel_rng` gives for a channel.
+    true : callable, optional
+        True rate or specific force along the axis, rad/s or m/s², from the numbers of the first
+        sample and the one past the last; 0 by default.
+    temperature : callable, optional
+        °C, likewise; the reference of the drift by default.
+    block : int
+        Samples of a block.
+
+    Yields
+    ------
+    ndarray, shape (block,)
+        rad/s or m/s²; the last one may be shorter.
+
+    Raises
+    ------
+    ValueError
+        If the rate is not above 0, or what `true` or `temperature` give is not finite.
+    """
+    if not (math.isfinite(rate) and rate > 0):
+        raise ValueError(f"the rate is {rate} Hz, expected a frequency above 0")
+    axis = _Axis(model, rate, samples, rng)
+    waiting: list[Array] = []
+    ready = 0
+    for start in range(0, samples, CHUNK):
+        stop = min(start + CHUNK, samples)
+        waiting.append(axis.samples(start, stop, true, temperature))
+        ready += stop - start
+        while ready >= block:
+            whole = np.concatenate(waiting) if len(waiting) > 1 else waiting[0]
+            yield whole[:block]
+            ready -= block
+            waiting = [whole[block:]]
+    if ready:
+        yield np.concatenate(waiting)
+
+
+@dataclass(frozen=True)
+class _Discrete:
+    """The matrices of an axis, over one sampling interval."""
+
+    slow: SlowSources
+    transition: Array
+    factor: Array
+    output: Array
+    white: float
+    held: Held
+
+
+class _Axis:
+    """An axis that is being simulated."""
+
+    def __init__(
+        self, model: SensorModel, rate: float, samples: int, rng: np.random.Generator
+    ) -> None:
+        self._model, self._rate = model, rate
+        interval = 1.0 / rate
+        slow_terms = _realised(model, rate, max(samples, 2) * interval)
+        sources = sources_of(slow_terms)
+        self._times, self._densities = sources.times, sources.densities
+        self._white = sources.white
+        begin, self._noise, self._lines, self._counts = rng.spawn(4)
+        self._discrete = self._discretised(interval)
+        slow, held = self._discrete.slow, self._discrete.held
+        self._coupling = np.ascontiguousarray(slow.coupling.T)
+        self._shared = np.ascontiguousarray(slow.shared.T)
+        self._lag = np.array([held.lag_decay, held.lag_step])
+        self._x, self._e = self._start(begin)
+        self._memory = np.zeros(4)
+        terms = model.noise.terms
+        self._sinusoids = [
+            (term, self._lines.uniform(0.0, 2.0 * math.pi))
+            for term in terms
+            if isinstance(term, Sinusoid)
+        ]
+        # Only one of each in a model.
+        self._Q = next((term.Q for term in terms if isinstance(term, Quantization)), 0.0)
+        self._counted = self._counts.standard_normal() if self._Q else 0.0
+        self._drift = np.zeros(3)
+        if model.drift is not None:
+            drift = model.drift
+            self._drift[:] = drift.sensitivity, drift.quadratic, drift.reference
+
+    def _discretised(self, interval: float) -> _Discrete:
+        low_pass, lag = self._model.low_pass, self._model.drift.lag if self._model.drift else 0.0
+        slow = slow_sources(self._times, interval, low_pass)
+        scale = np.sqrt(self._densities)
+        shared = slow.shared * scale[:, None]
+        driven = SlowSources(
+            slow.decay, slow.lost, slow.own * scale, slow.coupling, shared, slow.residual
+        )
+        held = held_input(low_pass, lag, interval)
+        if low_pass is None:
+            none = np.zeros((0, 0))
+            white = math.sqrt(self._white / interval)
+            return _Discrete(driven, none, none, np.zeros(0), white, held)
+        # What is left to the filter itself: all its noise that is not in a slow state.
+        m = low_pass.order
+        parts = (slow.residual * scale[:, None, None]).reshape(-1, m)
+        white_part = math.sqrt(self._white) * white_factor(low_pass, interval)
+        factor = np.asarray(np.linalg.qr(np.concatenate([parts, white_part]), mode="r"))
+        transition = filter_transition(low_pass, interval)
+        return _Discrete(driven, transition, factor, low_pass.output, 0.0, held)
+
+    def _start(self, rng: np.random.Generator) -> tuple[Array, Array]:
+        """Draw the states at the first sample."""
+        walk = np.isinf(self._times)
+        spread = np.where(walk, 0.0, np.sqrt(self._densities * np.where(walk, 0, self._times) / 2))
+        x = spread * rng.standard_normal(len(spread))
+        low_pass = self._model.low_pass
+        if low_pass is None:
+            return x, np.zeros(0)
+        mean_given_x, covariance_given_x = stationary(
+            self._times, self._densities, self._white, low_pass
+        )
+        values, vectors = np.linalg.eigh(covariance_given_x)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        # A ramp that has always been rising leaves the filter behind by F^-1 p R.
+        ramp = np.linalg.solve(low_pass.transition, low_pass.steady_state) * self._model.noise.R
+        return x, x @ mean_given_x + root @ rng.standard_normal(low_pass.order) + ramp
+
+    def samples(
+        self, start: int, stop: int, true: Signal | None, temperature: Signal | None
+    ) -> Array:
+        """Return the next samples."""
+        model, discrete, held = self._model, self._discrete, self._discrete.held
+        size = stop - start
+        given = np.full(size, model.bias)
+        if true is not None:
+            given += (1.0 + model.scale_error) * _checked(true(start, stop), size, "motion")
+        if model.noise.R:
+            given += model.noise.R / self._rate * np.arange(start, stop)
+        temperatures = np.empty(0)
+        if temperature is not None and model.drift is not None:
+            temperatures = _checked(temperature(start, stop), size, "temperature")
+        own = max(len(self._e), 1)
+        normal = self._noise.standard_normal((size, len(self._x) + own))
+        log = np.empty(size)
+        run(
+            log,
+            given,
+            temperatures,
+            normal,
+            self._memory,
+            self._x,
+            self._e,
+            discrete.slow.decay,
+            discrete.slow.own,
+            self._coupling,
+            self._shared,
+            discrete.transition,
+            discrete.factor,
+            discrete.output,
+            discrete.white,
+            held.step,
+            self._lag,
+            held.lag_coupling,
+            held.lagged_step,
+            self._drift,
+        )
+        for line, phase in self._sinusoids:
+            log += self._line(line, phase, start, stop)
+        if self._Q:
+            counts = self._counts.standard_normal(size)
+            log += self._Q * self._rate * np.diff(counts, prepend=self._counted)
+            self._counted = counts[-1]
+        return _registered(log, model)
+
+    def _line(self, line: Sinusoid, phase: float, start: int, stop: int) -> Array:
+        response = self._model.low_pass.response(line.frequency) if self._model.low_pass else 1.0
+        # Whole turns are taken away first: they would cost digits after 10^9 samples.
+        turns = np.arange(start, stop) * (line.frequency / self._rate) % 1.0
+        shift = phase + np.angle(response)
+        return np.asarray(line.amplitude * abs(response) * np.cos(2.0 * math.pi * turns + shift))
+
+
+def _registered(log: Array, model: SensorModel) -> Array:
+    """Saturate and round, as a register does."""
+    if model.full_scale is not None:
+        np.clip(log, -model.full_scale, model.full_scale, out=log)
+    if model.resolution > 0.0:
+        log /= model.resolution
+        np.rint(log, out=log)
+        log *= model.resolution
+    return log
+
+
+def _realised(model: SensorModel, rate: float, duration: float) -> list[Term]:
+    """Return the terms with flicker noise as a bank of processes."""
+    terms: list[Term] = [term for term in model.noise.terms if not isinstance(term, Flicker)]
+    if model.low_pass is not None:
+        return [*terms, *bank_for(model, rate, duration)]
+    for term in model.noise.terms:
+        if isinstance(term, Flicker):
+            terms += sampled_bank(term.B, 1.0 / rate, duration)
+    return terms
+
+
+def _checked(values: Array, size: int, what: str) -> Array:
+    found = np.ascontiguousarray(values, dtype=np.float64)
+    if found.shape != (size,):
+        raise ValueError(f"{what} has shape {found.shape}, expected ({size},)")
+    if not np.isfinite(found.sum()):
+        raise ValueError(f"{what} has values that are not finite")
+    return found

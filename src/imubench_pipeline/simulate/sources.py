@@ -1,0 +1,89 @@
+"""A model to simulate, and what it stands on: each figure with its source, and what is assumed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal
+
+from imubench_pipeline.settings.simulated_sensor import ModelSettings
+from imubench_pipeline.settings.validation import ConfigError, parse, read_yaml
+from imubench_pipeline.simulate.imu import ImuModel
+from imubench_pipeline.simulate.models import imu_model
+
+Topic = Literal["noise", "bias", "drift", "low-pass", "register", "log"]
+"""Part of a model; ``log``: what the log that is written stands for."""
+
+
+@dataclass(frozen=True)
+class Remark:
+    """A sentence about a part of a model."""
+
+    topic: Topic
+    text: str
+
+
+@dataclass
+class Origin:
+    """A model, and what it stands on.
+
+    Attributes
+    ----------
+    imu : ImuModel
+    said : str
+        What the figures are from, in words.
+    figures : dict of str to list of Remark
+        The figures of each channel, with their source.
+    assumed : list of Remark
+        What no source says.
+    sensor : str or None
+        Name of the sensor file that its logs go with.
+    """
+
+    imu: ImuModel
+    said: str
+    figures: dict[str, list[Remark]] = field(default_factory=dict)
+    assumed: list[Remark] = field(default_factory=list)
+    sensor: str | None = None
+
+    def assume(self, topic: Topic, text: str) -> None:
+        """Add what no source says, once."""
+        remark = Remark(topic, text)
+        if remark not in self.assumed:
+            self.assumed.append(remark)
+
+
+def from_file(path: Path) -> Origin:
+    """Read a file of models (see `settings`).
+
+    Raises
+    ------
+    ConfigError
+        If it is not there, or a figure cannot be used.
+    """
+    given = parse(ModelSettings, read_yaml(path), str(path))
+    named = f"{path.name}" + (f" ({given.source})" if given.source else "")
+    as_given = Remark("noise", f"as {path.name} has it")
+    figures = {str(name): [as_given] for name in given.axes}
+    try:
+        model = imu_model(given.axes, given)
+    except ValueError as error:
+        raise ConfigError(f"{path}: axes.{error}") from error
+    return Origin(model, f"the model file {named}", figures, [], given.sensor)
+
+
+def only(origin: Origin, channels: Sequence[str]) -> Origin:
+    """Return a model with some of its channels.
+
+    Raises
+    ------
+    ConfigError
+        If it has no such channel.
+    """
+    if missing := [name for name in channels if name not in origin.imu.axes]:
+        there = ", ".join(origin.imu.axes) or "none"
+        raise ConfigError(f"no figures of {missing[0]}; there are those of {there}")
+    axes = {name: axis for name, axis in origin.imu.axes.items() if name in channels}
+    figures = {name: lines for name, lines in origin.figures.items() if name in channels}
+    return replace(origin, imu=replace(origin.imu, axes=axes), figures=figures)

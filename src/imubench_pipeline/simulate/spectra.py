@@ -1,0 +1,250 @@
+"""Spectrum and Allan variance of noise behind a low-pass, as sampled: in closed form.
+
+Both follow from the exact discrete state space of the process and its filter. Flicker noise is a
+sum of Gauss-Markov processes without end in both directions, cut where nothing is left of them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from imubench_pipeline.noise.low_pass import LowPass
+from imubench_pipeline.simulate.discretisation import (
+    filter_transition,
+    slow_sources,
+    stationary,
+    white_factor,
+)
+from imubench_pipeline.simulate.flicker_band import mixture
+from imubench_pipeline.typing import Array
+
+_CHUNK = 2048
+"""Frequencies that are worked on at a time."""
+
+_FASTEST = 1e-5
+"""Shortest correlation time of flicker noise, in 1 / (angular cut-off frequency)."""
+
+_SLOWEST = 1e5
+"""Longest, in the longest time that is asked for."""
+
+
+@dataclass(frozen=True)
+class Sources:
+    """What drives a filter.
+
+    Attributes
+    ----------
+    white : float
+        N^2.
+    flicker : float
+        B^2 of flicker noise.
+    times, densities : ndarray, shape (n,)
+        Correlation time, s, and driving density of Gauss-Markov processes; an infinite time: a
+        random walk.
+    """
+
+    white: float
+    flicker: float
+    times: Array
+    densities: Array
+
+    def realised(self, low_pass: LowPass, interval: float, longest: float) -> tuple[Array, Array]:
+        """Return times and densities with those of the processes that make up flicker noise.
+
+        Parameters
+        ----------
+        low_pass : LowPass
+        interval : float
+            Sampling interval, s.
+        longest : float
+            Longest time that is asked for, s.
+
+        Returns
+        -------
+        times, densities : ndarray, shape (n,)
+        """
+        if self.flicker == 0.0:
+            return self.times, self.densities
+        shortest = _FASTEST * min(1.0 / low_pass.angular_cutoff, interval)
+        times, variance = mixture(shortest, _SLOWEST * longest)
+        densities = self.flicker * 2.0 * variance / times
+        return np.concatenate([self.times, times]), np.concatenate([self.densities, densities])
+
+
+def sampled_spectrum(sources: Sources, low_pass: LowPass, omega: Array, rate: float) -> Array:
+    """Return the spectrum of the samples, SI^2.
+
+    Parameters
+    ----------
+    sources : Sources
+    low_pass : LowPass
+    omega : ndarray
+        rad a sample, not 0.
+    rate : float
+        Hz.
+
+    Returns
+    -------
+    ndarray
+        In the shape of ``omega``.
+    """
+    interval = 1.0 / rate
+    flat = np.ravel(omega)
+    lowest = float(np.abs(flat).min(initial=math.pi))
+    times, densities = sources.realised(low_pass, interval, interval / lowest)
+    slow = slow_sources(times, interval, low_pass)
+    transition = filter_transition(low_pass, interval)
+    white = white_factor(low_pass, interval)
+    found = np.empty_like(flat)
+    for begin in range(0, len(flat), _CHUNK):
+        w = flat[begin : begin + _CHUNK]
+        turn = np.exp(1j * w)[:, None, None] * np.eye(low_pass.order)
+        # g = c (z - A)^-1, shape (frequencies, m)
+        g = np.linalg.solve(
+            (turn - transition).swapaxes(1, 2),
+            np.broadcast_to(low_pass.output[:, None], (len(w), low_pass.order, 1)).astype(complex),
+        )[..., 0]
+        power = sources.white * (np.abs(g @ white.T) ** 2).sum(axis=1)
+        if len(times):
+            # z - e^(-interval/T), where both may be all but 1
+            gap = (-2.0 * np.sin(w / 2.0) ** 2 + 1j * np.sin(w))[:, None] + slow.lost
+            through = (1.0 + g @ slow.coupling.T) / gap
+            first = np.abs(through * slow.own + g @ slow.shared.T) ** 2
+            rest = (np.abs(np.einsum("wm,nkm->wnk", g, slow.residual)) ** 2).sum(axis=2)
+            power += (first + rest) @ densities
+        found[begin : begin + _CHUNK] = power
+    return found.reshape(np.shape(omega))
+
+
+def allan_variance(sources: Sources, low_pass: LowPass, n: Array, rate: float) -> Array:
+    """Return the Allan variance of the samples, SI^2.
+
+    The difference of the sums over two adjacent clusters is a linear function of the state
+    before them and of the noise inside them. Both are built up by doubling, as sums of positive
+    parts, so that the cost grows with log n.
+
+    Parameters
+    ----------
+    sources : Sources
+    low_pass : LowPass
+    n : ndarray
+        Samples a cluster, whole numbers from 1.
+    rate : float
+        Hz.
+
+    Returns
+    -------
+    ndarray
+        In the shape of ``n``.
+    """
+    interval = 1.0 / rate
+    sizes = np.ravel(n).astype(np.int64)
+    longest = interval * int(sizes.max(initial=1))
+    times, densities = sources.realised(low_pass, interval, longest)
+    one, start = _one_sample(sources.white, times, densities, low_pass, interval)
+    powers = [one]
+    for _ in range(int(sizes.max(initial=1)).bit_length() - 1):
+        powers.append(powers[-1].then(powers[-1]))
+    found = np.empty(len(sizes))
+    for i, size in enumerate(sizes):
+        chosen = [powers[bit] for bit in range(int(size).bit_length()) if size >> bit & 1]
+        cluster = chosen[0]
+        for part in chosen[1:]:
+            cluster = cluster.then(part)
+        found[i] = cluster.difference(start) / (2.0 * float(size) ** 2)
+    return found.reshape(np.shape(n))
+
+
+@dataclass(frozen=True)
+class _Cluster:
+    """Consecutive samples of independent systems z = (x, e): what becomes of state and sum.
+
+    Attributes
+    ----------
+    transition, lost : ndarray, shape (n, k, k)
+        Of the state over the samples, and 1 less it.
+    sums : ndarray, shape (n, k)
+        What the sum of the samples has of the state before them.
+    state, both, total : ndarray, shapes (n, k, k), (n, k), (n,)
+        Covariance of what noise adds to the state after them and to their sum.
+    """
+
+    transition: Array
+    lost: Array
+    sums: Array
+    state: Array
+    both: Array
+    total: Array
+
+    def then(self, later: _Cluster) -> _Cluster:
+        """Return this cluster and the one that follows it, as one."""
+        after = later.transition
+        carried = np.einsum("nij,nj->ni", self.state, later.sums)
+        return _Cluster(
+            after @ self.transition,
+            self.lost + self.transition @ later.lost,
+            self.sums + np.einsum("nj,njk->nk", later.sums, self.transition),
+            after @ self.state @ after.swapaxes(1, 2) + later.state,
+            np.einsum("nij,nj->ni", after, self.both + carried) + later.both,
+            self.total
+            + 2.0 * np.einsum("ni,ni->n", later.sums, self.both)
+            + np.einsum("ni,ni->n", later.sums, carried)
+            + later.total,
+        )
+
+    def difference(self, start: Array) -> float:
+        """Return the variance of the sum over the next such cluster less that over this one."""
+        change = np.einsum("nj,njk->nk", self.sums, self.lost)
+        before = np.einsum("ni,nij,nj->n", change, start, change)
+        inside = (
+            np.einsum("ni,nij,nj->n", self.sums, self.state, self.sums)
+            - 2.0 * np.einsum("ni,ni->n", self.sums, self.both)
+            + self.total
+        )
+        return float((before + inside + self.total).sum())
+
+
+def _one_sample(
+    white: float, times: Array, densities: Array, low_pass: LowPass, interval: float
+) -> tuple[_Cluster, Array]:
+    """Return one sample of every source, the white one last, and the stationary covariance."""
+    n, m = len(times), low_pass.order
+    slow = slow_sources(times, interval, low_pass)
+    A = filter_transition(low_pass, interval)
+    transition = np.zeros((n + 1, 1 + m, 1 + m))
+    transition[:, 1:, 1:] = A
+    transition[:n, 0, 0] = slow.decay
+    transition[:n, 1:, 0] = slow.coupling
+    lost = np.eye(1 + m) - transition
+    lost[:n, 0, 0] = slow.lost
+    factor = np.zeros((n + 1, 1 + m, 1 + m))
+    factor[:n, 0, 0] = slow.own
+    factor[:n, 0, 1:] = slow.shared
+    factor[:n, 1:, 1:] = slow.residual
+    factor[:n] *= np.sqrt(densities)[:, None, None]
+    factor[n, 1:, 1:] = math.sqrt(white) * white_factor(low_pass, interval)
+    sums = np.zeros((n + 1, 1 + m))
+    sums[:n, 0] = 1.0
+    sums[:, 1:] = low_pass.output
+    one = _Cluster(
+        transition,
+        lost,
+        sums,
+        factor.swapaxes(1, 2) @ factor,
+        np.zeros((n + 1, 1 + m)),
+        np.zeros(n + 1),
+    )
+    start = np.zeros((n + 1, 1 + m, 1 + m))
+    for i in range(n):
+        # Where a walk stands at the start does not matter: the difference does not see it.
+        alone = (times[i : i + 1], densities[i : i + 1])
+        mean, covariance = stationary(*alone, 0.0, low_pass)
+        variance = 0.0 if math.isinf(times[i]) else densities[i] * times[i] / 2.0
+        start[i, 0, 0] = variance
+        start[i, 0, 1:] = start[i, 1:, 0] = variance * mean[0]
+        start[i, 1:, 1:] = covariance + variance * np.outer(mean[0], mean[0])
+    start[n, 1:, 1:] = stationary(times[:0], densities[:0], white, low_pass)[1]
+    return one, start

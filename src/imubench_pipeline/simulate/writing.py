@@ -1,0 +1,202 @@
+"""A simulated log as a file that the readers of the project read, and the notes beside it.
+
+Parquet is written as recordings are kept, in SI. CSV has the columns, units and delimiter of the
+sensor file where that names columns of one text file, and those of Parquet elsewhere. The notes,
+``<log>.yaml``, say how it is written where the sensor file says otherwise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import yaml
+
+from imubench_pipeline.readers.text_log import TextLog
+from imubench_pipeline.recordings.recording import LogWriter
+from imubench_pipeline.settings.sensor import (
+    QUANTITIES,
+    TEMPERATURE,
+    ColumnSource,
+    LogFormat,
+    quantity_of,
+)
+from imubench_pipeline.settings.validation import ConfigError
+from imubench_pipeline.tables import replacing
+from imubench_pipeline.typing import Array
+from imubench_pipeline.units import SI_UNITS
+
+MARK = "SIMULATED, not measured"
+FORMATS = (".parquet", ".csv")
+_HEAD = f"# {MARK}: "
+"""How notes begin, before the name of their log."""
+
+Blocks = Iterable[Mapping[str, Array]]
+
+
+def write_log(
+    path: Path,
+    blocks: Blocks,
+    columns: Iterable[str],
+    log: LogFormat,
+    metadata: Mapping[str, Any],
+    remarks: Iterable[str],
+    said: Callable[[int], None],
+) -> None:
+    """Write a simulated log, atomically.
+
+    Parameters
+    ----------
+    path : Path
+        Its suffix, ``.parquet`` or ``.csv``, is the format.
+    blocks : iterable of mapping of str to ndarray
+        Columns in SI.
+    columns : iterable of str
+        Their names.
+    log : LogFormat
+        As `layout` gives it.
+    metadata : mapping
+        Of the Parquet file.
+    remarks : iterable of str
+        Comments at the top of a CSV file.
+    said : callable
+        Is told after each block how many samples there are.
+    """
+    names = list(columns)
+    known = {str(name): source for name, source in log.channels.items()}
+    known |= {} if log.temperature is None else {TEMPERATURE: log.temperature}
+    sources = {name: known[name] for name in names}
+    with replacing(path) as temporary:
+        done = 0
+        if path.suffix == ".parquet":
+            with LogWriter(temporary, dict.fromkeys(names, pa.float64())) as writer:
+                for block in blocks:
+                    writer.write(block)
+                    done += len(next(iter(block.values())))
+                    said(done)
+                writer.finish({**metadata, "rows": done, "grid": done, "segments": [[0, done]]})
+            return
+        with TextLog(temporary, log, sources, log.rate_hz or 1.0, remarks) as text:
+            for block in blocks:
+                text.write(block)
+                done += len(next(iter(block.values())))
+                said(done)
+
+
+def write_notes(path: Path, log: LogFormat, sensor: LogFormat | None, words: str) -> None:
+    """Write the notes beside a log: what of its format the sensor file says otherwise.
+
+    Parameters
+    ----------
+    path : Path
+        Of the log.
+    log : LogFormat
+        Of the log.
+    sensor : LogFormat or None
+        That of the sensor file.
+    words : str
+        What the log is.
+    """
+    own = log.model_dump(exclude_unset=True, exclude_none=True)
+    base = {} if sensor is None else sensor.model_dump(exclude_unset=True)
+    notes = {"device": "simulated", "log": _over(own, base)}
+    text = yaml.safe_dump(notes, sort_keys=False, default_flow_style=None, width=100)
+    comment = "".join(f"# {line}\n" for line in words.splitlines())
+    with replacing(notes_path(path)) as temporary:
+        temporary.write_text(f"{_HEAD}{path.name}\n{comment}{text}", encoding="utf-8")
+
+
+def notes_path(path: Path) -> Path:
+    """Return where the notes beside a log are.
+
+    Raises
+    ------
+    ConfigError
+        If notes are there that `write_notes` has not written, or those of another log.
+    """
+    notes = path.with_suffix(".yaml")
+    if not notes.exists():
+        return notes
+    first = notes.read_text("utf-8", "replace").partition("\n")[0]
+    if not first.startswith(_HEAD.rstrip(": ")):
+        raise ConfigError(f"{notes}: is there already and not of a simulation; name another --out")
+    other = path.with_name(first.removeprefix(_HEAD))
+    if first.startswith(_HEAD) and other != path and other.is_file():
+        raise ConfigError(
+            f"{notes}: says how {other.name} is written, and that cannot be read without it; "
+            f"expected a log of another name than {path.stem!r}: name another --out"
+        )
+    return notes
+
+
+def layout(path: Path, columns: Iterable[str], rate: float, sensor: LogFormat | None) -> LogFormat:
+    """Return how a log will be written.
+
+    Parameters
+    ----------
+    path : Path
+    columns : iterable of str
+        Channels, and perhaps temperature.
+    rate : float
+        Hz.
+    sensor : LogFormat or None
+        That of the sensor file.
+
+    Raises
+    ------
+    ConfigError
+        If the suffix is of no format that is written.
+    """
+    if path.suffix not in FORMATS:
+        raise ConfigError(f"{path}: expected a name that ends in {' or '.join(FORMATS)}")
+    names = list(columns)
+    text = path.suffix == ".csv"
+    channels = {name: _si_source(name) for name in names if name != TEMPERATURE}
+    temperature = _si_source(TEMPERATURE) if TEMPERATURE in names else None
+    delimiter = ","
+    if text and sensor is not None and _has_names(sensor, channels):
+        channels = {name: sensor.channels[name] for name in channels}  # type: ignore[index]  # the keys are channels, as text
+        temperature = sensor.temperature if temperature and sensor.temperature else temperature
+        delimiter = sensor.delimiter or delimiter
+    keys: dict[str, Any] = {
+        "reader": "csv" if text else "arrow",
+        "rate": f"{rate:.17g} Hz",
+        "channels": {name: one.model_dump(exclude_unset=True) for name, one in channels.items()},
+    }
+    if temperature is not None:
+        keys["temperature"] = temperature.model_dump(exclude_unset=True)
+    if text:
+        keys |= {"delimiter": delimiter, "header": True, "comment": "#", "decimal": "."}
+    if sensor is not None and sensor.bandwidth is not None:
+        keys["bandwidth"] = sensor.bandwidth
+    return LogFormat.model_validate(keys)
+
+
+def _has_names(sensor: LogFormat, channels: Mapping[str, ColumnSource]) -> bool:
+    """Return whether a sensor's logs are one text file with a name for each of these channels."""
+    held = {str(name): source for name, source in sensor.channels.items()}
+    sources = [held.get(name) for name in channels]
+    if sensor.temperature is not None:
+        sources.append(sensor.temperature)
+    named = all(s is not None and isinstance(s.column, str) and not s.file for s in sources)
+    return named and sensor.reader in (None, "csv")
+
+
+def _si_source(name: str) -> ColumnSource:
+    unit = SI_UNITS["temperature" if name == TEMPERATURE else QUANTITIES[quantity_of(name)]]
+    return ColumnSource(column=name, unit=unit)
+
+
+def _over(own: Mapping[str, Any], base: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what makes ``own`` of ``base`` when it is merged over it; null takes a key out."""
+    found: dict[str, Any] = {key: None for key, value in base.items() if key not in own and value}
+    for key, value in own.items():
+        before = base.get(key)
+        if isinstance(value, Mapping) and isinstance(before, Mapping):
+            if inner := _over(value, before):
+                found[key] = inner
+        elif value != before:
+            found[key] = dict(value) if isinstance(value, Mapping) else value
+    return found

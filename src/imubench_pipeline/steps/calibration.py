@@ -1,0 +1,100 @@
+"""The calibration of one recording, from what a run keeps of it and of its sensor."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.recordings.recording import channel_logs, read_metadata
+from imubench_pipeline.settings.known_rates import AtRest, OnRateTable
+from imubench_pipeline.settings.sensor import Sensor
+from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
+from imubench_pipeline.steps.known_rates import Given, at_rest, on_rate_table, unusable
+from imubench_pipeline.steps.noise_source import from_printed, from_static
+from imubench_pipeline.tables.keys import Key
+from imubench_pipeline.tables.of_calibration import CALIBRATION_TABLES
+from imubench_pipeline.typing import Row
+from imubench_pipeline.units import quantity_to_si
+
+
+def calibration_tables(
+    folder: Path, static: Sequence[Path], sensor: str, recording: str, settings: str
+) -> dict[str, list[Row]]:
+    """Return the rows of the tables of a gyro on a rate table, or at rest where it points known.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the recording, with ``quality.json`` and ``log.parquet``.
+    static : sequence of Path
+        Folders of the static recordings of the same sensor.
+    sensor, recording : str
+    settings : str
+        As `imubench_pipeline.run.plan.Plan.experiment_settings` gives them.
+
+    Returns
+    -------
+    dict
+        By table; no rows of a rejected recording.
+    """
+    rows: dict[str, list[Row]] = {name: [] for name in CALIBRATION_TABLES}
+    logs = channel_logs(folder)
+    if not logs:
+        return rows
+    given = json.loads(settings)
+    declared, simulated = _declared(given)
+    # Of several gyros the notes name one: the ingest has seen to it.
+    metadata = read_metadata(next(iter(logs.values())).path)
+    gyros = (name for name in [*logs, *metadata["unusable"]] if name.startswith("gyro_"))
+    channel: str = declared.channel or next(gyros)
+    if channel not in logs:
+        key = asdict(Key(sensor, recording, channel))
+        rows["calibration"] = list(unusable(key, isinstance(declared, OnRateTable)))
+        return rows
+    own = Quality.read(folder / "quality.json").recording
+    source = from_static(static, own, channel) or from_printed(
+        sensor, Sensor.model_validate(given["sensor"]), channel
+    )
+    about = Given(
+        Key(sensor, recording, channel),
+        logs[channel],
+        source,
+        metadata.get("begins", 0.0),
+        _truth(simulated, channel),
+    )
+    if isinstance(declared, OnRateTable):
+        return rows | asdict(on_rate_table(about, declared))
+    return rows | asdict(at_rest(about, declared))
+
+
+def _declared(
+    given: Mapping[str, Any],
+) -> tuple[OnRateTable | AtRest, SimulatedRecording | None]:
+    """Return what stands beside a log, or would stand beside a simulated one."""
+    if "simulated" not in given:
+        if "rate_table" in given:
+            return OnRateTable.model_validate(given["rate_table"]), None
+        return AtRest.model_validate(given["pointing"]), None
+    simulated = SimulatedRecording.model_validate(given["simulated"])
+    if simulated.rate_table is not None:
+        return simulated.rate_table.declared, simulated
+    assert simulated.pointing is not None  # only recordings with one of both are calibrated
+    return simulated.pointing.declared, simulated
+
+
+def _truth(simulated: SimulatedRecording | None, channel: str) -> dict[str, float]:
+    """Return the true figures of a simulation: its bias, and what it has of a line."""
+    if simulated is None:
+        return {}
+    found = {}
+    for name, axis in simulated.channels.items():
+        if name == channel and axis.bias is not None:
+            found["bias"] = quantity_to_si(axis.bias, "angular_rate")
+    if simulated.rate_table is not None:
+        found |= {"scale_factor": simulated.rate_table.scale_factor}
+        found |= {"quadratic": 0.0, "asymmetry": 0.0}
+    return found

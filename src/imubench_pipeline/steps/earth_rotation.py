@@ -1,0 +1,102 @@
+"""The Earth's rate of one recording, from what a run keeps of it and of its sensor."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+from imubench_pipeline.experiments.earth_rate.published import Schedule, published_row
+from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.recordings.recording import channel_logs, read_metadata
+from imubench_pipeline.settings.config import EarthRateSettings
+from imubench_pipeline.settings.sensor import Sensor
+from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
+from imubench_pipeline.settings.two_position import TwoPosition
+from imubench_pipeline.simulate.models import axis_model
+from imubench_pipeline.steps.noise_source import from_printed, from_static
+from imubench_pipeline.steps.turned import WHOLE, earth_rate_of, unusable
+from imubench_pipeline.tables.keys import Key
+from imubench_pipeline.tables.of_earth_rate import EARTH_RATE_TABLES
+from imubench_pipeline.typing import Row
+from imubench_pipeline.units import quantity_to_si
+
+
+def earth_rate_tables(
+    folder: Path, static: Sequence[Path], sensor: str, recording: str, settings: str
+) -> dict[str, list[Row]]:
+    """Return the rows of the tables of a gyro that was turned.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the recording, with ``quality.json`` and ``log.parquet``.
+    static : sequence of Path
+        Folders of the static recordings of the same sensor.
+    sensor, recording : str
+    settings : str
+        As `imubench_pipeline.run.plan.Plan.earth_rate_settings` gives them.
+
+    Returns
+    -------
+    dict
+        By table; no rows of a rejected recording.
+    """
+    rows: dict[str, list[Row]] = {name: [] for name in EARTH_RATE_TABLES}
+    given = json.loads(settings)
+    simulated = (
+        SimulatedRecording.model_validate(given["simulated"]) if "simulated" in given else None
+    )
+    logs = channel_logs(folder)
+    if not logs:
+        return rows
+    if simulated is not None and simulated.two_position is not None:
+        declared = simulated.two_position.declared
+    else:
+        declared = TwoPosition.model_validate(given["two_position"])
+    own = Quality.read(folder / "quality.json").recording
+    metadata = read_metadata(next(iter(logs.values())).path)
+    channel = declared.turned([*logs, *metadata["unusable"]])
+    if channel not in logs:
+        key = Key(sensor, recording, channel)
+        rows["earth_rate"] = list(unusable(asdict(key), declared))
+        return rows
+    how = EarthRateSettings.model_validate(given["earth_rate"])
+    source = from_static(static, own, channel, how.draws) or from_printed(
+        sensor, Sensor.model_validate(given["sensor"]), channel
+    )
+    key, log = Key(sensor, recording, channel), logs[channel]
+    found = earth_rate_of(key, log, declared, source, how, begins=metadata.get("begins", 0.0))
+    rows |= asdict(found)
+    if simulated is not None:
+        rows["earth_rate_published"] = list(_published(key, simulated, rows["earth_rate"]))
+    return rows
+
+
+def _published(key: Key, simulated: SimulatedRecording, found: Sequence[Row]) -> Iterator[Row]:
+    """Yield what the source of a simulated recording prints, beside what is found of it."""
+    turns = simulated.two_position
+    if turns is None:
+        return
+    rate = quantity_to_si(simulated.rate, "frequency")
+    schedule = Schedule(turns.seconds("dwell"), turns.seconds("turning"), rate, turns.latitude_si)
+    (noise,) = (
+        axis_model(axis, name).noise
+        for name, axis in simulated.channels.items()
+        if name == key.channel
+    )
+    values = {(row["part"], row["method"]): row.get("value") for row in found}
+    for one in turns.published:
+        text = simulated.duration if one.part == WHOLE else one.part.removeprefix("last ")
+        value = quantity_to_si(one.printed, "angular_rate")
+        yield (
+            asdict(key)
+            | {"part": one.part, "place": one.where, "printed": one.printed}
+            | published_row(value, schedule, quantity_to_si(text, "time"), noise)
+            | {
+                "simulated": values.get((one.part, "pairs")),
+                "simulated_filter": values.get((one.part, "filter")),
+                "assumed": ", ".join(turns.assumed) or None,
+            }
+        )

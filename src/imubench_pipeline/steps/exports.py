@@ -1,0 +1,67 @@
+"""The exports of a run: a folder a sensor, with a file a program."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+from imubench_pipeline.export.imu import ExportError
+from imubench_pipeline.export.request import Request, Tables, load, made, recordings_of
+from imubench_pipeline.export.targets import TARGETS
+from imubench_pipeline.settings.config import ExportSettings
+from imubench_pipeline.tables import making, write_content
+from imubench_pipeline.units import quantity_to_si
+
+NOT_MADE = "not_made.txt"
+"""Names the programs for which there is no file, with the reason."""
+
+
+def exports(
+    tables: Tables, settings: ExportSettings, recordings: Path | None = None
+) -> Iterator[tuple[Path, str | bytes]]:
+    """Yield the files of a run, each with its place in the folder of the exports.
+
+    Parameters
+    ----------
+    tables : mapping of str to pyarrow.Table
+        Those of `imubench_pipeline.export.request.NEEDED`.
+    settings : ExportSettings
+    recordings : Path, optional
+        As `imubench_pipeline.export.request.made` takes it.
+
+    Yields
+    ------
+    (Path, str or bytes)
+        ``<sensor>/<target>/<file of the program>``; ``<sensor>/not_made.txt`` for what a program
+        cannot hold.
+    """
+    for sensor in dict.fromkeys(tables["parameters"]["sensor"].to_pylist()):
+        refused = []
+        for target in settings.targets:
+            request = Request(
+                sensor=sensor,
+                target=target,
+                axis=settings.axis,
+                horizon=quantity_to_si(settings.horizon, "time"),
+                inflation=settings.inflation,
+                because=settings.because,
+                overbound=settings.overbound,
+                most_excess=settings.most_excess,
+            )
+            try:
+                content = made(tables, request, recordings)
+            except ExportError as error:
+                refused.append(f"{target}: {error}")
+                continue
+            yield Path(sensor, target, TARGETS[target].file_name), content
+        if refused:
+            yield Path(sensor, NOT_MADE), "\n".join(refused) + "\n"
+
+
+def write_exports(tables: Path, settings: str, folder: Path) -> None:
+    """Write a folder a sensor, with a file a program; all appear together."""
+    how = ExportSettings.model_validate(json.loads(settings))
+    with making(folder) as made:
+        for place, content in exports(load(tables), how, recordings_of(tables)):
+            write_content(content, made / place)

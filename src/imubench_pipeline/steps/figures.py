@@ -1,0 +1,20 @@
+"""Draw the figures of all sensors for print."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+
+from imubench_pipeline.report.static_figures.of_run import draw_comparison
+from imubench_pipeline.tables import making, read
+
+
+def write_figures(tables: Iterable[Path], settings: str, figures: Path) -> None:
+    """Write a folder of figures; all appear together."""
+    with making(figures) as folder:
+        draw_comparison(
+            {path.stem: read(path.stem, [path]) for path in tables},
+            json.loads(settings)["report"]["units"],
+            folder,
+        )

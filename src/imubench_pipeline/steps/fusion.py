@@ -1,0 +1,148 @@
+"""The table ``fusion`` of a run, from its tables of recordings and parameters."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from functools import cache, partial
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from imubench_pipeline.estimators.estimate import JointDraws
+from imubench_pipeline.estimators.rows import draws, estimate_of
+from imubench_pipeline.navigation.fusion.equivalence import (
+    Candidate,
+    TemperaturePart,
+    equivalence_rows,
+)
+from imubench_pipeline.recordings.fitness import left_out, with_doubts
+from imubench_pipeline.settings.config import FusionSettings
+from imubench_pipeline.tables import build, read, write_arrow
+from imubench_pipeline.typing import Row
+from imubench_pipeline.units import quantity_to_si
+
+NEEDED = ("recordings", "parameters", "allan_compensated", "temperature")
+"""The tables of a run that it takes."""
+
+_OF_LIMIT = 1.96
+"""Standard deviations from an estimate to a 95 % limit."""
+
+
+def candidates(
+    tables: Mapping[str, pa.Table], joint: Mapping[tuple[str, str], Path] | None = None
+) -> Iterator[Candidate]:
+    """Yield the channels of recordings that decide, each with the estimate of the method to use.
+
+    Where temperature is taken out of a channel, its estimate is that of what temperature leaves.
+
+    Parameters
+    ----------
+    tables : mapping of str to pyarrow.Table
+        Those of `NEEDED`, of a run.
+    joint : mapping of (str, str) to Path, optional
+        The table ``draws`` of recordings, by sensor and recording.
+
+    Yields
+    ------
+    Candidate
+    """
+    recordings, parameters = tables["recordings"], tables["parameters"]
+    warm = _temperature_parts(tables)
+    compensated = parameters.filter(pc.equal(parameters["method"], "compensated")).to_pylist()
+    recommended = parameters.filter(parameters["recommended"]).to_pylist()
+    about = {(row["sensor"], row["recording"]): row for row in recordings.to_pylist()}
+    apart = left_out(about.values())
+    groups: dict[tuple[str, str, str, str], list[Row]] = {}
+    used = [row for row in compensated if _channel(row) in warm]
+    used += [row for row in recommended if _channel(row) not in warm]
+    for row in used:
+        key = (row["sensor"], row["recording"], row["channel"], row["method"])
+        groups.setdefault(key, []).append(row)
+    read = cache(draws)
+
+    def drawn(path: Path, channel: str, method: str) -> JointDraws | None:
+        return read(path).get((channel, method))
+
+    for (sensor, recording, channel, method), rows in groups.items():
+        if (sensor, recording) in apart:
+            continue
+        path = (joint or {}).get((sensor, recording))
+        of = about[sensor, recording]
+        yield Candidate(
+            sensor,
+            recording,
+            channel,
+            of["simulated"],
+            of["duration"] or 0.0,
+            estimate_of(method, rows),
+            warm.get((sensor, recording, channel)),
+            partial(drawn, path, channel, method) if path else None,
+        )
+
+
+def _temperature_parts(
+    tables: Mapping[str, pa.Table],
+) -> dict[tuple[str, str, str], TemperaturePart]:
+    """Return what temperature adds to the channels of which it is taken out."""
+    curves: dict[tuple[str, str, str], list[tuple[float, float]]] = {}
+    for row in tables["allan_compensated"].to_pylist():
+        curves.setdefault(_channel(row), []).append((row["tau"], row["temperature"]))
+    temperature = tables["temperature"]
+    chosen = pc.and_(temperature["compensated"], pc.equal(temperature["parameter"], "sensitivity"))
+    found = {}
+    for row in temperature.filter(chosen).to_pylist():
+        if _channel(row) in curves:
+            tau, deviation = np.array(curves[_channel(row)]).T
+            error = (row["upper"] - row["lower"]) / (2.0 * _OF_LIMIT * abs(row["value"]))
+            found[_channel(row)] = TemperaturePart(tau, deviation, error)
+    return found
+
+
+def _channel(row: Row) -> tuple[str, str, str]:
+    return row["sensor"], row["recording"], row["channel"]
+
+
+def fusion_rows(
+    tables: Mapping[str, pa.Table],
+    how: FusionSettings,
+    joint: Mapping[tuple[str, str], Path] | None = None,
+) -> Iterator[Row]:
+    """Return the rows of the table ``fusion``.
+
+    Parameters
+    ----------
+    tables : mapping of str to pyarrow.Table
+        Those of `NEEDED`, of a run.
+    how : FusionSettings
+    joint : mapping of (str, str) to Path, optional
+        As `candidates` takes it.
+
+    Returns
+    -------
+    iterator of mapping
+    """
+    rows = equivalence_rows(
+        candidates(tables, joint),
+        [quantity_to_si(tau, "time") for tau in how.tau],
+        how.common.model_dump(),
+        longest=how.longest,
+        draws=how.draws,
+        seed=how.seed,
+    )
+    pairs = ("sensor", "recording"), ("other", "other_recording")
+    return with_doubts(rows, tables["recordings"].to_pylist(), pairs)
+
+
+def write_fusion(
+    inputs: Mapping[str, str], joint: list[Path], settings: str, outputs: list[Path]
+) -> None:
+    """Write the table ``fusion``, as Parquet and CSV; ``joint``: tables ``draws`` of recordings."""
+    how = FusionSettings.model_validate(json.loads(settings))
+    tables = {name: read(name, [Path(inputs[name])]) for name in NEEDED}
+    of_recording = {(path.parts[-3], path.parts[-2]): path for path in joint}
+    table = build("fusion", fusion_rows(tables, how, of_recording))
+    for output in outputs:
+        write_arrow(table, output)

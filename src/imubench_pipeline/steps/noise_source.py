@@ -1,0 +1,168 @@
+"""Which noise model an Earth-rate experiment is weighed by: that of the same sensor at rest.
+
+The log of a gyro that is turned does not tell its noise: the turns are in it. The model is that of
+a static recording of the same sensor, of the same device where there is one, and the longest of
+several; without any, that of the typical figures of its datasheet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from imubench_pipeline.estimators.rows import estimates, recommended_estimates
+from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise.simulate import channel_rng
+from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.settings.sensor import Sensor
+from imubench_pipeline.settings.validation import ConfigError
+from imubench_pipeline.simulate.from_datasheet import from_datasheet
+
+NO_MODEL = (
+    "the noise of this sensor is not known: no static recording of it could be used, and its "
+    "datasheet prints no noise; add a static log of this sensor"
+)
+"""Why nothing is found without a `NoiseSource`."""
+
+_SEED = 20260101
+"""Of the drawn models: each recording and channel has a stream of its own."""
+
+
+@dataclass(frozen=True)
+class NoiseSource:
+    """A noise model, and where it is from.
+
+    Attributes
+    ----------
+    model : NoiseModel
+        That the data of its source favour, SI.
+    papers : NoiseModel
+        The papers' N, B, T_B and K of the same source, for their filter; it may lack some.
+    words : str
+        Where it is from.
+    drawn : tuple of NoiseModel
+        Drawn from what its log leaves open of it; none where nothing is known of that.
+    """
+
+    model: NoiseModel
+    papers: NoiseModel
+    words: str
+    drawn: tuple[NoiseModel, ...] = ()
+
+    def with_drift(self, drift: float) -> NoiseModel:
+        """Return the model with a steady drift of a standard deviation beside its own, rad/s^2.
+
+        Parameters
+        ----------
+        drift : float
+        """
+        return _drifting(self.model, drift)
+
+    def drawn_with_drift(self, drift: float) -> list[NoiseModel]:
+        """Return the drawn models with the same drift beside their own, rad/s^2.
+
+        Parameters
+        ----------
+        drift : float
+        """
+        return [_drifting(one, drift) for one in self.drawn]
+
+
+def _drifting(model: NoiseModel, drift: float) -> NoiseModel:
+    return replace(model, R=(model.R**2 + drift**2) ** 0.5) if drift else model
+
+
+def from_static(
+    folders: Sequence[Path], own: Mapping[str, Any], channel: str, draws: int = 0
+) -> NoiseSource | None:
+    """Return the noise of a gyro from the static recordings of its sensor.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+        Of those recordings, with their ``quality.json``, ``parameters.parquet`` and, where models
+        are drawn, ``draws.parquet``.
+    own : mapping
+        Row of the table ``recordings`` of the recording that was turned.
+    channel : str
+        The gyro that was turned; another gyro of the sensor answers where it has no estimate.
+    draws : int
+        Models that are drawn from what the log leaves open of the estimate.
+
+    Returns
+    -------
+    NoiseSource or None
+        None where no recording has an estimate of a gyro with white noise in it.
+    """
+    found = [(Quality.read(folder / "quality.json").recording, folder) for folder in folders]
+    usable = [
+        (row, folder) for row, folder in found if row["status"] == "ok" and row["kind"] == "static"
+    ]
+
+    def far(item: tuple[Mapping[str, Any], Path]) -> tuple[bool, bool, float, str]:
+        row = item[0]
+        return (
+            row["simulated"] != own["simulated"],
+            row["device"] != own["device"],
+            -(row["duration"] or 0.0),
+            row["recording"],
+        )
+
+    for row, folder in sorted(usable, key=far):
+        parameters = folder / "parameters.parquet"
+        joint = folder / "draws.parquet" if draws else None
+        best = recommended_estimates(parameters, joint)
+        gyros = [name for name in best if name.startswith("gyro_") and best[name].model.N]
+        if gyros:
+            name = min(gyros, key=lambda name: (name != channel, name))
+            every = {estimate.method: estimate for estimate in estimates(parameters)[name]}
+            papers = every.get("likelihood_gm", best[name]).model
+            words = f"{_words(row, own, name, channel)}; method {best[name].method}"
+            rng = channel_rng(_SEED, row["sensor"], row["recording"], name)
+            drawn = tuple(draw_models(best[name], draws, rng)) if draws else ()
+            return NoiseSource(best[name].model, papers, words, drawn)
+    return None
+
+
+def from_printed(name: str, sensor: Sensor, channel: str) -> NoiseSource | None:
+    """Return the noise of a gyro as its datasheet prints it.
+
+    Parameters
+    ----------
+    name : str
+        Of the sensor file.
+    sensor : Sensor
+    channel : str
+
+    Returns
+    -------
+    NoiseSource or None
+        None where no noise of it is printed.
+    """
+    try:
+        origin = from_datasheet(name, sensor, 0)
+    except ConfigError:
+        return None
+    if channel not in origin.imu.axes or not origin.imu.axes[channel].noise.N:
+        return None
+    model = origin.imu.axes[channel].noise
+    return NoiseSource(
+        model,
+        model,
+        f"typical figures of {origin.said}, not measured: no static recording of this sensor "
+        "tells its noise",
+    )
+
+
+def _words(row: Mapping[str, Any], own: Mapping[str, Any], name: str, channel: str) -> str:
+    said = [f"static recording {row['recording']}"]
+    if row["device"] != own["device"]:
+        said.append(f"of another device, {row['device']}")
+    if row["simulated"]:
+        said.append("simulated")
+    if name != channel:
+        said.append(f"of its {name}, as {channel} has no estimate there")
+    return ", ".join(said)

@@ -1,0 +1,220 @@
+"""What a sensor at rest could find of attitude, north and the Earth's rate, before it tries.
+
+Its noise is that of a static recording: a measured one before a simulated one, the longest of
+several. A log may have fewer than three axes: those that are there stand for the others.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from imubench_pipeline.estimators.rows import recommended_estimates
+from imubench_pipeline.experiments.alignment.accuracy import accuracies
+from imubench_pipeline.experiments.alignment.triad import Site, Triad
+from imubench_pipeline.experiments.earth_rate.needs import prediction_rows
+from imubench_pipeline.experiments.earth_rate.prediction import Outlook
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise.simulate import channel_rng
+from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.settings.config import EarthRateSettings
+from imubench_pipeline.settings.printed import Datasheet, QuantityDatasheet
+from imubench_pipeline.settings.sensor import QUANTITIES
+from imubench_pipeline.typing import Row
+from imubench_pipeline.units import quantity_to_si
+
+TIMES = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 1800.0, 3600.0)
+"""Of rest, s."""
+
+DWELL = 28.0
+"""Data in each dwell of the predicted turns, s; with the turn half a minute."""
+
+TURNING = 2.0
+"""Time that such a turn takes, s."""
+
+_RUNS = 400
+"""Triads of the check: their rms is sure to 3.5 %."""
+
+_SEED = 20260101
+_TYPICAL = ("1sigma", "typ")
+
+
+@dataclass(frozen=True)
+class Noise:
+    """The noise of a sensor at rest.
+
+    Attributes
+    ----------
+    recording : str
+        That it is from.
+    rate : float
+        Hz.
+    models : dict of str to NoiseModel
+        By channel.
+    """
+
+    recording: str
+    rate: float
+    models: dict[str, NoiseModel]
+
+    def three(self, quantity: str) -> dict[str, NoiseModel]:
+        """Return the models of the axes x, y and z, and of which channel each is.
+
+        An axis that is not in the log has the noise of the next one that is.
+
+        Parameters
+        ----------
+        quantity : str
+            ``gyro`` or ``accel``; at least one axis of it is there.
+        """
+        names = [name for name in self.models if name.startswith(quantity)]
+        found = {}
+        for place, axis in enumerate("xyz"):
+            own = f"{quantity}_{axis}"
+            name = own if own in self.models else names[place % len(names)]
+            found[f"{axis}: {name}"] = self.models[name]
+        return found
+
+    @property
+    def middle_gyro(self) -> str | None:
+        """The gyro whose Allan deviation over a dwell is the middle one; None: there is none."""
+        gyros = [name for name in self.models if name.startswith("gyro_")]
+        if not gyros:
+            return None
+        tau = np.array([DWELL])
+
+        def over_dwell(name: str) -> float:
+            return float(self.models[name].allan_variance(tau)[0])
+
+        return sorted(gyros, key=over_dwell)[len(gyros) // 2]
+
+
+def noise_at_rest(folders: Sequence[Path]) -> Noise | None:
+    """Return the noise of a sensor from its static recordings; None where none tells it.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+        Of those recordings, with their ``quality.json`` and ``parameters.parquet``.
+    """
+    found = [(Quality.read(folder / "quality.json").recording, folder) for folder in folders]
+    usable = [
+        (row, folder) for row, folder in found if row["status"] == "ok" and row["kind"] == "static"
+    ]
+
+    def far(item: tuple[Mapping[str, Any], Path]) -> tuple[bool, float, str]:
+        row = item[0]
+        return row["simulated"], -(row["duration"] or 0.0), row["recording"]
+
+    for row, folder in sorted(usable, key=far):
+        best = recommended_estimates(folder / "parameters.parquet")
+        models = {name: one.model for name, one in best.items() if one.model.N}
+        if any(name.startswith("gyro_") for name in models):
+            return Noise(row["recording"], row["rate"], models)
+    return None
+
+
+def outlook_tables(folders: Sequence[Path], sensor: str, settings: str) -> dict[str, list[Row]]:
+    """Return the rows of ``alignment`` and ``earth_rate_prediction`` of a sensor at rest.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+        Of its static recordings.
+    sensor : str
+    settings : str
+        As `imubench_pipeline.run.plan.Plan.outlook_settings` gives them.
+
+    Returns
+    -------
+    dict
+        By table; no rows where no recording tells the noise of a gyro, and none of ``alignment``
+        where there is no accelerometer.
+    """
+    rows: dict[str, list[Row]] = {"alignment": [], "earth_rate_prediction": []}
+    given = json.loads(settings)
+    how = EarthRateSettings.model_validate(given["earth_rate"])
+    noise = noise_at_rest(folders)
+    if noise is None:
+        return rows
+    rows["earth_rate_prediction"] = list(_predicted(sensor, noise, how))
+    if any(name.startswith("accel_") for name in noise.models):
+        printed = Datasheet.model_validate(given["datasheet"])
+        rows["alignment"] = list(_aligned(sensor, noise, printed, how))
+    return rows
+
+
+def _predicted(sensor: str, noise: Noise, how: EarthRateSettings) -> Iterator[Row]:
+    gyro = noise.middle_gyro
+    assert gyro is not None  # noise_at_rest has seen to it
+    latitude = quantity_to_si(how.latitude, "angle")
+    outlook = Outlook(noise.models[gyro], latitude, TURNING, noise.rate)
+    run_time = max(quantity_to_si(how.run_time, "time"), 3.0 * DWELL)
+    names = {"sensor": sensor, "recording": noise.recording, "channel": gyro}
+    for row in prediction_rows(outlook, DWELL, how.goals, run_time):
+        yield names | row
+
+
+def _aligned(
+    sensor: str, noise: Noise, printed: Datasheet, how: EarthRateSettings
+) -> Iterator[Row]:
+    gyros, accelerometers = noise.three("gyro"), noise.three("accel")
+    gyro_bias, gyro_words = _bias(printed, "gyro", how)
+    accelerometer_bias, accelerometer_words = _bias(printed, "accel", how)
+    triad = Triad(
+        gyros=tuple(gyros.values()),
+        accelerometers=tuple(accelerometers.values()),
+        gyro_bias=gyro_bias,
+        accelerometer_bias=accelerometer_bias,
+    )
+    site = Site(latitude=quantity_to_si(how.latitude, "angle"))
+    about = {
+        "sensor": sensor,
+        "recording": noise.recording,
+        "latitude": site.latitude,
+        "gyro_bias": gyro_bias,
+        "gyro_bias_from": gyro_words,
+        "accelerometer_bias": accelerometer_bias,
+        "accelerometer_bias_from": accelerometer_words,
+        "gyros": ", ".join(gyros),
+        "accelerometers": ", ".join(accelerometers),
+    }
+    rng = channel_rng(_SEED, sensor, noise.recording, "alignment")
+    for one in accuracies(triad, site, noise.rate, TIMES, runs=_RUNS, rng=rng):
+        roll, pitch, heading = (float(value) for value in one.sigma)
+        row = about | {
+            "positions": one.positions,
+            "method": one.method,
+            "time": one.time,
+            "roll": roll,
+            "pitch": pitch,
+            "heading": heading if one.reason is None else None,
+            "reason": one.reason,
+        }
+        if one.errors is not None:
+            row["simulated"] = one.simulated
+            for name, ratio in zip(("roll", "pitch", "heading"), one.errors.tolist(), strict=True):
+                row[f"error_{name}"] = None if math.isnan(ratio) else ratio
+        yield row
+
+
+def _bias(printed: Datasheet, quantity: str, how: EarthRateSettings) -> tuple[float, str]:
+    """Return the standard deviation of the fixed bias in SI, and what it is from."""
+    dimension = QUANTITIES[quantity]
+    sheet: QuantityDatasheet | None = getattr(printed, quantity)
+    for name, kind in product(("bias_repeatability", "offset"), _TYPICAL):
+        for figure in sheet.printed(name) if sheet else ():
+            value = figure.on_axis("x")
+            if figure.kind == kind and isinstance(value, float):
+                said = f"{name.replace('_', ' ')} {value:g} {figure.unit} ({kind}), datasheet"
+                return quantity_to_si(f"{value!r} {figure.unit}", dimension), said
+    key = {"gyro": "gyro_bias", "accel": "accelerometer_bias"}[quantity]
+    assumed = getattr(how, key)
+    return quantity_to_si(assumed, dimension), f"{assumed} (earth_rate.{key}), assumed"

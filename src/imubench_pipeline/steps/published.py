@@ -1,0 +1,158 @@
+"""What a paper prints of a sensor beside what is found of the log that is simulated from it."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+import pyarrow as pa
+
+from imubench_pipeline.datasheets.comparable import SENSITIVITY
+from imubench_pipeline.estimators.estimate import SI_UNITS
+from imubench_pipeline.noise import FLOOR
+from imubench_pipeline.settings.sensor import quantity_of
+from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
+from imubench_pipeline.simulate.truth import figures_of
+from imubench_pipeline.typing import Row
+from imubench_pipeline.units import quantity_to_si
+
+_Place = tuple[str, str, str, str]
+
+_DATASHEET = {
+    "N": ("N", 1.0),
+    "adev_minimum": ("B", 1.0 / FLOOR),
+    "offset": ("bias", 1.0),
+    SENSITIVITY: (SENSITIVITY, 1.0),
+}
+"""Parameter and factor of what is printed in a datasheet, by statistic or quantity."""
+
+
+def published_rows(
+    truths: str, truth: Iterable[Row], tables: Mapping[str, pa.Table]
+) -> Iterator[Row]:
+    """Yield the rows of the table ``published``.
+
+    Parameters
+    ----------
+    truths : str
+        The simulated recordings, as the plan wrote them.
+    truth : iterable of mapping
+        The table ``simulated_truth``.
+    tables : mapping of str to pyarrow.Table
+        ``parameters``, ``fixed_bias``, ``temperature`` and ``datasheet`` of the same sensor.
+    """
+    entries = [SimulatedRecording.model_validate(entry) for entry in json.loads(truths)]
+    if not any(one.published for entry in entries for one in entry.channels.values()):
+        return
+    true = _slowest(truth)
+    curve, best = _estimates(tables)
+    printed = _printed(tables["datasheet"].to_pylist())
+    for entry in entries:
+        for channel, settings in entry.channels.items():
+            quantity = quantity_of(channel)
+            units = SI_UNITS[quantity]
+            for figure in settings.published:
+                key = (entry.sensor, entry.recording, str(channel), figure.parameter)
+                found = _as_shown(best.get(key, {}))
+                sheet = printed.get(key, [])
+                shown = true.get((*key[:3], f"{figure.parameter} in the log"), true.get(key, {}))
+                yield {
+                    "sensor": entry.sensor,
+                    "recording": entry.recording,
+                    "channel": channel,
+                    "place": figure.where,
+                    "figure": figure.figure,
+                    "printed": figure.printed,
+                    "of": figure.of,
+                    "parameter": figure.parameter,
+                    "means": figure.si(quantity),
+                    "unit": units.get(
+                        figure.parameter,
+                        units["B"] + "/K" * (figure.parameter == "sensitivity"),
+                    ),
+                    "truth": shown.get("value"),
+                    "curve": curve.get(key),
+                    **{name: found.get(name) for name in ("value", "lower", "upper")},
+                    "datasheet": min(sheet, default=None),
+                    "datasheet_upper": max(sheet) if len(set(sheet)) > 1 else None,
+                    "reason": figure.why,
+                }
+
+
+def _as_shown(row: Row) -> Row:
+    """Return an estimate as the log shows it: what is printed was read off the curve of a log."""
+    if row.get("parameter") != "N" or row.get("fitted") is None or not row["value"]:
+        return row
+    factor = row["fitted"] / row["value"]
+    limits = {name: row[name] and row[name] * factor for name in ("lower", "upper")}
+    return {**row, **limits, "value": row["fitted"]}
+
+
+def _place(row: Row, parameter: str | None = None) -> _Place:
+    return row["sensor"], row["recording"], row["channel"], parameter or row["parameter"]
+
+
+def _estimates(tables: Mapping[str, pa.Table]) -> tuple[dict[_Place, Any], dict[_Place, Row]]:
+    """Return what the curve says, and the rows of the recommended method."""
+    curve: dict[_Place, Any] = {}
+    parameters = tables["parameters"].to_pylist()
+    for row in parameters:
+        if row["method"] == "curve" and row["component"] == 1:
+            curve[_place(row)] = row["value"]
+    best = _slowest(row for row in parameters if row["recommended"])
+    for row in tables["fixed_bias"].to_pylist():
+        curve[_place(row, "bias")] = row["value"]
+    for row in tables["temperature"].to_pylist():
+        if row["parameter"] in ("bias", "sensitivity"):
+            best[_place(row)] = row
+    return curve, best
+
+
+def _slowest(rows: Iterable[Row]) -> dict[_Place, Row]:
+    """Return rows by their place; of several processes the slowest, the floor of the curve."""
+    given = [row for row in rows if row["value"] is not None]
+    times = {
+        (_place(row, "B"), row["component"]): row["value"]
+        for row in given
+        if row["parameter"] == "T_B"
+    }
+
+    def slowness(row: Row) -> float:
+        # Flicker noise, which has no T_B, is slower than all.
+        of_process = row["parameter"] == "B"
+        return times.get((_place(row), row["component"]), math.inf) if of_process else 0.0
+
+    return {_place(row): row for row in sorted(given, key=slowness)}
+
+
+def _printed(rows: Iterable[Row]) -> dict[_Place, list[float]]:
+    """Return the figures of the datasheet, in the conventions of the parameters."""
+    found: dict[_Place, list[float]] = {}
+    for row in rows:
+        known = _DATASHEET.get(row["statistic"]) or _DATASHEET.get(row["quantity"])
+        if known is not None and row["comparable"] is not None:
+            parameter, factor = known
+            found.setdefault(_place(row, parameter), []).append(row["comparable"] * factor)
+    return found
+
+
+def truth_rows(truths: str) -> Iterator[Row]:
+    """Yield the rows of the table ``simulated_truth``."""
+    for entry in json.loads(truths):
+        recording = SimulatedRecording.model_validate(entry)
+        rate = quantity_to_si(recording.rate, "frequency")
+        for channel, truth in recording.channels.items():
+            for figure in figures_of(truth, channel, rate):
+                yield {
+                    "sensor": recording.sensor,
+                    "recording": recording.recording,
+                    "channel": channel,
+                    "parameter": figure.name,
+                    "component": figure.component,
+                    "value": figure.value,
+                    "unit": figure.unit,
+                    "assumed": bool({figure.setting, figure.name} & set(truth.assumed)),
+                    "source": recording.source,
+                }

@@ -1,0 +1,40 @@
+"""Rank the sensors for each requirement, and say what would help the verdicts most."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pyarrow.compute as pc
+
+from imubench_pipeline.navigation.selection import ranked
+from imubench_pipeline.navigation.verdicts.basis import Basis
+from imubench_pipeline.navigation.verdicts.judgement import judgements
+from imubench_pipeline.navigation.verdicts.next_steps import next_step_rows
+from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.tables import build, read, write_arrow
+
+
+def write_ranking(tables: dict[str, Path], settings: str, outputs: list[Path]) -> None:
+    """Write the tables ``ranking`` and ``next_steps``, as Parquet and CSV."""
+    given = json.loads(settings)
+    requirements = {
+        name: Requirement.model_validate(one) for name, one in given["requirements"].items()
+    }
+    joined = {name: read(name, [path]) for name, path in tables.items()}
+    asked = joined.pop("error_budget").filter(pc.field("requirement").is_valid())
+    columns = ["sensor", "recording", "channel", "recommended", "value"]
+    recommended = joined["parameters"].select(columns).filter(pc.field("recommended"))
+    basis = Basis.of(
+        joined["recordings"].to_pylist(),
+        joined["doubts"].to_pylist(),
+        recommended.to_pylist(),
+        joined["backtest"].to_pylist(),
+    )
+    judged = list(judgements(asked.to_pylist(), requirements, given["sensors"], basis))
+    made = {
+        "ranking": build("ranking", ranked(judged, basis)),
+        "next_steps": build("next_steps", next_step_rows(judged, basis)),
+    }
+    for output in outputs:
+        write_arrow(made[output.stem], output)

@@ -1,0 +1,125 @@
+"""Reconstruction of a log from an estimate, and how well it repeats the measured curve."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from imubench_pipeline.allan import AllanCurve
+from imubench_pipeline.estimators.estimate import Estimate
+from imubench_pipeline.estimators.rows import estimates
+from imubench_pipeline.estimators.score import score
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise.simulate import (
+    channel_rng,
+    ensemble,
+    reconstructed_variance,
+    simulate_blocks,
+)
+from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.recordings.recording import LogWriter
+from imubench_pipeline.settings.config import ReconstructionSettings
+from imubench_pipeline.steps.kept_curves import compensated_curves, curves
+from imubench_pipeline.tables import replacing, write
+from imubench_pipeline.tables.keys import Key
+
+
+@dataclass(frozen=True)
+class Reconstruction:
+    """Rows of the tables ``reconstruction`` and ``scores`` of one channel and method."""
+
+    curve_rows: list[Mapping[str, Any]]
+    score_row: Mapping[str, Any]
+
+
+def reconstruct(
+    key: Key,
+    estimate: Estimate,
+    measured: AllanCurve,
+    rate: float,
+    settings: ReconstructionSettings,
+    series: Path,
+) -> Reconstruction:
+    """Simulate full-length logs and an ensemble from an estimate, and score them.
+
+    Parameters
+    ----------
+    key : Key
+    estimate : Estimate
+    measured : AllanCurve
+        Of the log; the reconstruction has its length and its tau.
+    rate : float
+        Hz.
+    settings : ReconstructionSettings
+    series : Path
+        Where the first full-length log goes, if it is to be kept.
+    """
+    names = asdict(key) | {"method": estimate.method}
+    model = estimate.model
+    if not model.terms:
+        reasons = {p.reason for p in estimate.parameters.values() if p.reason}
+        return Reconstruction(
+            [], names | {"reason": "no term has a value: " + "; ".join(sorted(reasons))}
+        )
+    sizes, samples = measured.cluster_size, measured.samples
+
+    def stream(use: str) -> np.random.Generator:
+        return channel_rng(settings.seed, *names.values(), use)
+
+    if settings.keep_series:
+        _keep(model, rate, samples, stream("member 1"), series)
+    variances = [
+        reconstructed_variance(model, rate, samples, sizes, stream(f"member {number}"))
+        for number in range(1, settings.members + 1)
+    ]
+    reconstructed = np.sqrt(np.mean(variances, axis=0))
+    deviations = np.sqrt(
+        ensemble(model, rate, samples, sizes, settings.band_members, stream("band"))
+    )
+    lower, median, upper = np.quantile(deviations, [0.025, 0.5, 0.975], axis=0)
+    scores = score(measured.deviation, reconstructed, lower, upper)
+    rows = _rows(names, measured.tau, median, lower, upper, reconstructed)
+    return Reconstruction(list(rows), names | asdict(scores))
+
+
+def _rows(
+    names: Mapping[str, Any], tau: NDArray[np.float64], *columns: NDArray[np.float64]
+) -> Iterator[Mapping[str, Any]]:
+    titles = ("tau", "adev", "lower", "upper", "reconstructed")
+    for values in zip(tau, *columns, strict=True):
+        yield {**names, **dict(zip(titles, map(float, values), strict=True))}
+
+
+def _keep(
+    model: NoiseModel, rate: float, samples: int, rng: np.random.Generator, series: Path
+) -> None:
+    with replacing(series) as temporary, LogWriter(temporary, {"simulated": pa.float64()}) as log:
+        for block in simulate_blocks(model, rate, samples, rng):
+            log.write({"simulated": block})
+        log.finish({"simulated": True, "rate": rate, "rows": samples, "model": asdict(model)})
+
+
+def write_reconstruction(
+    inputs: list[Path], outputs: list[Path], settings: ReconstructionSettings
+) -> None:
+    """Write the tables ``reconstruction`` and ``scores`` of a recording."""
+    quality, allan, parameters, compensated = inputs
+    about = Quality.read(quality)
+    measured = curves(allan, about)
+    left = compensated_curves(compensated, measured)
+    found = []
+    for channel, by_method in estimates(parameters).items():
+        key = Key(about.recording["sensor"], about.recording["recording"], channel)
+        rate = about.channels[channel]["rate"]
+        for estimate in by_method:
+            series = quality.parent / "series" / f"{channel}.{estimate.method}.parquet"
+            curve = (left if estimate.method == "compensated" else measured)[channel]
+            found.append(reconstruct(key, estimate, curve, rate, settings, series))
+    write("reconstruction", [row for result in found for row in result.curve_rows], outputs[0])
+    write("scores", [result.score_row for result in found], outputs[1])

@@ -1,0 +1,24 @@
+"""Compare the fixed biases of each device from one turn-on to the next with its datasheet."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from imubench_pipeline.navigation.repeatability import repeatability_rows
+from imubench_pipeline.settings.config import DatasheetSettings
+from imubench_pipeline.settings.sensor import sensors_of
+from imubench_pipeline.tables import build, read, write_arrow
+
+
+def write_repeatability(
+    biases: Path, recordings: Path, settings: str, catalogue: str, outputs: list[Path]
+) -> None:
+    """Write the table ``repeatability``, as Parquet and CSV."""
+    how = DatasheetSettings.model_validate(json.loads(settings))
+    fixed = read("fixed_bias", [biases]).to_pylist()
+    about = read("recordings", [recordings]).to_pylist()
+    found = repeatability_rows(fixed, about, sensors_of(catalogue), how.tolerance)
+    table = build("repeatability", found)
+    for output in outputs:
+        write_arrow(table, output)

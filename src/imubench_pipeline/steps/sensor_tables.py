@@ -1,0 +1,150 @@
+"""The tables of a sensor: what its recordings have left, joined, judged and compared."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+
+import pyarrow as pa
+
+from imubench_pipeline.datasheets.plausibility import implausible_of
+from imubench_pipeline.datasheets.suspicion import unusual_rows
+from imubench_pipeline.estimators.spectral_findings import band_finding, line_findings
+from imubench_pipeline.navigation.backtest import verdicts
+from imubench_pipeline.navigation.drift import drift_rows
+from imubench_pipeline.navigation.pooled import pooled_rows
+from imubench_pipeline.recordings.fitness import (
+    doubts,
+    judged,
+    left_out,
+    undecided,
+    with_doubts,
+    with_doubts_of_all,
+)
+from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.settings.sensor import sensors_of
+from imubench_pipeline.steps.published import published_rows, truth_rows
+from imubench_pipeline.tables import build
+from imubench_pipeline.tables.failures import Failure, read_with_failures, with_failures, without
+from imubench_pipeline.tables.keys import divided
+from imubench_pipeline.typing import Row
+
+
+def joined_tables(
+    parts: Mapping[str, list[Path]], truths: str, catalogue: str, decide: str = "{}"
+) -> dict[str, pa.Table]:
+    """Join the results of the recordings of a sensor.
+
+    Parameters
+    ----------
+    parts : mapping of str to list of Path
+        Files of each table, in the order of the recordings; ``quality`` for the JSON files.
+    truths : str
+        Those that are simulated, as the plan wrote them.
+    catalogue : str
+        The sensor files, likewise.
+    decide : str
+        The section of the configuration that says which recordings decide, as JSON.
+
+    Returns
+    -------
+    dict
+        Every table of recordings.
+    """
+    qualities = [Quality.read(path) for path in parts["quality"]]
+    told = [Failure(**quality.failure) for quality in qualities if quality.failure]
+    joined = {}
+    for name, paths in parts.items():
+        if name != "quality":
+            joined[name], failed = read_with_failures(name, paths)
+            told += failed
+    failures = list(dict.fromkeys(told))
+    joined = without(joined, {(one.sensor, one.recording) for one in failures})
+    about = [quality.recording for quality in qualities]
+    devices = {(row["sensor"], row["recording"]): row["device"] for row in about}
+    recommended = joined["parameters"].filter(joined["parameters"]["recommended"])
+    estimated, biases = recommended.to_pylist(), joined["fixed_bias"].to_pylist()
+    joined["drift"] = build("drift", drift_rows(estimated, biases, about))
+    of_logs = without_doubles(
+        (row for quality in qualities for row in quality.findings),
+        joined["deterministic"],
+        {(row["sensor"], row["recording"]): row.get("duration") or 0.0 for row in about},
+    )
+    sensors = sensors_of(catalogue)
+    of_levels = (
+        row
+        for quality in qualities
+        for row in implausible_of(quality, sensors.get(quality.recording["sensor"]))
+    )
+    unusual = unusual_rows(estimated, sensors)
+    of_estimates = joined.pop("estimate_findings").to_pylist()
+    found = [*of_logs, *of_levels, *of_estimates, *spectral_rows(joined), *unusual]
+    if "backtest" in joined:
+        found += verdicts.findings(joined["backtest"].to_pylist())
+    joined["findings"] = build("findings", found)
+    doubted = list(doubts(joined["findings"].to_pylist(), estimated, joined["models"].to_pylist()))
+    about = judged(about, doubted, json.loads(decide).get("include", ()))
+    joined["recordings"] = build("recordings", about)
+    joined["doubts"] = build("doubts", (one.row() for one in doubted))
+    apart = left_out(about)
+    pools = pooled_rows(undecided(estimated, apart), undecided(biases, apart), devices)
+    joined["pooled"] = build("pooled", with_doubts_of_all(pools, about))
+    for name in _JUDGED & joined.keys():
+        joined[name] = build(name, with_doubts(joined[name].to_pylist(), about))
+    truth = list(truth_rows(truths))
+    joined["simulated_truth"] = build("simulated_truth", truth)
+    joined["published"] = build("published", published_rows(truths, truth, joined))
+    return with_failures(joined, failures)
+
+
+_JUDGED = {"error_budget", "datasheet"}
+"""Tables of a recording's own step whose rows say what is doubted of the recording."""
+
+_OF_LOGS = {"step": "bias_step", "warm_up": "warm_up_drift"}
+"""What is found of a log as it is read, and found again, with its size, beside its noise."""
+
+_NEAR = 1 / 100
+"""Part of a recording within which two steps are one."""
+
+
+def without_doubles(
+    findings: Iterable[Row],
+    deterministic: pa.Table,
+    durations: Mapping[tuple[str, str], float],
+) -> Iterator[Row]:
+    """Yield the findings of the ingest that the table ``deterministic`` does not tell better.
+
+    Parameters
+    ----------
+    findings : iterable of mapping
+        Rows of the table ``findings``.
+    deterministic : pyarrow.Table
+    durations : mapping
+        Of each sensor and recording, s.
+    """
+    known: dict[tuple[str, str, str], list[Row]] = {}
+    for row in deterministic.to_pylist():
+        known.setdefault((row["sensor"], row["recording"], row["channel"]), []).append(row)
+    for finding in findings:
+        kind = _OF_LOGS.get(finding["finding"])
+        if kind is None:
+            yield finding
+            continue
+        place = (finding["sensor"], finding["recording"], finding["channel"])
+        same = (row for row in known.get(place, ()) if row["kind"] == kind)
+        near = _NEAR * durations.get((finding["sensor"], finding["recording"]), 0.0)
+        if not any(abs(row["start"] - (finding["start"] or 0.0)) <= near for row in same):
+            yield finding
+
+
+def spectral_rows(tables: Mapping[str, pa.Table]) -> Iterator[Row]:
+    """Yield the rows of the table ``findings`` that the tables ``lines`` and ``models`` tell."""
+    for (sensor, recording), lines in divided(tables["lines"], "sensor", "recording").items():
+        for finding in line_findings(lines.to_pylist()):
+            yield finding.row(sensor, recording)
+    models = tables["models"]
+    for row in models.filter(models["chosen"]).to_pylist():
+        if row["band"] is not None:
+            for finding in band_finding(row["channel"], row["band"], row["band_source"] or ""):
+                yield finding.row(row["sensor"], row["recording"])

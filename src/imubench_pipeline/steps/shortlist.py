@@ -1,0 +1,58 @@
+"""The shortlist of a run, or of the catalogue without one."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from imubench_pipeline.navigation.shortlist.classes import measured_ranges
+from imubench_pipeline.navigation.shortlist.figures import printed_ranges
+from imubench_pipeline.navigation.shortlist.rows import shortlist_rows
+from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.settings.sensor import Sensor, sensors_of
+from imubench_pipeline.tables import build, read, write_arrow
+from imubench_pipeline.typing import Row
+
+NEEDED = ("recordings", "parameters", "ranking")
+"""The tables of a run that it reads."""
+
+
+def rows_of_run(
+    requirements: Mapping[str, Requirement],
+    sensors: Mapping[str, Sensor],
+    tables: Mapping[str, Path],
+) -> Iterator[Row]:
+    """Yield the rows of the table ``shortlist``.
+
+    Parameters
+    ----------
+    requirements : mapping of str to Requirement
+    sensors : mapping of str to Sensor
+        The catalogue.
+    tables : mapping of str to Path
+        Files of the tables `NEEDED`; empty: nothing is measured.
+
+    Raises
+    ------
+    OSError, ValueError
+        If a table cannot be read, or is of another form.
+    """
+    found = {name: read(name, [path]).to_pylist() for name, path in tables.items()}
+    recordings = found.get("recordings", [])
+    classes = {name: sensor.price_class for name, sensor in sensors.items()}
+    measured = measured_ranges(found.get("parameters", []), recordings, classes)
+    ranges = replace(measured, printed=printed_ranges(sensors))
+    yield from shortlist_rows(requirements, sensors, ranges, found.get("ranking", []), recordings)
+
+
+def write_shortlist(
+    tables: dict[str, Path], settings: str, catalogue: str, outputs: list[Path]
+) -> None:
+    """Write the table ``shortlist``, as Parquet and CSV."""
+    asked = json.loads(settings)["requirements"]
+    requirements = {name: Requirement.model_validate(one) for name, one in asked.items()}
+    table = build("shortlist", rows_of_run(requirements, sensors_of(catalogue), tables))
+    for output in outputs:
+        write_arrow(table, output)

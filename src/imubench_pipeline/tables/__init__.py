@@ -1,0 +1,36 @@
+"""What is kept: the columns of every table, and tables read, checked and written.
+
+Beside it findings and failures, which every step may leave, and the digest of the code.
+"""
+
+from imubench_pipeline.tables.files import (
+    TableError,
+    build,
+    columns_of,
+    joined,
+    making,
+    read,
+    read_part,
+    replacing,
+    schema,
+    write,
+    write_arrow,
+    write_content,
+    write_json,
+)
+
+__all__ = [
+    "TableError",
+    "build",
+    "columns_of",
+    "joined",
+    "making",
+    "read",
+    "read_part",
+    "replacing",
+    "schema",
+    "write",
+    "write_arrow",
+    "write_content",
+    "write_json",
+]

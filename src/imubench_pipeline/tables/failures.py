@@ -1,0 +1,176 @@
+"""What failed, as the tables tell it: a step that did for one recording or sensor leaves no row.
+
+A step that raises, is killed twice or runs past its time leaves its outputs valid and empty. Each
+says why in its metadata (the ingest in ``quality.json``), so that the steps that follow pass it on,
+and the tables and pages tell it.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Container, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Literal
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from imubench_pipeline.tables.files import build, joined, read_part, schema, write_arrow
+from imubench_pipeline.tables.findings import Finding
+from imubench_pipeline.tables.schemas import TABLES
+
+Cause = Literal["error", "killed", "time"]
+QUALITY = "quality.json"
+_METADATA = b"imubench.failure"
+_BESIDE = ("earth_rotation", "calibration")
+"""Steps that need more than a static log: the rest of what it tells stands without them."""
+
+_NOT_JUDGED = {"fitness": None, "decides": False}
+
+_NAMED = ("recordings", "findings", "estimate_findings", "failures")
+"""Tables that say why a recording is left out of the others."""
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A step that failed.
+
+    Attributes
+    ----------
+    sensor : str
+    recording : str or None
+        None: a step of the whole sensor.
+    step : str
+    cause : {"error", "killed", "time"}
+    reason : str
+        In one line.
+    """
+
+    sensor: str
+    recording: str | None
+    step: str
+    cause: Cause
+    reason: str
+
+    @property
+    def name(self) -> str:
+        """What is left out."""
+        return f"{self.sensor}/{self.recording}" if self.recording else self.sensor
+
+    def finding(self) -> Finding:
+        """Return the finding about the recording."""
+        detail = f"{self.reason}; the recording is left out, and tried again by the next run"
+        return Finding("failed", "fatal", detail, 1.0)
+
+
+def failure_of(path: Path) -> Failure | None:
+    """Return why an output is empty; None where it is the work of its step.
+
+    Parameters
+    ----------
+    path : Path
+        A table as Parquet, or ``quality.json``.
+    """
+    if path.name == QUALITY:
+        found = json.loads(path.read_text(encoding="utf-8")).get("failure")
+        return Failure(**found) if found else None
+    return told_by(pq.read_schema(path)) if path.suffix == ".parquet" else None
+
+
+def told_by(read: pa.Schema) -> Failure | None:
+    """Return the failure that the metadata of a table tells."""
+    text = (read.metadata or {}).get(_METADATA)
+    return Failure(**json.loads(text)) if text else None
+
+
+def read_with_failures(table: str, paths: Sequence[Path]) -> tuple[pa.Table, list[Failure]]:
+    """Read and join files of one table, and what failed of those that are empty for it.
+
+    Parameters
+    ----------
+    table : str
+    paths : sequence of Path
+    """
+    parts = [read_part(table, path) for path in paths]
+    failures = [told for part in parts if len(part) == 0 and (told := told_by(part.schema))]
+    return joined(table, parts), failures
+
+
+def write_empty(outputs: Iterable[tuple[str | None, Path]], failure: Failure) -> None:
+    """Write the tables that a step declares, without a row and with what failed.
+
+    Parameters
+    ----------
+    outputs : iterable of (str or None, Path)
+        The table, or None where its name is that of the file.
+    failure : Failure
+    """
+    told = {_METADATA: json.dumps(asdict(failure), sort_keys=True).encode()}
+    for name, path in outputs:
+        table = name if name in TABLES else path.stem
+        write_arrow(schema(table).empty_table().replace_schema_metadata(told), path)
+
+
+def with_failures(
+    tables: Mapping[str, pa.Table], failures: Sequence[Failure]
+) -> dict[str, pa.Table]:
+    """Return tables with what failed: told in ``failures`` and ``findings``, and left out.
+
+    A recording of which a step failed has the status ``failed``, and no rows in other tables. What
+    is found of a static log by a step that needs more than the log leaves that alone out.
+
+    Parameters
+    ----------
+    tables : mapping of str to Table
+        Those of recordings, among them ``recordings`` and ``findings``.
+    failures : sequence of Failure
+    """
+    if not failures:
+        return {"failures": schema("failures").empty_table()} | dict(tables)
+    kinds = {
+        (row["sensor"], row["recording"]): row["kind"] for row in tables["recordings"].to_pylist()
+    }
+    reasons = {
+        (one.sensor, one.recording): one.reason
+        for one in reversed(failures)
+        if one.step not in _BESIDE or kinds.get((one.sensor, one.recording or "")) != "static"
+    }
+    marked = without(tables, reasons)
+    marked["recordings"] = build(
+        "recordings",
+        (
+            row | {"status": "failed", "reason": reasons[key]} | _NOT_JUDGED
+            if key in reasons
+            else row
+            for row in tables["recordings"].to_pylist()
+            for key in [(row["sensor"], row["recording"])]
+        ),
+    )
+    of_recordings = [one for one in failures if one.recording]
+    known = tables["findings"].to_pylist()
+    told = [one.finding().row(one.sensor, str(one.recording)) for one in of_recordings]
+    marked["findings"] = build("findings", [*known, *(row for row in told if row not in known)])
+    before = tables["failures"].to_pylist() if "failures" in tables else []
+    new = [row for row in map(asdict, failures) if row not in before]
+    marked["failures"] = build("failures", [*before, *new])
+    return marked
+
+
+def without(
+    tables: Mapping[str, pa.Table], left_out: Container[tuple[str, str | None]]
+) -> dict[str, pa.Table]:
+    """Return tables without the rows of some recordings, but for those that say why.
+
+    Parameters
+    ----------
+    tables : mapping of str to Table
+    left_out : container of (str, str)
+        Sensor and recording.
+    """
+    kept = dict(tables)
+    for name, table in tables.items():
+        if "recording" in table.schema.names and name not in _NAMED:
+            keys = zip(table["sensor"].to_pylist(), table["recording"].to_pylist(), strict=True)
+            kept[name] = table.filter(pa.array([key not in left_out for key in keys], pa.bool_()))
+    return kept

@@ -1,0 +1,165 @@
+"""Reading and writing tables: checked against their schemas, atomically."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.csv as pacsv
+import pyarrow.parquet as pq
+
+from imubench_pipeline.tables.columns import Column
+from imubench_pipeline.tables.schemas import PARTS_OF, TABLES
+
+_SMALL = 1_000_000  # bytes
+
+
+class TableError(ValueError):
+    """Rows that do not fit the schema of their table."""
+
+
+def columns_of(table: str) -> tuple[Column, ...]:
+    """Return the columns of a table, or of the table that a file of a recording has rows of."""
+    return TABLES[PARTS_OF.get(table, table)]
+
+
+def schema(table: str) -> pa.Schema:
+    """Return the Arrow schema of a table, with unit and meaning in the field metadata."""
+    return pa.schema(
+        [
+            pa.field(
+                column.name,
+                column.type,
+                nullable=not column.required,
+                metadata={"unit": column.unit, "meaning": column.meaning},
+            )
+            for column in columns_of(table)
+        ]
+    )
+
+
+def build(table: str, rows: Iterable[Mapping[str, Any]]) -> pa.Table:
+    """Make an Arrow table of rows and check it against the schema.
+
+    Parameters
+    ----------
+    table : str
+        A key of `imubench_pipeline.tables.schemas.TABLES`, or of ``PARTS_OF`` there.
+    rows : iterable of mapping
+        One mapping a row; a column that a row leaves out is null. NaN becomes null.
+
+    Raises
+    ------
+    TableError
+        If a row has a column that the table does not, or lacks a required value.
+    """
+    listed = list(rows)
+    columns = columns_of(table)
+    unknown = {name for row in listed for name in row} - {column.name for column in columns}
+    if unknown:
+        raise TableError(f"table {table}: unknown columns {sorted(unknown)}")
+    arrays = []
+    for column in columns:
+        values = [row.get(column.name) for row in listed]
+        array = pa.array(values, type=column.type, from_pandas=True)
+        if column.required and array.null_count:
+            raise TableError(f"table {table}: column {column.name} has {array.null_count} nulls")
+        arrays.append(array)
+    return pa.Table.from_arrays(arrays, schema=schema(table))
+
+
+@contextlib.contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Give a temporary name beside ``path``, renamed to it when the block ends without error."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+        # mkstemp makes private files; results are for everybody, as the umask says.
+        umask = os.umask(0)
+        os.umask(umask)
+        temporary.chmod(0o666 & ~umask)
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def making(folder: Path) -> Iterator[Path]:
+    """Give the name of a folder to fill, renamed to ``folder`` when the block ends without error.
+
+    Parameters
+    ----------
+    folder : Path
+        It may not be there yet, or be empty.
+    """
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=".part", dir=folder.parent))
+    try:
+        inside = scratch / folder.name
+        inside.mkdir()  # beside what mkdtemp makes private
+        yield inside
+        inside.rename(folder)
+    finally:
+        shutil.rmtree(scratch)
+
+
+def write(table: str, rows: Iterable[Mapping[str, Any]], path: Path) -> None:
+    """Check rows against the schema of their table and write them as Parquet, atomically."""
+    write_arrow(build(table, rows), path)
+
+
+def write_arrow(table: pa.Table, path: Path) -> None:
+    """Write an Arrow table as Parquet or, where the name ends so, CSV, atomically."""
+    with replacing(path) as temporary:
+        if path.suffix == ".csv":
+            pacsv.write_csv(table, temporary)
+        else:
+            # A small file is read in half the time by snappy, and thousands of them are.
+            compression = "zstd" if table.nbytes > _SMALL else "snappy"
+            pq.write_table(table, temporary, compression=compression)
+
+
+def read(table: str, paths: Sequence[Path]) -> pa.Table:
+    """Read and join files of one table, in the order given."""
+    return joined(table, [read_part(table, path) for path in paths])
+
+
+def joined(table: str, parts: Sequence[pa.Table]) -> pa.Table:
+    """Join parts of one table, in the order given."""
+    expected = schema(table)
+    plain = [part.replace_schema_metadata(None) for part in parts] or [expected.empty_table()]
+    return pa.concat_tables(plain).cast(expected)
+
+
+def read_part(table: str, path: Path) -> pa.Table:
+    """Read one file of a table, with the metadata that it has."""
+    expected = schema(table)
+    with pq.ParquetFile(path) as file:
+        part = file.read(use_threads=False)
+    if part.schema.names != expected.names:
+        raise TableError(f"{path}: columns {part.schema.names}, expected {expected.names}")
+    if part.schema.equals(expected):
+        return part
+    return part.cast(expected).replace_schema_metadata(part.schema.metadata)
+
+
+def write_content(content: str | bytes, path: Path) -> None:
+    """Write a text or bytes, atomically."""
+    with replacing(path) as temporary:
+        temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
+def write_json(data: object, path: Path) -> None:
+    """Write JSON, atomically."""
+    with replacing(path) as temporary:
+        temporary.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")

@@ -1,0 +1,61 @@
+"""A finding: what is wrong with a recording, or worth knowing of it, or why it cannot be used."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+LEFT_OUT = ("rejected", "failed")
+"""Findings that a recording is left out, with the reason: they are listed by themselves."""
+
+Severity = Literal["note", "warning", "fatal"]
+
+
+_HALF_REASON = 700
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One finding about a recording or one of its channels.
+
+    Attributes
+    ----------
+    finding : str
+        Its name, such as ``missing_samples``.
+    severity : {"note", "warning", "fatal"}
+        ``fatal``: the channel, or the whole recording, is left out of the analysis.
+    detail : str
+        In words, with the unit of ``value`` and what to do.
+    value : float
+        Its size.
+    channel : str or None
+        None: the whole recording.
+    start, end : float or None
+        The part of the recording that it concerns, s from the first sample; None: all of it.
+    """
+
+    finding: str
+    severity: Severity
+    detail: str
+    value: float
+    channel: str | None = None
+    start: float | None = None
+    end: float | None = None
+
+    def row(self, sensor: str, recording: str) -> Mapping[str, Any]:
+        """Return the row of the table ``findings``."""
+        return {"sensor": sensor, "recording": recording, **asdict(self)}
+
+
+class RecordingError(ValueError):
+    """A recording that cannot be used; the text is the reason, with what to mend.
+
+    What a damaged file puts into it, such as a name of a million letters, is left out of the
+    middle.
+    """
+
+    def __init__(self, reason: str) -> None:
+        if len(reason) > 2 * _HALF_REASON:
+            reason = f"{reason[:_HALF_REASON]} [...] {reason[-_HALF_REASON:]}"
+        super().__init__(reason)

@@ -1,0 +1,85 @@
+"""Which code a result comes from."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Iterator
+from contextlib import suppress
+from functools import lru_cache
+from pathlib import Path
+
+_PACKAGE = Path(__file__).parents[1]
+_NAME = _PACKAGE.name
+
+# A whole tree of each module's syntax would take as long to read as all logs of a run.
+_IMPORT = re.compile(r"^ *from (\w+)((?:\.\w+)*) import (\([^)]*\)|.*)$", re.MULTILINE)
+_IMPORTED = re.compile(r"(\w+)(?: as \w+)?")
+_TEXT = re.compile(r"""["'](\w[\w.]*)["']""", re.ASCII)
+
+
+def source_digest(*modules: str) -> str:
+    """Return a digest of modules of this package and of all that they use of it.
+
+    That is what they import, and what their texts name: another module in full, since some are
+    imported by name when they are needed, or a file or folder beside the module, such as templates.
+
+    Parameters
+    ----------
+    *modules : str
+        Names below the package, such as ``allan`` or ``estimators.curve``.
+
+    Raises
+    ------
+    ValueError
+        If there is no such module.
+    """
+    todo, seen = [_path(module) for module in modules], set()
+    while todo:
+        path = todo.pop()
+        if path not in seen:
+            seen.add(path)
+            todo += _used(path) if path.suffix == ".py" else ()
+    digest = hashlib.sha256()
+    for path in sorted(seen):
+        digest.update(str(path.relative_to(_PACKAGE)).encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _path(module: str) -> Path:
+    base = _PACKAGE.joinpath(*module.split("."))
+    for path in (base.with_suffix(".py"), base / "__init__.py"):
+        if path.is_file():
+            return path
+    raise ValueError(f"no module {module!r} in {_NAME}")
+
+
+@lru_cache(maxsize=256)
+def _used(path: Path) -> tuple[Path, ...]:
+    """Return the files of the package that a module uses by itself."""
+    text = path.read_text("utf-8")
+    found: list[Path] = []
+    for package, base, names in _IMPORT.findall(text):
+        if package != _NAME:
+            continue
+        if base:
+            found.append(_path(base[1:]))
+        for name in _IMPORTED.findall(names):
+            with suppress(ValueError):
+                found.append(_path(f"{base}.{name}"[1:]))
+    for name in dict.fromkeys(_TEXT.findall(text)):
+        found += _named(name, path.parent)
+    return tuple(found)
+
+
+def _named(text: str, folder: Path) -> Iterator[Path]:
+    """Yield the modules, or the files in the folder of a module, that a text is the name of."""
+    if text.startswith(_NAME + "."):
+        with suppress(ValueError):
+            yield _path(text.removeprefix(_NAME + "."))
+    else:
+        beside = folder / text
+        if beside.is_file():
+            yield beside
+        elif beside.is_dir() and not (beside / "__init__.py").exists():
+            yield from (path for path in beside.rglob("*") if path.is_file())

@@ -1,0 +1,70 @@
+"""The rooms of the package, and the arrows between them: docs/architecture.md."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import PROJECT
+
+PACKAGE = PROJECT / "src/imubench_pipeline"
+LINT = "import sys, importlinter.cli as cli; sys.exit(cli.lint_imports(no_cache=True))"
+
+ROOMS = {path.parent.name for path in PACKAGE.glob("*/__init__.py")}
+LEAVES = {path.stem for path in PACKAGE.glob("*.py")} - {"__init__"}
+
+
+def lint(source: Path) -> subprocess.CompletedProcess[str]:
+    environment = os.environ | {"PYTHONPATH": str(source), "COLUMNS": "200"}
+    return subprocess.run(
+        [sys.executable, "-c", LINT],
+        cwd=PROJECT,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_no_arrow_points_back() -> None:
+    done = lint(PROJECT / "src")
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize(
+    ("module", "line"),
+    [
+        ("noise/terms.py", "from imubench_pipeline.estimators.estimate import Estimate\n"),
+        ("readers/batch.py", "from imubench_pipeline.noise import NoiseModel\n"),
+        ("experiments/alignment/fine.py", "from imubench_pipeline.settings.config import Run\n"),
+        ("flat.py", "\n"),
+    ],
+    ids=["back", "files and models", "settings of a run", "no room"],
+)
+def test_an_arrow_back_or_a_module_in_no_room_is_found(
+    module: str, line: str, tmp_path: Path
+) -> None:
+    ignored = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(PACKAGE, tmp_path / PACKAGE.name, ignore=ignored)
+    with (tmp_path / PACKAGE.name / module).open("a") as file:
+        file.write(line)
+    done = lint(tmp_path)
+    assert done.returncode == 1, done.stdout + done.stderr
+    assert "Contracts: " in done.stdout and " 0 broken" not in done.stdout, done.stdout
+
+
+def test_the_house_has_few_rooms_and_three_leaves() -> None:
+    assert len(ROOMS) + len(LEAVES) <= 20
+    assert LEAVES == {"earth", "typing", "units"}
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/architecture.md"])
+def test_every_room_is_named_where_one_looks_for_it(page: str) -> None:
+    text = (PROJECT / page).read_text()
+    named = {room: rf"\b{room}/" for room in ROOMS} | {leaf: rf"\b{leaf}\b" for leaf in LEAVES}
+    missing = [name for name, pattern in named.items() if not re.search(pattern, text)]
+    assert not missing, f"{page} does not name {missing}"
