@@ -186,3 +186,34 @@ def test_steps_of_the_temperature_are_noted(rng: np.random.Generator) -> None:
     (finding,) = column_findings({"temperature": summary(temperature)}, 1.0, SETTINGS)
     assert (finding.finding, finding.severity) == ("quantised", "note")
     assert finding.value == pytest.approx(0.1)
+
+
+def filled(log: np.ndarray, rng: np.random.Generator) -> None:
+    log[rng.random(len(log)) < 0.2] = log.mean()
+
+
+def dead_band(log: np.ndarray, rng: np.random.Generator) -> None:
+    log -= log.mean()
+    log[np.abs(log) < SIGMA] = 0.0
+
+
+@pytest.mark.parametrize("spoil", [filled, dead_band])
+@pytest.mark.parametrize("step", [0.0, 0.02, 0.1])
+def test_samples_that_pile_up_at_one_value_are_found(
+    rng: np.random.Generator, spoil: Callable[..., None], step: float
+) -> None:
+    log = an_hour(rng)
+    if step:
+        log = np.round(log / (step * SIGMA)) * step * SIGMA
+    spoil(log, rng)
+    assert "piled_up" in names(log)
+
+
+@pytest.mark.parametrize("step", [0.02, 0.3, 0.7, 1.0, 1.5, 3.0])
+@pytest.mark.parametrize("digit", [0.0, 0.3, 0.97, 1.024, 1.5])
+def test_registers_pile_nothing_up(rng: np.random.Generator, step: float, digit: float) -> None:
+    step *= SIGMA
+    log = np.round((0.37 * step + an_hour(rng)) / step) * step
+    if digit:
+        log = np.round(log / (digit * step)) * digit * step
+    assert "piled_up" not in names(log)

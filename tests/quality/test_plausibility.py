@@ -37,11 +37,12 @@ def found(
     sensor: Sensor | None = None,
     *,
     static: bool = True,
+    timed: bool = True,
 ) -> list[Finding]:
     """Return what is implausible of logs in SI of what the sensor file takes them for."""
     columns = {name: summary(log) for name, log in logs.items()}
     channels = {
-        name: kept_level(column, RATE, units[name.split("_")[0]])
+        name: kept_level(column, RATE, units[name.split("_")[0]], timed=timed)
         for name, column in columns.items()
     }
     axes = [columns.get(f"accel_{axis}") for axis in "xyz"]
@@ -113,9 +114,10 @@ def test_the_datasheet_says_what_noise_is_usual(rng: np.random.Generator) -> Non
     assert found({"gyro_x": quiet}, SI, printing(noise_density=density(1e-4))) == []
     # Far off, and in degrees or radians, too.
     assert found({"gyro_x": loud}, SI, printing(noise_density=density(0.001))) != []
-    assert found({"gyro_x": loud}, SI, printing(noise_density=density(0.004))) == []
+    (finding,) = found({"gyro_x": loud}, SI, printing(noise_density=density(0.004)))
+    assert finding.finding == "noise_unlike_datasheet"  # no unit explains it
     huge = found({"gyro_x": 1e7 * loud}, SI, printing(noise_density=density(0.004)))
-    assert [f.finding for f in huge] == ["turning"]  # no unit explains it
+    assert [f.finding for f in huge] == ["noise_unlike_datasheet", "turning"]
 
 
 def test_the_offset_of_degrees_taken_for_radians_is_no_turn(rng: np.random.Generator) -> None:
@@ -258,3 +260,57 @@ def test_one_move_or_a_warm_up_is_no_steady_turn(rng: np.random.Generator) -> No
     for course in (time > 300, 1 - np.exp(-time / 60)):
         moved = DOWN * np.cos(course) + sideways * np.sin(course)
         assert found(triad(rng, moved)) == []
+
+
+def triad_of_gyros(rng: np.random.Generator, *scales: float) -> dict[str, np.ndarray]:
+    return {f"gyro_{a}": scale * gyro(rng) for a, scale in zip("xyz", scales, strict=True)}
+
+
+@pytest.mark.parametrize("scale", [math.radians(1.0), 0.15, 6.0])
+def test_an_axis_unlike_both_others_is_named(rng: np.random.Generator, scale: float) -> None:
+    # Loud enough for the one axis to be usual of some gyro.
+    (one,) = found(triad_of_gyros(rng, 5.0, 5.0, 5.0 * scale), {"gyro": "deg/s"})
+    assert (one.finding, one.channel, one.severity) == ("axis_unlike", "gyro_z", "warning")
+    assert one.value == pytest.approx(scale, rel=0.2)
+    assert ("is it in rad/s, and not deg/s?" in one.detail) is (scale == math.radians(1.0))
+
+
+def test_an_accelerometer_axis_in_g_is_named(rng: np.random.Generator) -> None:
+    logs = triad(rng, DOWN)
+    logs["accel_y"] /= STANDARD_GRAVITY
+    (one,) = found(logs)
+    assert (one.finding, one.channel) == ("axis_unlike", "accel_y")
+    assert "is it in g, and not m/s^2?" in one.detail
+
+
+@pytest.mark.parametrize("scales", [(1.0, 1.0, 3.0), (1.0, 1.0, 0.4), (1.0, 3.0, 13.0)])
+def test_axes_may_differ(rng: np.random.Generator, scales: tuple[float, float, float]) -> None:
+    assert found(triad_of_gyros(rng, *scales)) == []
+
+
+@pytest.mark.parametrize("scale", [1 / 6, 8.0])
+def test_a_noise_far_from_the_printed_one_is_in_doubt(
+    rng: np.random.Generator, scale: float
+) -> None:
+    sensor = printing(noise_density=density(math.degrees(GYRO.N)))
+    (one,) = found({"gyro_x": scale * gyro(rng, 1e-3)}, sensor=sensor)
+    assert (one.finding, one.severity) == ("noise_unlike_datasheet", "warning")
+    assert one.value == pytest.approx(scale, rel=0.3)
+
+
+@pytest.mark.parametrize("scale", [0.3, 1.0, 3.0])
+def test_a_noise_about_as_printed_is_not(rng: np.random.Generator, scale: float) -> None:
+    sensor = printing(noise_density=density(math.degrees(GYRO.N)))
+    assert found({"gyro_x": scale * gyro(rng, 1e-3)}, sensor=sensor) == []
+
+
+@pytest.mark.parametrize(("times", "said"), [(10.0, True), (0.1, True), (2.0, False)])
+def test_a_rate_that_no_stamp_tells_is_held_against_the_printed_noise(
+    rng: np.random.Generator, times: float, said: bool
+) -> None:
+    sensor = printing(noise_density=density(math.degrees(GYRO.N)))
+    log = {"gyro_x": math.sqrt(times) * gyro(rng, 1e-3)}  # N as of another rate
+    assert found(log, sensor=sensor) == []
+    names = [(one.finding, "the stated rate of 100 Hz" in one.detail)
+             for one in found(log, sensor=sensor, timed=False)]  # fmt: skip
+    assert names == [("noise_unlike_datasheet", True)] * said

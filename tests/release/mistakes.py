@@ -5,7 +5,7 @@ python -m tests.release.mistakes [--rows 240000] [--mistake NAME ...]
 A log of the ADIS16405 is read through the public interface, and so is the same log with a mistake
 in it, by the steps of the workflow at default settings. What decides is compared: the recommended
 parameters, of which pools and exports are made, and the totals of the error budgets, of which the
-ranking is. Where one of them changed by more than its interval, there must be a doubt that the log
+ranking is. Where one of them changed by more than its intervals, there must be a doubt that the log
 without the mistake does not have: on that channel or the whole recording, as a status of the value,
 or the recording is rejected. The exit status is 1 where there is none.
 """
@@ -303,11 +303,11 @@ class Analysed:
         if self.left_out is not None:
             return
         new = {channel for _, channel in self.doubts - before.doubts}
-        for (channels, name), (value, _, _) in self.values.items():
+        for (channels, name), (value, low, high) in self.values.items():
             if (channels, name) not in before.values or new & {None, *channels.split()}:
                 continue
             old, lower, upper = before.values[channels, name]
-            if abs(value - old) > upper - lower:
+            if abs(value - old) > max(upper - lower, high - low):
                 yield f"{name} of {channels}: {value:.3g} instead of {old:.3g}"
 
 

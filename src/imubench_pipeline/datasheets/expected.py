@@ -44,6 +44,8 @@ class Expected:
     offset_from : str
     bandwidth : float or None
         The widest that is printed, Hz.
+    printed : float or None
+        White noise density that the datasheet prints, SI/√Hz, two-sided.
     """
 
     noise: tuple[float, float] | None
@@ -51,6 +53,7 @@ class Expected:
     offset: float = _LARGEST_OFFSET
     offset_from: str = "of any gyro"
     bandwidth: float | None = None
+    printed: float | None = None
 
 
 def expected(sensor: Sensor | None, quantity: str) -> Expected:
@@ -69,7 +72,7 @@ def expected(sensor: Sensor | None, quantity: str) -> Expected:
     printed = printed_figures(sensor, quantity).get("N")
     noise = usual if printed is None else (printed / _UNDER_PRINTED, printed * NEAR_PRINTED)
     noise_from = "of a gyro" if printed is None else "that its datasheet prints"
-    return Expected(noise, noise_from, *_offset(sensor), _bandwidth(sensor, quantity))
+    return Expected(noise, noise_from, *_offset(sensor), _bandwidth(sensor, quantity), printed)
 
 
 def _offset(sensor: Sensor) -> tuple[float, str]:

@@ -7,13 +7,14 @@ edit of a datasheet need not read the log again.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from imubench_pipeline.datasheets.expected import Expected, expected
 from imubench_pipeline.datasheets.rates import implausible_rates
+from imubench_pipeline.datasheets.suspicion import NEAR_PRINTED
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.recordings.quality.rotation import GravityTurn
 from imubench_pipeline.recordings.quality_file import Quality
@@ -33,6 +34,19 @@ what a datasheet prints, and of a gyro without one above 0.15 °/s/√Hz or belo
 
 _EXPLAINED = 1.5
 """Times beyond what is usual that a noise may be in the unit that is asked for instead."""
+
+_UNEVEN = 4.0
+"""Times the noise of both other axes of a sensor, either way, from which one is in doubt."""
+
+_EVEN = 2.5
+"""Times by which those two may differ from each other for that."""
+
+_UNTIMED = 2.5
+"""Times a printed noise, either way, from which it is in doubt where no stamps tell the rate: N
+goes with its root, and a stated rate that is ten times wrong is 3.2 times."""
+
+_SAME = 1.5
+"""Times by which its noise may be off theirs in the unit that is asked for instead."""
 
 _UNITS: Mapping[str, Sequence[str]] = {
     "gyro": ("rad/s", "deg/s", "mdeg/s", "mrad/s", "deg/h"),
@@ -75,6 +89,7 @@ def implausible(
     found = implausible_rates(rates, {name: of[quantity_of(name)].bandwidth for name in channels})
     if not found:  # else the density is that of another time
         found += _noise(channels, of)
+        found += _unlike(channels, of, {f.channel for f in found})
     if gravity is None or gravity.swept < _TILTED:  # its mean is not gravity then
         found += _gravity(channels)
     if static:
@@ -176,6 +191,68 @@ def _noise(channels: Mapping[str, Level], of: Mapping[str, Expected]) -> Iterato
                 )
                 yield Finding("suspicious_unit", "warning", detail, factor, name)
                 break
+
+
+def _unlike(
+    channels: Mapping[str, Level], of: Mapping[str, Expected], told: Collection[str | None]
+) -> Iterator[Finding]:
+    """Yield the channels whose noise is far from what is printed, or from both other axes.
+
+    What a wrong scale or range, another sensor or one axis in another unit leaves, where no unit
+    explains the figure by itself.
+    """
+    for name, level in channels.items():
+        if name in told:
+            continue
+        quantity = quantity_of(name)
+        sign, dimension = _SHOWN[quantity]
+        low, high = level["density"]
+        high = math.inf if high is None else high
+        printed = of[quantity].printed
+        timed = level.get("timed", True)
+        near = NEAR_PRINTED if timed else _UNTIMED
+        if printed is not None and (low > near * printed or near * high < printed):
+            shown = low if low > printed else high
+            figures = [from_si(x, sign, dimension) for x in (shown, printed)]
+            rate = "" if timed else f"the stated rate of {level['rate']:g} Hz, "
+            detail = (
+                f"{name} has a noise of {figures[0]:.3g} {sign}, {shown / printed:.3g} times the "
+                f"{figures[1]:.3g} that its datasheet prints: check {rate}scale, range and column "
+                "of the channel, and whether it is this sensor"
+            )
+            yield Finding("noise_unlike_datasheet", "warning", detail, shown / printed, name)
+            continue
+        others = [f"{quantity}_{axis}" for axis in "xyz" if f"{quantity}_{axis}" != name]
+        ratio = _ratio(level, [channels[one] for one in others if one in channels])
+        if ratio is not None:
+            shown = low if ratio > 1.0 else high
+            explained = (
+                f"is it in {unit}, and not {level['unit']}? Check"
+                for unit, factor in mistakes(level["unit"], quantity)
+                if 1.0 / _SAME < ratio * factor < _SAME
+            )
+            detail = (
+                f"the noise of {name} is {ratio:.3g} times that of {' and '.join(others)}, "
+                f"{from_si(shown, sign, dimension):.3g} {sign}, as axes of one sensor hardly ever "
+                f"have: {next(explained, 'check')} unit, scale and column of this axis"
+            )
+            yield Finding("axis_unlike", "warning", detail, ratio, name)
+
+
+def _ratio(level: Level, others: Sequence[Level]) -> float | None:
+    """Return how many times the noise of two axes alike a third has; None: not far off."""
+    if len(others) < 2 or any(one["density"][1] is None for one in (level, *others)):
+        return None
+    least = min(one["density"][0] for one in others)
+    most = max(one["density"][1] for one in others)
+    low, high = level["density"]
+    if not (least > 0.0 and high > 0.0) or most > _EVEN * least:
+        return None
+    if low > _UNEVEN * most:
+        return float(low / max(one["density"][0] for one in others))
+    if _UNEVEN * high < least:
+        return float(high / min(one["density"][1] for one in others))
+    return None
 
 
 def _turning(means: Mapping[str, float], usual: Expected) -> Iterator[Finding]:

@@ -217,11 +217,12 @@ def _ingest(
     for temporary, final in written:
         temporary.replace(final)
     column = {name: found for part in parts for name, found in part.columns.items()}
+    timed = {name for part in parts if part.stamped for name in part.columns}
     units = {str(name): source.unit for name, source in log.channels.items()}
     channels = {
         name: {"grid": kept.grid, "segments": kept.segments}
         | counts[name]
-        | kept_level(column[name], kept.rate, units[name])
+        | kept_level(column[name], kept.rate, units[name], timed=name in timed)
         for name, kept in channel_logs(folder).items()
     }
     begin = notes.use.start

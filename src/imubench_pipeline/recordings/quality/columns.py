@@ -147,7 +147,8 @@ def _values(
         )
         yield Finding("quantised", "note", detail, steps.step, channel)
     length, end = column.longest_run
-    if length > max(3.0 * levels.longest_by_chance(column), settings.longest_stuck * rate):
+    stuck = length > max(3.0 * levels.longest_by_chance(column), settings.longest_stuck * rate)
+    if stuck:
         detail = f"{channel} stays at one value for {length / rate:.4g} s ({length} samples)"
         yield Finding(
             "stuck_for_a_while",
@@ -158,15 +159,24 @@ def _values(
             (end - length) / rate,
             end / rate,
         )
-    piled = levels.saturated(column, steps, settings.saturated)
-    if piled is not None:
-        side, number = piled
+    at_end = levels.saturated(column, steps, settings.saturated)
+    if at_end is not None:
+        side, number = at_end
         value = column.low if side == "lowest" else column.high
         detail = (
             f"{channel} has {number} samples at its {side} value, {_figure(channel, value)}: it is "
             "saturated; use a wider range"
         )
         yield Finding("saturated", "warning", detail, number, channel)
+    heap = None if stuck else levels.piled(column, steps)
+    if heap is not None:
+        value, share = heap
+        detail = (
+            f"{100 * share:.2g} % of the samples of {channel} are {_figure(channel, value)}, many "
+            "times as many as at the values beside it: lost samples were filled in, or a dead band "
+            "holds the output; leave the cells of lost samples empty"
+        )
+        yield Finding("piled_up", "warning", detail, share, channel)
 
 
 def _changes(

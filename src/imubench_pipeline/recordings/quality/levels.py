@@ -22,6 +22,23 @@ _NORMAL_MEDIAN = 0.4549
 """Median of the square of a standard normal variable."""
 
 
+_COARSE = 1.0
+"""Step over noise up to which neighbouring levels are about as frequent: one has 1.65 times the
+samples of the next where the mean lies on it."""
+
+_BESIDE = 4
+"""Levels on either side that a level is compared with."""
+
+_TIMES = 2.5
+"""Times the fullest of them from which samples pile up: where figures are rounded to digits
+somewhat coarser than the register, some digits have two of its steps."""
+
+_PILED = 0.005
+"""Part of the samples from which it matters."""
+
+_BY_CHANCE = 10
+
+
 @dataclass(frozen=True)
 class Quantisation:
     """The steps of a quantised column.
@@ -64,7 +81,43 @@ def noise_of(column: ColumnSummary) -> float:
     return _median(column.blocks().spread)
 
 
-def kept_level(column: ColumnSummary, rate: float, unit: str) -> dict[str, Any]:
+def piled(column: ColumnSummary, steps: Quantisation | None) -> tuple[float, float] | None:
+    """Return a value within the noise that samples pile up at, where no register is so coarse.
+
+    Neighbouring levels of a register are about as frequent as each other. Samples that were lost
+    and filled in by one value, or rates that a dead band reports as 0, are not.
+
+    Parameters
+    ----------
+    column : ColumnSummary
+    steps : Quantisation or None
+        Of the column.
+
+    Returns
+    -------
+    (value, share) or None
+        SI, and the part of the samples that are there.
+    """
+    if steps is not None and steps.over_noise > _COARSE:
+        return None
+    pieces = [piece.values[np.isfinite(piece.values)] for piece in column.excerpts()]
+    values = np.concatenate([np.empty(0), *pieces])
+    if len(values) == 0:
+        return None
+    at, counts = np.unique(values, return_counts=True)
+    most = int(np.argmax(counts))
+    around = np.delete(counts[max(0, most - _BESIDE) : most + _BESIDE + 1], min(most, _BESIDE))
+    if at[most] in (column.low, column.high) or len(around) < 2 * _BESIDE:
+        return None  # saturated, or too few levels
+    share = counts[most] / len(values)
+    if share < _PILED or counts[most] < _TIMES * max(around.max(), _BY_CHANCE):
+        return None
+    return float(at[most]), float(share)
+
+
+def kept_level(
+    column: ColumnSummary, rate: float, unit: str, *, timed: bool = True
+) -> dict[str, Any]:
     """Return what is kept of the level of a channel, to be judged beside its datasheet.
 
     Parameters
@@ -74,14 +127,22 @@ def kept_level(column: ColumnSummary, rate: float, unit: str) -> dict[str, Any]:
         Hz.
     unit : str
         In which the log is said to be written.
+    timed : bool
+        It has stamps; else the rate is as it is stated.
 
     Returns
     -------
     dict
-        ``mean``, SI; ``density``, see `density_of`; ``unit``; ``rate``.
+        ``mean``, SI; ``density``, see `density_of`; ``unit``; ``rate``; ``timed``.
     """
     density = density_of(column, rate)
-    return {"mean": level_of(column), "density": density, "unit": unit, "rate": rate}
+    return {
+        "mean": level_of(column),
+        "density": density,
+        "unit": unit,
+        "rate": rate,
+        "timed": timed,
+    }
 
 
 def density_of(column: ColumnSummary, rate: float) -> tuple[float, float | None]:
