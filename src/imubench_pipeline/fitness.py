@@ -31,6 +31,7 @@ UNFIT = frozenset(
         "stuck",
         "channel_twice",
         "log_twice",
+        "recording_twice",
         "joined",
         "interleaved",
     }

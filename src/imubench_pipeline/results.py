@@ -38,6 +38,7 @@ from imubench_pipeline.published import published_rows, truth_rows
 from imubench_pipeline.quality.plausibility import implausible
 from imubench_pipeline.quality.rotation import GravityTurn
 from imubench_pipeline.quality.spectral import band_finding, line_findings
+from imubench_pipeline.quality.twins import recorded_twice
 from imubench_pipeline.sensor import Sensor, quantity_of
 from imubench_pipeline.suspicion import unusual_rows
 from imubench_pipeline.tables import build, read
@@ -324,7 +325,8 @@ def joined_tables(
     )
     unusual = unusual_rows(estimated, sensors)
     of_estimates = joined.pop("estimate_findings").to_pylist()
-    found = [*of_logs, *of_levels, *of_estimates, *spectral_rows(joined), *unusual]
+    twins = recorded_twice(joined["models"].to_pylist(), biases)
+    found = [*of_logs, *of_levels, *of_estimates, *spectral_rows(joined), *unusual, *twins]
     if "backtest" in joined:
         found += verdicts.findings(joined["backtest"].to_pylist())
     joined["findings"] = build("findings", found)
