@@ -217,3 +217,21 @@ def test_registers_pile_nothing_up(rng: np.random.Generator, step: float, digit:
     if digit:
         log = np.round(log / (digit * step)) * digit * step
     assert "piled_up" not in names(log)
+
+
+@pytest.mark.parametrize("step", [0.5, 0.6, 0.7, 0.8])
+def test_the_last_level_of_a_coarse_register_is_no_saturation(
+    rng: np.random.Generator, step: float
+) -> None:
+    for _ in range(30):
+        log = np.round((rng.standard_normal(20_000) + rng.random()) / step) * step
+        assert "saturated" not in names(log)
+        clipped = names(np.clip(log, None, np.round(2.0 / step) * step))
+        assert {"saturated", "coarse"} & set(clipped)
+
+
+def test_a_last_block_of_one_sample_is_no_step(rng: np.random.Generator) -> None:
+    for _ in range(20):
+        log = 0.01 + SIGMA * rng.standard_normal(59 * 256 + 1)
+        log[-1] = 0.01 + 1.5 * SIGMA
+        assert "step" not in names(log)

@@ -28,6 +28,7 @@ UNFIT = frozenset(
         "stuck",
         "channel_twice",
         "log_twice",
+        "recording_twice",
         "joined",
         "interleaved",
     }
@@ -58,6 +59,7 @@ BEARS_ON: Mapping[str, frozenset[str]] = {
     "telegraph_noise": _SLOW | {"bias"},
     "K_differs": frozenset({"K", "R"}),
     "slow_noise_differs": _SLOW,
+    "slow_noise_missing": _SLOW,
     "noise_grows": _WHITE,
     "noise_varies": _WHITE,
     "backtest_contradicts": _SLOW,

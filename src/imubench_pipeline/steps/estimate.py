@@ -22,6 +22,7 @@ from imubench_pipeline.estimators.deterministic.verdict import deterministic_row
 from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate, not_shown
 from imubench_pipeline.estimators.least_squares import UnfitCurveError
 from imubench_pipeline.estimators.likelihood import Likelihood
+from imubench_pipeline.estimators.missing_slow import slow_noise_missing
 from imubench_pipeline.estimators.model_choice import disagreement
 from imubench_pipeline.estimators.rows import allan_rows, draw_rows, parameter_rows
 from imubench_pipeline.estimators.thermal.path import TemperaturePath, temperature_path
@@ -140,6 +141,10 @@ def estimate_channel(
         there = presence(log.blocks(), log.grid, log.segments) if log.holes else None
         limited = partial(with_fitted_limits, segments=log.segments, presence=there)
         final = limited(measured, found)
+        if not courses.found:  # else what they explain is taken out
+            white = found.estimates[0].parameters["N"].lower
+            lack = slow_noise_missing(key.channel, found.spectrum, found.fitted, white)
+            into.estimate_findings += [lack.row(key.sensor, key.recording)] if lack else []
         into.models += _model_rows(key, found)
         into.lines += _line_rows(key, found)
         into.spectrum += _spectrum_rows(key, found)

@@ -22,6 +22,7 @@ from imubench_pipeline.recordings.fitness import (
     with_doubts,
     with_doubts_of_all,
 )
+from imubench_pipeline.recordings.quality.twins import recorded_twice
 from imubench_pipeline.recordings.quality_file import Quality
 from imubench_pipeline.settings.sensor import sensors_of
 from imubench_pipeline.steps.published import published_rows, truth_rows
@@ -79,7 +80,8 @@ def joined_tables(
     )
     unusual = unusual_rows(estimated, sensors)
     of_estimates = joined.pop("estimate_findings").to_pylist()
-    found = [*of_logs, *of_levels, *of_estimates, *spectral_rows(joined), *unusual]
+    twins = recorded_twice(joined["models"].to_pylist(), biases)
+    found = [*of_logs, *of_levels, *of_estimates, *spectral_rows(joined), *unusual, *twins]
     if "backtest" in joined:
         found += verdicts.findings(joined["backtest"].to_pylist())
     joined["findings"] = build("findings", found)

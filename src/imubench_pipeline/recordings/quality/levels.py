@@ -38,6 +38,10 @@ _PILED = 0.005
 
 _BY_CHANCE = 10
 
+_BEYOND = 12.0
+"""Samples that noise would have beyond its last level, of which one is there but for a chance of
+exp(-12)."""
+
 
 @dataclass(frozen=True)
 class Quantisation:
@@ -214,6 +218,23 @@ def saturated(
         return None  # so few levels that an extreme is nothing special
     for side, number in zip(("lowest", "highest"), column.at_extremes, strict=True):
         # A Gaussian leaves a few samples at its last level, whatever the step.
-        if number > max(share * column.present, 10):
+        if number > max(share * column.present, 10) and _cut_off(column, steps, side, number):
             return side, number
     return None
+
+
+def _cut_off(column: ColumnSummary, steps: Quantisation | None, side: str, number: int) -> bool:
+    """Tell whether samples at an extreme ask for others beyond it, which are not there.
+
+    Counts n of neighbouring levels fall faster and faster in the tail of noise: the level beyond
+    the last one has n_last^2 / n_next exp(-q^2), with q the step over the noise.
+    """
+    if steps is None:
+        return True
+    pieces = [piece.values[np.isfinite(piece.values)] for piece in column.excerpts()]
+    at, counts = np.unique(np.concatenate([np.empty(0), *pieces]), return_counts=True)
+    last, following = (0, 1) if side == "lowest" else (-1, -2)
+    if len(at) < 2 or at[last] != (column.low if side == "lowest" else column.high):
+        return True
+    beyond = number * counts[last] / counts[following] * math.exp(-(steps.over_noise**2))
+    return bool(beyond > _BEYOND)

@@ -180,9 +180,13 @@ def motions(blocks: Blocks, times: float) -> list[tuple[int, int]]:
 
 
 def _means(blocks: Blocks, size: int) -> Array:
-    """Return medians of the means of ``size`` blocks: one knock does not move them."""
+    """Return medians of the means of ``size`` blocks: one knock does not move them.
+
+    The mean of a block of a few samples, such as the last one, is far off without any step.
+    """
     whole = len(blocks.mean) // size
-    grouped = blocks.mean[: whole * size].reshape(whole, size)
+    mean = np.where(2 * blocks.count >= blocks.size, blocks.mean, np.nan)
+    grouped = mean[: whole * size].reshape(whole, size)
     if np.isfinite(grouped).all():
         return np.median(grouped, axis=1)
     return np.array([_median(group) for group in grouped])
