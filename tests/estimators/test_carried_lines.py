@@ -1,5 +1,7 @@
 """A comb of lines is carried on as a few, with the power of all."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -58,3 +60,15 @@ def test_a_comb_is_a_warning_that_says_how_many_and_how_much_power() -> None:
     assert f"{100 * rest / powers.sum():.3g} % of that of all lines" in warning.detail
     assert f"({np.sqrt(rest):.3g} rad/s rms)" in warning.detail
     assert joined_finding("gyro_x", "gyro", rows) == warning
+
+
+def test_a_line_that_integrates_to_as_much_as_the_noise_is_warned_of() -> None:
+    # A gyro's angle swings by A / (2 pi f), about its value a second before, and walks by N.
+    frequency, white = 17.3, 6.6e-4
+    one = {"channel": "gyro_x", "kind": "sinusoid", "frequency": frequency, "ratio": 1e4}
+    for part, names in ((0.49, ["lines"]), (0.51, ["lines", "strong_line"])):
+        amplitude = part * white * math.pi * frequency * math.sqrt(2.0)
+        found = line_findings([one | {"amplitude": amplitude}], {"gyro_x": white})
+        assert [finding.finding for finding in found] == names
+        assert len(line_findings([one | {"amplitude": amplitude}], {"gyro_y": white})) == 1
+    assert found[1].value == pytest.approx(0.51)

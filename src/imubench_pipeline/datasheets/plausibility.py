@@ -201,6 +201,7 @@ def _unlike(
     What a wrong scale or range, another sensor or one axis in another unit leaves, where no unit
     explains the figure by itself.
     """
+    untimed = False
     for name, level in channels.items():
         if name in told:
             continue
@@ -220,7 +221,13 @@ def _unlike(
                 f"{figures[1]:.3g} that its datasheet prints: check {rate}scale, range and column "
                 "of the channel, and whether it is this sensor"
             )
-            yield Finding("noise_unlike_datasheet", "warning", detail, shown / printed, name)
+            far = low > NEAR_PRINTED * printed or NEAR_PRINTED * high < printed
+            if far or not untimed:  # a wrong rate is that of all channels: it is told once
+                untimed = untimed or not timed
+                of_channel = name if timed or far else None
+                yield Finding(
+                    "noise_unlike_datasheet", "warning", detail, shown / printed, of_channel
+                )
             continue
         others = [f"{quantity}_{axis}" for axis in "xyz" if f"{quantity}_{axis}" != name]
         ratio = _ratio(level, [channels[one] for one in others if one in channels])

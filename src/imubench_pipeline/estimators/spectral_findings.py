@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -9,16 +10,24 @@ from imubench_pipeline.estimators.carried_lines import MOST, joined_finding
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables.findings import Finding
 
+_STRONG = 0.5
+"""Part of what white noise integrates to in a second from which a sinusoid counts in budgets."""
 
-def line_findings(lines: Iterable[Mapping[str, Any]]) -> list[Finding]:
+
+def line_findings(
+    lines: Iterable[Mapping[str, Any]], white: Mapping[str, float] | None = None
+) -> list[Finding]:
     """Return a note for each channel with lines, from rows of the table ``lines``.
 
-    There is a warning where they are too many for a noise model to carry each on.
+    There is a warning where they are too many for a noise model to carry each on, and where one is
+    so strong that it is a good part of an error budget: a sensor seldom makes such a line itself.
 
     Parameters
     ----------
     lines : iterable of mapping
         With ``channel``, ``kind``, ``frequency`` (Hz), ``amplitude`` (SI) and ``ratio``.
+    white : mapping of str to float, optional
+        N of each channel, where it is known.
     """
     by_channel: dict[str, list[Mapping[str, Any]]] = {}
     for line in lines:
@@ -35,9 +44,37 @@ def line_findings(lines: Iterable[Mapping[str, Any]]) -> list[Finding]:
             "noise there; they are left out of the likelihood"
         )
         findings.append(Finding("lines", "note", detail, strongest["frequency"], channel))
+        strong = _strong(channel, sinusoids, (white or {}).get(channel))
+        findings += [strong] if strong else []
         if number > MOST:
             findings.append(joined_finding(channel, quantity_of(channel), sinusoids))
     return findings
+
+
+def _strong(
+    channel: str, sinusoids: Iterable[Mapping[str, Any]], white: float | None
+) -> Finding | None:
+    """Return a warning of the sinusoid that integrates to most in a second.
+
+    Its integral A / (2 pi f) differs by A sin(pi f t) / (pi f sqrt(2)) rms after t; the sine is
+    at most 1, or its argument.
+    """
+    if not white:
+        return None
+    parts = {
+        line["amplitude"] / (math.sqrt(2.0) * max(1.0, math.pi * line["frequency"])) / white: line
+        for line in sinusoids
+    }
+    most = max(parts, default=0.0)
+    if most < _STRONG:
+        return None
+    frequency = parts[most]["frequency"]
+    detail = (
+        f"a sinusoid of {channel} at {frequency:.5g} Hz integrates to {most:.3g} times what its "
+        "white noise does in a second, and is in the error budgets: if it is a vibration of the "
+        "place, and not of the sensor, record elsewhere, or on softer ground"
+    )
+    return Finding("strong_line", "warning", detail, most, channel)
 
 
 def band_finding(channel: str, highest: float, source: str) -> list[Finding]:

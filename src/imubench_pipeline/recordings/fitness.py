@@ -63,6 +63,7 @@ BEARS_ON: Mapping[str, frozenset[str]] = {
     "noise_grows": _WHITE,
     "noise_varies": _WHITE,
     "backtest_contradicts": _SLOW,
+    "strong_line": frozenset({"S"}),
     **{name: frozenset(powers) for name, powers in SCALES.items()},
 }
 """The parameters on which a finding casts doubt; a warning that is not here, on all."""

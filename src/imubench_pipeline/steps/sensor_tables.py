@@ -142,8 +142,12 @@ def without_doubles(
 
 def spectral_rows(tables: Mapping[str, pa.Table]) -> Iterator[Row]:
     """Yield the rows of the table ``findings`` that the tables ``lines`` and ``models`` tell."""
+    white: dict[tuple[str, str], dict[str, float]] = {}
+    for row in tables["parameters"].filter(tables["parameters"]["recommended"]).to_pylist():
+        if row["parameter"] == "N" and row["value"] is not None:
+            white.setdefault((row["sensor"], row["recording"]), {})[row["channel"]] = row["value"]
     for (sensor, recording), lines in divided(tables["lines"], "sensor", "recording").items():
-        for finding in line_findings(lines.to_pylist()):
+        for finding in line_findings(lines.to_pylist(), white.get((sensor, recording))):
             yield finding.row(sensor, recording)
     models = tables["models"]
     for row in models.filter(models["chosen"]).to_pylist():
