@@ -7,7 +7,10 @@ from itertools import chain
 
 from imubench_pipeline.run.bounded_steps import BoundedSteps
 from imubench_pipeline.run.plan import Plan
+from imubench_pipeline.run.processes import Steps
 from imubench_pipeline.run.resources import asked, time_limits
+from imubench_pipeline.run.step_modules import STEPS
+from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables.schemas import (
     CALIBRATED,
     COMPARED,
@@ -17,9 +20,6 @@ from imubench_pipeline.tables.schemas import (
     TABLES,
     TURNED,
 )
-from imubench_pipeline.run.step_modules import STEPS
-from imubench_pipeline.run.processes import Steps
-from imubench_pipeline.settings.validation import ConfigError
 
 
 configfile: "config/config.yaml"
