@@ -235,3 +235,11 @@ def test_a_last_block_of_one_sample_is_no_step(rng: np.random.Generator) -> None
         log = 0.01 + SIGMA * rng.standard_normal(59 * 256 + 1)
         log[-1] = 0.01 + 1.5 * SIGMA
         assert "step" not in names(log)
+
+
+@pytest.mark.parametrize("step", [0.01, 0.1, 0.3])
+def test_ten_levels_are_not_fewer_than_ten(rng: np.random.Generator, step: float) -> None:
+    for first in range(-200, 200, 7):
+        log = (first + np.clip(np.round(4.5 + 1.3 * rng.standard_normal(5000)), 0, 9)) * step
+        log[:2] = first * step, (first + 9) * step
+        assert "coarse" not in names(log)

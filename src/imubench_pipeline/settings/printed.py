@@ -324,5 +324,5 @@ def _check_micro(value: float, unit: str, dimension: str, key: str) -> None:
     if to_si(value, unit, dimension) > _LARGEST_ACCELERATION_NOISE:
         raise ValueError(
             f"{key}: found {value:g} {unit}, which no accelerometer has; was the sign of micro or "
-            f"milli lost? expected such as {value:g} u{unit}"
+            f"milli lost? expected such as {value:g} u{unit.removeprefix('m')}"
         )

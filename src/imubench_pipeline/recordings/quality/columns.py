@@ -133,7 +133,7 @@ def _values(
 ) -> Iterator[Finding]:
     """Yield what the values tell by themselves."""
     rounded = "; the figures were rounded after it" if steps is not None and steps.hidden else ""
-    if steps is not None and steps.levels < settings.fewest_levels:
+    if steps is not None and round(steps.levels) < settings.fewest_levels:
         detail = (
             f"{channel} has {steps.levels:.0f} levels of {_figure(channel, steps.step)}, fewer "
             f"than {settings.fewest_levels}: its noise is that of the rounding; record "
