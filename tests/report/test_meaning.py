@@ -51,6 +51,16 @@ def test_sensors_stand_in_their_order_with_what_decides() -> None:
     assert position["decides"] and position["source"].startswith("gyro N in the static window (")
 
 
+def test_a_verdict_stands_beside_what_is_doubted_of_its_logs() -> None:
+    requirements = {"robot": Requirement.model_validate(ROBOT)}
+    about = {sensor: {"price_class": None} for sensor, _ in SIMULATED}
+    table = build("ranking", ranking_rows(errors(), requirements, about)).to_pylist()
+    doubted = [row | {"doubts": "knocks" if row["sensor"] != "good" else ""} for row in table]
+    (shown,) = rankings(doubted, {"robot": ROBOT}, SIMULATED, "practical")
+    # Of the third nothing is known, and the reason says why.
+    assert [group["doubts"] for group in shown["groups"]] == ["", "knocks", ""]
+
+
 def test_a_budget_names_its_sources_and_what_is_missing() -> None:
     tables = list(budget_tables(errors(), SIMULATED, "practical"))
     assert [(t["sensor"], t["simulated"]) for t in tables] == [

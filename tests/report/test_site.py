@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.report.sensor import change_words
-from imubench_pipeline.report.site import Page, Site
+from imubench_pipeline.report.site import Page, Site, sensor_names
 from imubench_pipeline.report.start import summary
 from tests.report.tables import (
     KNOWN,
@@ -208,3 +208,12 @@ def test_the_command_that_makes_results_again_has_what_the_run_was_given() -> No
     assert other.again(other.views[0], "scores") == (
         f"snakemake -c2 --config 'logs=my logs' simulated=false --forcerun ingest -- {target}"
     )
+
+
+def test_sensors_of_one_vendor_and_model_are_told_apart() -> None:
+    described = {
+        name: {"vendor": "V", "model": model}
+        for name, model in (("a", "1"), ("b", "1"), ("c", "2"))
+    }
+    names = sensor_names("abcd", described)
+    assert names == {"a": "V 1 (a)", "b": "V 1 (b)", "c": "V 2", "d": "d"}

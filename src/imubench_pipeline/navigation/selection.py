@@ -12,6 +12,9 @@ from imubench_pipeline.navigation.verdicts.unless import unless_words
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.typing import Row
 
+_SHOWN = 3
+"""Recordings whose doubts are named; of more the number."""
+
 
 def ranking_rows(
     errors: Iterable[Row],
@@ -75,7 +78,6 @@ def ranked(judged: Sequence[Judgement], basis: Basis) -> Iterator[Row]:
                 **_unless_row(one),
             }
             for standing, weak in zip(one.standings, one.weak, strict=True):
-                key = one.sensor, standing.total["recording"]
                 yield {
                     **of_sensor,
                     "at_most": standing.total["limit"] * one.requirement.sigmas,
@@ -83,8 +85,18 @@ def ranked(judged: Sequence[Judgement], basis: Basis) -> Iterator[Row]:
                     **_limit_row(standing),
                     **_evidence_row(one.sensor, standing, weak, basis),
                     **_backtest_row(name, standing, basis),
-                    "doubts": basis.doubted(key),
+                    "doubts": _doubts(one.sensor, standing, basis),
                 }
+
+
+def _doubts(sensor: str, standing: Standing, basis: Basis) -> str:
+    """Return what is doubted of the recordings that a standing rests on."""
+    found = [row["recording"] for row in standing.totals]
+    if len(found) < 2:
+        return basis.doubted((sensor, standing.total["recording"]))
+    said = [f"{name}: {words}" for name in found if (words := basis.doubted((sensor, name)))]
+    more = len(said) - _SHOWN
+    return "; ".join(said[:_SHOWN]) + (f"; and {more} more" if more > 0 else "")
 
 
 def _limit_row(standing: Standing) -> Row:

@@ -64,6 +64,7 @@ def rankings(
                     "verdict": stands["verdict"],
                     "conditions": stands["conditions"],
                     "weak": evidence_words(stands) if stands["rank"] else "",
+                    "doubts": (stands["doubts"] or "") if stands["rank"] else "",
                     "unless": stands["unless"],
                     "limits": [_limit(row, system) for row in limits],
                 }

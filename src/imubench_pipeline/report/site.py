@@ -6,6 +6,7 @@ import hashlib
 import json
 import re
 import shlex
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -182,13 +183,7 @@ class Site:
     @cached_property
     def names(self) -> dict[str, str]:
         """Vendor and model of each sensor."""
-        described = self.settings["sensors"]
-        return {
-            sensor: f"{described[sensor]['vendor']} {described[sensor]['model']}"
-            if sensor in described
-            else sensor
-            for sensor in self.sensors
-        }
+        return sensor_names(self.sensors, self.settings["sensors"])
 
     @cached_property
     def looks(self) -> dict[str, Appearance]:
@@ -296,3 +291,26 @@ def _flat(parts: Iterable[object]) -> Iterable[bytes]:
             yield hashlib.sha256(part).digest()
         else:
             yield json.dumps(part, sort_keys=True, default=str).encode()
+
+
+def sensor_names(
+    sensors: Iterable[str], described: Mapping[str, Mapping[str, str]]
+) -> dict[str, str]:
+    """Return vendor and model of each sensor, with the name of its file where two are alike.
+
+    Parameters
+    ----------
+    sensors : iterable of str
+    described : mapping of str to mapping
+        ``vendor`` and ``model`` of those that have a file.
+    """
+    plain = {
+        sensor: f"{described[sensor]['vendor']} {described[sensor]['model']}"
+        if sensor in described
+        else sensor
+        for sensor in sensors
+    }
+    times = Counter(plain.values())
+    return {
+        sensor: f"{name} ({sensor})" if times[name] > 1 else name for sensor, name in plain.items()
+    }

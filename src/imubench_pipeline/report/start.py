@@ -196,7 +196,9 @@ def _basis(site: Site, row: Row) -> str:
     if row["spread"] is not None:
         text += f" Spread: {100 * row['spread']:.2g} %, {_SPREAD_OF[row['spread_of']]}."
     doubts = list(dict.fromkeys(finding["finding"] for finding in chosen.warnings))
-    if doubts:
+    if row["recordings"] > 1:  # those of all of them
+        text += f" Doubts: {row['doubts']}." if row["doubts"] else ""
+    elif doubts:
         text += f" Doubts: {', '.join(term(name).name for name in doubts)}."
     return text + left_out
 

@@ -158,7 +158,12 @@ def _ranking_lines(group: Mapping[str, Any], *, every: bool) -> Iterator[list[st
     if group["weak"]:
         said.stylize("dim")
     weak = f"on weak evidence: {group['weak']}" if group["weak"] else ""
-    for line in (weak, one_line(group["unless"] or "", _LONGEST_FINDING)):
+    doubts = f"in doubt: {group['doubts']}" if group["doubts"] else ""
+    for line in (
+        weak,
+        one_line(doubts, _LONGEST_FINDING),
+        one_line(group["unless"] or "", _LONGEST_FINDING),
+    ):
         # The names have what the other columns leave.
         said.append("".join(f"\n{part}" for part in wrap(line, _BESIDE)), style="yellow")
     first: list[str | Text] = [str(group["rank"]), sensor, said]
