@@ -198,3 +198,14 @@ def test_tied_sensors_stand_in_the_order_of_their_margins(margins: list[float]) 
 def test_a_requirement_that_nothing_answers_has_no_groups() -> None:
     (one,) = rankings([], {"robot": ROBOT}, {}, "si")
     assert (one["name"], one["groups"]) == ("robot", [])
+
+
+def test_of_tied_sensors_one_without_conditions_is_named_first() -> None:
+    requirements = {"robot": Requirement.model_validate(ROBOT)}
+    about = {sensor: {"price_class": None} for sensor, _ in SIMULATED}
+    table = build("ranking", ranking_rows(errors(), requirements, about)).to_pylist()
+    tied = [row | {"rank": 1} for row in table if row["sensor"] != "gyro"]
+    verdicts = {"good": "passes if", "poor": "probably passes"}
+    given = [row | {"verdict": verdicts[row["sensor"]]} for row in tied]
+    (shown,) = rankings(given, {"robot": ROBOT}, SIMULATED, "practical")
+    assert [group["sensor"] for group in shown["groups"]] == ["poor", "good"]

@@ -27,7 +27,7 @@ def test_a_doubt_leaves_every_figure(code: str) -> None:
     recordings = [about("s", "r", doubts=words), about("s", "q"), about("t", "r", doubts=words)]
     told = [doubt("s", "r", code), doubt("t", "r", code)]
     doubted, _ = judge(SENSORS, ASKED, recordings, told)
-    assert {row["doubts"] for row in doubted} == {words}
+    assert all(words in row["doubts"] for row in doubted)
     assert figures(doubted) == figures(clean)
 
 

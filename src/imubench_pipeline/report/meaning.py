@@ -73,13 +73,20 @@ def rankings(
 
 
 def _order(rows: Sequence[Row]) -> Any:
-    """Return a key that puts the ranked sensors first, by their margin."""
-    margins: dict[str, tuple[int, float]] = {}
+    """Return a key that puts the ranked sensors first, of one rank those that pass as they are.
+
+    A sensor of which little is known has a large margin and conditions.
+    """
+    places: dict[str, tuple[int, int, float]] = {}
     for row in rows:
         if row["decides"]:
-            rank, margin = row["rank"], row["margin"]
-            margins[row["sensor"]] = (rank or 10**6, -(margin or 0.0))
-    return margins.__getitem__
+            rank, margin = row["rank"] or 10**6, row["margin"] or 0.0
+            place = _MERIT.index(row["verdict"]) if row["verdict"] in _MERIT else len(_MERIT)
+            places[row["sensor"]] = (rank, place // 2, -margin)
+    return places.__getitem__
+
+
+_MERIT = ("passes", "probably passes", "passes if", "probably passes if")
 
 
 def _limit(row: Row, system: System) -> dict[str, Any]:
