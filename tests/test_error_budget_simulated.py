@@ -130,6 +130,7 @@ def test_each_term_grows_as_in_simulated_runs(term: Term, calibrated: bool) -> N
             assert abs(found - expected) < 4.0 * error + 2e-3 * expected, (time, order)
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("levelled", [True, False])
 def test_dead_reckoning_of_simulated_runs(levelled: bool) -> None:
     rng = np.random.default_rng([8, levelled])

@@ -352,6 +352,7 @@ def test_biases() -> None:
     assert "gravity" in found[None, "accel_z", "bias"]["reason"]
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("repeats", [2, 3000])
 def test_time_is_linear(rng: np.random.Generator, repeats: int) -> None:
     names = [f"r{i}" for i in range(3000)]

@@ -76,6 +76,7 @@ def test_a_log_depends_on_its_seed_only() -> None:
     assert not np.allclose(log("s", "r", "gyro_x"), log("sr", "", "gyro_x"))
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(
     "model",
     [
@@ -120,6 +121,7 @@ def test_every_term_is_simulated_as_its_allan_variance_says(rng, model: NoiseMod
     assert (np.abs(found.mean(axis=0) - expected) < tolerance).all()
 
 
+@pytest.mark.release
 def test_the_ensemble_is_that_of_full_length_logs(rng) -> None:
     length = 40_000
     sizes = cluster_sizes(length, per_decade=4)
@@ -132,6 +134,7 @@ def test_the_ensemble_is_that_of_full_length_logs(rng) -> None:
     np.testing.assert_allclose(drawn.std(axis=0) / spread, 1.0, atol=0.2)
 
 
+@pytest.mark.release
 def test_neighbouring_taus_go_together_in_the_ensemble(rng) -> None:
     sizes = np.array([2, 3, 4, 8])
     full = np.array([reconstructed_variance(MODEL, RATE, 4000, sizes, rng) for _ in range(3000)])

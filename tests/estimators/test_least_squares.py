@@ -152,6 +152,7 @@ def test_clean_curves_keep_their_short_taus(rng) -> None:
     assert shortened <= 4
 
 
+@pytest.mark.release
 def test_ten_hour_logs_of_an_mti_7(rng) -> None:
     """RMSE near the Cramér-Rao bound of 0.037, 4.2 and 9.8 %."""
     errors = {name: [] for name in ("N", "B", "T_B")}
@@ -175,6 +176,7 @@ def simulated_curves(model: NoiseModel, members: int, hours: float = 10.0) -> li
     return [allan_variance(log, 10.0, overlap="octave") for log in logs]
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("model", [MTI_7, C102])
 def test_limits_hold_the_truth_as_often_as_they_say(model: NoiseModel) -> None:
     """Of 60 logs 95 % are 57; fewer than 51 has a probability of 0.2 %."""

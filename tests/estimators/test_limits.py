@@ -147,6 +147,7 @@ def test_errors_are_those_of_the_exact_covariance(
         assert errors.of(name) == pytest.approx(error, rel=0.05), name
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("method", METHODS)
 def test_the_width_of_the_limits_is_the_scatter_of_fits(method: str) -> None:
     """Sixty logs know a standard deviation to 9 %."""

@@ -152,6 +152,7 @@ def test_a_long_channel_of_noise_has_no_lines(rng, model: NoiseModel) -> None:
     assert alarms <= 1
 
 
+@pytest.mark.release
 def test_the_false_alarms_are_as_many_as_is_said(rng) -> None:
     logs, segments, points = 8000, 9, 512
     window = signal.get_window("hann", points)

@@ -248,6 +248,7 @@ def test_two_processes_keep_their_own_b(rng) -> None:
     assert high[1] < low[2]
 
 
+@pytest.mark.release
 def test_intervals_hold_the_truth_as_often_as_they_say(rng) -> None:
     # 10 h, sampled every second: white noise is known less well than at 100 Hz, the rest as well.
     truth, logs = np.array([MTI_7.N, MTI_7.K, MTI_7.B, MTI_7.T_B]), 100

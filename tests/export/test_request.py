@@ -151,6 +151,7 @@ def test_an_overbound_has_the_terms_that_the_program_holds(
     assert "replaced by" not in text
 
 
+@pytest.mark.release
 def test_an_overbound_lies_above_the_draws_of_the_recording(
     tables: dict[str, pa.Table], tmp_path: Path
 ) -> None:

@@ -67,6 +67,7 @@ def test_a_temperature_that_steps_between_segments_is_no_regressor():
     assert np.abs(coefficients.of_knots(path, [levels])).max() < 1e-9
 
 
+@pytest.mark.release
 def test_what_temperature_adds_to_one_segment_is_not_taken_from_the_next():
     segments = [(0, 45_000), (45_000, SAMPLES)]
     off = DAY - DAY.mean() + np.where(TIME < 9_000.0, 0.0, 20.0)
@@ -173,6 +174,7 @@ def test_a_constant_temperature_is_refused_before_holes_are_filled_again(monkeyp
     assert fit.bias.lower < 3e-3 < fit.bias.upper
 
 
+@pytest.mark.release
 def test_holes_and_segments_leave_the_sensitivity():
     rng = np.random.default_rng(6)
     log = simulate(NOISE, RATE, SAMPLES, rng) + 6e-5 * (DAY - DAY.mean())
@@ -183,6 +185,7 @@ def test_holes_and_segments_leave_the_sensitivity():
     assert fit.sensitivity.lower < 6e-5 < fit.sensitivity.upper
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("missing", [0, 2_000])
 def test_steps_of_a_temperature_are_no_lines_of_the_noise_that_it_leaves(missing):
     rng = np.random.default_rng(31)

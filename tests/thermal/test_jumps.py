@@ -68,6 +68,7 @@ def test_a_path_jumps_within_a_sample():
     assert np.abs(error).max() < 0.01
 
 
+@pytest.mark.release
 def test_a_level_of_whole_degrees_may_lie_anywhere_in_its_cell():
     rng = np.random.default_rng(11)
     chances = []

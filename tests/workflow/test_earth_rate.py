@@ -185,6 +185,7 @@ def _joined() -> set[Job]:
     }
 
 
+@pytest.mark.release
 def test_one_core_gives_the_same_tables(project: Project, tmp_path: Path) -> None:
     settings = [one for one in project.settings if not one.startswith("results=")]
     alone = Project(

@@ -246,6 +246,7 @@ def test_an_edit_of_a_template_runs_the_report(project: Project, code: Path) -> 
     assert project.job_list() == {("report", "")}
 
 
+@pytest.mark.release
 def test_an_interrupted_run_ends_as_a_fresh_one(done: Project, tmp_path: Path) -> None:
     # The last of this file: it runs, and leaves another project.
     logs = done.folder / "logs"
