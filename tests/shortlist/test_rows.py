@@ -149,7 +149,7 @@ def test_what_is_not_judged_says_why() -> None:
 
 def test_what_is_measured_stands_beside_it() -> None:
     standing = {"requirement": "r", "sensor": "s", "recording": "a", "decides": True,
-                "margin": 1.5, "limit_verdict": "passes"}  # fmt: skip
+                "margin": 1.5, "verdict": "passes"}  # fmt: skip
     for simulated, words in ((True, "simulated logs"), (False, "logs")):
         recordings = [{"sensor": "s", "recording": "a", "simulated": simulated}]
         (row,) = judged(sensor(noise_density=DENSITY), ranking=[standing], recordings=recordings)

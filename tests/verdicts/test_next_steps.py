@@ -108,3 +108,13 @@ def test_what_no_file_says_is_to_be_found_out_and_no_log_settles_it() -> None:
         "error: it would free 1 verdict of a condition"
     )
     assert "log_longer" not in {one["action"] for one in steps}
+
+
+def test_a_unit_that_changes_no_verdict_turns_none() -> None:
+    doubts = [doubt("s", "r", "suspicious_unit", factor=FACTOR)]
+    recordings = [about("s", "r", decides=False, doubts="suspicious unit (gyro_x)")]
+    for margin, turned in ((0.5 * FACTOR, 0), (5.0 * FACTOR, 1)):
+        (row,), steps = judge({"s": {"r": gyro(margin)}}, {"robot": HEADING}, recordings, doubts)
+        assert row["logged_verdict"] == "surely fails"
+        (first,) = (one for one in steps if one["action"] == "check_unit")
+        assert first["verdicts_turned"] == turned

@@ -78,7 +78,7 @@ def shortlist_rows(
                 row |= {
                     "measured_margin_of": "simulated logs" if of_model else "logs",
                     "measured_margin": standing["margin"],
-                    "measured_verdict": standing["limit_verdict"],
+                    "measured_verdict": standing["verdict"],
                 }
             rows.append(row | {"requirement": name, "sensor": sensor})
         yield from sorted(rows, key=lambda row: (-(row["best_margin"] or 0.0), row["sensor"]))

@@ -76,9 +76,11 @@ def _steps(one: Judgement, basis: Basis) -> Iterator[_Step]:
     """Yield what would help one verdict: to turn it, and to make its evidence stronger."""
     if one.unless is not None:
         action: Action = "check_unit" if one.unless.factors else "record_again"
+        either = one.unless.logged, one.unless.mended
+        same = None not in either and len({each.verdict for each in either if each}) == 1
         for key, doubts in one.unless.doubts.items():
             what = _quantities(basis.factors(key)) or doubts
-            yield _Step(action, key, one.name, turns=True, what=what)
+            yield _Step(action, key, one.name, turns=not same, what=what)
     if not one.decides.known:
         yield from _to_know(one, basis)
         return
