@@ -57,6 +57,7 @@ def judge(
     recordings: Rows | None = None,
     doubts: Rows | None = None,
     parameters: Rows | None = None,
+    abilities: dict[str, Any] | None = None,
 ) -> tuple[Rows, Rows]:
     """Return the tables ``ranking``, of the limits that decide, and ``next_steps``."""
     questions = [q for name, one in asked.items() for q in of_requirement(name, one)]
@@ -76,8 +77,8 @@ def judge(
             for row in three_axes(sensor, name)
         ]
     basis = Basis.of(recordings, doubts or [], parameters)
-    prices = {sensor: {"price_class": None} for sensor in sensors}
-    judged = list(judgements(errors, asked, prices, basis))
+    files = {sensor: {"price_class": None, "abilities": abilities or {}} for sensor in sensors}
+    judged = list(judgements(errors, asked, files, basis))
     ranking = build("ranking", ranked(judged, basis)).to_pylist()
     steps = build("next_steps", next_step_rows(judged, basis)).to_pylist()
     return [row for row in ranking if row["decides"]], steps

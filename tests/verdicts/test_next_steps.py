@@ -110,6 +110,13 @@ def test_what_no_file_says_is_to_be_found_out_and_no_log_settles_it() -> None:
     assert "log_longer" not in {one["action"] for one in steps}
 
 
+def test_nothing_is_to_do_with_a_sensor_that_lacks_what_it_must_have() -> None:
+    must = {"full_scale": {"gyro": "300 deg/s"}}
+    asked = {"robot": requirement(("heading", "100 s", "0.1 deg"), must=must)}
+    (row,), steps = judge({"s": {"r": gyro(1.1)}}, asked, abilities={"full_scale": {"gyro": 1.0}})
+    assert row["verdict"] == "excluded" and steps == []
+
+
 def test_a_unit_that_changes_no_verdict_turns_none() -> None:
     doubts = [doubt("s", "r", "suspicious_unit", factor=FACTOR)]
     recordings = [about("s", "r", decides=False, doubts="suspicious unit (gyro_x)")]

@@ -56,7 +56,7 @@ def next_step_rows(judged: Sequence[Judgement], basis: Basis) -> list[dict[str, 
     """
     groups: dict[tuple[Any, ...], list[_Step]] = {}
     for one in judged:
-        if one.outside is None:
+        if one.outside is None and not one.rests.lacking:
             for step in _steps(one, basis):
                 groups.setdefault((step.key, step.action), []).append(step)
     rows = [_row(steps, basis) for steps in groups.values()]
