@@ -243,3 +243,16 @@ def test_ten_levels_are_not_fewer_than_ten(rng: np.random.Generator, step: float
         log = (first + np.clip(np.round(4.5 + 1.3 * rng.standard_normal(5000)), 0, 9)) * step
         log[:2] = first * step, (first + 9) * step
         assert "coarse" not in names(log)
+
+
+@pytest.mark.parametrize("levels", [0.0, 3.0])
+def test_a_mean_that_crosses_the_edge_of_a_coarse_register_is_no_step(
+    rng: np.random.Generator, levels: float
+) -> None:
+    # In steps of six sigma the means move only while the level lies near an edge.
+    register = 6.0 * SIGMA
+    level = np.interp(np.arange(360_000), [176_000, 184_000], [0.2, 0.8]) * register
+    level[180_000:] += levels * register
+    log = level + SIGMA * rng.standard_normal(360_000)
+    found = names(np.round(log / register) * register)
+    assert ("step" in found) == (levels > 1.5)

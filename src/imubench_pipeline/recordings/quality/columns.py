@@ -199,7 +199,11 @@ def _changes(
         yield Finding(
             "motion", "warning", detail, (last - first) / rate, channel, first / rate, last / rate
         )
+    # A level near the edge of a step of a coarse register moves the means by up to one of them.
+    least = 1.5 * steps.step if steps is not None and _rounding(steps) else 0.0
     for step in moves:
+        if abs(step.size) < least:
+            continue
         at = step.sample / rate
         detail = (
             f"the mean of {channel} changes by {_figure(channel, step.size)} at {at:.5g} s "
