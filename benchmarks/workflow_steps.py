@@ -1,8 +1,8 @@
-"""Steps of the workflow in this process, for one recording, as the Snakefile has them.
+"""Steps of the workflow in this process, for one recording, as its rules have them.
 
 Snakemake takes a second to begin, which for thousands of short logs is more than what they cost.
-So input, output and parameters of a rule are read from the Snakefile, where they are the arguments
-of a call, and its script runs with them.
+So input, output and parameters of a rule are read from ``workflow/rules``, where they are the
+arguments of a call, and its script runs with them.
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ from imubench_pipeline.tables import schemas
 
 PROJECT = Path(__file__).parents[1]
 
+_FILES = ("common", "recordings", "experiments", "sensors")
 _RULE = re.compile(r"^rule (\w+):\n((?:[ ].*\n|\n)*)", re.MULTILINE)
 _SECTION = re.compile(r"^    (input|output|params):\n((?:        .*\n|\n)*)", re.MULTILINE)
-_TUPLE = re.compile(r"^([A-Z_]+) = (\(\n(?:    .*\n)*\))", re.MULTILINE)
+_UNUSED = re.compile(r"^\w+:\n(?:    .*\n)*|\A[\s\S]*?(?=^RESULTS)", re.MULTILINE)
 
 
 class Named(SimpleNamespace):
@@ -35,6 +36,10 @@ class Named(SimpleNamespace):
     def items(self) -> Iterable[tuple[str, Any]]:
         """Return names and values."""
         return [(name, value) for name, value in vars(self).items() if name != "_unnamed"]
+
+    def keys(self) -> list[str]:
+        """Return the names."""
+        return [name for name, _ in self.items()]
 
     def __iter__(self) -> Iterator[Any]:
         yield from self._unnamed
@@ -57,14 +62,13 @@ class OneRecording:
         ((self.sensor, self.recording),) = plan.recordings
         self.folder = plan.run.results / "recordings" / self.sensor / self.recording
         self.folder.mkdir(parents=True, exist_ok=True)
+        self._of = {"sensor": self.sensor, "recording": self.recording}
         self._names: dict[str, Any] = vars(schemas) | {
-            "FOLDER": str(self.folder),
-            "RESULTS": str(plan.run.results),
             "plan": _Uncoded(plan),
-            "of_sensor": lambda file: [f"{self.folder}/{file}"],
+            "rules": _Rules(self),
         }
-        for name, text in _tuples():
-            self._names[name] = eval(text, self._names)
+        for code in _between_rules():
+            exec(code, self._names)
 
     def run(self, rule: str, **instead: Any) -> Named:
         """Run the script of a rule.
@@ -73,7 +77,7 @@ class OneRecording:
         ----------
         rule : str
         **instead : Named
-            ``output`` and so on, where they are to be others than those in the Snakefile.
+            ``output`` and so on, where they are to be others than those of the rule.
 
         Returns
         -------
@@ -81,26 +85,47 @@ class OneRecording:
             The output.
         """
         given = {
-            section: instead.get(section) or self._called(text)
-            for section, text in _rules()[rule].items()
+            section: instead.get(section) or self.called(rule, section) for section in _SECTIONS
         }
-        about = Named(sensor=self.sensor, recording=self.recording)
-        snakemake = SimpleNamespace(**{"input": Named()} | given | {"wildcards": about})
+        snakemake = SimpleNamespace(**given, wildcards=Named(**self._of))
         script = PROJECT / "workflow/scripts" / f"{rule}.py"
         runpy.run_path(str(script), init_globals={"snakemake": snakemake}, run_name="__main__")
         return given["output"]
 
     def input(self, rule: str) -> Named:
         """Return the input of a rule, those files of it that are there."""
-        wanted = self._called(_rules()[rule]["input"])
+        wanted = self.called(rule, "input")
         there = {name: files for name, files in wanted.items() if Path(files[0]).exists()}
         return Named(**there)
 
-    def _called(self, arguments: str) -> Named:
-        about = SimpleNamespace(sensor=self.sensor, recording=self.recording)
+    def called(self, rule: str, section: str) -> Named:
+        """Return the input, output or params of a rule."""
+        arguments = _rules()[rule].get(section, "")
         found: Named = eval(f"_Named(\n{arguments})", {**self._names, "_Named": Named})
-        values = {name: value(about) if callable(value) else value for name, value in found.items()}
-        return Named(*(v(about) if callable(v) else v for v in found._unnamed), **values)
+        return Named(**{name: self._filled(value) for name, value in found.items()})
+
+    def _filled(self, value: Any) -> Any:
+        """Return what stands in a rule, for this recording."""
+        if callable(value):
+            return self._filled(value(_Wildcards(self._of)))
+        if isinstance(value, list):
+            return [self._filled(one) for one in value]
+        return value.format(**self._of) if isinstance(value, str) and "{sensor}" in value else value
+
+
+class _Wildcards(dict[str, str]):
+    def __getattr__(self, name: str) -> str:
+        return self[name]
+
+
+class _Rules:
+    """The rules as other rules see them."""
+
+    def __init__(self, recording: OneRecording) -> None:
+        self._recording = recording
+
+    def __getattr__(self, rule: str) -> Any:
+        return SimpleNamespace(output=self._recording.called(rule, "output"))
 
 
 class _Uncoded:
@@ -116,15 +141,25 @@ class _Uncoded:
         return getattr(self._plan, name)
 
 
+_SECTIONS = ("input", "output", "params")
+
+
+def _texts() -> Iterator[str]:
+    for name in _FILES:
+        yield (PROJECT / f"workflow/rules/{name}.smk").read_text(encoding="utf-8")
+
+
 @cache
 def _rules() -> dict[str, dict[str, str]]:
     """Return the arguments of input, output and params of each rule, as text."""
-    text = (PROJECT / "Snakefile").read_text(encoding="utf-8")
-    return {rule: dict(_SECTION.findall(body)) for rule, body in _RULE.findall(text)}
+    return {
+        rule: dict(_SECTION.findall(body))
+        for text in _texts()
+        for rule, body in _RULE.findall(text)
+    }
 
 
 @cache
-def _tuples() -> list[tuple[str, str]]:
-    """Return name and text of the tuples of tables at the top of the Snakefile."""
-    text = (PROJECT / "Snakefile").read_text(encoding="utf-8")
-    return _TUPLE.findall(text[: text.index("\nrule ")])
+def _between_rules() -> list[Any]:
+    """Return the code between the rules: the names that these use."""
+    return [compile(_UNUSED.sub("", _RULE.sub("", text)), "rules", "exec") for text in _texts()]

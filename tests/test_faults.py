@@ -22,19 +22,20 @@ OF = ("estimate", "s", "a")
 def test_a_step_that_failed_has_another_attempt_at_each_run_until_it_succeeds(
     tmp_path: Path,
 ) -> None:
+    log = tmp_path / "logs/estimate.log"
     assert Faults(tmp_path).attempt(OF) == 0
     for attempt in (0, 1, 2):
         run = Faults(tmp_path)
         assert run.attempt(OF) == attempt
         assert list(run.now()) == []
-        run.failed(FAILURE, attempt, "Traceback: ...")
-        ((failure, log),) = run.now()
-        assert failure == FAILURE and "Traceback" in log.read_text()
+        run.failed(FAILURE, attempt, log)
+        assert list(run.now()) == [(FAILURE, log)]
+        assert log.read_text().endswith(f"s/a, estimate: {FAILURE.reason}\n")
         assert run.attempt(OF) == attempt  # the same until the end of the run
     assert Faults(tmp_path).attempt(OF, again=False) == 2
     run = Faults(tmp_path)
     run.succeeded(OF, run.attempt(OF))
-    assert list(run.now()) == [] and not log.exists()
+    assert list(run.now()) == []
     assert Faults(tmp_path).attempt(OF) == Faults(tmp_path).attempt(OF, again=False) == 3
 
 
@@ -44,7 +45,7 @@ def test_what_never_failed_leaves_no_record(tmp_path: Path) -> None:
 
 
 def test_a_record_that_was_cut_off_stops_nothing(tmp_path: Path) -> None:
-    Faults(tmp_path).failed(FAILURE, 0, "")
+    Faults(tmp_path).failed(FAILURE, 0, tmp_path / "log")
     (record,) = tmp_path.rglob("*.json")
     record.write_text("{")
     assert Faults(tmp_path).attempt(OF) == 0
@@ -55,7 +56,7 @@ def test_a_run_says_what_is_left_out_unless_its_caller_looks_itself(
 ) -> None:
     run = Faults(tmp_path)
     assert run.left_out() == ""
-    run.failed(FAILURE, 0, "")
+    run.failed(FAILURE, 0, tmp_path / "log")
     assert f"s/a: {FAILURE.reason}" in run.left_out()
     monkeypatch.setenv(TOLD, "1")
     assert run.left_out() == ""
@@ -64,7 +65,7 @@ def test_a_run_says_what_is_left_out_unless_its_caller_looks_itself(
 @pytest.mark.parametrize("table", [*TABLES, *PARTS_OF])
 def test_any_table_can_be_empty_and_say_why(table: str, tmp_path: Path) -> None:
     path = tmp_path / f"{table}.parquet"
-    write_empty([(None, path)], FAILURE)
+    write_empty([path], FAILURE)
     assert failure_of(path) == FAILURE
     assert read(table, [path]).num_rows == 0
     assert read_with_failures(table, [path])[1] == [FAILURE]

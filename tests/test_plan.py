@@ -1,5 +1,4 @@
 import json
-import re
 from pathlib import Path
 from typing import Any
 
@@ -7,11 +6,10 @@ import pytest
 import yaml
 
 from imubench_pipeline.report.publish import pages, site_of
-from imubench_pipeline.run.plan import STEPS, Plan
+from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables import build
 from imubench_pipeline.tables.schemas import TABLES
-from tests.conftest import PROJECT
 from tests.test_configuration import SENSOR
 
 
@@ -118,20 +116,6 @@ def test_a_log_of_another_size_is_another_log(project: dict[str, Any]) -> None:
     before = Plan(project).ingest_settings("s", "a")
     put(project, "a.csv", "1,2\n3,4\n")
     assert Plan(project).ingest_settings("s", "a") != before
-
-
-def test_code_is_known_by_its_content() -> None:
-    digests = {step: Plan.code(step) for step in STEPS}
-    assert len(set(digests.values())) == len(STEPS)
-
-
-def test_every_step_of_the_workflow_has_its_code() -> None:
-    rules = set(
-        re.findall(r"^rule (\w+):", (PROJECT / "Snakefile").read_text(), flags=re.MULTILINE)
-    )
-    assert rules - {"all"} == set(STEPS)
-    scripts = {path.stem for path in (PROJECT / "workflow/scripts").glob("*.py")}
-    assert scripts == set(STEPS)
 
 
 REQUIREMENT = {

@@ -7,17 +7,18 @@ import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import psutil
 import pytest
 
-from imubench_pipeline.run.processes import StepError, Steps
+from imubench_pipeline.run.processes import Job, Processes, StepError
 
 
 @pytest.fixture
-def steps(tmp_path: Path) -> Iterator[Steps]:
-    made = Steps(tmp_path)
+def steps() -> Iterator[Processes]:
+    made = Processes()
     yield made
     made.close()
 
@@ -26,8 +27,13 @@ def put(folder: Path, name: str, text: str) -> None:
     (folder / f"{name}.py").write_text(text)
 
 
-def run(steps: Steps, name: str, output: Path, **params: object) -> None:
-    steps.run(name, input=["in"], output=[str(output)], params=params, wildcards={"sensor": "s"})
+def job(name: str, output: Path, **params: object) -> Job:
+    script = output.with_name(f"{name}.py")
+    return Job(script, ["in"], [str(output)], params, {"sensor": "s"}, output.with_suffix(".log"))
+
+
+def run(steps: Processes, name: str, output: Path, **params: object) -> None:
+    steps.run(job(name, output, **params))
 
 
 SAY = """
@@ -41,7 +47,7 @@ if __name__ == "__main__":
 
 
 def test_a_script_sees_what_it_is_given_in_a_process_of_its_own(
-    steps: Steps, tmp_path: Path
+    steps: Processes, tmp_path: Path
 ) -> None:
     put(tmp_path, "say", SAY.replace("here = snakemake", "here = globals().get('snakemake')"))
     seen = []
@@ -54,7 +60,7 @@ def test_a_script_sees_what_it_is_given_in_a_process_of_its_own(
     assert first == second != os.getpid() and one != other
 
 
-def test_imports_are_shared_and_what_a_step_leaves_is_not(steps: Steps, tmp_path: Path) -> None:
+def test_imports_are_shared_and_what_a_step_leaves_is_not(steps: Processes, tmp_path: Path) -> None:
     put(
         tmp_path,
         "count",
@@ -74,13 +80,12 @@ if __name__ == "__main__":
     assert (tmp_path / "imported").read_text().split() == ["imports"] + ["__main__"] * 3
 
 
-def test_a_script_that_fails_says_where(
-    steps: Steps, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_script_that_fails_says_where(steps: Processes, tmp_path: Path) -> None:
     put(tmp_path, "bad", "def turn():\n    raise ValueError('upside down')\nturn()\n")
-    with pytest.raises(StepError, match=r"^bad.py failed$"):
+    with pytest.raises(StepError, match=r"^bad.py failed$") as caught:
         run(steps, "bad", tmp_path / "out")
-    said = capfd.readouterr().err
+    said = (tmp_path / "out.log").read_text()
+    assert said == caught.value.trace
     assert said.startswith(f'Traceback (most recent call last):\n  File "{tmp_path / "bad.py"}"')
     assert said.endswith("ValueError: upside down\n") and "runpy" not in said
     put(tmp_path, "exits", "import sys\nsys.exit('no')")
@@ -88,10 +93,10 @@ def test_a_script_that_fails_says_where(
         run(steps, "exits", tmp_path / "out")
     with pytest.raises(StepError, match=r"^missing.py failed$"):
         run(steps, "missing", tmp_path / "out")
-    assert "No such file" in capfd.readouterr().err
+    assert "No such file" in (tmp_path / "out.log").read_text()
 
 
-def test_a_script_that_is_killed_harms_no_other(steps: Steps, tmp_path: Path) -> None:
+def test_a_script_that_is_killed_harms_no_other(steps: Processes, tmp_path: Path) -> None:
     put(tmp_path, "dies", "import os\nif __name__ == '__main__': os.kill(os.getpid(), 9)\n")
     put(tmp_path, "say", SAY.replace("here = snakemake", "here = globals().get('snakemake')"))
     with pytest.raises(StepError, match=r"^dies.py was killed$"):
@@ -105,7 +110,7 @@ def test_a_script_that_is_killed_harms_no_other(steps: Steps, tmp_path: Path) ->
 
 
 def test_a_request_that_dies_with_the_server_is_a_step_that_was_killed(
-    steps: Steps, tmp_path: Path
+    steps: Processes, tmp_path: Path
 ) -> None:
     put(tmp_path, "say", SAY.replace("here = snakemake", "here = globals().get('snakemake')"))
     run(steps, "say", tmp_path / "out", size="x")
@@ -119,7 +124,7 @@ def test_a_request_that_dies_with_the_server_is_a_step_that_was_killed(
             asked.result(timeout=10)
 
 
-def test_threads_run_scripts_at_the_same_time(steps: Steps, tmp_path: Path) -> None:
+def test_threads_run_scripts_at_the_same_time(steps: Processes, tmp_path: Path) -> None:
     put(
         tmp_path,
         "meet",
@@ -158,13 +163,14 @@ else:
 RUN_BOTH = """
 import sys, threading
 from pathlib import Path
-from imubench_pipeline.run.processes import Steps
+from imubench_pipeline.run.processes import Job, Processes
 folder = Path(sys.argv[1])
-steps = Steps(folder)
-threading.Thread(target=steps.run, args=("wait", [], [folder / "out"], [], [])).start()
+steps = Processes()
+wait = Job(folder / "wait.py", [], [folder / "out"], [], [], folder / "log")
+threading.Thread(target=steps.run, args=(wait,)).start()
 while not (folder / "out").is_file():
     pass
-steps.run("imports_long", [], [], [], [])
+steps.run(Job(folder / "imports_long.py", [], [], [], [], folder / "log"))
 """
 
 
@@ -196,7 +202,7 @@ def test_scripts_end_at_once_with_the_run_that_started_them(tmp_path: Path) -> N
 
 @pytest.mark.skipif(not Path("/proc/self/comm").is_file(), reason="names are set on Linux alone")
 def test_a_script_can_be_told_by_its_name_and_outlives_the_process_that_forked_it(
-    steps: Steps, tmp_path: Path
+    steps: Processes, tmp_path: Path
 ) -> None:
     put(tmp_path, "wait", WAIT.replace("600", "1"))
     with ThreadPoolExecutor(1) as pool:
@@ -210,10 +216,10 @@ def test_a_script_can_be_told_by_its_name_and_outlives_the_process_that_forked_i
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the system ends a fork on Linux alone")
-def test_a_script_that_runs_past_its_time_is_ended(steps: Steps, tmp_path: Path) -> None:
+def test_a_script_that_runs_past_its_time_is_ended(steps: Processes, tmp_path: Path) -> None:
     put(tmp_path, "wait", WAIT)
     with pytest.raises(StepError, match=r"^wait.py ran for longer than 0.5 s$") as caught:
-        steps.run("wait", [], [str(tmp_path / "out")], {}, {"sensor": "s"}, seconds=0.5)
+        steps.run(job("wait", tmp_path / "out"), seconds=0.5)
     assert caught.value.cause == "time"
     _, script = map(int, (tmp_path / "out").read_text().split())
     assert not psutil.pid_exists(script)
@@ -230,7 +236,7 @@ def test_a_script_that_runs_past_its_time_is_ended(steps: Steps, tmp_path: Path)
     ],
 )
 def test_an_error_says_whether_what_it_was_run_for_is_to_blame(
-    text: str, cause: str | None, reason: str, steps: Steps, tmp_path: Path
+    text: str, cause: str | None, reason: str, steps: Processes, tmp_path: Path
 ) -> None:
     put(tmp_path, "bad", f"if __name__ == '__main__':\n    {text}\n")
     with pytest.raises(StepError) as caught:
@@ -239,8 +245,27 @@ def test_an_error_says_whether_what_it_was_run_for_is_to_blame(
     assert caught.value.reason.startswith(reason)
 
 
-def test_a_script_that_cannot_be_imported_is_nobodys_fault(steps: Steps, tmp_path: Path) -> None:
+def test_a_script_that_cannot_be_imported_is_nobodys_fault(
+    steps: Processes, tmp_path: Path
+) -> None:
     put(tmp_path, "bad", "import no_such_module\n")
     with pytest.raises(StepError) as caught:
         run(steps, "bad", tmp_path / "out")
     assert caught.value.cause is None
+
+
+def test_what_a_script_prints_goes_to_its_log(
+    steps: Processes, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    put(
+        tmp_path,
+        "talks",
+        "import os\nif __name__ == '__main__':\n"
+        "    print('in Python', flush=True)\n    os.system('echo beside it >&2')\n    1 / 0\n",
+    )
+    log = tmp_path / "new/talks.log"
+    for _ in range(2):
+        with pytest.raises(StepError) as caught:
+            steps.run(replace(job("talks", tmp_path / "out"), log=log))
+    assert capfd.readouterr() == ("", "")
+    assert log.read_text() == 2 * f"in Python\nbeside it\n{caught.value.trace}"

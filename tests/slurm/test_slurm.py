@@ -15,6 +15,7 @@ import pytest
 
 from imubench_pipeline.run.resources import Extent, resources_of
 from tests.workflow.project import Project, linked, put_log, put_sensor
+from tests.workflow.rules import costs
 from tests.workflow.test_workflow import STEPS_OF_A_RECORDING
 
 pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("workflow")]
@@ -22,7 +23,7 @@ pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("workflow")]
 SCRIPTS = Path(__file__).parent
 PROGRAMS = ("slurmctld", "slurmd", "munged", "sbatch", "srun", "squeue")
 PLUGIN = "snakemake_executor_plugin_slurm"
-ENOUGH = resources_of("estimate", Extent())["mem_mb"]
+ENOUGH = resources_of(costs()["estimate"], Extent())["mem_mb"]
 TOO_LITTLE = 100  # MB; Snakemake alone takes 180: it is killed within 3 s
 MEMORY = f"{TOO_LITTLE} if attempt == 1 or wildcards.recording == 'doomed' else {ENOUGH}"
 FLAGS = [

@@ -103,7 +103,7 @@ def test_the_report_says_which_recordings_a_step_failed_for(
     failed = {name: row["reason"] for (_, name), row in recordings.items() if row["reason"]}
     assert failed.keys() == REASONS.keys()
     page = html.unescape((project.results / "report/index.html").read_text())
-    logs = project.results / "faults/recordings/one"
+    logs = project.results / "logs/recordings/one"
     for name, reason in REASONS.items():
         assert failed[name].startswith(reason)
         assert recordings["one", name]["status"] == "failed"

@@ -1,5 +1,7 @@
 """Compute the Allan variance of every channel of a recording."""
 
+# mypy: disable-error-code=name-defined
+
 import json
 from pathlib import Path
 
@@ -12,4 +14,4 @@ if __name__ == "__main__":
     settings = AllanSettings.model_validate(json.loads(snakemake.params.settings))
     kept = Path(snakemake.input.quality).parent
     rows = curves(kept, names.sensor, names.recording, settings)
-    write("allan", rows, Path(snakemake.output[0]))
+    write("allan", rows, Path(snakemake.output.curve))

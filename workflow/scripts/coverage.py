@@ -1,5 +1,7 @@
 """Say what vendors publish of the sensors of the catalogue."""
 
+# mypy: disable-error-code=name-defined
+
 from pathlib import Path
 
 from imubench_pipeline.steps.coverage import write_coverage

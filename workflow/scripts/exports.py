@@ -1,12 +1,14 @@
 """Write what filters and simulators load, for every sensor."""
 
+# mypy: disable-error-code=name-defined
+
 from pathlib import Path
 
 from imubench_pipeline.steps.exports import write_exports
 
 if __name__ == "__main__":
     write_exports(
-        Path(snakemake.input[0]).parent,
+        Path(snakemake.input.recordings).parent,
         snakemake.params.settings,
-        Path(snakemake.output[0]),
+        Path(snakemake.output.folder),
     )

@@ -1,5 +1,7 @@
 """Draw the figures of all sensors for print."""
 
+# mypy: disable-error-code=name-defined
+
 from pathlib import Path
 
 from imubench_pipeline.steps.figures import write_figures
@@ -8,5 +10,5 @@ if __name__ == "__main__":
     write_figures(
         [Path(path) for path in snakemake.input],
         snakemake.params.settings,
-        Path(snakemake.output[0]),
+        Path(snakemake.output.folder),
     )

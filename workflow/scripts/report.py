@@ -1,5 +1,7 @@
 """Write the pages of the report whose data changed."""
 
+# mypy: disable-error-code=name-defined
+
 from pathlib import Path
 
 from imubench_pipeline.steps.report import write_report
@@ -8,5 +10,5 @@ if __name__ == "__main__":
     write_report(
         [Path(path) for path in snakemake.input.tables],
         snakemake.params.settings,
-        Path(snakemake.output[0]),
+        Path(snakemake.output.page),
     )

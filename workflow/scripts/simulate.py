@@ -1,8 +1,10 @@
 """Write a simulated recording, in the layout of its sensor's logs."""
 
+# mypy: disable-error-code=name-defined
+
 from pathlib import Path
 
 from imubench_pipeline.steps.simulate import write_recording
 
 if __name__ == "__main__":
-    write_recording(snakemake.params.settings, Path(snakemake.output[0]))
+    write_recording(snakemake.params.settings, Path(snakemake.output.log))

@@ -48,7 +48,7 @@ class Faults:
         record = self._before.get(of)
         return record["attempt"] + (record["failed"] and again) if record else 0
 
-    def failed(self, failure: Failure, attempt: int, trace: str) -> None:
+    def failed(self, failure: Failure, attempt: int, log: Path) -> None:
         """Keep that a step failed.
 
         Parameters
@@ -56,15 +56,17 @@ class Faults:
         failure : Failure
         attempt : int
             Its number.
-        trace : str
-            What it said, for its log.
+        log : Path
+            Of the step, which is told, too.
         """
-        from imubench_pipeline.tables import write_content, write_json
+        from imubench_pipeline.tables import write_json
 
         path = self._path((failure.step, failure.sensor, failure.recording))
-        said = f"{failure.name}, {failure.step}: {failure.reason}\n\n{trace}"
-        write_content(said.rstrip() + "\n", log_of(path))
-        write_json({"attempt": attempt, "failed": True, **asdict(failure)}, path)
+        record = {"attempt": attempt, "failed": True, "log": str(log), **asdict(failure)}
+        write_json(record, path)
+        log.parent.mkdir(parents=True, exist_ok=True)
+        with log.open("a", encoding="utf-8") as file:
+            file.write(f"{failure.name}, {failure.step}: {failure.reason}\n")
 
     def succeeded(self, of: Of, attempt: int) -> None:
         """Keep that a step which had failed did not any more."""
@@ -75,14 +77,13 @@ class Faults:
             step, sensor, recording = of
             about = {"step": step, "sensor": sensor, "recording": recording}
             write_json({"attempt": attempt, "failed": False, **about}, path)
-            log_of(path).unlink(missing_ok=True)
 
     def now(self) -> Iterator[tuple[Failure, Path]]:
         """Yield what has failed in this run, with the log of it."""
         for of, record in self._records():
             if record["failed"] and record["attempt"] >= self.attempt(of):
                 names = ("sensor", "recording", "step", "cause", "reason")
-                yield Failure(**{name: record[name] for name in names}), log_of(self._path(of))
+                yield Failure(**{name: record[name] for name in names}), Path(record["log"])
 
     def left_out(self) -> str:
         """Return what a run says that left something out; nothing where its caller looks itself."""
@@ -107,8 +108,3 @@ class Faults:
             with contextlib.suppress(OSError, ValueError, KeyError):  # one that was cut off
                 record = json.loads(path.read_text(encoding="utf-8"))
                 yield (record["step"], record["sensor"], record["recording"]), record
-
-
-def log_of(record: Path) -> Path:
-    """Return the log beside a record."""
-    return record.with_suffix(".log")

@@ -1,6 +1,6 @@
 """What a run consists of: the recordings found and the settings of each step.
 
-This is all that the Snakefile asks of the package. Settings are handed to a rule as JSON text
+This is all that the rules ask of the package. Settings are handed to a rule as JSON text
 of what the rule depends on, so that an edit runs again what it touches and nothing else.
 """
 
@@ -17,7 +17,6 @@ from pydantic import BaseModel
 from imubench_pipeline.navigation.suitability.abilities import abilities
 from imubench_pipeline.recordings.drop_zone import Recording, fingerprint, fingerprints, found_logs
 from imubench_pipeline.run.faults import Faults
-from imubench_pipeline.run.step_modules import STEPS
 from imubench_pipeline.settings.config import Run, given_beside, read_run
 from imubench_pipeline.settings.printed import IN_USE
 from imubench_pipeline.settings.requirements import Requirement, read_requirements
@@ -412,8 +411,8 @@ class Plan:
 
     @staticmethod
     def code(step: str) -> str:
-        """Return the digest of the code that a step runs."""
-        return source_digest(*STEPS[step])
+        """Return the digest of the code that a step runs: the module of its name in ``steps``."""
+        return source_digest(f"steps.{step}")
 
 
 def _text(value: object) -> str:

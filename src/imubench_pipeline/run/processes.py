@@ -19,6 +19,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -73,62 +74,69 @@ class StepError(Exception):
         self.trace = trace
 
 
-class Steps:
+@dataclass(frozen=True)
+class Job:
+    """A script, and what it is run for.
+
+    Attributes
+    ----------
+    script : Path
+    input, output, params, wildcards : object
+        What the script sees as ``snakemake.input`` and so on. They are pickled.
+    log : Path
+        What is printed goes to the end of it.
+    """
+
+    script: Path
+    input: Any
+    output: Any
+    params: Any
+    wildcards: Any
+    log: Path
+
+    @property
+    def name(self) -> str:
+        """Name of the step."""
+        return self.script.stem
+
+
+class Processes:
     """Runs scripts in forks of one process, which begins with the first of them.
 
     It ends with the process that has this object, even where that is killed; so do the forks, on
     Linux, where each also has the name of its script. A fork does not need the process that made
     it any more.
-
-    Parameters
-    ----------
-    folder : Path
-        Where the scripts are, as <name>.py.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+    def __init__(self) -> None:
         self._lock = threading.Lock()
         self._server: tuple[subprocess.Popen[bytes], socket.socket] | None = None
         atexit.register(self.close)
 
-    def run(
-        self,
-        name: str,
-        input: Any,
-        output: Any,
-        params: Any,
-        wildcards: Any,
-        seconds: float | None = None,
-    ) -> None:
+    def run(self, job: Job, seconds: float | None = None) -> None:
         """Run a script to its end; several threads may run one each.
 
         Parameters
         ----------
-        name : str
-            Of the script.
-        input, output, params, wildcards : object
-            What the script sees as ``snakemake.input`` and so on. They are pickled.
+        job : Job
         seconds : float, optional
             It is ended where it takes longer, its imports apart.
 
         Raises
         ------
         StepError
-            If the script fails, which it has said on the standard error, is killed, or takes
-            longer.
+            If the script fails, is killed, or takes longer.
         """
-        given = {"input": input, "output": output, "params": params, "wildcards": wildcards}
-        request = pickle.dumps((str(self._folder / f"{name}.py"), given))
+        request = pickle.dumps(job)
         ours, theirs = socket.socketpair()
         with ours:
             with theirs:
                 self._hand_over(theirs)
             how, told = _answer(ours, len(request).to_bytes(8, "big") + request, seconds)
         if how != DONE:
-            raise _error(name, how, told, seconds)
+            raise _error(job.name, how, told, seconds)
         if COSTS in os.environ:
-            about = {"step": name, "of": "/".join(map(str, wildcards))} | told
+            about = {"step": job.name, "of": "/".join(map(str, job.wildcards))} | told
             with self._lock, Path(os.environ[COSTS]).open("a", encoding="utf-8") as file:
                 file.write(json.dumps(about) + "\n")
 

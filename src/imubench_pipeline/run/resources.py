@@ -1,8 +1,8 @@
 """Memory and time that a job asks for on a cluster, from the size of the log.
 
-The numbers are what steps took of logs of up to 60 million samples, with a margin
-(docs/cluster.md). A job has one core whatever its log: no step computes with more. A run on one
-computer is not held to any of it.
+The costs that the rules state are what steps took of logs of up to 60 million samples
+(docs/cluster.md); here a margin is added. A job has one core whatever its log: no step computes
+with more. A run on one computer is not held to any of it.
 """
 
 from __future__ import annotations
@@ -16,9 +16,8 @@ from pathlib import Path
 from typing import TypedDict
 
 from imubench_pipeline.recordings.drop_zone import COMPRESSED, Recording
-from imubench_pipeline.run.bounded_steps import Limit, Limits
 from imubench_pipeline.run.plan import Plan
-from imubench_pipeline.run.step_modules import OF_SENSOR
+from imubench_pipeline.run.scripts import Limit, Limits
 from imubench_pipeline.units import quantity_to_si
 
 _BESIDE = 900
@@ -27,9 +26,6 @@ small steps of the same group."""
 
 _START = 60
 """s; a cold start of Python from a shared file system, and the compilers of a first run."""
-
-_STARTED = {"sensor_tables", "outlook"}
-"""Steps of which one group has so many that each cannot ask for a start of its own."""
 
 _MARGIN = 10
 """A busy node and a slow file system may take that many times the time measured."""
@@ -49,8 +45,8 @@ class Resources(TypedDict):
     runtime: int
 
 
-Asked = Callable[[Mapping[str, str], int, str], int]
-"""Takes the wildcards of a job, its attempt and the name of its rule."""
+Asked = Callable[[Mapping[str, str], int], int]
+"""Takes the wildcards of a job, and its attempt."""
 
 
 @dataclass(frozen=True)
@@ -71,64 +67,96 @@ class Extent:
     recordings: int = 1
 
 
-_OF_A_RECORDING: Mapping[str, tuple[float, float, float, float, float]] = {
-    # MB, MB a million samples of a channel; s, s a channel, s a million values
-    "simulate": (300, 0, 1, 0, 0.2),
-    "ingest": (400, 0, 1, 0, 0.15),
-    "allan": (400, 20, 10, 0, 0.2),
-    "estimate": (400, 5, 10, 0.7, 0.1),
-    "reconstruct": (350, 15, 1, 1.3, 0.6),
-    "datasheet": (300, 0, 1, 0, 0),
-    "error_budget": (350, 0, 3, 0.5, 0.05),
-    "earth_rotation": (450, 60, 15, 0, 3),
-    "calibration": (450, 60, 5, 0, 1),
-}
+@dataclass(frozen=True, kw_only=True)
+class OfRecording:
+    """What a step of one recording takes.
 
-_OF_ALL: Mapping[str, tuple[float, float, float, float]] = {
-    # MB, MB a recording; s, s a recording
-    "sensor_tables": (300, 2, 1, 0.03),
-    "outlook": (350, 0.1, 3, 0.005),
-    "tables": (300, 0.5, 1, 0.005),
-    "ranking": (300, 0.1, 1, 0.01),
-    "shortlist": (300, 0.2, 3, 0.01),
-    "repeatability": (300, 0.1, 1, 0.01),
-    "fusion": (300, 0.2, 6, 0.01),
-    "coverage": (300, 0, 1, 0),
-    "exports": (300, 0.5, 1, 0.05),
-    "figures": (350, 3, 12, 0.06),
-    "report": (350, 3, 2, 0.12),
-}
+    Attributes
+    ----------
+    memory : float
+        MB.
+    memory_of_samples : float
+        MB a million samples of a channel.
+    time : float
+        s.
+    time_of_channels : float
+        s a channel.
+    time_of_values : float
+        s a million values of all channels.
+    """
+
+    memory: float
+    memory_of_samples: float = 0.0
+    time: float
+    time_of_channels: float = 0.0
+    time_of_values: float = 0.0
+
+    def of(self, extent: Extent) -> tuple[float, float]:
+        """Return memory in MB and time in s."""
+        values = self.time_of_values * extent.million_samples
+        return (
+            self.memory + self.memory_of_samples * extent.million_samples,
+            _START + _MARGIN * (self.time + (self.time_of_channels + values) * extent.channels),
+        )
 
 
-def resources_of(rule: str, extent: Extent, attempt: int = 1) -> Resources:
+@dataclass(frozen=True, kw_only=True)
+class OfMany:
+    """What a step of many recordings takes, of one sensor or of all.
+
+    Attributes
+    ----------
+    memory : float
+        MB.
+    memory_of_each : float
+        MB a recording.
+    time : float
+        s.
+    time_of_each : float
+        s a recording.
+    many_jobs : bool
+        One group has so many of them that each cannot ask for a start of its own.
+    """
+
+    memory: float
+    memory_of_each: float = 0.0
+    time: float
+    time_of_each: float = 0.0
+    many_jobs: bool = False
+
+    def of(self, extent: Extent) -> tuple[float, float]:
+        """Return memory in MB and time in s."""
+        start = 0.0 if self.many_jobs else _START
+        return (
+            self.memory + self.memory_of_each * extent.recordings,
+            start + _MARGIN * (self.time + self.time_of_each * extent.recordings),
+        )
+
+
+Cost = OfRecording | OfMany
+
+
+def resources_of(cost: Cost, extent: Extent, attempt: int = 1) -> Resources:
     """Return what a job asks for; each attempt asks for twice as much as the one before.
 
     Parameters
     ----------
-    rule : str
-        A step of the workflow.
+    cost : OfRecording or OfMany
+        Of its rule.
     extent : Extent
     attempt : int
         Counted from 1.
     """
-    if rule in _OF_ALL:
-        memory, more_memory, time, more_time = _OF_ALL[rule]
-        memory += more_memory * extent.recordings
-        time += more_time * extent.recordings
-    else:
-        memory, of_samples, time, of_channels, of_values = _OF_A_RECORDING[rule]
-        memory += of_samples * extent.million_samples
-        time += (of_channels + of_values * extent.million_samples) * extent.channels
-    start = 0 if rule in _STARTED else _START
+    memory, seconds = cost.of(extent)
     times: int = 2 ** (attempt - 1)
     return {
         "mem_mb": times * math.ceil((_BESIDE + memory) / 100) * 100,
-        "runtime": times * math.ceil((start + _MARGIN * time) / 60),
+        "runtime": times * math.ceil(seconds / 60),
     }
 
 
-def asked(plan: Plan) -> dict[str, Asked]:
-    """Return what rules of Snakemake state as their resources.
+def asked(plan: Plan) -> Callable[[Cost], dict[str, Asked]]:
+    """Return what makes of the cost of a rule what it states as its resources.
 
     Parameters
     ----------
@@ -136,18 +164,21 @@ def asked(plan: Plan) -> dict[str, Asked]:
     """
     extent = _extents(plan)
 
-    def of_job(wildcards: Mapping[str, str], attempt: int, rulename: str) -> Resources:
-        found = extent(wildcards.get("sensor"), wildcards.get("recording"))
-        return resources_of(rulename, found, attempt)
+    def stated(cost: Cost) -> dict[str, Asked]:
+        def of_job(wildcards: Mapping[str, str], attempt: int) -> Resources:
+            known = extent(wildcards.get("sensor"), wildcards.get("recording"))
+            return resources_of(cost, known, attempt)
 
-    # Snakemake knows by their names what its functions take.
-    def mem_mb(wildcards: Mapping[str, str], attempt: int, rulename: str) -> int:
-        return of_job(wildcards, attempt, rulename)["mem_mb"]
+        # Snakemake knows by their names what its functions take.
+        def mem_mb(wildcards: Mapping[str, str], attempt: int) -> int:
+            return of_job(wildcards, attempt)["mem_mb"]
 
-    def runtime(wildcards: Mapping[str, str], attempt: int, rulename: str) -> int:
-        return of_job(wildcards, attempt, rulename)["runtime"]
+        def runtime(wildcards: Mapping[str, str], attempt: int) -> int:
+            return of_job(wildcards, attempt)["runtime"]
 
-    return {"mem_mb": mem_mb, "runtime": runtime}
+        return {"mem_mb": mem_mb, "runtime": runtime}
+
+    return stated
 
 
 def time_limits(plan: Plan) -> Limits:
@@ -163,12 +194,12 @@ def time_limits(plan: Plan) -> Limits:
         key: quantity_to_si(value, "time") for key, value in given.model_dump(mode="json").items()
     }
 
-    def limit(step: str, wildcards: Mapping[str, str]) -> Limit:
-        found = extent(wildcards.get("sensor"), wildcards.get("recording"))
-        if step in OF_SENSOR:
-            more = seconds["each_recording"] * found.recordings
+    def limit(sensor: str, recording: str | None) -> Limit:
+        of = extent(sensor, recording)
+        if recording is None:
+            more = seconds["each_recording"] * of.recordings
             return Limit(seconds["sensor"] + more, "limits.sensor, limits.each_recording")
-        more = seconds["million_values"] * found.million_samples * found.channels
+        more = seconds["million_values"] * of.million_samples * of.channels
         return Limit(seconds["recording"] + more, "limits.recording, limits.million_values")
 
     return limit

@@ -18,13 +18,13 @@ import traceback
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from types import FrameType, SimpleNamespace
+from types import FrameType
 from typing import Any
 
 from numba import njit
 
 from imubench_pipeline.report.run_summary import one_line
-from imubench_pipeline.run.processes import BEGUN, DONE, FAILED, KILLED, LENGTH
+from imubench_pipeline.run.processes import BEGUN, DONE, FAILED, KILLED, LENGTH, Job
 
 _LONGEST = 300
 """Letters of an error in one line."""
@@ -36,12 +36,11 @@ def serve(requests: socket.socket) -> None:
     Parameters
     ----------
     requests : socket
-        Brings a connection for each step: through it come the path of the script and the
-        attributes of the object ``snakemake``, and it is told how the step ended.
+        Brings a connection for each step: through it comes the job, and it is told how that ended.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the forks end, and that the run ends is seen
     signal.signal(signal.SIGCHLD, _reap)
-    ready: dict[str, bool] = {}
+    ready: dict[Path, bool] = {}
     while True:
         _, descriptors, _, _ = socket.recv_fds(requests, 1, 1)
         if not descriptors:
@@ -49,15 +48,15 @@ def serve(requests: socket.socket) -> None:
         with socket.socket(fileno=descriptors[0]) as connection:
             with connection.makefile("rb") as stream:
                 size = int.from_bytes(stream.read(8), "big")
-                script, given = pickle.loads(stream.read(size))
-            if script not in ready:
-                ready[script] = _import_what_it_needs(script)
+                job: Job = pickle.loads(stream.read(size))
+            if job.script not in ready:
+                ready[job.script] = _import_what_it_needs(job.script)
             # Until a fork is known, that it has ended must not be heard of.
             signal.pthread_sigmask(signal.SIG_BLOCK, _ENDED)
             fork = os.fork()
             if fork == 0:
                 requests.close()
-                _run(connection, script, given, imported=ready[script])
+                _run(connection, job, imported=ready[job.script])
             _running[fork] = connection.dup()
             signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDED)
 
@@ -88,10 +87,10 @@ def _message(how: bytes, told: Mapping[str, Any]) -> bytes:
     return how + len(text).to_bytes(LENGTH, "big") + text
 
 
-def _import_what_it_needs(script: str) -> bool:
+def _import_what_it_needs(script: Path) -> bool:
     """Import what a script does; return whether that was possible."""
     try:
-        runpy.run_path(script, run_name="imports")
+        runpy.run_path(str(script), run_name="imports")
         # What two libraries put off until they are first used: half of what imports cost.
         importlib.import_module("pyarrow.dataset")
         _nothing()
@@ -107,9 +106,7 @@ def _nothing() -> None:
     """Make numba load what every function needs that it has compiled before."""
 
 
-def _run(
-    connection: socket.socket, script: str, given: Mapping[str, Any], *, imported: bool
-) -> None:
+def _run(connection: socket.socket, job: Job, *, imported: bool) -> None:
     """Run a script in this fork, say how it ended, and end."""
     how, told = FAILED, {"imported": imported, "error": "", "trace": "", "errno": None}
     try:
@@ -120,14 +117,13 @@ def _run(
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDED)
         if sys.platform == "linux":
             _end_with_who_asked(connection)
-            Path("/proc/self/comm").write_text(Path(script).stem)  # for ps and top
+            Path("/proc/self/comm").write_text(job.name)  # for ps and top
         connection.sendall(BEGUN)
-        runpy.run_path(
-            script, init_globals={"snakemake": SimpleNamespace(**given)}, run_name="__main__"
-        )
+        _print_to(job.log)
+        runpy.run_path(str(job.script), init_globals={"snakemake": job}, run_name="__main__")
         how = DONE
     except BaseException as error:
-        told["trace"] = _said(error, script)
+        told["trace"] = _said(error, str(job.script))
         told["error"] = one_line("".join(traceback.format_exception_only(error)), _LONGEST)
         told["errno"] = error.errno if isinstance(error, OSError) else None
     finally:
@@ -137,6 +133,15 @@ def _run(
         cost = {"cpu": used.ru_utime + used.ru_stime, "memory": used.ru_maxrss * 1024 / 1e6}  # KiB
         connection.sendall(_message(how, cost if how == DONE else told))
         os._exit(how != DONE)
+
+
+def _print_to(log: Path) -> None:
+    """Have this process print to the end of a file."""
+    log.parent.mkdir(parents=True, exist_ok=True)
+    file = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
+    for stream in (1, 2):
+        os.dup2(file, stream)
+    os.close(file)
 
 
 def _end_with_who_asked(connection: socket.socket) -> None:

@@ -18,7 +18,6 @@ import pyarrow.parquet as pq
 
 from imubench_pipeline.tables.files import build, joined, read_part, schema, write_arrow
 from imubench_pipeline.tables.findings import Finding
-from imubench_pipeline.tables.schemas import TABLES
 
 Cause = Literal["error", "killed", "time"]
 QUALITY = "quality.json"
@@ -97,19 +96,18 @@ def read_with_failures(table: str, paths: Sequence[Path]) -> tuple[pa.Table, lis
     return joined(table, parts), failures
 
 
-def write_empty(outputs: Iterable[tuple[str | None, Path]], failure: Failure) -> None:
+def write_empty(tables: Iterable[Path], failure: Failure) -> None:
     """Write the tables that a step declares, without a row and with what failed.
 
     Parameters
     ----------
-    outputs : iterable of (str or None, Path)
-        The table, or None where its name is that of the file.
+    tables : iterable of Path
+        Each has the name of its file.
     failure : Failure
     """
     told = {_METADATA: json.dumps(asdict(failure), sort_keys=True).encode()}
-    for name, path in outputs:
-        table = name if name in TABLES else path.stem
-        write_arrow(schema(table).empty_table().replace_schema_metadata(told), path)
+    for path in tables:
+        write_arrow(schema(path.stem).empty_table().replace_schema_metadata(told), path)
 
 
 def with_failures(

@@ -9,6 +9,6 @@ FAILURES = (
     text("recording", "that is left out; null: a step of the whole sensor", required=False),
     text("step", "of the workflow, which failed"),
     text("cause", "error, killed, or time: it ran past its time"),
-    text("reason", "in one line; the folder faults has the rest"),
+    text("reason", "in one line; the log of the step has the rest"),
 )
 """Columns of the table ``failures``."""

@@ -1,0 +1,160 @@
+"""Runs the scripts of the rules; what one of them does to one recording ends nothing else."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from snakemake.sourcecache import LocalSourceFile, SourceCache, infer_source_file
+
+from imubench_pipeline.run.faults import Faults, Of
+from imubench_pipeline.run.processes import Job, Processes, StepError
+from imubench_pipeline.tables.failures import Failure
+
+
+@dataclass(frozen=True)
+class Limit:
+    """How long a step may take.
+
+    Attributes
+    ----------
+    seconds : float
+    words : str
+        Where it is set.
+    """
+
+    seconds: float
+    words: str
+
+
+Limits = Callable[[str, str | None], Limit]
+"""Takes the sensor and the recording of a job; None: a step of the whole sensor."""
+
+
+class Scripts:
+    """Stands for Snakemake's own `script`, which a rule with a script calls.
+
+    A rule with the parameter ``attempt`` is one of a recording or a sensor, which is left out
+    where its script fails. One that is killed, as the system does where memory is short, is run
+    once more. What the run as a whole must have fails as any script does, and so does a step that
+    is stopped with the run, meets a full disk, or cannot be imported.
+
+    Parameters
+    ----------
+    faults : Faults
+        Where it is recorded what failed.
+    limits : callable, optional
+        How long a step of one recording or sensor may take; without, each failure ends the job.
+    """
+
+    def __init__(self, faults: Faults, limits: Limits | None) -> None:
+        self._faults = faults
+        self._limits = limits
+        self._processes = Processes()
+
+    def __call__(
+        self,
+        path: str,
+        basedir: str,
+        input: Any,
+        output: Any,
+        params: Any,
+        wildcards: Any,
+        threads: int,
+        resources: Any,
+        log: Any,
+        *others: Any,
+    ) -> None:
+        """Run a script to its end, or leave its outputs empty.
+
+        Parameters
+        ----------
+        path, basedir : str
+            The script, and the folder of the rule.
+        input, output, params, wildcards, threads, resources, log : object
+            As Snakemake has them.
+        *others
+            Likewise; the last but two and the last but one are where it keeps what it fetches.
+
+        Raises
+        ------
+        StepError
+            If the run cannot go on without the script.
+        """
+        script = _fetched(path, basedir, *others[-3:-1])
+        job = Job(script, input, output, params, wildcards, Path(log[0]))
+        job.log.unlink(missing_ok=True)
+        attempt = params.get("attempt")
+        try:
+            if self._limits is None or attempt is None:
+                self._processes.run(job)
+            else:
+                self._bounded(job, attempt, self._limits)
+        except StepError as error:
+            sys.stderr.write(error.trace)
+            raise
+
+    def _bounded(self, job: Job, attempt: int, limits: Limits) -> None:
+        """Run a script; leave its outputs empty where its recording or sensor makes it fail."""
+        of: Of = (job.name, job.wildcards["sensor"], job.wildcards.get("recording"))
+        outputs = [Path(path) for path in job.output]
+        if before := _before(job.input, outputs[0].parent):
+            _leave_out(outputs, job.params, before)
+            return
+        limit = limits(*of[1:])
+        try:
+            self._tried(job, limit)
+        except StepError as error:
+            if error.cause is None:
+                raise
+            words = f" ({limit.words})" * (error.cause == "time")
+            reason = f"the step {job.name} {_VERBS[error.cause]}{error.reason}{words}"
+            failure = Failure(of[1], of[2], job.name, error.cause, reason)
+            sys.stderr.write(error.trace)
+            print(f"{failure.name} is left out: {reason}", file=sys.stderr, flush=True)
+            self._faults.failed(failure, attempt, job.log)
+            _leave_out(outputs, job.params, failure)
+        else:
+            self._faults.succeeded(of, attempt)
+
+    def _tried(self, job: Job, limit: Limit) -> None:
+        try:
+            self._processes.run(job, limit.seconds)
+        except StepError as error:
+            if error.cause != "killed":
+                raise
+            print(f"{error}: it is run once more", file=sys.stderr, flush=True)
+            self._processes.run(job, limit.seconds)
+
+
+_VERBS = {"error": "failed: ", "killed": "was killed twice: ", "time": ""}
+
+
+def _fetched(path: str, basedir: str, *kept: Any) -> Path:
+    """Return where a script lies, which may be that of a workflow from elsewhere."""
+    source = infer_source_file(path, infer_source_file(basedir))
+    if isinstance(source, LocalSourceFile):
+        return Path(source.get_path_or_uri(secret_free=True))
+    return Path(SourceCache(*kept).get_path(source))
+
+
+def _before(inputs: Any, folder: Path) -> Failure | None:
+    """Return which earlier step of the same recording failed, by the inputs of a job."""
+    from imubench_pipeline.tables.failures import failure_of
+
+    own = (Path(path) for path in inputs if Path(path).parent == folder)
+    return next((failure for path in own if (failure := failure_of(path))), None)
+
+
+def _leave_out(outputs: list[Path], params: Any, failure: Failure) -> None:
+    from imubench_pipeline.tables.failures import QUALITY, write_empty
+
+    write_empty((path for path in outputs if path.name != QUALITY), failure)
+    for path in outputs:
+        if path.name == QUALITY:
+            from imubench_pipeline.recordings.ingest import write_failed
+
+            write_failed(params.settings, failure, path)

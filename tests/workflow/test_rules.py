@@ -1,0 +1,58 @@
+"""Every rule is whole: a forgotten part of a step fails here, and not in a run."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from imubench_pipeline.run.plan import Plan
+from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, PARTS_OF, TABLES
+from tests.conftest import PROJECT
+from tests.workflow.rules import costs, rules
+
+
+@pytest.fixture(scope="module")
+def known(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    return {rule.name: rule for rule in rules(tmp_path_factory.mktemp("rules"))}
+
+
+def test_each_rule_has_a_script_and_a_module_of_its_name(known: dict[str, Any]) -> None:
+    assert {rule.name: rule.script for rule in known.values()} == {
+        name: f"../scripts/{name}.py" for name in known
+    }
+    assert {path.stem for path in (PROJECT / "workflow/scripts").glob("*.py")} == known.keys()
+    codes = {name: rule.params.get("code") for name, rule in known.items()}
+    assert codes == {name: Plan.code(name) for name in known}
+    assert len(set(codes.values())) == len(codes)
+
+
+def test_each_rule_names_all_that_it_reads_and_writes(known: dict[str, Any]) -> None:
+    for name, rule in known.items():
+        for files in (rule.input, rule.output):
+            named = sum(end - begin if end else 1 for begin, end in files._names.values())
+            assert named == len(files), name
+        assert str(rule.log[0]).endswith(f"/{name}.log")
+
+
+def test_each_rule_says_what_it_takes(known: dict[str, Any]) -> None:
+    assert costs().keys() == known.keys()
+    for rule in known.values():
+        assert {"mem_mb", "runtime"} <= set(rule.resources)
+
+
+def test_what_is_of_one_recording_or_sensor_is_left_out_alone(known: dict[str, Any]) -> None:
+    # A simulated recording that cannot be made is a fault of the settings.
+    alone = {name for name, rule in known.items() if rule.params.get("attempt")}
+    assert alone == {name for name, rule in known.items() if rule.wildcard_names} - {"simulate"}
+
+
+def test_each_table_is_made_by_one_rule(known: dict[str, Any]) -> None:
+    made: dict[str, list[str]] = {}
+    for name, rule in known.items():
+        for path in map(Path, rule.output):
+            if path.suffix == ".parquet":
+                assert path.stem in {*TABLES, *PARTS_OF}, (name, path)
+                if path.parent.name == "tables":
+                    made.setdefault(path.stem, []).append(name)
+    assert {table for table, by in made.items() if len(by) > 1} == set()
+    assert made.keys() == TABLES.keys() - set(OF_ONE_RECORDING)

@@ -1,0 +1,119 @@
+"""The plan of the run, how scripts are run, and the files that rules share."""
+
+import atexit
+import gc
+import os
+
+from imubench_pipeline.run.plan import Plan
+from imubench_pipeline.run.resources import OfMany, OfRecording, asked, time_limits
+from imubench_pipeline.run.scripts import Scripts
+from imubench_pipeline.settings.validation import ConfigError
+from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, SAMPLES, TABLES
+
+# The graph of a thousand recordings is millions of objects, which live as long as the run: to look
+# for garbage among them as often as Python does, and at the end, takes a fourth of the time.
+gc.set_threshold(100_000, 20, 100)
+atexit.register(gc.freeze)
+
+try:
+    plan = Plan(config)
+except ConfigError as error:
+    raise WorkflowError(str(error)) from None
+
+# What a rule does is named by its `script:`, and Snakemake calls the function of this name for it.
+# This one forks a process that has the imports. On a cluster what fails is tried again by Snakemake.
+script = Scripts(plan.faults, None if workflow.remote_exec else time_limits(plan))
+cost = asked(plan)
+
+RESULTS = str(plan.run.results)
+KEPT = RESULTS + "/recordings/{sensor}/{recording}"
+JOINED = RESULTS + "/sensors/{sensor}"
+LOGS = RESULTS + "/logs"
+
+FOLDERS = {}
+for sensor, recording in plan.recordings:
+    FOLDERS.setdefault(sensor, []).append(
+        KEPT.format(sensor=sensor, recording=recording)
+    )
+
+
+wildcard_constraints:
+    sensor="[^/]+",
+    recording="[^/]+",
+
+
+def tables_of(*made):
+    """The tables that rules write into the folder of a recording."""
+    return tuple(name for rule in made for name in rule.output.keys())
+
+
+def of_sensor(file):
+    """A file of every recording of a sensor."""
+    return lambda w: [f"{folder}/{file}" for folder in FOLDERS[w.sensor]]
+
+
+def at_rest(file):
+    """A file of every static recording of a sensor."""
+    return lambda w: [
+        f"{KEPT.format(sensor=w.sensor, recording=recording)}/{file}"
+        for recording in plan.static_of(w.sensor)
+    ]
+
+
+def every(file):
+    """A file of every recording."""
+    return [f"{folder}/{file}" for folders in FOLDERS.values() for folder in folders]
+
+
+def of_each(recordings, table):
+    """A table of some recordings."""
+    return [
+        f"{KEPT.format(sensor=s, recording=r)}/{table}.parquet" for s, r in recordings
+    ]
+
+
+def of_each_sensor(table):
+    """A table of every sensor."""
+    return [f"{JOINED.format(sensor=sensor)}/{table}.parquet" for sensor in FOLDERS]
+
+
+def table(name):
+    """A table of all sensors."""
+    return f"{RESULTS}/tables/{name}.parquet"
+
+
+def as_files(*tables):
+    """Tables of all sensors as they are written, by name."""
+    return {
+        name: [f"{RESULTS}/tables/{name}.{kind}" for kind in ("parquet", "csv")]
+        for name in tables
+    }
+
+
+def tried(step):
+    """How often a step was tried. One that has this fails for its recording or sensor alone."""
+    return lambda w: plan.attempt(step, w.sensor, w.get("recording"))
+
+
+def missing():
+    """The files of this run that are not there."""
+    made = [
+        *(
+            file
+            for name in TABLES
+            if name not in OF_ONE_RECORDING
+            for file in as_files(name)[name]
+        ),
+        *(file for table in (*OF_SENSOR, *OUTLOOK) for file in of_each_sensor(table)),
+        *(file for table in TURNED for file in of_each(plan.turned, table)),
+        *(file for table in CALIBRATED for file in of_each(plan.calibrated, table)),
+        *(str(found.path) for found in plan.recordings.values() if found.simulated),
+    ]
+    for (sensor, recording), found in plan.recordings.items():
+        if not found.held_back:
+            for rule in OF_RECORDING:
+                made += [
+                    file.format(sensor=sensor, recording=recording)
+                    for file in rule.output
+                ]
+    return [file for file in made if not os.path.exists(file)]

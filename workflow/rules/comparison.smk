@@ -1,0 +1,128 @@
+"""All sensors: their tables, and what follows of these."""
+
+
+rule tables:
+    input:
+        **{name: of_each_sensor(name) for name in OF_SENSOR},
+        **{name: of_each(plan.turned, name) for name in TURNED if name not in OUTLOOK},
+        **{
+            name: of_each(plan.turned if name in TURNED else [], name)
+            + of_each_sensor(name)
+            for name in OUTLOOK
+        },
+        **{name: of_each(plan.calibrated, name) for name in CALIBRATED},
+    output:
+        **as_files(*sorted({*OF_SENSOR, *OUTLOOK, *TURNED, *CALIBRATED})),
+    log:
+        LOGS + "/tables.log",
+    group:
+        "comparison"
+    resources:
+        **cost(OfMany(memory=300, memory_of_each=0.5, time=1, time_of_each=0.005)),
+    params:
+        code=plan.code("tables"),
+    script:
+        "../scripts/tables.py"
+
+
+rule ranking:
+    input:
+        error_budget=table("error_budget"),
+        backtest=table("backtest"),
+        recordings=table("recordings"),
+        doubts=table("doubts"),
+        parameters=table("parameters"),
+    output:
+        **as_files("ranking", "next_steps"),
+    log:
+        LOGS + "/ranking.log",
+    group:
+        "comparison"
+    resources:
+        **cost(OfMany(memory=300, memory_of_each=0.1, time=1, time_of_each=0.01)),
+    params:
+        settings=plan.ranking_settings(),
+        code=plan.code("ranking"),
+    script:
+        "../scripts/ranking.py"
+
+
+rule shortlist:
+    input:
+        recordings=table("recordings"),
+        parameters=table("parameters"),
+        ranking=table("ranking"),
+    output:
+        **as_files("shortlist"),
+    log:
+        LOGS + "/shortlist.log",
+    group:
+        "comparison"
+    resources:
+        **cost(OfMany(memory=300, memory_of_each=0.2, time=3, time_of_each=0.01)),
+    params:
+        settings=plan.ranking_settings(),
+        catalogue=plan.catalogue(
+            "price_class", "temperature_range", "rate", "mass", "power"
+        ),
+        code=plan.code("shortlist"),
+    script:
+        "../scripts/shortlist.py"
+
+
+rule repeatability:
+    input:
+        biases=table("fixed_bias"),
+        recordings=table("recordings"),
+    output:
+        **as_files("repeatability"),
+    log:
+        LOGS + "/repeatability.log",
+    group:
+        "comparison"
+    resources:
+        **cost(OfMany(memory=300, memory_of_each=0.1, time=1, time_of_each=0.01)),
+    params:
+        settings=plan.settings("datasheet"),
+        catalogue=plan.catalogue(),
+        code=plan.code("repeatability"),
+    script:
+        "../scripts/repeatability.py"
+
+
+rule fusion:
+    input:
+        recordings=table("recordings"),
+        parameters=table("parameters"),
+        allan_compensated=table("allan_compensated"),
+        temperature=table("temperature"),
+        draws=every("draws.parquet"),
+    output:
+        **as_files("fusion"),
+    log:
+        LOGS + "/fusion.log",
+    group:
+        "comparison"
+    resources:
+        **cost(OfMany(memory=300, memory_of_each=0.2, time=6, time_of_each=0.01)),
+    params:
+        settings=plan.settings("fusion"),
+        code=plan.code("fusion"),
+    script:
+        "../scripts/fusion.py"
+
+
+rule coverage:
+    output:
+        **as_files("coverage", "coverage_by_vendor"),
+    log:
+        LOGS + "/coverage.log",
+    group:
+        "comparison"
+    resources:
+        **cost(OfMany(memory=300, time=1)),
+    params:
+        catalogue=plan.catalogue(),
+        code=plan.code("coverage"),
+    script:
+        "../scripts/coverage.py"

@@ -1,0 +1,59 @@
+"""What is read: the pages of the report, figures for print, models that filters load."""
+
+
+rule report:
+    input:
+        tables=[table(name) for name in TABLES if name not in OF_ONE_RECORDING],
+        samples=[file for name in SAMPLES for file in every(f"{name}.parquet")],
+    output:
+        page=report(RESULTS + "/report/index.html", category="Comparison"),
+    log:
+        LOGS + "/report.log",
+    group:
+        "comparison"
+    resources:
+        **cost(OfMany(memory=350, memory_of_each=3, time=2, time_of_each=0.12)),
+    params:
+        settings=plan.report_settings(),
+        code=plan.code("report"),
+    script:
+        "../scripts/report.py"
+
+
+rule figures:
+    input:
+        recordings=table("recordings"),
+        allan=table("allan"),
+        parameters=table("parameters"),
+        simulated_truth=table("simulated_truth"),
+    output:
+        folder=directory(RESULTS + "/report/figures"),
+    log:
+        LOGS + "/figures.log",
+    resources:
+        **cost(OfMany(memory=350, memory_of_each=3, time=12, time_of_each=0.06)),
+    params:
+        settings=plan.figures_settings(),
+        code=plan.code("figures"),
+    script:
+        "../scripts/figures.py"
+
+
+rule exports:
+    input:
+        recordings=table("recordings"),
+        parameters=table("parameters"),
+        allan=table("allan"),
+        temperature=table("temperature"),
+        draws=every("draws.parquet"),
+    output:
+        folder=directory(RESULTS + "/exports"),
+    log:
+        LOGS + "/exports.log",
+    resources:
+        **cost(OfMany(memory=300, memory_of_each=0.5, time=1, time_of_each=0.05)),
+    params:
+        settings=plan.settings("exports"),
+        code=plan.code("exports"),
+    script:
+        "../scripts/exports.py"
