@@ -1,6 +1,49 @@
 """Benchmark of inertial sensors: from static logs to a cross-IMU report.
 
-Arrays and parameters are SI throughout: rad/s and m/s² for samples, s for times, Hz for
-rates. A unit is converted once, where a file is read (`readers`) or a page is drawn
-(`report`).
+Units
+-----
+SI throughout: rad/s and m/s^2 for samples, s for times, Hz for rates, ordinary frequencies and
+bandwidths, degC for temperatures. Spectral densities are two-sided, in SI^2/Hz. A unit is converted
+once, where a file is read (`readers`, `settings`) or a page is drawn (`report`).
+
+Names
+-----
+=============  ====================================================================================
+gyro_x         a channel: quantity and axis; gyro_x to gyro_z, accel_x to accel_z
+rate           sampling rate, Hz; its inverse is the sampling interval T
+tau            cluster length, s; n samples are a cluster of n T
+Q              angle or velocity quantization, rad or m/s
+N              angle or velocity random walk, rad/sqrt(s) or m/s/sqrt(s)
+B              bias instability as IEEE Std 952 has it: the curve's plateau is 0.664 B; rad/s, m/s^2
+T_B            correlation time of the Gauss-Markov process that stands for B, s
+K              rate or acceleration random walk, rad/s/sqrt(s) or m/s^2/sqrt(s)
+R              rate or acceleration ramp, rad/s^2 or m/s^3
+F, GM          flicker noise; a first-order Gauss-Markov process
+B_curve        highest Allan deviation of all F and GM terms, over 0.664
+sigma_min      lowest point of the curve, at tau_min
+=============  ====================================================================================
+
+Types
+-----
+`typing.Array` is an array of 64-bit floats: the samples of one channel have shape (n,), missing
+ones are NaN. `typing.Row` is a row of a table, by column. A log that is longer than memory goes as
+an iterator of blocks, arrays of consecutive samples.
+
+Rooms
+-----
+From the lowest: `units`, `earth` and `typing`; `settings` (what users declare), `allan` (the Allan
+variance), `tables` (columns, reading, writing), `noise` (what each noise is), `readers` (log
+files), `recordings` (logs, judged and kept), `estimators` (parameters), `datasheets`, `simulate` (a
+whole sensor), `navigation` (what noise means in use), `experiments` (known rates), `export`,
+`report`, `steps` (one module a rule of the workflow), `run` (plan, processes, commands). Only the
+last three know the files and the settings of a run together. ``docs/architecture.md`` says what may
+use what.
+
+References
+----------
+.. [1] IEEE Std 952-2020 and IEEE Std 647: single-axis interferometric fibre optic gyros, and ring
+   laser gyros; the noise terms and the Allan variance.
+.. [2] J. A. Farrell, F. O. Silva, F. Rahman, J. Wendel, "Inertial Measurement Unit Error Modeling
+   Tutorial", IEEE Control Systems Magazine 42(6), 2022.
+.. [3] W. J. Riley, "Handbook of Frequency Stability Analysis", NIST Special Publication 1065, 2008.
 """
