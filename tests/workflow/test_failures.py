@@ -24,7 +24,7 @@ FAULTS = """
         time.sleep(600)
     if key.recording == "dies":
         os.kill(os.getpid(), 9)
-    estimates: dict[str, Estimate] = {}
+    channel = _Channel(key, log, curve, settings, bandwidth)
 """
 IN_OUTLOOK = """
     if sensor == "two":
@@ -66,7 +66,11 @@ def faulty(project: Project, tmp_path_factory: pytest.TempPathFactory) -> dict[s
     package = Path(imubench_pipeline.__file__).parent
     copy = place / package.name
     shutil.copytree(package, copy)  # with what numba has compiled
-    put_fault(copy / "steps/estimate.py", "estimates: dict[str, Estimate] = {}", FAULTS)
+    put_fault(
+        copy / "steps/estimate.py",
+        "channel = _Channel(key, log, curve, settings, bandwidth)",
+        FAULTS,
+    )
     names = (
         'names = {"sensor": sensor, "device": notes.device or recording, "recording": recording}'
     )

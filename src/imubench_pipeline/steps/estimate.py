@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.allan import AllanCurve, of_blocks
 from imubench_pipeline.allan.presence import presence
@@ -26,6 +25,7 @@ from imubench_pipeline.estimators.missing_slow import slow_noise_missing
 from imubench_pipeline.estimators.model_choice import disagreement
 from imubench_pipeline.estimators.rows import allan_rows, draw_rows, parameter_rows
 from imubench_pipeline.estimators.thermal.path import TemperaturePath, temperature_path
+from imubench_pipeline.estimators.thermal.result import ThermalFit
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.recordings.quality_file import Quality
 from imubench_pipeline.recordings.recording import ChannelLog, static_logs
@@ -42,8 +42,9 @@ from imubench_pipeline.steps.compensation import (
     temperature_rows,
 )
 from imubench_pipeline.steps.kept_curves import curves
+from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.tables.keys import Key
-from imubench_pipeline.typing import Row
+from imubench_pipeline.typing import Array, Row
 from imubench_pipeline.units import quantity_to_si
 
 
@@ -66,6 +67,10 @@ class Estimation:
     """Rows of the table ``findings``."""
     paths: dict[Path, TemperaturePath] = field(default_factory=dict)
     """Of the temperature, by the file of the log: its channels have one."""
+
+    def add_findings(self, key: Key, findings: Iterable[Finding]) -> None:
+        """Take what is found of a channel."""
+        self.estimate_findings += [one.row(key.sensor, key.recording) for one in findings]
 
 
 def estimate_channel(
@@ -90,86 +95,16 @@ def estimate_channel(
     into : Estimation
         Takes the rows.
     """
-    band = quantity_to_si(settings.band, "frequency") if settings.band else None
-    courses = find_courses(
-        log.blocks, log.grid, log.rate, segments=log.segments, highest=_unfiltered(band, bandwidth)
-    )
-    unit = SI_UNITS[quantity_of(key.channel)]["B"]
-    verdict = verdict_of(key.channel, unit, courses)
-    into.deterministic += deterministic_rows(asdict(key), unit, courses)
-    into.estimate_findings += [
-        finding.row(key.sensor, key.recording) for finding in verdict.findings
-    ]
-
-    def blocks() -> Iterator[NDArray[np.float64]]:
-        return courses.less(log.blocks())
-
-    measured = curve
-    if courses.found:
-        sizes = curve.cluster_size
-        curve = of_blocks(
-            blocks(), log.grid, log.rate, sizes, holes=log.holes, segments=log.segments
-        )
-    estimates: dict[str, Estimate] = {}
-    final = measured
-    if "curve" in settings.methods:
-        estimates["curve"] = reading.read(curve, longest=settings.longest)
-    for method in ("paper", "weighted"):
-        if method in settings.methods:
-            try:
-                fitted = least_squares.fit(curve, method=method, longest=settings.longest)
-            except UnfitCurveError as error:
-                fitted = not_shown(method, str(error))
-            estimates[method] = fitted
+    channel = _Channel(key, log, curve, settings, bandwidth)
+    verdict = verdict_of(key.channel, channel.unit, channel.courses)
+    into.deterministic += deterministic_rows(asdict(key), channel.unit, channel.courses)
+    into.add_findings(key, verdict.findings)
+    estimates = channel.by_curve()
     if _BY_LIKELIHOOD & set(settings.methods):
-
-        def stream(use: str) -> np.random.Generator:
-            return channel_rng(settings.seed, *asdict(key).values(), use)
-
-        fit = partial(
-            likelihood.fit_blocks,
-            samples=log.grid,
-            rate=log.rate,
-            holes=log.holes,
-            segments=log.segments,
-            band=band,
-            bandwidth=bandwidth,
-            resolution=resolution_of(log),
-        )
-        found = fit(blocks, rng=stream("posterior"))
-        estimates |= {estimate.method: estimate for estimate in found.estimates}
-        there = presence(log.blocks(), log.grid, log.segments) if log.holes else None
-        limited = partial(with_fitted_limits, segments=log.segments, presence=there)
-        final = limited(measured, found)
-        if not courses.found:  # else what they explain is taken out
-            white = found.estimates[0].parameters["N"].lower
-            lack = slow_noise_missing(key.channel, found.spectrum, found.fitted, white)
-            into.estimate_findings += [lack.row(key.sensor, key.recording)] if lack else []
-        into.models += _model_rows(key, found)
-        into.lines += _line_rows(key, found)
-        into.spectrum += _spectrum_rows(key, found)
-        into.low_pass += low_pass_rows(key, found)
-        if log.temperature and "compensated" in settings.methods:
-            if log.path not in into.paths:
-                rng = channel_rng(settings.seed, key.sensor, key.recording, log.path.name)
-                path = temperature_path(log.temperatures(), log.segments, rng)
-                into.paths[log.path] = path
-            path = into.paths[log.path]
-            # A warm-up is what temperature explains: it stays in the log that they are fitted to.
-            plain = found
-            if courses.found:
-                plain = fit(log.blocks, rng=stream("posterior"))
-            warm = temperature_of(log, path, plain, band, bandwidth, stream("temperature"))
-            into.temperature += temperature_rows(key, warm)
-            if warm.compensated:
-                estimates["compensated"] = compensated_estimate(warm)
-                left = limited(compensated_curve(log, warm, measured), warm.without_temperature)
-                added = temperature_curve(log, warm, measured)
-                into.allan_compensated += compensated_rows(key, left, added)
-    into.allan += allan_rows(key, final)
-    into.estimate_findings += [
-        finding.row(key.sensor, key.recording) for finding in disagreements(key.channel, estimates)
-    ]
+        estimates |= channel.by_likelihood(into)
+    else:
+        into.allan += allan_rows(key, curve)
+    into.add_findings(key, disagreements(key.channel, estimates))
     if "likelihood" in estimates:
         estimates |= {
             method: agreeing(estimates[method], estimates["likelihood"])
@@ -184,7 +119,112 @@ def estimate_channel(
                 estimate = verdict.applied(estimate)
             into.parameters += parameter_rows(key, estimate, recommended=method == best)
             into.draws += draw_rows(key, estimate)
-    into.fixed_bias.append(asdict(key) | {"value": log.mean(), "unit": unit})
+    into.fixed_bias.append(asdict(key) | {"value": log.mean(), "unit": channel.unit})
+
+
+class _Channel:
+    """A channel, with what is taken out of it before its noise is estimated."""
+
+    def __init__(
+        self,
+        key: Key,
+        log: ChannelLog,
+        curve: AllanCurve,
+        settings: EstimateSettings,
+        bandwidth: float | None,
+    ) -> None:
+        self.key, self.log, self.curve = key, log, curve
+        self.settings = settings
+        self.unit = SI_UNITS[quantity_of(key.channel)]["B"]
+        self._bandwidth = bandwidth
+        self._band = quantity_to_si(settings.band, "frequency") if settings.band else None
+        unfiltered = _unfiltered(self._band, bandwidth)
+        self.courses = find_courses(
+            log.blocks, log.grid, log.rate, segments=log.segments, highest=unfiltered
+        )
+
+    def by_curve(self) -> dict[str, Estimate]:
+        """Return the estimates that are read from the Allan variance, or fitted to it."""
+        settings, curve = self.settings, self.curve
+        if self.courses.found:
+            curve = of_blocks(
+                self._blocks(),
+                self.log.grid,
+                self.log.rate,
+                curve.cluster_size,
+                holes=self.log.holes,
+                segments=self.log.segments,
+            )
+        estimates: dict[str, Estimate] = {}
+        if "curve" in settings.methods:
+            estimates["curve"] = reading.read(curve, longest=settings.longest)
+        for method in ("paper", "weighted"):
+            if method in settings.methods:
+                try:
+                    fitted = least_squares.fit(curve, method=method, longest=settings.longest)
+                except UnfitCurveError as error:
+                    fitted = not_shown(method, str(error))
+                estimates[method] = fitted
+        return estimates
+
+    def by_likelihood(self, into: Estimation) -> dict[str, Estimate]:
+        """Return the estimates from the spectrum; the rows that go with them are taken."""
+        key, log = self.key, self.log
+        fitted = self._fitted(self._blocks)
+        there = presence(log.blocks(), log.grid, log.segments) if log.holes else None
+        limited = partial(with_fitted_limits, segments=log.segments, presence=there)
+        into.allan += allan_rows(key, limited(self.curve, fitted))
+        if not self.courses.found:  # else what they explain is taken out
+            white = fitted.estimates[0].parameters["N"].lower
+            lack = slow_noise_missing(key.channel, fitted.spectrum, fitted.fitted, white)
+            into.add_findings(key, [lack] if lack else [])
+        into.models += _model_rows(key, fitted)
+        into.lines += _line_rows(key, fitted)
+        into.spectrum += _spectrum_rows(key, fitted)
+        into.low_pass += low_pass_rows(key, fitted)
+        estimates = {estimate.method: estimate for estimate in fitted.estimates}
+        if log.temperature and "compensated" in self.settings.methods:
+            warm = self._temperature(fitted, into)
+            into.temperature += temperature_rows(key, warm)
+            if warm.compensated:
+                estimates["compensated"] = compensated_estimate(warm)
+                left = compensated_curve(log, warm, self.curve)
+                added = temperature_curve(log, warm, self.curve)
+                left = limited(left, warm.without_temperature)
+                into.allan_compensated += compensated_rows(key, left, added)
+        return estimates
+
+    def _temperature(self, fitted: Likelihood, into: Estimation) -> ThermalFit:
+        """Return what temperature explains of the channel."""
+        key, log = self.key, self.log
+        if log.path not in into.paths:
+            rng = channel_rng(self.settings.seed, key.sensor, key.recording, log.path.name)
+            into.paths[log.path] = temperature_path(log.temperatures(), log.segments, rng)
+        # A warm-up is what temperature explains: it stays in the log that they are fitted to.
+        plain = self._fitted(log.blocks) if self.courses.found else fitted
+        rng = self._stream("temperature")
+        return temperature_of(log, into.paths[log.path], plain, self._band, self._bandwidth, rng)
+
+    def _fitted(self, blocks: Callable[[], Iterator[Array]]) -> Likelihood:
+        log = self.log
+        return likelihood.fit_blocks(
+            blocks,
+            samples=log.grid,
+            rate=log.rate,
+            holes=log.holes,
+            segments=log.segments,
+            band=self._band,
+            bandwidth=self._bandwidth,
+            resolution=resolution_of(log),
+            rng=self._stream("posterior"),
+        )
+
+    def _blocks(self) -> Iterator[Array]:
+        """Yield the log without what is deterministic in it."""
+        return self.courses.less(self.log.blocks())
+
+    def _stream(self, use: str) -> np.random.Generator:
+        return channel_rng(self.settings.seed, *asdict(self.key).values(), use)
 
 
 def _unfiltered(band: float | None, bandwidth: float | None) -> float | None:
@@ -202,9 +242,9 @@ _BEST_FIRST = ("likelihood", "likelihood_gm", "weighted", "paper", "curve")
 """The method to use is the first of these that is asked for."""
 
 
-def _model_rows(key: Key, found: Likelihood) -> Iterator[Row]:
+def _model_rows(key: Key, fit: Likelihood) -> Iterator[Row]:
     """Yield the rows of the table ``models``, the chosen model first."""
-    for place, candidate in enumerate(found.candidates):
+    for place, candidate in enumerate(fit.candidates):
         terms = candidate.found.terms
         yield asdict(key) | {
             "model": terms.name,
@@ -217,29 +257,29 @@ def _model_rows(key: Key, found: Likelihood) -> Iterator[Row]:
             "deviance": candidate.goodness.deviance,
             "chance": candidate.goodness.chance,
             "verdict": candidate.goodness.verdict,
-            "note": _note(found) if place == 0 else candidate.goodness.where,
-            "bins": int(found.used.sum()),
-            "band": found.band.highest if found.band else None,
-            "band_source": found.band.source if found.band else None,
+            "note": _note(fit) if place == 0 else candidate.goodness.where,
+            "bins": int(fit.used.sum()),
+            "band": fit.band.highest if fit.band else None,
+            "band_source": fit.band.source if fit.band else None,
         }
 
 
-def _note(found: Likelihood) -> str:
-    notes = [found.candidates[0].goodness.where, disagreement(found.candidates)]
+def _note(fit: Likelihood) -> str:
+    notes = [fit.candidates[0].goodness.where, disagreement(fit.candidates)]
     return "; ".join(note for note in notes if note)
 
 
-def _line_rows(key: Key, found: Likelihood) -> Iterator[Row]:
+def _line_rows(key: Key, fit: Likelihood) -> Iterator[Row]:
     """Yield the rows of the table ``lines``."""
-    for line in found.lines:
+    for line in fit.lines:
         row = asdict(line)
         row.pop("resolution")
         yield asdict(key) | row
 
 
-def _spectrum_rows(key: Key, found: Likelihood) -> Iterator[Row]:
+def _spectrum_rows(key: Key, fit: Likelihood) -> Iterator[Row]:
     """Yield the rows of the table ``spectrum``."""
-    spectrum, fitted = found.spectrum, found.fitted
+    spectrum, fitted = fit.spectrum, fit.fitted
     names = ("frequency", "lower", "upper", "ordinates", "density")
     columns = [getattr(spectrum, name) for name in names]
     for i, values in enumerate(zip(*columns, strict=True)):
@@ -248,7 +288,7 @@ def _spectrum_rows(key: Key, found: Likelihood) -> Iterator[Row]:
             | dict(zip(names, map(float, values), strict=True))
             | {
                 "fitted": float(fitted[i]) if np.isfinite(fitted[i]) else None,
-                "used": bool(found.used[i]),
+                "used": bool(fit.used[i]),
             }
         )
 
@@ -258,10 +298,10 @@ def estimation(
 ) -> Estimation:
     """Return the rows that the channels leave; none of a rejected recording."""
     given = json.loads(settings)
-    found = Estimation()
+    into = Estimation()
     measured = curves(curve, Quality.read(quality))
     for channel, log in static_logs(quality.parent).items():
         key = Key(sensor, recording, channel)
         how = EstimateSettings.model_validate(given["estimate"])
-        estimate_channel(key, log, measured[channel], how, given["bandwidth"], found)
-    return found
+        estimate_channel(key, log, measured[channel], how, given["bandwidth"], into)
+    return into
