@@ -221,37 +221,16 @@ def find_cutoff(
     if not fits.may_bend(filters):
         absent = Parameter(None, "absent", "the spectrum shows no low-pass")
         return Cutoff(absent, None, Parameter(fits.unfiltered()[0]), 0.0, 0.0)
-    tried = fits.tried(filters, _COARSE)
     rounding = resolution**2 / (12.0 * spectrum.rate)
-    usable, ruled = used, np.zeros(len(used), dtype=np.bool_)
-    for passed in range(_PASSES if tried else 0):
-        earlier, ruled = ruled, _ruled_by_ends(spectrum, fits, tried[0], rounding)
-        if passed and bool((ruled == earlier).all()):
-            break
-        near = usable & ~ruled & (spectrum.frequency > _NEAR * tried[0].cutoff)
-        if near.sum() >= FEWEST_BINS:
-            used = near
-            fits = FilterFits(spectrum.taken(used))
-        if rounding > 0.0:
-            fits.rounded = rounding / fits.density(tried[0])[0] ** 2
-        fits.choose_slow(tried[0])
-        tried = fits.tried(filters)
-        if not tried:
-            break
+    settled = _settled(spectrum, used, fits, filters, rounding)
+    fits, tried, used = settled.fits, settled.tried, settled.used
     N_alone, without, cost_alone, rising = fits.unfiltered()
     behind = fits.behind(tried[0]) if tried else math.inf
     gained = 2.0 * (without - behind)
     beside_rounding = 2.0 * (rising - behind)
     doubt = _process_or_filter(fits, tried, cost_alone, gained, stated)
     if doubt is not None or gained < _BEYOND_BIC or beside_rounding < -_BEYOND_BIC:
-        absent = Parameter(None, "absent", "the spectrum shows no low-pass")
-        if doubt is None:
-            return Cutoff(absent, None, Parameter(N_alone), 0.0, gained)
-        reason, before = doubt
-        low, high = sorted((N_alone, before))
-        unknown = Parameter(None, "not_identified", reason, low, high, fitted=N_alone)
-        told = replace(absent, status="not_identified", reason=reason)
-        return Cutoff(told, None, unknown, 0.0, gained, or_process=reason, N_behind=before)
+        return _without_filter(N_alone, gained, doubt)
     best = tried[0]
     # A floor is taken to be there where it shows only: with it a high cut-off is never told.
     alike = [
@@ -267,21 +246,7 @@ def find_cutoff(
         replace(best, cutoff=cutoff).low_pass.half_power(spectrum.rate)
         for cutoff in (best.cutoff, lower, upper)
     )
-    readings = [
-        Reading(
-            math.exp(best.cost - one.cost),
-            *(
-                math.log(max(fits.density(replace(one, cutoff=cutoff))[0] / N, _LEAST_N))
-                for cutoff in (low, one.cutoff, high)
-            ),
-        )
-        for one, (low, high) in zip(alike, limits, strict=True)
-    ]
-    readings += [
-        also_after_sampling(reading, one, spectrum.rate)
-        for reading, one in zip(readings, alike, strict=True)
-        if one.is_first_order_analogue
-    ]
+    readings = _readings(fits, alike, limits)
     if gained < _BEYOND_DOUBT and N_alone > 0.0:
         # Of so many filters one may be there by chance.
         alone = math.log(N_alone / N)
@@ -320,7 +285,7 @@ def find_cutoff(
         beside_rounding < _BEYOND_BIC,
         best.kind,
         behind=Behind(white + (after / N) ** 2, *slow),
-        ruled=ruled,
+        ruled=settled.ruled,
         readings=readings,
         allowed=[
             Allowed(one, max(0.5 * math.log(high / low), _LEAST_WIDTH))
@@ -328,6 +293,79 @@ def find_cutoff(
         ],
         rounded=fits.rounded,
     )
+
+
+@dataclass(frozen=True)
+class _Settled:
+    """Fits of filters to the bins that tell of them: ``used``, not those ``ruled`` by the ends."""
+
+    fits: FilterFits
+    tried: Sequence[Tried]
+    used: NDArray[np.bool_]
+    ruled: NDArray[np.bool_]
+
+
+def _settled(
+    spectrum: Spectrum,
+    usable: NDArray[np.bool_],
+    fits: FilterFits,
+    filters: Sequence[tuple[Kind, int]],
+    rounding: float,
+) -> _Settled:
+    """Fit the filters, and again where the best of them changes which bins tell of it."""
+    tried = fits.tried(filters, _COARSE)
+    used, ruled = usable, np.zeros(len(usable), dtype=np.bool_)
+    for passed in range(_PASSES if tried else 0):
+        earlier, ruled = ruled, _ruled_by_ends(spectrum, fits, tried[0], rounding)
+        if passed and bool((ruled == earlier).all()):
+            break
+        near = usable & ~ruled & (spectrum.frequency > _NEAR * tried[0].cutoff)
+        if near.sum() >= FEWEST_BINS:
+            used = near
+            fits = FilterFits(spectrum.taken(used))
+        if rounding > 0.0:
+            fits.rounded = rounding / fits.density(tried[0])[0] ** 2
+        fits.choose_slow(tried[0])
+        tried = fits.tried(filters)
+        if not tried:
+            break
+    return _Settled(fits, tried, used, ruled)
+
+
+def _without_filter(N_alone: float, gained: float, doubt: tuple[str, float] | None) -> Cutoff:
+    """Return that no filter shows; or, with a doubt, that one may be there, with another N."""
+    absent = Parameter(None, "absent", "the spectrum shows no low-pass")
+    if doubt is None:
+        return Cutoff(absent, None, Parameter(N_alone), 0.0, gained)
+    reason, before = doubt
+    low, high = sorted((N_alone, before))
+    unknown = Parameter(None, "not_identified", reason, low, high, fitted=N_alone)
+    told = replace(absent, status="not_identified", reason=reason)
+    return Cutoff(told, None, unknown, 0.0, gained, or_process=reason, N_behind=before)
+
+
+def _readings(
+    fits: FilterFits, alike: Sequence[Tried], limits: Sequence[tuple[float, float]]
+) -> list[Reading]:
+    """Return N before each filter that the log allows, over that of the best, and how likely."""
+    best = alike[0]
+    N = fits.density(best)[0]
+    readings = [
+        Reading(
+            math.exp(best.cost - one.cost),
+            *(
+                math.log(max(fits.density(replace(one, cutoff=cutoff))[0] / N, _LEAST_N))
+                for cutoff in (low, one.cutoff, high)
+            ),
+        )
+        for one, (low, high) in zip(alike, limits, strict=True)
+    ]
+    readings += [
+        also_after_sampling(reading, one, fits.rate)
+        for reading, one in zip(readings, alike, strict=True)
+        if one.is_first_order_analogue
+    ]
+    return readings
 
 
 def _ruled_by_ends(
