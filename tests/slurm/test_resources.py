@@ -62,7 +62,7 @@ def test_every_step_asks_for_more_of_a_larger_log_and_when_it_is_tried_again() -
         assert second == {what: 2 * amount for what, amount in first.items()}
         assert larger["mem_mb"] >= first["mem_mb"] and larger["runtime"] >= first["runtime"]
         grows |= {rule} if larger != first else set()
-    assert set(costs()) - grows == {"datasheet", "coverage"}
+    assert set(costs()) - grows == {"datasheet", "catalogue"}
 
 
 def test_packed_samples_count_for_more(tmp_path: Path) -> None:

@@ -131,7 +131,7 @@ def test_the_tables_are_those_of_a_local_run(project: Project, tmp_path: Path) -
     assert states[-1] == "COMPLETED" and states.count("COMPLETED") <= 2
     assert (project.results / "report/index.html").is_file()
     local = Project(project.folder, tmp_path / "results", settings=project.settings)
-    rules = ("tables", "ranking", "shortlist", "repeatability", "fusion", "coverage")
+    rules = ("tables", "ranking", "shortlist", "repeatability", "fusion", "catalogue")
     assert local.run(*rules).returncode == 0
     made = sorted(path.name for path in (local.results / "tables").iterdir())
     assert made == sorted(path.name for path in (project.results / "tables").iterdir())

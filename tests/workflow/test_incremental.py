@@ -200,7 +200,7 @@ def test_an_edit_of_a_bandwidth_runs_the_estimates_of_its_sensor(project: Projec
 def test_an_edit_of_a_datasheet_runs_its_comparison(project: Project) -> None:
     density = {"value": 0.02, "unit": "deg/s/sqrt(Hz)"}
     put_sensor(project.folder / "sensors/one.yaml", datasheet={"gyro": {"noise_density": density}})
-    compared = {("datasheet", of) for of in ONE} | {("coverage", "")}
+    compared = {("datasheet", of) for of in ONE} | {("catalogue", "")}
     assert project.job_list() == compared | joined(*ALL)
 
 

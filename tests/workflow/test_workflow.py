@@ -128,7 +128,7 @@ def test_one_core_and_two_give_the_same_tables(project: Project, tmp_path: Path)
 def test_an_edit_of_a_datasheet_runs_its_deltas_and_the_global_steps(project: Project) -> None:
     density = {"value": 0.02, "unit": "deg/s/sqrt(Hz)"}
     put_sensor(project.folder / "sensors/one.yaml", datasheet={"gyro": {"noise_density": density}})
-    steps = {"datasheet": 2, "coverage": 1, "sensor_tables": 2}
+    steps = {"datasheet": 2, "catalogue": 1, "sensor_tables": 2}
     assert project.jobs() == GLOBAL_STEPS | steps
     assert project.run().returncode == 0
     printed = {

@@ -112,17 +112,17 @@ rule fusion:
         "../scripts/fusion.py"
 
 
-rule coverage:
+rule catalogue:
     output:
         **as_files("coverage", "coverage_by_vendor"),
     log:
-        LOGS + "/coverage.log",
+        LOGS + "/catalogue.log",
     group:
         "comparison"
     resources:
         **cost(OfMany(memory=300, time=1)),
     params:
         catalogue=plan.catalogue(),
-        code=plan.code("coverage"),
+        code=plan.code("catalogue"),
     script:
-        "../scripts/coverage.py"
+        "../scripts/catalogue.py"

@@ -4,7 +4,7 @@
 
 from pathlib import Path
 
-from imubench_pipeline.steps.coverage import write_coverage
+from imubench_pipeline.steps.catalogue import write_coverage
 
 if __name__ == "__main__":
     write_coverage(snakemake.params.catalogue, [Path(path) for path in snakemake.output])
