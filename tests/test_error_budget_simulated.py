@@ -29,7 +29,7 @@ from imubench_pipeline.noise import (
     Term,
     WhiteNoise,
 )
-from imubench_pipeline.noise.growth import SensorStart, variance
+from imubench_pipeline.noise.growth import SensorStart
 from imubench_pipeline.noise.simulate import simulate
 
 Array = NDArray[np.float64]
@@ -126,7 +126,7 @@ def test_each_term_grows_as_in_simulated_runs(term: Term, calibrated: bool) -> N
     for time in TIMES:
         for order in range(3):
             found, error = spread(errors[order, :, round(time * RATE) - 1])
-            expected = math.sqrt(variance(term, order, time, start))
+            expected = math.sqrt(term.growth(order, time, start))
             assert abs(found - expected) < 4.0 * error + 2e-3 * expected, (time, order)
 
 

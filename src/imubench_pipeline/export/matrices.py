@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import io
 import json
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -27,16 +26,7 @@ from scipy.linalg import block_diag
 from imubench_pipeline.export.comments import heading
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.mapping import named
-from imubench_pipeline.noise import (
-    GaussMarkov,
-    NoiseModel,
-    Quantization,
-    Ramp,
-    RandomWalk,
-    Sinusoid,
-    Term,
-    WhiteNoise,
-)
+from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
 FOLLOWED = 4.0
@@ -94,13 +84,14 @@ def matrices(model: NoiseModel, rate: float, horizon: float) -> Matrices:
     longest = max(FOLLOWED * horizon, 4.0 / rate)
     terms = model.realised(1.0 / rate, longest)
     discrete = model.state_space(rate, longest)
-    continuous = [_continuous(term) for term in terms if not isinstance(term, Quantization)]
+    spaces = [term.continuous_space() for term in terms]
+    continuous = [space for space in spaces if space is not None]
     nothing = np.zeros((0, 0))
     return Matrices(
-        F=block_diag(nothing, *(F for F, _, _ in continuous)),
-        Q=block_diag(nothing, *(Q for _, Q, _ in continuous)),
-        H_continuous=np.concatenate([np.zeros(0), *(H for _, _, H in continuous)]),
-        R=sum(term.N**2 for term in terms if isinstance(term, WhiteNoise)),
+        F=block_diag(nothing, *(space.transition for space in continuous)),
+        Q=block_diag(nothing, *(space.density for space in continuous)),
+        H_continuous=np.concatenate([np.zeros(0), *(space.output for space in continuous)]),
+        R=sum(term.drive.white for term in terms if term.drive is not None and term.drive.white),
         Phi=discrete.transition,
         Q_d=discrete.process_noise,
         H=discrete.output,
@@ -109,20 +100,6 @@ def matrices(model: NoiseModel, rate: float, horizon: float) -> Matrices:
         P0=discrete.initial_variance,
         states=[named([t]) for t in terms for _ in t.state_space(1.0 / rate).output],
     )
-
-
-def _continuous(term: Term) -> tuple[Array, Array, Array]:
-    """Return F, Q and H of a term."""
-    if isinstance(term, GaussMarkov):
-        return np.array([[-1.0 / term.T_B]]), np.array([[term.density]]), np.ones(1)
-    if isinstance(term, RandomWalk):
-        return np.zeros((1, 1)), np.array([[term.K**2]]), np.ones(1)
-    if isinstance(term, Ramp):
-        return np.array([[0.0, 1.0], [0.0, 0.0]]), np.zeros((2, 2)), np.array([1.0, 0.0])
-    if isinstance(term, Sinusoid):
-        speed = 2.0 * math.pi * term.frequency
-        return np.array([[0.0, speed], [-speed, 0.0]]), np.zeros((2, 2)), np.array([1.0, 0.0])
-    return np.zeros((0, 0)), np.zeros((0, 0)), np.zeros(0)
 
 
 def write_json(imu: Imu) -> str:
@@ -169,10 +146,8 @@ def write_json(imu: Imu) -> str:
 def _parameters(model: NoiseModel) -> dict[str, object]:
     found: dict[str, object] = {name: getattr(model, name) for name in ("Q", "N", "B", "K", "R")}
     found["T_B"] = model.T_B
-    found["further"] = [{"B": part.B, "T_B": part.T_B} for part in model.further]
-    found["sinusoids"] = [
-        {"amplitude": part.amplitude, "frequency": part.frequency} for part in model.sinusoids
-    ]
+    found["further"] = [term.values for term in model.further]
+    found["sinusoids"] = [line.values for line in model.sinusoids]
     return found
 
 

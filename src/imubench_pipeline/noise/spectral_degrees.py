@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.allan.presence import Presence
 from imubench_pipeline.allan.quadratic_forms import tail_degrees, variance_degrees
-from imubench_pipeline.noise.model import NoiseModel, Quantization, Ramp, Sinusoid
+from imubench_pipeline.noise.model import NoiseModel
+from imubench_pipeline.noise.terms import Deterministic, Quantization
 from imubench_pipeline.typing import Array
 
 Span = tuple[int, int]
@@ -145,9 +146,9 @@ class _Covariance:
 
     def __init__(self, model: NoiseModel, n: int, interval: float) -> None:
         self._n, self._interval = n, interval
-        self._noise = [t for t in model.terms if not isinstance(t, Quantization | Ramp | Sinusoid)]
-        rounded = Quantization(model.Q) if model.Q > 0 else None
-        self._rounding = rounded.Q**2 / interval**2 if rounded else 0.0
+        # Roundings are correlated at single lags, which the steps of a smooth covariance miss.
+        self._noise = [t for t in model.terms if not isinstance(t, Quantization | Deterministic)]
+        self._rounding = model.Q**2 / interval**2
         self.at_zero = float(self._smooth(np.zeros(1))[0]) + 6.0 * self._rounding
         self.ramp = model.R * interval * n**2
         self.lines = self.line_products = 0.0

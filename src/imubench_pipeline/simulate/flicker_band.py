@@ -1,6 +1,6 @@
 """Flicker noise in continuous time, as it enters a filter: a bank of Gauss-Markov processes.
 
-`noise.flicker.bank` has the Allan variance of flicker noise that is sampled without a
+`noise.terms.flicker.bank` has the Allan variance of flicker noise that is sampled without a
 filter. Before a filter whose cut-off may lie above Nyquist, the density B^2 / (2 pi f) itself is
 needed, far beyond the cut-off. Processes of equal variance (ln r / pi) B^2 whose correlation
 times have the ratio r make up that density: the ripple is 4 e^(-pi^2 / ln r), below 1e-3 for two
