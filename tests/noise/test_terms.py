@@ -1,6 +1,7 @@
 """Every kind of noise term in the registry: what it says of itself is one thing, said many ways."""
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -318,5 +319,5 @@ def test_the_curve_shows_its_parameter_where_it_says(term: Term) -> None:
 
 @of_all
 def test_its_words_have_its_values(term: Term) -> None:
-    for size in term.values.values():
-        assert f"{abs(size):.3g}"[:3] in term.in_words.replace("e-01", "").replace("3.000", "0.3")
+    written = [float(one) for one in re.findall(r"-?\d+(?:\.\d+)?(?:e[-+]\d+)?", term.in_words)]
+    assert written == pytest.approx(list(term.values.values()), rel=1e-3)
