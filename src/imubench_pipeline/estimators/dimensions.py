@@ -30,7 +30,7 @@ def _dimension(quantity: str, parameter: TermParameter) -> str:
 
 
 DIMENSIONS: Mapping[str, Mapping[str, str]] = {
-    quantity: {symbol: _dimension(quantity, one) for symbol, one in PARAMETERS.items()}
+    quantity: {symbol: _dimension(quantity, parameter) for symbol, parameter in PARAMETERS.items()}
     | {"B_curve": signal, "sigma_min": signal, "tau_min": "time"}
     for quantity, signal in QUANTITIES.items()
 }

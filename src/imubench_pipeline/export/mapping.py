@@ -86,8 +86,8 @@ def as_walk(
     if all(term.role is Role.RANDOM_WALK for term in slow):
         return Mapped(NoiseModel(N=model.N, K=model.K), _left_out(model))
     K = math.sqrt(3.0 * _variance(slow, horizon) / horizon)
-    found = NoiseModel(N=model.N, K=K)
-    return _compared(model, found, f"a random walk K = {K:.3e}", slow, horizon, rate)
+    replacement = NoiseModel(N=model.N, K=K)
+    return _compared(model, replacement, f"a random walk K = {K:.3e}", slow, horizon, rate)
 
 
 def as_process(model: NoiseModel, horizon: float, rate: float) -> Mapped:
@@ -104,9 +104,9 @@ def as_process(model: NoiseModel, horizon: float, rate: float) -> Mapped:
         (process,) = processes
         return Mapped(NoiseModel(N=model.N, B=process.B, T_B=process.T_B), _left_out(model))
     process = _nearest_process(slow, model.N, horizon)
-    found = NoiseModel(N=model.N, B=process.B, T_B=process.T_B)
+    replacement = NoiseModel(N=model.N, B=process.B, T_B=process.T_B)
     what = f"a Gauss-Markov process B = {process.B:.3e}, T_B = {process.T_B:.4g} s"
-    return _compared(model, found, what, slow, horizon, rate)
+    return _compared(model, replacement, what, slow, horizon, rate)
 
 
 def as_process_and_walk(model: NoiseModel, horizon: float, rate: float) -> Mapped:
@@ -118,9 +118,9 @@ def as_process_and_walk(model: NoiseModel, horizon: float, rate: float) -> Mappe
         B, T_B = (processes[0].B, processes[0].T_B) if processes else (0.0, None)
         return Mapped(NoiseModel(N=model.N, B=B, T_B=T_B, K=model.K), _left_out(model))
     process = _nearest_process(replaced, model.N, horizon)
-    found = NoiseModel(N=model.N, B=process.B, T_B=process.T_B, K=model.K)
+    replacement = NoiseModel(N=model.N, B=process.B, T_B=process.T_B, K=model.K)
     what = f"a Gauss-Markov process B = {process.B:.3e}, T_B = {process.T_B:.4g} s"
-    return _compared(model, found, what, replaced, horizon, rate)
+    return _compared(model, replacement, what, replaced, horizon, rate)
 
 
 def named(terms: Sequence[Term]) -> str:
@@ -178,7 +178,7 @@ def _nearest_process(slow: Sequence[Term], N: float, horizon: float) -> GaussMar
 
 def _compared(
     model: NoiseModel,
-    found: NoiseModel,
+    replacement: NoiseModel,
     what: str,
     replaced: Sequence[Term],
     horizon: float,
@@ -188,7 +188,7 @@ def _compared(
     noise = replace(model, Q=0.0, sinusoids=())
 
     def error(tau: Array) -> Array:
-        return np.sqrt(found.allan_variance(tau) / noise.allan_variance(tau)) - 1.0
+        return np.sqrt(replacement.allan_variance(tau) / noise.allan_variance(tau)) - 1.0
 
     half, twice = (float(x) for x in error(np.array([0.5, 2.0]) * horizon))
     tau = np.geomspace(1.0 / rate, horizon, 200)
@@ -201,7 +201,7 @@ def _compared(
         f"by at most {100 * float(below[worst]):+.1f} % (at {tau[worst]:.3g} s)"
     ]
     return Mapped(
-        found,
+        replacement,
         [*words, *_left_out(model)],
         half,
         twice,

@@ -118,37 +118,39 @@ def write_json(imu: Imu) -> str:
         "inflation": imu.inflation,
     }
     for name, axis in imu.axes.items():
-        found = matrices(axis.model, imu.rate, imu.horizon)
+        of_axis = matrices(axis.model, imu.rate, imu.horizon)
         content[name] = {
             "model": axis.model.name,
             "unit": {"gyro": "rad/s", "accel": "m/s^2"}[name],
             "parameters": _parameters(axis.model),
             "density_bounded": list(axis.bounded) if axis.bounded else None,
-            "states": list(found.states),
+            "states": list(of_axis.states),
             "continuous": {
-                "F": found.F.tolist(),
-                "Q": found.Q.tolist(),
-                "H": found.H_continuous.tolist(),
-                "R": found.R,
+                "F": of_axis.F.tolist(),
+                "Q": of_axis.Q.tolist(),
+                "H": of_axis.H_continuous.tolist(),
+                "R": of_axis.R,
             },
             "discrete": {
-                "Phi": found.Phi.tolist(),
-                "Q_d": found.Q_d.tolist(),
-                "H": found.H.tolist(),
-                "R_d": found.R_d,
-                "x0": found.x0.tolist(),
-                "P0": found.P0.tolist(),
+                "Phi": of_axis.Phi.tolist(),
+                "Q_d": of_axis.Q_d.tolist(),
+                "H": of_axis.H.tolist(),
+                "R_d": of_axis.R_d,
+                "x0": of_axis.x0.tolist(),
+                "P0": of_axis.P0.tolist(),
             },
         }
     return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
 
 def _parameters(model: NoiseModel) -> dict[str, object]:
-    found: dict[str, object] = {name: getattr(model, name) for name in ("Q", "N", "B", "K", "R")}
-    found["T_B"] = model.T_B
-    found["further"] = [term.values for term in model.further]
-    found["sinusoids"] = [line.values for line in model.sinusoids]
-    return found
+    parameters: dict[str, object] = {
+        name: getattr(model, name) for name in ("Q", "N", "B", "K", "R")
+    }
+    parameters["T_B"] = model.T_B
+    parameters["further"] = [term.values for term in model.further]
+    parameters["sinusoids"] = [line.values for line in model.sinusoids]
+    return parameters
 
 
 def write_npz(imu: Imu) -> bytes:
@@ -160,11 +162,11 @@ def write_npz(imu: Imu) -> bytes:
     """
     arrays: dict[str, Array] = {"rate": np.array(imu.rate), "horizon": np.array(imu.horizon)}
     for name, axis in imu.axes.items():
-        found = matrices(axis.model, imu.rate, imu.horizon)
+        of_axis = matrices(axis.model, imu.rate, imu.horizon)
         if axis.bounded:
             arrays[f"{name}_density_bounded"] = np.array(axis.bounded)
         for key in ("F", "Q", "H_continuous", "R", "Phi", "Q_d", "H", "R_d", "x0", "P0"):
-            arrays[f"{name}_{key}"] = np.asarray(getattr(found, key))
+            arrays[f"{name}_{key}"] = np.asarray(getattr(of_axis, key))
     about = np.array(heading(imu, "any Kalman filter", _CONVENTION.format(rate=imu.rate)))
     stream = io.BytesIO()
     np.savez(stream, about=about, **arrays)  # type: ignore[arg-type]  # its stub takes a flag among the arrays

@@ -82,8 +82,8 @@ def write(imu: Imu) -> str:
         longest = max(FOLLOWED * imu.horizon, 4.0 / imu.rate)
         drives = drives_of(axis.model.realised(1.0 / imu.rate, longest))
         white = float(drives.white)
-        walk = float(sum(one.density for one in drives.walks))
-        processes = [(float(one.density), float(one.T_B)) for one in drives.processes]
+        walk = float(sum(walk.density for walk in drives.walks))
+        processes = [(float(part.density), float(part.T_B)) for part in drives.processes]
         unit = {"gyro": ("rad/s", "rad"), "accel": ("m/s^2", "m/s")}[name]
         entries += f'    "{name}": {{\n'
         entries += f'        "white": {white!r},  # N^2, ({unit[0]})^2/Hz\n'

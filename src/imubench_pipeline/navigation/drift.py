@@ -39,7 +39,7 @@ from numpy.typing import NDArray
 from scipy.special import stdtr, stdtrit
 
 from imubench_pipeline.navigation.pooled import POOLED, bounded_exp, points_about_median, usable
-from imubench_pipeline.noise import TERMS
+from imubench_pipeline.noise import PARAMETERS, TERMS
 from imubench_pipeline.typing import Row
 
 Order = Literal["started", "name"]
@@ -58,7 +58,7 @@ _FEWEST = 3  # recordings that tell the spread between them
 _LINE_FROM = 8  # recordings; a line takes one degree of freedom more
 _EACH, _GROWTH = 32, 1.05  # tau is found anew with each of 32 recordings, then with each 5 % more
 _NAMES = (*POOLED, "bias")
-_OF_BIAS = {kind.symbol for kind in TERMS if "B" in (one.symbol for one in kind.parameters)}
+_OF_BIAS = {kind.symbol for kind in TERMS if PARAMETERS["B"] in kind.parameters}
 _ABSENT: Row = {"status": "absent", "value": None}
 _NOTHING = (math.nan, math.nan, math.nan, math.nan, 0.0, -1.0, -1.0)
 

@@ -91,11 +91,11 @@ def degrees_of_model(
     """
     spans = tuple(segments) if segments else ((0, samples),)
     left = np.ones(len(sizes)) if share is None else share
-    found = [
+    pairs = [
         _degrees(model, 1.0 / rate, int(n), spans, presence, float(part))
         for n, part in zip(sizes, left, strict=True)
     ]
-    edf, upper = (np.array(column, dtype=np.float64) for column in zip(*found, strict=True))
+    edf, upper = (np.array(column, dtype=np.float64) for column in zip(*pairs, strict=True))
     return Degrees(edf, upper)
 
 
@@ -225,7 +225,7 @@ class _Covariance:
         self, terms: NDArray[np.int64], mask: tuple[NDArray[np.bool_], int] | None
     ) -> Array | None:
         """Return those of the covariance of the differences, thinned; None where too many."""
-        found = []
+        eigenvalues = []
         if mask is not None:
             there, stride = mask
             thinning = max(1, round(self._n / _TAIL_STEPS / stride))
@@ -245,5 +245,5 @@ class _Covariance:
             smooth, rounding = self._at(lags)
             row = smooth + rounding / step
             matrix = row[np.abs(np.subtract.outer(places, places))]
-            found.append(np.maximum(np.linalg.eigvalsh(matrix), 0.0))
-        return np.concatenate(found)
+            eigenvalues.append(np.maximum(np.linalg.eigvalsh(matrix), 0.0))
+        return np.concatenate(eigenvalues)

@@ -52,12 +52,12 @@ def bank(B: float, lowest: float, highest: float) -> list[GaussMarkov]:
     if not 0 < lowest < highest:
         raise ValueError(f"the band from {lowest} to {highest} Hz is empty")
     times, variances = _unit_bank(round(math.log10(highest / lowest), 6))
-    found = []
+    processes = []
     for time, variance in zip(times / (2.0 * math.pi * lowest), variances, strict=True):
         if variance > 0:
             density = 2.0 * B**2 * variance / time  # of the driving noise
-            found.append(GaussMarkov(bias_instability(density, time), time))
-    return found
+            processes.append(GaussMarkov(bias_instability(density, time), time))
+    return processes
 
 
 def ripple(lowest: float, highest: float) -> float:

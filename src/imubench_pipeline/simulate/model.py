@@ -155,8 +155,10 @@ class SensorModel:
         if self.low_pass is None:
             return self.noise.sampled_spectrum(w, rate) + rounding
         behind = [term for term in self.noise.terms if term.drive is None]
-        found = np.sum([term.sampled_spectrum(w, 1.0 / rate) for term in behind], axis=0) + rounding
-        return np.asarray(found + spectra.sampled_spectrum(self.sources, self.low_pass, w, rate))
+        spectrum = (
+            np.sum([term.sampled_spectrum(w, 1.0 / rate) for term in behind], axis=0) + rounding
+        )
+        return np.asarray(spectrum + spectra.sampled_spectrum(self.sources, self.low_pass, w, rate))
 
     def allan_variance(self, tau: ArrayLike, rate: float) -> Array:
         """Return the Allan variance of the samples, exactly.
@@ -179,12 +181,12 @@ class SensorModel:
         rounding = self.resolution**2 / 12.0 / n
         if self.low_pass is None:
             return self.noise.allan_variance(n / rate, rate) + rounding
-        found = rounding + spectra.allan_variance(self.sources, self.low_pass, n, rate)
+        variance = rounding + spectra.allan_variance(self.sources, self.low_pass, n, rate)
         for term in self.noise.terms:
             if term.drive is None:
                 left = term.passed(self.low_pass.power)
-                found = found + left * term.sampled_allan_variance(n, 1.0 / rate)
-        return found
+                variance = variance + left * term.sampled_allan_variance(n, 1.0 / rate)
+        return variance
 
     @property
     def sources(self) -> spectra.Sources:
@@ -205,7 +207,7 @@ def sources_of(terms: Sequence[Term]) -> spectra.Sources:
         White and flicker noise, Gauss-Markov processes and random walks; others have no density.
     """
     drives = drives_of(terms)
-    slow = [(one.T_B, one.density) for one in (*drives.processes, *drives.walks)]
+    slow = [(part.T_B, part.density) for part in (*drives.processes, *drives.walks)]
     times, densities = np.array(slow, dtype=np.float64).reshape(-1, 2).T
     return spectra.Sources(drives.white, drives.flicker, times, densities)
 
@@ -226,9 +228,9 @@ def bank_for(model: SensorModel, rate: float, duration: float) -> list[GaussMark
     list of GaussMarkov
         None without flicker noise, or without a filter.
     """
-    found: list[GaussMarkov] = []
+    processes: list[GaussMarkov] = []
     for term in model.noise.terms:
         if term.drive is not None and term.drive.flicker and model.low_pass is not None:
             highest = flicker_band.ABOVE * max(model.low_pass.cutoff, rate / 2.0)
-            found += flicker_band.bank(term.drive.flicker, 0.5 / duration, highest)
-    return found
+            processes += flicker_band.bank(term.drive.flicker, 0.5 / duration, highest)
+    return processes

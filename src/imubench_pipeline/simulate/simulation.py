@@ -202,11 +202,11 @@ class _Axis:
         """Return the next samples."""
         model, discrete, held = self._model, self._discrete, self._discrete.held
         size = stop - start
-        given = np.full(size, model.bias)
+        entering = np.full(size, model.bias)
         if true is not None:
-            given += (1.0 + model.scale_error) * _checked(true(start, stop), size, "motion")
+            entering += (1.0 + model.scale_error) * _checked(true(start, stop), size, "motion")
         if model.noise.R:
-            given += model.noise.R / self._rate * np.arange(start, stop)
+            entering += model.noise.R / self._rate * np.arange(start, stop)
         temperatures = np.empty(0)
         if temperature is not None and model.drift is not None:
             temperatures = _checked(temperature(start, stop), size, "temperature")
@@ -215,7 +215,7 @@ class _Axis:
         log = np.empty(size)
         run(
             log,
-            given,
+            entering,
             temperatures,
             normal,
             self._memory,
@@ -272,9 +272,9 @@ def _realised(model: SensorModel, rate: float, duration: float) -> list[Term]:
 
 
 def _checked(values: Array, size: int, what: str) -> Array:
-    found = np.ascontiguousarray(values, dtype=np.float64)
-    if found.shape != (size,):
-        raise ValueError(f"{what} has shape {found.shape}, expected ({size},)")
-    if not np.isfinite(found.sum()):
+    signal = np.ascontiguousarray(values, dtype=np.float64)
+    if signal.shape != (size,):
+        raise ValueError(f"{what} has shape {signal.shape}, expected ({size},)")
+    if not np.isfinite(signal.sum()):
         raise ValueError(f"{what} has values that are not finite")
-    return found
+    return signal

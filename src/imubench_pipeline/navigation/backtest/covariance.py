@@ -138,10 +138,10 @@ class WindowCovariance:
             return self._units[term]
         reach = self.window.blocks - 1
         lags = np.abs(np.arange(-reach, self.lags + reach, dtype=np.float64))
-        found = correlated(term.block_covariance(lags, self.window.block), self._overlap)
+        covariance = correlated(term.block_covariance(lags, self.window.block), self._overlap)
         if term.as_unit()[1] is not term:
-            self._units[term] = found
-        return found
+            self._units[term] = covariance
+        return covariance
 
     @cached_property
     def _overlap(self) -> Array:

@@ -216,19 +216,19 @@ def budget(
         raise ValueError(f"quantity is {quantity!r}, expected one of {get_args(Quantity)}")
     if not (math.isfinite(time) and time > 0):
         raise ValueError(f"time is {time}, expected a time above 0")
-    found = _sources(quantity, time, gyro, accel, start)
+    contributions = _sources(quantity, time, gyro, accel, start)
     missing: list[Missing] = []
     assumptions: list[str] = []
     for measured, cause, source, lever in _levers(quantity, time, start, use):
         figures = gyro_figures if measured == "gyro" else accel_figures
         part = of_figure(measured, cause, source, lever, figures)
         if isinstance(part, Contribution):
-            found.append(part)
+            contributions.append(part)
         elif part is not None:
             missing.append(part)
             if cause == "turn_on_bias":
                 assumptions.append(f"turn-on bias of the {_WORDS[measured]}: not known, left out")
-    return Budget(time, quantity, found, assumptions, missing)
+    return Budget(time, quantity, contributions, assumptions, missing)
 
 
 def _sources(
@@ -236,18 +236,18 @@ def _sources(
 ) -> list[Contribution]:
     order = _GYRO_ORDER[quantity]
     gravity = STANDARD_GRAVITY if order > 0 else 1.0
-    found = list(of_sensor("gyro", gyro, order, time, start.gyro, gravity))
+    contributions = list(of_sensor("gyro", gyro, order, time, start.gyro, gravity))
     if quantity in _ACCEL_ORDER:
-        found.extend(of_sensor("accel", accel, _ACCEL_ORDER[quantity], time, start.accel))
+        contributions.extend(of_sensor("accel", accel, _ACCEL_ORDER[quantity], time, start.accel))
     if quantity == "heading":
-        found.append(Contribution("initial heading", start.heading, "start", STATED))
+        contributions.append(Contribution("initial heading", start.heading, "start", STATED))
     elif isinstance(start.tilt, Levelled):
         if quantity == "attitude" and isinstance(start.accel, Calibrated):
-            found.extend(_of_levelling(accel, start.accel.window, start.tilt))
+            contributions.extend(_of_levelling(accel, start.accel.window, start.tilt))
     else:
         lever = gravity * of_constant(order - 1, time)
-        found.append(Contribution("initial tilt", start.tilt * lever, "start", STATED))
-    return found
+        contributions.append(Contribution("initial tilt", start.tilt * lever, "start", STATED))
+    return contributions
 
 
 def _levers(

@@ -51,5 +51,5 @@ __all__ = [
 TERMS = registered(Quantization, WhiteNoise, Flicker, GaussMarkov, RandomWalk, Ramp, Sinusoid)
 """Every kind of noise term, in the order of a model's name."""
 
-PARAMETERS = {one.symbol: one for kind in TERMS for one in kind.parameters}
+PARAMETERS = {parameter.symbol: parameter for kind in TERMS for parameter in kind.parameters}
 """Every parameter of these by its symbol; flicker noise and a Gauss-Markov process share B."""

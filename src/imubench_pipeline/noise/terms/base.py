@@ -188,7 +188,7 @@ class Term(ABC):
     @property
     def values(self) -> dict[str, float]:
         """Its parameters by symbol, SI."""
-        return {one.symbol: getattr(self, one.symbol) for one in self.parameters}
+        return {parameter.symbol: getattr(self, parameter.symbol) for parameter in self.parameters}
 
     @property
     def in_words(self) -> str:
@@ -220,9 +220,9 @@ class Term(ABC):
     def scaled(self, factor: float) -> Self:
         """Return the term of a signal that is a factor larger; times stay."""
         scaled = {
-            one.symbol: getattr(self, one.symbol) * factor**one.signal
-            for one in self.parameters
-            if one.signal
+            parameter.symbol: getattr(self, parameter.symbol) * factor**parameter.signal
+            for parameter in self.parameters
+            if parameter.signal
         }
         return replace(self, **scaled)
 

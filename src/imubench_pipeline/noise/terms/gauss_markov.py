@@ -177,15 +177,15 @@ class GaussMarkov(Term):
         decayed = -np.expm1(-n * x)
         gain = decayed / (n * lost)
         variance = 0.5 * self.density * self.T_B
-        found = np.empty((len(n), len(n)))
+        covariance = np.empty((len(n), len(n)))
         for later in range(len(n)):  # row by row: there may be thousands, and one matrix is enough
             lag = blocks.start[later] - blocks.stop[:later] + 1
-            found[later, :later] = variance * gain[later] * gain[:later] * np.exp(-x * lag)
-            found[:later, later] = found[later, :later]
+            covariance[later, :later] = variance * gain[later] * gain[:later] * np.exp(-x * lag)
+            covariance[:later, later] = covariance[later, :later]
         p = math.exp(-x)
         own = (n * (1.0 + p) / lost - 2.0 * p * decayed / lost**2) / n**2
-        np.fill_diagonal(found, variance * own)
-        return found
+        np.fill_diagonal(covariance, variance * own)
+        return covariance
 
     def block_sums(self, blocks: int, width: int, rate: float, rng: np.random.Generator) -> Array:
         """Draw them with the states at their ends."""

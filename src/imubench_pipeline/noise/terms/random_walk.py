@@ -94,10 +94,10 @@ class RandomWalk(Term):
         n = (blocks.stop - blocks.start).astype(np.float64)
         first = (blocks.start - blocks.start[0]).astype(np.float64)
         means = first + (n - 1.0) / 2.0
-        found = np.minimum.outer(means, means)
-        np.fill_diagonal(found, first + (n - 1.0) * (2.0 * n - 1.0) / (6.0 * n))
-        found *= self.K**2 * (1.0 / blocks.rate)
-        return np.asarray(found)
+        covariance = np.minimum.outer(means, means)
+        np.fill_diagonal(covariance, first + (n - 1.0) * (2.0 * n - 1.0) / (6.0 * n))
+        covariance *= self.K**2 * (1.0 / blocks.rate)
+        return np.asarray(covariance)
 
     def block_sums(self, blocks: int, width: int, rate: float, rng: np.random.Generator) -> Array:
         """Draw them with the states at their ends."""

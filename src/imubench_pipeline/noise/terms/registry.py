@@ -29,10 +29,10 @@ def registered(*kinds: type[Term]) -> tuple[type[Term], ...]:
     for kind in kinds:
         _check(kind)
     for name in ("symbol", "word"):
-        given = [getattr(kind, name) for kind in kinds]
-        twice = sorted({one for one in given if given.count(one) > 1})
-        if twice:
-            raise TypeError(f"{name} {twice[0]!r} is that of two noise terms")
+        stated = [getattr(kind, name) for kind in kinds]
+        for value in stated:
+            if stated.count(value) > 1:
+                raise TypeError(f"{name} {value!r} is that of two noise terms")
     known: dict[str, TermParameter] = {}
     for kind in kinds:
         for parameter in kind.parameters:
@@ -46,14 +46,17 @@ def _check(kind: type[Term]) -> None:
     if inspect.isabstract(kind):
         missing = ", ".join(sorted(kind.__abstractmethods__))
         raise TypeError(f"the noise term {name} lacks {missing}")
-    lacking = [one for one in _STATED if not hasattr(kind, one)]
+    lacking = [variable for variable in _STATED if not hasattr(kind, variable)]
     if lacking:
         raise TypeError(f"the noise term {name} lacks the class variable {', '.join(lacking)}")
-    symbols, own = [one.symbol for one in kind.parameters], [one.name for one in fields(kind)]
+    symbols = [parameter.symbol for parameter in kind.parameters]
+    own = [field.name for field in fields(kind)]
     if symbols != own:
         raise TypeError(f"the noise term {name} states the parameters {symbols}, and has {own}")
-    for one in kind.parameters:
-        if (one.signal, one.seconds) == (0.0, 1.0) and one.search is None:
-            raise TypeError(f"{one.symbol} of {name} is a time, without the range of a search")
+    for parameter in kind.parameters:
+        if (parameter.signal, parameter.seconds) == (0.0, 1.0) and parameter.search is None:
+            raise TypeError(
+                f"{parameter.symbol} of {name} is a time, without the range of a search"
+            )
     if (kind.role is Role.GAUSS_MARKOV) != (kind.gauss_markov is not Term.gauss_markov):
         raise TypeError(f"the role of {name} and its process (`gauss_markov`) are not the same")
