@@ -1,5 +1,8 @@
 """The registry refuses a term that lacks something; whoever lists terms lists all of them."""
 
+import importlib
+import inspect
+import pkgutil
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +23,7 @@ from imubench_pipeline.noise import (
     Term,
     TermParameter,
     WhiteNoise,
+    terms,
 )
 from imubench_pipeline.noise.terms.registry import registered
 from imubench_pipeline.recordings.fitness import SCALES
@@ -92,6 +96,17 @@ def test_a_term_that_says_nothing_is_refused(name: str, monkeypatch: pytest.Monk
     monkeypatch.delattr(WhiteNoise, name)
     with pytest.raises(TypeError, match=f"WhiteNoise lacks the class variable {name}"):
         registered(WhiteNoise)
+
+
+def test_every_kind_is_registered() -> None:
+    for module in pkgutil.iter_modules(terms.__path__, f"{terms.__name__}."):
+        importlib.import_module(module.name)
+    known, kinds = {Term}, [Term]
+    while kinds:
+        more = kinds.pop().__subclasses__()
+        kinds += more
+        known.update(kind for kind in more if kind.__module__.startswith(terms.__name__))
+    assert {kind for kind in known if not inspect.isabstract(kind)} == set(TERMS)
 
 
 @pytest.mark.parametrize("kind", TERMS)

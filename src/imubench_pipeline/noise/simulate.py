@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from imubench_pipeline.allan import of_phase
 from imubench_pipeline.allan.phase import integrate
 from imubench_pipeline.noise.model import NoiseModel
+from imubench_pipeline.noise.state_space import root_of
 from imubench_pipeline.noise.variance_covariance import variance_covariance
 from imubench_pipeline.typing import Array
 
@@ -76,8 +77,8 @@ def simulate_blocks(
         for space, state, stream in zip(spaces, states, streams, strict=True):
             if len(state):
                 driven = np.flatnonzero(np.diag(space.process_noise))
-                drive = stream.standard_normal((size, len(driven)))
-                drive *= np.sqrt(np.diag(space.process_noise)[driven])
+                root = root_of(space.process_noise)[np.ix_(driven, driven)]
+                drive = stream.standard_normal((size, len(driven))) @ root.T
                 _add_states(log, state, space.transition, driven, drive, space.output)
         yield log
 

@@ -89,6 +89,23 @@ class ContinuousSpace:
         return cls(none, none, np.zeros(0))
 
 
+def root_of(covariance: Array) -> Array:
+    """Return the lower triangular root of a covariance; what does not vary has a row of zeros.
+
+    Parameters
+    ----------
+    covariance : ndarray, shape (m, m)
+
+    Returns
+    -------
+    ndarray, shape (m, m)
+    """
+    varying = np.flatnonzero(np.diag(covariance))
+    root, own = np.zeros_like(covariance), np.ix_(varying, varying)
+    root[own] = np.linalg.cholesky(covariance[own])
+    return root
+
+
 def repeated(transition: Array, noise: Array, times: int) -> tuple[Array, Array]:
     """Return what a step does when it is done several times, by powers of two.
 

@@ -18,7 +18,7 @@ from imubench_pipeline.experiments.earth_rate.covariance import longest
 from imubench_pipeline.experiments.earth_rate.experiment import Blocks
 from imubench_pipeline.noise import NoiseModel, Role, Term
 from imubench_pipeline.noise.block_means import of_block_means
-from imubench_pipeline.noise.state_space import StateSpace, repeated
+from imubench_pipeline.noise.state_space import StateSpace, repeated, root_of
 from imubench_pipeline.typing import Array
 
 WIDE = 1.0
@@ -115,7 +115,7 @@ def block_states(model: NoiseModel, blocks: Blocks, turn_on_bias: float = WIDE) 
     steps = tuple(_step(whole, int(gap), int(size)) for gap, size in kinds.T)
     return BlockStates(
         tuple(names),
-        np.sqrt(whole.initial_variance),
+        root_of(whole.initial_variance),
         steps,
         which.ravel(),
         np.sqrt(white / blocks.count),
