@@ -86,7 +86,7 @@ class Flicker(Term):
         return None
 
     @property
-    def drive(self) -> Drive | None:
+    def drive(self) -> Drive:
         """B of flicker noise."""
         return Drive(flicker=self.B)
 
@@ -139,7 +139,7 @@ class Flicker(Term):
         """
         raise TypeError("flicker noise has no finite state space; take its Gauss-Markov bank")
 
-    def reading(self, lowest_tau: float) -> Reading | None:
+    def reading(self, lowest_tau: float) -> Reading:
         """0.664 B: it is as high everywhere; the curve shows it where it is lowest."""
         return Reading(lowest_tau, FLOOR * self.B, "B", FLOOR)
 

@@ -119,19 +119,19 @@ class GaussMarkov(Term):
             stationary,
         )
 
-    def continuous_space(self) -> ContinuousSpace | None:
+    def continuous_space(self) -> ContinuousSpace:
         """F = -1/T_B, Q = S_B."""
         return ContinuousSpace(
             np.array([[-1.0 / self.T_B]]), np.array([[self.density]]), np.ones(1)
         )
 
     @property
-    def drive(self) -> Drive | None:
+    def drive(self) -> Drive:
         """S_B through T_B."""
         return Drive(process=Process(self.T_B, self.density))
 
     @property
-    def gauss_markov(self) -> GaussMarkov | None:
+    def gauss_markov(self) -> GaussMarkov:
         """Itself."""
         return self
 
@@ -193,7 +193,7 @@ class GaussMarkov(Term):
         space = self.state_space(interval)
         return of_scalar(space, self.start(rng, interval), blocks, width, rng)
 
-    def reading(self, lowest_tau: float) -> Reading | None:
+    def reading(self, lowest_tau: float) -> Reading:
         """0.664 B at the peak."""
         return Reading(PEAK_TAU * self.T_B, FLOOR * self.B, "B", FLOOR, peak=True)
 

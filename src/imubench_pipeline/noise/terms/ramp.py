@@ -54,7 +54,7 @@ class Ramp(Deterministic):
             np.zeros((2, 2)),
         )
 
-    def continuous_space(self) -> ContinuousSpace | None:
+    def continuous_space(self) -> ContinuousSpace:
         """Give the states: the drift, and its rate."""
         return ContinuousSpace(
             np.array([[0.0, 1.0], [0.0, 0.0]]), np.zeros((2, 2)), np.array([1.0, 0.0])

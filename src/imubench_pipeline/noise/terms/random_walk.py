@@ -60,12 +60,12 @@ class RandomWalk(Term):
         """Phi = 1, Q_d = K^2 T; it starts at 0."""
         return StateSpace.scalar(1.0, self.K**2 * interval, 0.0)
 
-    def continuous_space(self) -> ContinuousSpace | None:
+    def continuous_space(self) -> ContinuousSpace:
         """F = 0, Q = K^2."""
         return ContinuousSpace(np.zeros((1, 1)), np.array([[self.K**2]]), np.ones(1))
 
     @property
-    def drive(self) -> Drive | None:
+    def drive(self) -> Drive:
         """K^2, never forgotten."""
         return Drive(process=Process(math.inf, self.K**2))
 
@@ -105,6 +105,6 @@ class RandomWalk(Term):
         space = self.state_space(interval)
         return of_scalar(space, self.start(rng, interval), blocks, width, rng)
 
-    def reading(self, lowest_tau: float) -> Reading | None:
+    def reading(self, lowest_tau: float) -> Reading:
         """K at 3 s."""
         return Reading(3.0, self.K, "K")

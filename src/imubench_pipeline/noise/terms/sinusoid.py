@@ -65,7 +65,7 @@ class Sinusoid(Deterministic):
             np.eye(2) * self.amplitude**2 / 2.0,
         )
 
-    def continuous_space(self) -> ContinuousSpace | None:
+    def continuous_space(self) -> ContinuousSpace:
         """Turn at 2 pi f_0."""
         speed = 2.0 * math.pi * self.frequency
         return ContinuousSpace(

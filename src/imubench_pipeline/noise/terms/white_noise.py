@@ -64,12 +64,12 @@ class WhiteNoise(Term):
         """No state: R_d = N^2 / T."""
         return StateSpace.without_states(self.N**2 / interval)
 
-    def continuous_space(self) -> ContinuousSpace | None:
+    def continuous_space(self) -> ContinuousSpace:
         """No state: the density of the measurement is that of `drive`."""
         return ContinuousSpace.without_states()
 
     @property
-    def drive(self) -> Drive | None:
+    def drive(self) -> Drive:
         """N^2."""
         return Drive(white=self.N**2)
 
@@ -111,6 +111,6 @@ class WhiteNoise(Term):
         """Draw sums of variance n N^2 / T."""
         return rng.standard_normal(blocks) * math.sqrt(width * self.N**2 * rate)
 
-    def reading(self, lowest_tau: float) -> Reading | None:
+    def reading(self, lowest_tau: float) -> Reading:
         """N at 1 s."""
         return Reading(1.0, self.N, "N")
