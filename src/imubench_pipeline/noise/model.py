@@ -12,6 +12,7 @@ from scipy.linalg import block_diag
 
 from imubench_pipeline.noise.state_space import StateSpace
 from imubench_pipeline.noise.terms import (
+    PARAMETERS,
     Deterministic,
     Flicker,
     GaussMarkov,
@@ -76,11 +77,15 @@ class NoiseModel:
         for name in ("Q", "N", "B", "K"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0):
-                raise ValueError(f"{name} is {value}, expected a number from 0")
+                label = PARAMETERS[name].label
+                raise ValueError(f"the {label} {name} is {value}, expected a number from 0")
         if not math.isfinite(self.R):
-            raise ValueError(f"R is {self.R}, expected a finite number")
+            raise ValueError(f"the {PARAMETERS['R'].label} R is {self.R}, expected a finite number")
         if self.T_B is not None and not (math.isfinite(self.T_B) and self.T_B > 0):
-            raise ValueError(f"T_B is {self.T_B}, expected a time above 0, or None for flicker")
+            label = PARAMETERS["T_B"].label
+            raise ValueError(
+                f"the {label} T_B is {self.T_B} s, expected a time above 0, or None for flicker"
+            )
         for term in self.further:
             if isinstance(term, _OWN_PLACE):
                 raise ValueError(f"{term} is no further term, expected it in its own parameter")

@@ -188,6 +188,7 @@ class Gyrocompass:
 
     def _of_noise(self, time: float, *, swings: bool) -> Iterator[Contribution]:
         for term in self.gyro.terms:
+            # A line alone swings: its mean is nothing after each whole period.
             if isinstance(term, Sinusoid) and not swings:
                 sigma = self._envelope(term, time)
             else:
