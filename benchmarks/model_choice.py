@@ -25,8 +25,8 @@ from bands import bounds_over, highest, what_is_cut
 from imubench_pipeline.estimators.estimate import PARAMETERS, Parameter
 from imubench_pipeline.estimators.likelihood import Likelihood, fit
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
-from imubench_pipeline.noise.flicker import ripple
 from imubench_pipeline.noise.simulate import simulate
+from imubench_pipeline.noise.terms.flicker import ripple
 
 RATE = 20.0
 DURATION = 36_000.0

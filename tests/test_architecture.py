@@ -38,7 +38,7 @@ def test_no_arrow_points_back() -> None:
 @pytest.mark.parametrize(
     ("module", "line"),
     [
-        ("noise/terms.py", "from imubench_pipeline.estimators.estimate import Estimate\n"),
+        ("noise/terms/ramp.py", "from imubench_pipeline.estimators.estimate import Estimate\n"),
         ("readers/batch.py", "from imubench_pipeline.noise import NoiseModel\n"),
         ("experiments/alignment/fine.py", "from imubench_pipeline.settings.config import Run\n"),
         ("flat.py", "\n"),

@@ -1,7 +1,7 @@
 """Error budgets against simulated runs of dead reckoning."""
 
 import math
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,18 +19,14 @@ from imubench_pipeline.navigation.error_budget import (
     budget,
 )
 from imubench_pipeline.noise import (
-    Flicker,
     GaussMarkov,
     NoiseModel,
-    Quantization,
-    Ramp,
-    RandomWalk,
     Sinusoid,
     Term,
-    WhiteNoise,
 )
-from imubench_pipeline.noise.growth import SensorStart, variance
+from imubench_pipeline.noise.growth import SensorStart
 from imubench_pipeline.noise.simulate import simulate
+from tests.noise.examples import EXAMPLES, model_of, named
 
 Array = NDArray[np.float64]
 
@@ -39,16 +35,6 @@ RATE = 20.0
 BEFORE = 20.0
 TIMES = (4.0, 30.0)
 RUNS = 2000
-TERMS: tuple[Term, ...] = (
-    Quantization(0.3),
-    WhiteNoise(0.5),
-    Flicker(0.4),
-    GaussMarkov(0.7, 1.5),
-    GaussMarkov(0.7, 200.0),
-    RandomWalk(0.2),
-    Ramp(-0.01),
-    Sinusoid(0.5, 0.21),
-)
 
 
 def fractional_noise(shape: tuple[int, int], rng: np.random.Generator, earlier: int) -> Array:
@@ -64,21 +50,12 @@ def logs(model: NoiseModel, begun: bool, rng: np.random.Generator) -> Array:
     """Return simulated logs; flicker noise has a long past, or it begins with the log."""
     samples = round((BEFORE + max(TIMES)) * RATE)
     flicker = model.B if model.T_B is None else 0.0
-    rest = NoiseModel(
-        Q=model.Q,
-        N=model.N,
-        B=0.0 if flicker else model.B,
-        T_B=model.T_B,
-        K=model.K,
-        R=model.R,
-        further=model.further,
-        sinusoids=model.sinusoids,
-    )
-    found = np.array([simulate(rest, RATE, samples, one) for one in rng.spawn(RUNS)])
+    rest = replace(model, B=0.0) if flicker else model
+    log = np.array([simulate(rest, RATE, samples, stream) for stream in rng.spawn(RUNS)])
     if flicker:
         earlier = 0 if begun else 8 * samples
-        found += flicker * fractional_noise(found.shape, rng, earlier)
-    return found
+        log += flicker * fractional_noise(log.shape, rng, earlier)
+    return log
 
 
 def integrated(rate: Array) -> Array:
@@ -99,21 +76,10 @@ def spread(errors: Array) -> tuple[float, float]:
     return sigma, float(squares.std()) / math.sqrt(len(errors)) / (2.0 * sigma)
 
 
-def model_of(term: Term) -> NoiseModel:
-    match term:
-        case GaussMarkov(B, T_B):
-            return NoiseModel(B=B, T_B=T_B)
-        case Sinusoid():
-            return NoiseModel(sinusoids=(term,))
-    name = "B" if isinstance(term, Flicker) else term.symbol
-    values: dict[str, Any] = {name: getattr(term, name)}
-    return NoiseModel(**values)
-
-
 @pytest.mark.parametrize("calibrated", [True, False])
-@pytest.mark.parametrize("term", TERMS, ids=lambda t: repr(t))
+@pytest.mark.parametrize("term", EXAMPLES, ids=named)
 def test_each_term_grows_as_in_simulated_runs(term: Term, calibrated: bool) -> None:
-    rng = np.random.default_rng([7, TERMS.index(term), calibrated])
+    rng = np.random.default_rng([7, EXAMPLES.index(term), calibrated])
     log = logs(model_of(term), not calibrated, rng)
     rest = round(BEFORE * RATE)
     # A sample stands for the middle of its interval: a walk begins half an interval later.
@@ -126,7 +92,7 @@ def test_each_term_grows_as_in_simulated_runs(term: Term, calibrated: bool) -> N
     for time in TIMES:
         for order in range(3):
             found, error = spread(errors[order, :, round(time * RATE) - 1])
-            expected = math.sqrt(variance(term, order, time, start))
+            expected = math.sqrt(term.growth(order, time, start))
             assert abs(found - expected) < 4.0 * error + 2e-3 * expected, (time, order)
 
 

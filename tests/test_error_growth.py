@@ -19,24 +19,16 @@ from imubench_pipeline.noise import (
     Quantization,
     Ramp,
     RandomWalk,
+    Role,
     Sinusoid,
     Term,
     WhiteNoise,
 )
-from imubench_pipeline.noise.growth import SensorStart, mean_variance, variance
+from imubench_pipeline.noise.growth import SensorStart
+from tests.noise.examples import NOISES, named
 
 Array = NDArray[np.float64]
 
-TERMS: tuple[Term, ...] = (
-    Quantization(0.3),
-    WhiteNoise(0.5),
-    Flicker(0.4),
-    GaussMarkov(0.7, 1.5),
-    GaussMarkov(0.7, 200.0),
-    RandomWalk(0.2),
-    Ramp(-0.01),
-    Sinusoid(0.5, 0.21),
-)
 log_times = st.floats(-2.5, 3.5).map(lambda x: 10.0**x)
 orders = st.integers(0, 2)
 
@@ -79,7 +71,9 @@ def squared_gain(omega: Array, order: int, time: float, window: float) -> Array:
 
 @pytest.mark.parametrize("order", [0, 1, 2])
 @pytest.mark.parametrize(("time", "window"), [(3.0, 10.0), (40.0, 10.0), (10.0, 10.0)])
-@pytest.mark.parametrize("term", [t for t in TERMS[1:6]], ids=lambda t: repr(t))
+@pytest.mark.parametrize(
+    "term", [term for term in NOISES if term.role is not Role.NOT_GROWING], ids=named
+)
 def test_variance_is_the_integral_of_the_spectrum(
     term: Term, order: int, time: float, window: float
 ) -> None:
@@ -100,7 +94,7 @@ def test_variance_is_the_integral_of_the_spectrum(
     near = term.psd(np.array([end, end * 1.01]))
     slope = -math.log(near[1] / near[0]) / math.log(1.01)
     total += 2.0 * float(near[0]) * jumps / (4.0 * np.pi**2 * end) / (1.0 + slope)
-    found = variance(term, order, time, Calibrated(window))
+    found = term.growth(order, time, Calibrated(window))
     assert found == pytest.approx(total, rel=1e-5)
 
 
@@ -122,7 +116,7 @@ def test_quantization_by_parseval(order: int, start: SensorStart) -> None:
 
     h = np.where((s > -window) & (s < time), kernel(s), 0.0)
     total = float(np.sum((h[20:] - h[:-20]) ** 2)) / 20.0
-    found = variance(Quantization(1.0), order, time, start)
+    found = Quantization(1.0).growth(order, time, start)
     assert found == pytest.approx(total, rel=3e-3)
 
 
@@ -138,7 +132,7 @@ def test_flicker_since_switch_on_by_its_covariance(order: int, time: float, on_t
         return 2.0 * covariance * ((1 - s) * (1 - u)) ** order / math.factorial(order) ** 2
 
     expected = dblquad(integrand, 0.0, 1.0, 0.0, lambda s: s, epsabs=1e-8)[0]
-    found = variance(Flicker(1.0), order, time, Uncalibrated(bias=0.0, on_time=on_time))
+    found = Flicker(1.0).growth(order, time, Uncalibrated(bias=0.0, on_time=on_time))
     assert found == pytest.approx(expected * time ** (2 * order + 2), rel=1e-6)
 
 
@@ -197,8 +191,8 @@ def test_calibrated_flicker_and_walk_to_nine_digits(order: int, time: float, win
         flicker = folded(of_logarithm, order, time, window)
         walk = folded(of_distance, order, time, window)
     start = Calibrated(window)
-    assert variance(Flicker(1.0), order, time, start) == pytest.approx(flicker, rel=1e-9)
-    assert variance(RandomWalk(1.0), order, time, start) == pytest.approx(walk, rel=1e-12)
+    assert Flicker(1.0).growth(order, time, start) == pytest.approx(flicker, rel=1e-9)
+    assert RandomWalk(1.0).growth(order, time, start) == pytest.approx(walk, rel=1e-12)
 
 
 @given(orders, log_times, log_times, st.floats(-4.0, 7.0))
@@ -210,9 +204,9 @@ def test_gauss_markov_to_ten_digits(
         integral = of_exponential(term.T_B)
         calibrated = folded(integral, order, time, window)
         stationary = float(_double(integral, order, mpmath.mpf(time)))
-    found = variance(term, order, time, Calibrated(window)) / term.density
+    found = term.growth(order, time, Calibrated(window)) / term.density
     assert found == pytest.approx(calibrated, rel=1e-10)
-    found = variance(term, order, time, Uncalibrated(bias=0.0, on_time=3.0)) / term.density
+    found = term.growth(order, time, Uncalibrated(bias=0.0, on_time=3.0)) / term.density
     assert found == pytest.approx(stationary, rel=1e-10)
 
 
@@ -228,21 +222,12 @@ def test_lines_to_nine_digits(order: int, time: float, window: float, log_rate: 
         gain = abs(moving - c * (1 - mpmath.exp(-1j * w * W)) / (1j * w * W))
     # The phase itself is known to so many digits only.
     digits = 1e-9 + 1e-14 * frequency * (time + window)
-    found = math.sqrt(2.0 * variance(Sinusoid(1.0, frequency), order, time, Calibrated(window)))
+    found = math.sqrt(2.0 * Sinusoid(1.0, frequency).growth(order, time, Calibrated(window)))
     size = float(c)
     assert found == pytest.approx(float(gain), rel=1e-9, abs=digits * min(size, float(gain) + size))
 
 
 # Relations between the closed forms
-
-
-@pytest.mark.parametrize("term", TERMS, ids=lambda t: repr(t))
-@pytest.mark.parametrize("tau", [0.3, 4.0, 70.0])
-def test_equal_window_and_motion_give_the_allan_variance(term: Term, tau: float) -> None:
-    # The difference of adjacent means has twice the Allan variance.
-    expected = 2.0 * float(term.allan_variance(np.array([tau]))[0])
-    found = variance(term, 0, tau, Calibrated(tau)) / tau**2
-    assert found == pytest.approx(expected, rel=1e-9)
 
 
 @given(orders, log_times, log_times, st.floats(0.01, 100.0))
@@ -255,7 +240,7 @@ def test_scaling_laws(order: int, time: float, window: float, factor: float) -> 
     )
     for slope, term in enumerate((WhiteNoise(0.3), Flicker(0.3), RandomWalk(0.3), Ramp(0.3))):
         for before, after in pairs:
-            ratio = variance(term, order, later, after) / variance(term, order, time, before)
+            ratio = term.growth(order, later, after) / term.growth(order, time, before)
             assert ratio == pytest.approx(factor ** (2 * order + 1 + slope), rel=1e-8)
 
 
@@ -267,23 +252,18 @@ def test_a_gauss_markov_process_lies_between_white_noise_and_a_walk(
     # S(f) = S_B T_B^2 / (1 + (2 pi f T_B)^2)
     short = GaussMarkov(1.0, 1e-6 * min(time, window))
     white = WhiteNoise(math.sqrt(short.density) * short.T_B)
-    assert variance(short, order, time, start) == pytest.approx(
-        variance(white, order, time, start), rel=1e-4
+    assert short.growth(order, time, start) == pytest.approx(
+        white.growth(order, time, start), rel=1e-4
     )
     long = GaussMarkov(1.0, 1e7 * max(time, window))
     walk = RandomWalk(math.sqrt(long.density))
-    assert variance(long, order, time, start) == pytest.approx(
-        variance(walk, order, time, start), rel=1e-4
+    assert long.growth(order, time, start) == pytest.approx(
+        walk.growth(order, time, start), rel=1e-4
     )
-
-
-def test_unknown_terms_are_refused() -> None:
-    with pytest.raises(TypeError, match="not known"):
-        variance(object(), 0, 1.0, Calibrated(1.0))  # type: ignore[arg-type]  # wrong on purpose
 
 
 def test_the_mean_of_flicker_since_switch_on() -> None:
     # Right after switch-on 2/pi B^2; long after (B^2/pi) (ln(4 A / t) + 3/2).
-    assert mean_variance(Flicker(2.0), 5.0, 0.0) == pytest.approx(8.0 / math.pi)
+    assert Flicker(2.0).mean_variance(5.0, 0.0) == pytest.approx(8.0 / math.pi)
     late = (math.log(4e6) + 1.5) * 4.0 / math.pi
-    assert mean_variance(Flicker(2.0), 5.0, 5e6) == pytest.approx(late, rel=1e-6)
+    assert Flicker(2.0).mean_variance(5.0, 5e6) == pytest.approx(late, rel=1e-6)

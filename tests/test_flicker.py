@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.noise import FLOOR, NoiseModel
-from imubench_pipeline.noise.flicker import bank, ripple
+from imubench_pipeline.noise.terms.flicker import bank, ripple
 
 
 @pytest.mark.parametrize("band", [(0.01, 36_000.0), (0.02, 20.0), (1.0, 1e7)])

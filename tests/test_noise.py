@@ -14,12 +14,12 @@ from imubench_pipeline.noise import (
     Quantization,
     Ramp,
     RandomWalk,
-    Sinusoid,
     WhiteNoise,
     bias_instability,
     driving_density,
     sampled_gauss_markov_shape,
 )
+from tests.noise.test_terms import covariance_of_samples
 
 MTI_7 = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7)
 
@@ -38,26 +38,6 @@ def test_gauss_markov_to_ten_digits_at_every_tau(log_ratio: float, log_time: flo
     term = GaussMarkov(1.0, T_B)
     expected = float(exact_gauss_markov(tau, T_B)) * term.density
     assert term.allan_variance(np.array([tau]))[0] == pytest.approx(expected, rel=1e-10)
-
-
-@pytest.mark.parametrize(
-    "term", [WhiteNoise(0.3), GaussMarkov(0.7, 5.0), RandomWalk(0.2), Flicker(0.4)]
-)
-@pytest.mark.parametrize("tau", [0.5, 3.0, 40.0])
-def test_allan_variance_is_the_integral_of_the_spectrum(term, tau: float) -> None:
-    # sigma^2 = 4 int S sin^4(pi f tau) / (pi f tau)^2 df, with x = pi f tau
-    def integrand(x: float) -> float:
-        return float(term.psd(np.array([x / (np.pi * tau)]))[0] * np.sin(x) ** 4 / x**2)
-
-    total = sum(
-        quad(integrand, k * np.pi + 1e-12, (k + 1) * np.pi, limit=200)[0] for k in range(3000)
-    )
-    # beyond, sin^4 averages to 3/8; the rest falls with 1/x at least
-    last = 3000 * np.pi
-    tail = 3 / 8 * float(term.psd(np.array([last / (np.pi * tau)]))[0]) / last
-    assert 4 / (np.pi * tau) * (total + tail) == pytest.approx(
-        float(term.allan_variance(np.array([tau]))[0]), rel=2e-6
-    )
 
 
 @pytest.mark.parametrize("n", [1, 2, 7, 60])
@@ -81,26 +61,6 @@ def test_sampled_random_walk_is_the_sum_of_covariances(n: int) -> None:
     expected = weights @ covariance @ weights / 2
     found = RandomWalk(K).sampled_allan_variance(np.array([float(n)]), interval)[0]
     assert found == pytest.approx(expected, rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    "term",
-    [
-        WhiteNoise(0.3),
-        GaussMarkov(0.7, 5.0),
-        RandomWalk(0.2),
-        Flicker(0.4),
-        Quantization(0.1),
-    ],
-)
-def test_sampled_spectrum_gives_the_sampled_allan_variance(term) -> None:
-    interval, points = 0.1, 1 << 16
-    omega = np.pi * (np.arange(points) + 0.5) / points
-    for n in (1, 4, 50):
-        transfer = 4 * np.sin(n * omega / 2) ** 4 / (n**2 * np.sin(omega / 2) ** 2)
-        found = np.mean(term.sampled_spectrum(omega, interval) * transfer) / 2
-        expected = term.sampled_allan_variance(np.array([float(n)]), interval)[0]
-        assert found == pytest.approx(expected, rel=1e-6)
 
 
 def test_the_peak_of_gauss_markov_is_the_plateau_of_b() -> None:
@@ -147,48 +107,12 @@ def test_impossible_models(values: dict) -> None:
         NoiseModel(**values)
 
 
-def sampled_variance(space, n: int, interval: float) -> float:
-    """Allan variance of the output of a state space, from the covariances of its samples."""
-    mean, covariance = space.initial_mean, space.initial_variance
-    means, between = [], np.zeros((2 * n, 2 * n))
-    for i in range(2 * n):
-        means.append(space.output @ mean)
-        ahead = covariance
-        for j in range(i, 2 * n):
-            between[i, j] = between[j, i] = space.output @ ahead @ space.output
-            ahead = space.transition @ ahead
-        between[i, i] += space.measurement_noise
-        mean = space.transition @ mean
-        covariance = space.transition @ covariance @ space.transition.T + space.process_noise
-    weights = np.concatenate([-np.ones(n), np.ones(n)]) / n
-    return float(weights @ (between + np.outer(means, means)) @ weights / 2)
-
-
-@pytest.mark.parametrize("n", [1, 2, 7])
-def test_the_state_space_has_the_sampled_allan_variance(n: int) -> None:
-    model = NoiseModel(
-        Q=0.01,
-        N=0.2,
-        B=0.5,
-        T_B=3.0,
-        K=0.1,
-        R=0.3,
-        further=[GaussMarkov(0.4, 0.3)],
-    )
-    expected = model.allan_variance([n * 0.1], 10.0)[0]
-    assert sampled_variance(model.state_space(10.0), n, 0.1) == pytest.approx(expected, rel=1e-9)
+def test_terms_of_a_kind_have_their_states_side_by_side() -> None:
+    model = NoiseModel(Q=0.01, N=0.2, B=0.5, T_B=3.0, K=0.1, R=0.3, further=[GaussMarkov(0.4, 0.3)])
+    found = covariance_of_samples([model.state_space(10.0)], 8)
+    parts = covariance_of_samples([term.state_space(0.1) for term in model.terms], 8)
+    np.testing.assert_allclose(found, parts, rtol=1e-12)
     assert model.name == "Q+N+GM+GM+K+R"
-
-
-def test_a_sinusoid_averaged_over_its_phase_has_its_allan_variance() -> None:
-    line = Sinusoid(0.7, 0.23)
-    for n in (1, 5, 40):
-        expected = line.sampled_allan_variance(np.array([float(n)]), 0.1)[0]
-        space = line.state_space(0.1)
-        assert sampled_variance(space, n, 0.1) == pytest.approx(expected, rel=1e-9)
-    tau = np.array([401.0])
-    fine = line.sampled_allan_variance(tau / 1e-4, 1e-4)
-    np.testing.assert_allclose(fine, line.allan_variance(tau), rtol=1e-6)
 
 
 def test_ramp_and_quantization_in_closed_form() -> None:

@@ -7,7 +7,7 @@ import scipy.fft
 
 from imubench_pipeline.estimators.spectral_shapes import Shapes
 from imubench_pipeline.estimators.spectrum import SINGLE, Spectrum, spectra
-from imubench_pipeline.noise.flicker import bank
+from imubench_pipeline.noise.terms.flicker import bank
 
 RATE = 10.0
 CASES = ((1, 800), (8, 160))

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from imubench_pipeline.noise.state_space import repeated
+from imubench_pipeline.noise.state_space import repeated, root_of
 
 
 @pytest.mark.parametrize("times", [0, 1, 2, 7, 64, 100])
@@ -14,3 +14,13 @@ def test_a_step_done_so_often(times):
     found = repeated(step, root @ root.T, times)
     np.testing.assert_allclose(found[0], whole, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(found[1], added, rtol=1e-9, atol=1e-12)
+
+
+def test_the_root_of_a_covariance_in_which_something_does_not_vary():
+    own = np.array([[2.0, -0.7], [-0.7, 1.0]])
+    covariance = np.zeros((4, 4))
+    covariance[np.ix_([0, 2], [0, 2])] = own
+    root = root_of(covariance)
+    np.testing.assert_allclose(root @ root.T, covariance, atol=1e-15)
+    assert (np.triu(root, 1) == 0.0).all()
+    assert root_of(np.zeros((0, 0))).shape == (0, 0)

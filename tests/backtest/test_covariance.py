@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from imubench_pipeline.navigation.backtest.covariance import WindowCovariance, block_covariance
+from imubench_pipeline.navigation.backtest.covariance import WindowCovariance
 from imubench_pipeline.navigation.backtest.windows import Errors, Window, errors, window
 from imubench_pipeline.navigation.error_budget import Calibrated
 from imubench_pipeline.navigation.error_budget.budget import of_sensor
@@ -60,9 +60,9 @@ def test_the_covariance_of_blocks_is_that_of_their_means() -> None:
     v = process.density * process.T_B / 2.0
     for lag in (0, 1, 4):
         apart = np.abs(places[:, None] - places[None, :] - lag * block)
-        found = block_covariance(process, np.array([float(lag)]), block)[0]
+        found = process.block_covariance(np.array([float(lag)]), block)[0]
         assert found == pytest.approx(v * np.exp(-apart / 7.0).mean(), rel=1e-5)
-        found = block_covariance(walk, np.array([float(lag)]), block)[0]
+        found = walk.block_covariance(np.array([float(lag)]), block)[0]
         assert found == pytest.approx(-(0.5**2) / 2.0 * apart.mean(), rel=1e-5)
 
 

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from imubench_pipeline.experiments.earth_rate.covariance import of_means, of_term
+from imubench_pipeline.experiments.earth_rate.covariance import of_means
 from imubench_pipeline.experiments.earth_rate.experiment import Dwell, Experiment, block_means
 from imubench_pipeline.noise import Flicker, NoiseModel, RandomWalk, WhiteNoise
 from tests.earth_rate.brute import MODELS, of_blocks
@@ -26,16 +26,16 @@ def test_a_slow_process_keeps_its_digits():
     step = np.array([1.0, -1.0])
     walk = RandomWalk(model.terms[0].density ** 0.5)
     assert step @ of_means(model, blocks) @ step == pytest.approx(
-        step @ of_term(walk, blocks) @ step, rel=1e-4
+        step @ walk.mean_covariance(blocks) @ step, rel=1e-4
     )
 
 
 def test_white_noise_counts_the_samples_present():
     log = np.array([1.0, np.nan, 2.0, 3.0])
     found = block_means([log], Experiment((Dwell(0, 4, 1),), 4.0, 0.0), 4)
-    assert of_term(WhiteNoise(2.0), found.blocks)[0, 0] == pytest.approx(4.0 * 4.0 / 3)
+    assert WhiteNoise(2.0).mean_covariance(found.blocks)[0, 0] == pytest.approx(4.0 * 4.0 / 3)
 
 
 def test_flicker_noise_has_none():
-    with pytest.raises(TypeError, match="not known"):
-        of_term(Flicker(1.0), Experiment((Dwell(0, 4, 1),), 4.0, 0.0).blocks(4))
+    with pytest.raises(TypeError, match="no covariance"):
+        Flicker(1.0).mean_covariance(Experiment((Dwell(0, 4, 1),), 4.0, 0.0).blocks(4))

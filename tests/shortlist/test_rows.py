@@ -9,7 +9,7 @@ from imubench_pipeline.navigation.shortlist.classes import MeasuredRanges, measu
 from imubench_pipeline.navigation.shortlist.figures import printed_ranges
 from imubench_pipeline.navigation.shortlist.rows import VERDICTS, shortlist_rows
 from imubench_pipeline.noise import FLOOR, Flicker, GaussMarkov
-from imubench_pipeline.noise.growth import Uncalibrated, variance
+from imubench_pipeline.noise.growth import Uncalibrated
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import Sensor, read_sensors
 from imubench_pipeline.settings.validation import parse
@@ -84,7 +84,7 @@ def test_a_printed_bias_instability_is_b_or_the_minimum() -> None:
         sensor(noise_density=DENSITY, bias_instability=printed), of_class(K=(0.0, 1e-6))
     )
     start = Uncalibrated(bias=0.0, on_time=1.0)
-    floor = variance(Flicker(0.01 * DEG), 0, TIME, start)
+    floor = Flicker(0.01 * DEG).growth(0, TIME, start)
     white = N**2 * TIME
     walk = 1e-12 * (TIME**3 / 3.0 + TIME**2 * 1.0)
     assert row["best_margin"] == pytest.approx(margin(white + floor), rel=1e-8)
@@ -99,7 +99,7 @@ def test_the_worst_correlation_time_of_the_class_counts() -> None:
 
     def of_process(B: float) -> list[float]:
         terms = [Flicker(B), *(GaussMarkov(B, T_B) for T_B in (10.0, math.sqrt(4000.0), 400.0))]
-        return [variance(term, 0, TIME, start) for term in terms]
+        return [term.growth(0, TIME, start) for term in terms]
 
     B = 0.01 * DEG
     assert row["best_margin"] == pytest.approx(margin(N**2 * TIME + min(of_process(B))))
@@ -126,7 +126,7 @@ def test_b_of_the_datasheets_of_its_class_stands_for_one_that_is_not_published()
     assert ranges.printed == {("o", "gyro"): pytest.approx((0.01 * DEG, 0.01 * DEG / FLOOR))}
     (row,) = judged(silent, ranges)
     start = Uncalibrated(bias=0.0, on_time=1.0)
-    floor = variance(Flicker(0.01 * DEG), 0, TIME, start)
+    floor = Flicker(0.01 * DEG).growth(0, TIME, start)
     assert row["best_margin"] == pytest.approx(margin(N**2 * TIME + floor), rel=1e-8)
     assert "that of datasheets of class consumer (o)" in row["assumed"]
 

@@ -85,7 +85,7 @@ class Models:
 
 def models_of(model: NoiseModel) -> Models:
     """Return a noise model alone, without its ramp and lines, as `Models` of one."""
-    processes = list(model.further)
+    processes = model.further_processes
     letters = {"Q": model.Q, "N": model.N, "F": 0.0, "K": model.K}
     if model.T_B is None:
         letters["F"] = model.B

@@ -6,6 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
+from imubench_pipeline import units
+from imubench_pipeline.estimators.dimensions import DIMENSIONS
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
 from imubench_pipeline.typing import Array
 
@@ -27,32 +29,8 @@ COMPARED = ("N", "B_curve", "sigma_min", "K")
 """What is the same quantity of all models, and compared between sensors."""
 
 SI_UNITS: dict[str, dict[str, str]] = {
-    "gyro": {
-        "Q": "rad",
-        "N": "rad/s/sqrt(Hz)",
-        "B": "rad/s",
-        "T_B": "s",
-        "K": "rad/s/sqrt(s)",
-        "R": "rad/s^2",
-        "amplitude": "rad/s",
-        "frequency": "Hz",
-        "B_curve": "rad/s",
-        "sigma_min": "rad/s",
-        "tau_min": "s",
-    },
-    "accel": {
-        "Q": "m/s",
-        "N": "m/s^2/sqrt(Hz)",
-        "B": "m/s^2",
-        "T_B": "s",
-        "K": "m/s^2/sqrt(s)",
-        "R": "m/s^3",
-        "amplitude": "m/s^2",
-        "frequency": "Hz",
-        "B_curve": "m/s^2",
-        "sigma_min": "m/s^2",
-        "tau_min": "s",
-    },
+    quantity: {symbol: units.SI_UNITS[dimension] for symbol, dimension in dimensions.items()}
+    for quantity, dimensions in DIMENSIONS.items()
 }
 """SI unit of each parameter, by quantity."""
 

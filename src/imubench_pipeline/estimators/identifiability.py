@@ -236,7 +236,7 @@ def _as_maximum(model: NoiseModel) -> Maximum:
     values = {"Q": model.Q, "N": model.N, "F": 0.0 if model.T_B else model.B, "K": model.K}
     letters = "".join(letter for letter in "QNFK" if values[letter] > 0)
     processes = [(model.B, model.T_B)] if model.B > 0 and model.T_B else []
-    processes += [(process.B, process.T_B) for process in model.further]
+    processes += [(process.B, process.T_B) for process in model.further_processes]
     processes.sort(key=lambda process: process[1])
     powers = [values[letter] ** 2 for letter in letters] + [B**2 for B, _ in processes]
     return Maximum(

@@ -24,6 +24,7 @@ from imubench_pipeline.noise import (
     gauss_markov_shape,
     sampled_gauss_markov_shape,
 )
+from imubench_pipeline.noise.terms.gauss_markov import CORRELATION_TIMES
 from imubench_pipeline.typing import Array
 
 _FEWEST_POINTS = 4
@@ -34,9 +35,6 @@ _BENT_SIGMAS = 4.0
 _MOST_REFITS = 5
 _FADED = 0.1
 _SAMPLING_SIGMAS = 0.02
-_SHORTEST_CORRELATION = 20
-"""Sampling intervals: a shorter correlation is that of a filter, not a bias instability."""
-
 _SCAN = 160
 """Correlation times tried before the search is refined."""
 
@@ -209,7 +207,7 @@ class _Search:
         if sampled:
             self._walk = self._walk * (1.0 + 0.5 / self._n.astype(np.float64) ** 2)
         self.longest = self._tau[-1] / PEAK_TAU
-        self.shortest = min(_SHORTEST_CORRELATION * self._interval, self.longest / 2.0)
+        self.shortest = min(CORRELATION_TIMES.samples * self._interval, self.longest / 2.0)
 
     def _shape(self, T_B: float) -> Array:
         if self._sampled:

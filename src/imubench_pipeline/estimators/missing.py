@@ -22,7 +22,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from imubench_pipeline.noise import GaussMarkov, NoiseModel, RandomWalk
+from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.state_space import StateSpace
 from imubench_pipeline.typing import Array
 
@@ -196,7 +196,7 @@ def slow_part(
         terms = [
             term.state_space(interval)
             for term in model.realised(interval, max(len(mean), 2) * interval)
-            if isinstance(term, GaussMarkov | RandomWalk)
+            if term.drive is not None and term.drive.process is not None
         ]
         # The level itself is not known, but does not change.
         terms.append(StateSpace.scalar(1.0, 0.0, _DIFFUSE * spread**2))

@@ -26,6 +26,7 @@ from imubench_pipeline.estimators.whittle_kernels import (
     two_processes,
 )
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
+from imubench_pipeline.noise.terms.gauss_markov import CORRELATION_TIMES
 from imubench_pipeline.typing import Array
 
 SHAPES = 192
@@ -33,12 +34,6 @@ SHAPES = 192
 
 COARSE = 48
 """So many are enough to look for lines and for the band."""
-
-_SHORTEST_CORRELATION = 20
-"""Sampling intervals: a shorter correlation is that of a filter, not a bias instability."""
-
-_LONGEST_CORRELATION = 1 / 5
-"""Part of the log: a longer correlation cannot be told from a random walk."""
 
 
 @dataclass(frozen=True)
@@ -326,8 +321,8 @@ def whittle_of(
     behind : Behind, optional
         The sensor's low-pass, in these bins.
     """
-    longest = _LONGEST_CORRELATION * float(spectrum.length.max())
-    least = _SHORTEST_CORRELATION / spectrum.rate if shortest is None else shortest
+    longest = CORRELATION_TIMES.of_log * float(spectrum.length.max())
+    least = CORRELATION_TIMES.samples / spectrum.rate if shortest is None else shortest
     least = max(least, 1.0 / (np.pi * highest))
     return Whittle(spectrum, min(least, longest / 4.0), longest, shapes, behind)
 

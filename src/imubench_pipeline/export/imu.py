@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.export.temperature import TemperatureEffect
-from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
+from imubench_pipeline.noise import NoiseModel
 
 
 class ExportError(ValueError):
@@ -138,8 +138,8 @@ def inflated(model: NoiseModel, factor: float) -> NoiseModel:
         T_B=model.T_B,
         K=model.K * factor,
         R=model.R * factor,
-        further=[GaussMarkov(part.B * factor, part.T_B) for part in model.further],
-        sinusoids=[Sinusoid(part.amplitude * factor, part.frequency) for part in model.sinusoids],
+        further=[term.scaled(factor) for term in model.further],
+        sinusoids=[line.scaled(factor) for line in model.sinusoids],
     )
 
 

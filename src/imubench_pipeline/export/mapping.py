@@ -20,21 +20,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from imubench_pipeline.noise import (
-    Flicker,
-    GaussMarkov,
-    NoiseModel,
-    Quantization,
-    RandomWalk,
-    Sinusoid,
-    Term,
-    WhiteNoise,
-    bias_instability,
-)
+from imubench_pipeline.noise import GaussMarkov, NoiseModel, Role, Term, bias_instability
 from imubench_pipeline.typing import Array
 
 _SHORTEST = 1 / 30
@@ -93,11 +83,11 @@ def as_walk(
     if not slow:
         words = ["the model has no random walk, and no upper limit of one is known: it is 0"]
         return Mapped(NoiseModel(N=model.N), [*words, *_left_out(model)])
-    if all(isinstance(term, RandomWalk) for term in slow):
+    if all(term.role is Role.RANDOM_WALK for term in slow):
         return Mapped(NoiseModel(N=model.N, K=model.K), _left_out(model))
     K = math.sqrt(3.0 * _variance(slow, horizon) / horizon)
-    found = NoiseModel(N=model.N, K=K)
-    return _compared(model, found, f"a random walk K = {K:.3e}", slow, horizon, rate)
+    replacement = NoiseModel(N=model.N, K=K)
+    return _compared(model, replacement, f"a random walk K = {K:.3e}", slow, horizon, rate)
 
 
 def as_process(model: NoiseModel, horizon: float, rate: float) -> Mapped:
@@ -109,55 +99,55 @@ def as_process(model: NoiseModel, horizon: float, rate: float) -> Mapped:
     slow = _slow(model)
     if not slow:
         return Mapped(NoiseModel(N=model.N), _left_out(model))
-    if len(slow) == 1 and isinstance(slow[0], GaussMarkov):
-        process = slow[0]
+    processes = _processes(slow)
+    if len(slow) == len(processes) == 1:
+        (process,) = processes
         return Mapped(NoiseModel(N=model.N, B=process.B, T_B=process.T_B), _left_out(model))
     process = _nearest_process(slow, model.N, horizon)
-    found = NoiseModel(N=model.N, B=process.B, T_B=process.T_B)
+    replacement = NoiseModel(N=model.N, B=process.B, T_B=process.T_B)
     what = f"a Gauss-Markov process B = {process.B:.3e}, T_B = {process.T_B:.4g} s"
-    return _compared(model, found, what, slow, horizon, rate)
+    return _compared(model, replacement, what, slow, horizon, rate)
 
 
 def as_process_and_walk(model: NoiseModel, horizon: float, rate: float) -> Mapped:
     """Return white noise, one Gauss-Markov process and a random walk (see `as_process`)."""
     slow = _slow(model)
-    processes = [term for term in slow if isinstance(term, GaussMarkov)]
-    others = [term for term in slow if not isinstance(term, GaussMarkov | RandomWalk)]
-    if len(processes) <= 1 and not others:
+    processes = _processes(slow)
+    replaced = [term for term in slow if term.role is not Role.RANDOM_WALK]
+    if len(replaced) == len(processes) <= 1:
         B, T_B = (processes[0].B, processes[0].T_B) if processes else (0.0, None)
         return Mapped(NoiseModel(N=model.N, B=B, T_B=T_B, K=model.K), _left_out(model))
-    replaced = [term for term in slow if not isinstance(term, RandomWalk)]
     process = _nearest_process(replaced, model.N, horizon)
-    found = NoiseModel(N=model.N, B=process.B, T_B=process.T_B, K=model.K)
+    replacement = NoiseModel(N=model.N, B=process.B, T_B=process.T_B, K=model.K)
     what = f"a Gauss-Markov process B = {process.B:.3e}, T_B = {process.T_B:.4g} s"
-    return _compared(model, found, what, replaced, horizon, rate)
+    return _compared(model, replacement, what, replaced, horizon, rate)
 
 
 def named(terms: Sequence[Term]) -> str:
     """Return terms in words, with their values in SI."""
-    said = []
-    for term in terms:
-        if isinstance(term, GaussMarkov):
-            said.append(f"Gauss-Markov process B = {term.B:.3e}, T_B = {term.T_B:.4g} s")
-        elif isinstance(term, Flicker):
-            said.append(f"flicker noise B = {term.B:.3e}")
-        elif isinstance(term, Sinusoid):
-            said.append(f"line of amplitude {term.amplitude:.3e} at {term.frequency:.6g} Hz")
-        else:
-            said.append(f"{term.symbol} = {getattr(term, term.symbol):.3e}")
-    return ", ".join(said) or "no noise"
+    return ", ".join(term.in_words for term in terms) or "no noise"
+
+
+_KEPT_OR_LEFT_OUT = (Role.WHITE, Role.NOT_GROWING, Role.NO_NOISE)
 
 
 def _slow(model: NoiseModel) -> list[Term]:
-    return [t for t in model.terms if not isinstance(t, WhiteNoise | Quantization | Sinusoid)]
+    return [term for term in model.terms if term.role not in _KEPT_OR_LEFT_OUT]
+
+
+def _processes(terms: Sequence[Term]) -> list[GaussMarkov]:
+    return [term.gauss_markov for term in terms if term.gauss_markov is not None]
 
 
 def _left_out(model: NoiseModel) -> list[str]:
-    words = []
-    if model.Q > 0:
-        words.append(f"quantization noise Q = {model.Q:.3e} is left out: its error does not grow")
-    if model.sinusoids:
-        words.append(f"{named(list(model.sinusoids))}: left out, a line is no noise")
+    words = [
+        f"{term.label} noise {term.in_words} is left out: its error does not grow"
+        for term in model.terms
+        if term.role is Role.NOT_GROWING
+    ]
+    lines = [term for term in model.terms if term.role is Role.NO_NOISE]
+    if lines:
+        words.append(f"{named(lines)}: left out, a line is no noise")
     return words
 
 
@@ -188,19 +178,17 @@ def _nearest_process(slow: Sequence[Term], N: float, horizon: float) -> GaussMar
 
 def _compared(
     model: NoiseModel,
-    found: NoiseModel,
+    replacement: NoiseModel,
     what: str,
     replaced: Sequence[Term],
     horizon: float,
     rate: float,
 ) -> Mapped:
     """Say what was replaced, and by how much the deviation is off."""
-    noise = NoiseModel(
-        N=model.N, B=model.B, T_B=model.T_B, K=model.K, R=model.R, further=model.further
-    )
+    noise = replace(model, Q=0.0, sinusoids=())
 
     def error(tau: Array) -> Array:
-        return np.sqrt(found.allan_variance(tau) / noise.allan_variance(tau)) - 1.0
+        return np.sqrt(replacement.allan_variance(tau) / noise.allan_variance(tau)) - 1.0
 
     half, twice = (float(x) for x in error(np.array([0.5, 2.0]) * horizon))
     tau = np.geomspace(1.0 / rate, horizon, 200)
@@ -213,7 +201,7 @@ def _compared(
         f"by at most {100 * float(below[worst]):+.1f} % (at {tau[worst]:.3g} s)"
     ]
     return Mapped(
-        found,
+        replacement,
         [*words, *_left_out(model)],
         half,
         twice,

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import io
 import json
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -27,16 +26,7 @@ from scipy.linalg import block_diag
 from imubench_pipeline.export.comments import heading
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.mapping import named
-from imubench_pipeline.noise import (
-    GaussMarkov,
-    NoiseModel,
-    Quantization,
-    Ramp,
-    RandomWalk,
-    Sinusoid,
-    Term,
-    WhiteNoise,
-)
+from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
 FOLLOWED = 4.0
@@ -94,13 +84,14 @@ def matrices(model: NoiseModel, rate: float, horizon: float) -> Matrices:
     longest = max(FOLLOWED * horizon, 4.0 / rate)
     terms = model.realised(1.0 / rate, longest)
     discrete = model.state_space(rate, longest)
-    continuous = [_continuous(term) for term in terms if not isinstance(term, Quantization)]
+    spaces = [term.continuous_space() for term in terms]
+    continuous = [space for space in spaces if space is not None]
     nothing = np.zeros((0, 0))
     return Matrices(
-        F=block_diag(nothing, *(F for F, _, _ in continuous)),
-        Q=block_diag(nothing, *(Q for _, Q, _ in continuous)),
-        H_continuous=np.concatenate([np.zeros(0), *(H for _, _, H in continuous)]),
-        R=sum(term.N**2 for term in terms if isinstance(term, WhiteNoise)),
+        F=block_diag(nothing, *(space.transition for space in continuous)),
+        Q=block_diag(nothing, *(space.density for space in continuous)),
+        H_continuous=np.concatenate([np.zeros(0), *(space.output for space in continuous)]),
+        R=sum(term.drive.white for term in terms if term.drive is not None and term.drive.white),
         Phi=discrete.transition,
         Q_d=discrete.process_noise,
         H=discrete.output,
@@ -109,20 +100,6 @@ def matrices(model: NoiseModel, rate: float, horizon: float) -> Matrices:
         P0=discrete.initial_variance,
         states=[named([t]) for t in terms for _ in t.state_space(1.0 / rate).output],
     )
-
-
-def _continuous(term: Term) -> tuple[Array, Array, Array]:
-    """Return F, Q and H of a term."""
-    if isinstance(term, GaussMarkov):
-        return np.array([[-1.0 / term.T_B]]), np.array([[term.density]]), np.ones(1)
-    if isinstance(term, RandomWalk):
-        return np.zeros((1, 1)), np.array([[term.K**2]]), np.ones(1)
-    if isinstance(term, Ramp):
-        return np.array([[0.0, 1.0], [0.0, 0.0]]), np.zeros((2, 2)), np.array([1.0, 0.0])
-    if isinstance(term, Sinusoid):
-        speed = 2.0 * math.pi * term.frequency
-        return np.array([[0.0, speed], [-speed, 0.0]]), np.zeros((2, 2)), np.array([1.0, 0.0])
-    return np.zeros((0, 0)), np.zeros((0, 0)), np.zeros(0)
 
 
 def write_json(imu: Imu) -> str:
@@ -141,39 +118,39 @@ def write_json(imu: Imu) -> str:
         "inflation": imu.inflation,
     }
     for name, axis in imu.axes.items():
-        found = matrices(axis.model, imu.rate, imu.horizon)
+        of_axis = matrices(axis.model, imu.rate, imu.horizon)
         content[name] = {
             "model": axis.model.name,
             "unit": {"gyro": "rad/s", "accel": "m/s^2"}[name],
             "parameters": _parameters(axis.model),
             "density_bounded": list(axis.bounded) if axis.bounded else None,
-            "states": list(found.states),
+            "states": list(of_axis.states),
             "continuous": {
-                "F": found.F.tolist(),
-                "Q": found.Q.tolist(),
-                "H": found.H_continuous.tolist(),
-                "R": found.R,
+                "F": of_axis.F.tolist(),
+                "Q": of_axis.Q.tolist(),
+                "H": of_axis.H_continuous.tolist(),
+                "R": of_axis.R,
             },
             "discrete": {
-                "Phi": found.Phi.tolist(),
-                "Q_d": found.Q_d.tolist(),
-                "H": found.H.tolist(),
-                "R_d": found.R_d,
-                "x0": found.x0.tolist(),
-                "P0": found.P0.tolist(),
+                "Phi": of_axis.Phi.tolist(),
+                "Q_d": of_axis.Q_d.tolist(),
+                "H": of_axis.H.tolist(),
+                "R_d": of_axis.R_d,
+                "x0": of_axis.x0.tolist(),
+                "P0": of_axis.P0.tolist(),
             },
         }
     return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
 
 def _parameters(model: NoiseModel) -> dict[str, object]:
-    found: dict[str, object] = {name: getattr(model, name) for name in ("Q", "N", "B", "K", "R")}
-    found["T_B"] = model.T_B
-    found["further"] = [{"B": part.B, "T_B": part.T_B} for part in model.further]
-    found["sinusoids"] = [
-        {"amplitude": part.amplitude, "frequency": part.frequency} for part in model.sinusoids
-    ]
-    return found
+    parameters: dict[str, object] = {
+        name: getattr(model, name) for name in ("Q", "N", "B", "K", "R")
+    }
+    parameters["T_B"] = model.T_B
+    parameters["further"] = [term.values for term in model.further]
+    parameters["sinusoids"] = [line.values for line in model.sinusoids]
+    return parameters
 
 
 def write_npz(imu: Imu) -> bytes:
@@ -185,11 +162,11 @@ def write_npz(imu: Imu) -> bytes:
     """
     arrays: dict[str, Array] = {"rate": np.array(imu.rate), "horizon": np.array(imu.horizon)}
     for name, axis in imu.axes.items():
-        found = matrices(axis.model, imu.rate, imu.horizon)
+        of_axis = matrices(axis.model, imu.rate, imu.horizon)
         if axis.bounded:
             arrays[f"{name}_density_bounded"] = np.array(axis.bounded)
         for key in ("F", "Q", "H_continuous", "R", "Phi", "Q_d", "H", "R_d", "x0", "P0"):
-            arrays[f"{name}_{key}"] = np.asarray(getattr(found, key))
+            arrays[f"{name}_{key}"] = np.asarray(getattr(of_axis, key))
     about = np.array(heading(imu, "any Kalman filter", _CONVENTION.format(rate=imu.rate)))
     stream = io.BytesIO()
     np.savez(stream, about=about, **arrays)  # type: ignore[arg-type]  # its stub takes a flag among the arrays

@@ -50,7 +50,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from imubench_pipeline.allan import AllanCurve
-from imubench_pipeline.export.growth import growth, growth_of
+from imubench_pipeline.export.growth import growth
 from imubench_pipeline.export.smallest_model import (
     FAMILIES,
     Family,
@@ -58,7 +58,7 @@ from imubench_pipeline.export.smallest_model import (
     count_of_points,
     smallest,
 )
-from imubench_pipeline.noise import GaussMarkov, NoiseModel
+from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
 _LOOKS_AT = 0.37
@@ -271,7 +271,8 @@ def _excess(limit: Limits, model: NoiseModel) -> tuple[float, float]:
 
 def _unsuited(fitted: NoiseModel, family: Family, horizon: float) -> str | None:
     """Say so where a random walk is to follow a Gauss-Markov process beyond 2 T_B."""
-    times = [term.T_B for term in fitted.terms if isinstance(term, GaussMarkov)]
+    processes = [term.gauss_markov for term in fitted.terms if term.gauss_markov is not None]
+    times = [process.T_B for process in processes]
     if "GM" in family or not times or horizon <= _WALK_FOLLOWS * min(times):
         return None
     return (
@@ -355,8 +356,8 @@ def limits_of(
     return [
         Limits("Allan variance", tau, limit, lambda t: t.sampled_allan_variance(n, 1.0 / rate)),
         Limits("spectral density", frequency, density, lambda t: t.psd(frequency)),
-        Limits("first integral", time, first, lambda t: growth_of(t, time).first),
-        Limits("second integral", time, second, lambda t: growth_of(t, time).second),
+        Limits("first integral", time, first, lambda t: t.growth_from_known(time)[0]),
+        Limits("second integral", time, second, lambda t: t.growth_from_known(time)[1]),
     ]
 
 

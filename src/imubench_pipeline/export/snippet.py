@@ -1,17 +1,17 @@
 """Python that needs NumPy alone: the matrices of the noise at any rate, and a prediction.
 
 Held are white noise, Gauss-Markov processes, a random walk, and flicker noise as a bank of
-Gauss-Markov processes (`noise.flicker`) from the period of the samples to four times
-the horizon. Ramps, lines and quantization noise are not.
+Gauss-Markov processes (`noise.terms.flicker`) from the period of the samples to four times the
+horizon. Ramps, lines and quantization noise are not.
 """
 
 from __future__ import annotations
 
-from imubench_pipeline.export.comments import commented, heading, mapping_words
+from imubench_pipeline.export.comments import commented, heading
 from imubench_pipeline.export.imu import Imu
-from imubench_pipeline.export.mapping import Mapped, named
+from imubench_pipeline.export.mapping import named
 from imubench_pipeline.export.matrices import FOLLOWED
-from imubench_pipeline.noise import GaussMarkov, NoiseModel, RandomWalk, WhiteNoise
+from imubench_pipeline.noise.drives import drives_of
 
 _CONVENTION = (
     "White noise and random walk by their two-sided densities N^2 and K^2, Gauss-Markov processes "
@@ -74,17 +74,16 @@ def write(imu: Imu) -> str:
     imu : Imu
     """
     entries = ""
-    left_out: dict[str, Mapped] = {}
+    left_out: list[str] = []
     for name, axis in imu.axes.items():
-        model = axis.model
-        held = NoiseModel(N=model.N, B=model.B, T_B=model.T_B, K=model.K, further=model.further)
-        others = [term for term in model.terms if term not in held.terms]
+        others = [term for term in axis.model.terms if term.drive is None]
         if others:
-            left_out[name] = Mapped(held, [f"not held: {named(others)}"])
-        terms = held.realised(1.0 / imu.rate, max(FOLLOWED * imu.horizon, 4.0 / imu.rate))
-        white = float(sum(t.N**2 for t in terms if isinstance(t, WhiteNoise)))
-        walk = float(sum(t.K**2 for t in terms if isinstance(t, RandomWalk)))
-        processes = [(float(t.density), float(t.T_B)) for t in terms if isinstance(t, GaussMarkov)]
+            left_out.append(f"{name}: not held: {named(others)}.")
+        longest = max(FOLLOWED * imu.horizon, 4.0 / imu.rate)
+        drives = drives_of(axis.model.realised(1.0 / imu.rate, longest))
+        white = float(drives.white)
+        walk = float(sum(walk.density for walk in drives.walks))
+        processes = [(float(part.density), float(part.T_B)) for part in drives.processes]
         unit = {"gyro": ("rad/s", "rad"), "accel": ("m/s^2", "m/s")}[name]
         entries += f'    "{name}": {{\n'
         entries += f'        "white": {white!r},  # N^2, ({unit[0]})^2/Hz\n'
@@ -92,7 +91,7 @@ def write(imu: Imu) -> str:
         entries += f'        "gauss_markov": [  # S_B in ({unit[0]})^2/s, T_B in s\n'
         entries += "".join(f"            ({S!r}, {T!r}),\n" for S, T in processes)
         entries += f'        ],\n        "integral": "{unit[1]}",\n    }},\n'
-    about = [*heading(imu, "Python", _CONVENTION), *mapping_words(left_out)]
+    about = [*heading(imu, "Python", _CONVENTION), *left_out]
     return commented(about) + _PROGRAM.format(
         rate=float(imu.rate), horizon=float(imu.horizon), noise=entries
     )

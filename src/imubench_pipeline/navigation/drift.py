@@ -39,6 +39,7 @@ from numpy.typing import NDArray
 from scipy.special import stdtr, stdtrit
 
 from imubench_pipeline.navigation.pooled import POOLED, bounded_exp, points_about_median, usable
+from imubench_pipeline.noise import PARAMETERS, TERMS
 from imubench_pipeline.typing import Row
 
 Order = Literal["started", "name"]
@@ -57,6 +58,7 @@ _FEWEST = 3  # recordings that tell the spread between them
 _LINE_FROM = 8  # recordings; a line takes one degree of freedom more
 _EACH, _GROWTH = 32, 1.05  # tau is found anew with each of 32 recordings, then with each 5 % more
 _NAMES = (*POOLED, "bias")
+_OF_BIAS = {kind.symbol for kind in TERMS if PARAMETERS["B"] in kind.parameters}
 _ABSENT: Row = {"status": "absent", "value": None}
 _NOTHING = (math.nan, math.nan, math.nan, math.nan, 0.0, -1.0, -1.0)
 
@@ -185,13 +187,13 @@ def _rows(series: Series, cells: Sequence[dict[tuple[str, str], Row]]) -> Iterat
 def _kind(row: Row) -> str:
     """Return what B and T_B are parameters of, such as ``F`` or ``GM``; of others nothing."""
     terms = row["model"].split("+") if row.get("parameter") in ("B", "T_B") else []
-    return "+".join(term for term in terms if term in ("F", "GM"))
+    return "+".join(term for term in terms if term in _OF_BIAS)
 
 
 def _tested_as(column: tuple[str, ...]) -> tuple[str, ...]:
     """Return the channel, parameter and kind that say whether this one has changed."""
     channel, parameter, kind = column
-    return (channel, "B_curve", "") if parameter == "B" and kind in ("F", "GM") else column
+    return (channel, "B_curve", "") if parameter == "B" and kind in _OF_BIAS else column
 
 
 def _point(row: Row) -> tuple[float, ...]:

@@ -4,18 +4,23 @@ Beside it what follows from these alone: the growth of errors, flicker noise as 
 low-pass filters, simulated samples.
 """
 
-from imubench_pipeline.noise.model import (
+from imubench_pipeline.noise.model import NoiseModel
+from imubench_pipeline.noise.state_space import StateSpace
+from imubench_pipeline.noise.terms import (
     FLOOR,
+    PARAMETERS,
     PEAK_TAU,
+    TERMS,
+    Deterministic,
     Flicker,
     GaussMarkov,
-    NoiseModel,
     Quantization,
     Ramp,
     RandomWalk,
+    Role,
     Sinusoid,
-    StateSpace,
     Term,
+    TermParameter,
     WhiteNoise,
     bias_instability,
     driving_density,
@@ -25,16 +30,21 @@ from imubench_pipeline.noise.model import (
 
 __all__ = [
     "FLOOR",
+    "PARAMETERS",
     "PEAK_TAU",
+    "TERMS",
+    "Deterministic",
     "Flicker",
     "GaussMarkov",
     "NoiseModel",
     "Quantization",
     "Ramp",
     "RandomWalk",
+    "Role",
     "Sinusoid",
     "StateSpace",
     "Term",
+    "TermParameter",
     "WhiteNoise",
     "bias_instability",
     "driving_density",

@@ -14,26 +14,19 @@ weights of the integration on 0..t and -c/W on -W..0, and
 
 H the Fourier transform of h. The window and the motion see one process: what both see alike
 cancels, and H(0) = 0. Flicker noise (1/f) and a random walk (1/f^2) have no variance, but this
-integral of theirs is finite. Each term has it in closed form.
+integral of theirs is finite. Each term has it in closed form (`Term.growth`), with t the time, W
+the window and A the time since switch-on.
+
+References
+----------
+IEEE Std 952-2020, for the densities. The closed forms follow from S(f) |H(f)|^2, Parseval's theorem
+and the state equation of each process.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-
-from imubench_pipeline.noise.exponentials import decay, phi, squared_response
-from imubench_pipeline.noise.flicker_growth import after_window, since_switch_on
-from imubench_pipeline.noise.model import (
-    Flicker,
-    GaussMarkov,
-    Quantization,
-    Ramp,
-    RandomWalk,
-    Sinusoid,
-    Term,
-    WhiteNoise,
-)
 
 
 @dataclass(frozen=True)
@@ -118,126 +111,3 @@ def of_white_mean(order: int, time: float, start: SensorStart) -> float:
 def of_walk(order: int, time: float) -> float:
     """Return t^(2m+3) / ((2m+3) (m+1)!^2), the variance of a walk of K = 1 that begins at 0."""
     return of_white(order + 1, time)
-
-
-def variance(term: Term, order: int, time: float, start: SensorStart) -> float:
-    """Return the variance of the error that a term has grown to; the turn-on bias is apart.
-
-    With c of `of_constant`, t the time, W the window, A the time since switch-on, and x = t/T_B,
-    y = W/T_B, E_k(x) = x^k phi_k(-x) (`exponentials.phi`):
-
-    - N: N^2 (t^(2m+1) / ((2m+1) m!^2) + c^2 / W), without the last where not calibrated;
-    - Q: Q^2 ([m = 0] + (t^m/m! + c/W)^2 + (c/W)^2), without c/W where not calibrated. The
-      roundings between the ends are left out: for m > 0 they add a part of about one over the
-      number of samples;
-    - Gauss-Markov: S_B (T_B^(2m+3) P_m(x) + c^2 T_B (P_0(y) / y^2 + (d_x - d_y)^2 / 2)), with
-      P_m(x) the integral of E_{m+1}^2 from 0 to x, and d_x = (m+1)! x phi_{m+2}(-x) and
-      d_y = y phi_2(-y) what is lost of the state at the start, forward and backward; where not
-      calibrated S_B (T_B^(2m+3) P_m(x) + c^2 T_B (1 - d_x)^2 / 2);
-    - flicker: `flicker_growth`;
-    - K: K^2 (t^(2m+3) / ((2m+3) (m+1)!^2) + c^2 W/3), A in the place of W/3 where not calibrated;
-    - R: R^2 (t^(m+2) / (m+2)! + c W/2)^2, A in the place of W/2; deterministic, its square;
-    - a line, at a random phase: A^2 c^2 |(m+1)! phi_{m+1}(i w t) - phi_1(-i w W)|^2 / 2 with
-      w = 2 pi f_0.
-
-    Parameters
-    ----------
-    term : Term
-    order : int
-        m, 0 to 2: integrations but one.
-    time : float
-        t, s, above 0.
-    start : Calibrated or Uncalibrated
-
-    Returns
-    -------
-    float
-        SI: (rad/s)^2 or (m/s^2)^2 times s^(2m+2).
-
-    Raises
-    ------
-    TypeError
-        If the kind of term is not known.
-
-    References
-    ----------
-    IEEE Std 952-2020, for the densities. N: P. D. Groves, "Principles of GNSS, Inertial,
-    and Multisensor Integrated Navigation Systems", 2nd ed., 2013. The others follow
-    from S(f) |H(f)|^2, Parseval's theorem and the state equation of each process.
-    """
-    match term:
-        case WhiteNoise(N):
-            return N**2 * (of_white(order, time) + of_white_mean(order, time, start))
-        case Quantization(Q):
-            return Q**2 * _of_roundings(order, time, start)
-        case GaussMarkov():
-            return term.density * _of_gauss_markov(order, time, term.T_B, start)
-        case Flicker(B):
-            scale = B**2 * time ** (2 * order + 2)
-            if isinstance(start, Calibrated):
-                return scale * after_window(order, start.window / time)
-            return scale * since_switch_on(order, start.on_time / time)
-        case RandomWalk(K):
-            lag = start.window / 3.0 if isinstance(start, Calibrated) else start.on_time
-            return K**2 * (of_walk(order, time) + of_constant(order, time) ** 2 * lag)
-        case Ramp(R):
-            lag = start.window / 2.0 if isinstance(start, Calibrated) else start.on_time
-            rise = of_constant(order + 1, time) + of_constant(order, time) * lag
-            return (R * rise) ** 2
-        case Sinusoid(amplitude, frequency):
-            gain = _of_line(order, time, 2.0 * math.pi * frequency, start)
-            return 0.5 * (amplitude * gain) ** 2
-    raise TypeError(f"the growth of {term} is not known")
-
-
-def mean_variance(term: Term, time: float, on_time: float) -> float:
-    """Return the variance of the mean of a term over a window.
-
-    Parameters
-    ----------
-    term : Term
-    time : float
-        Length of the window, s.
-    on_time : float
-        Time from switch-on to the beginning of the window, s (see `Uncalibrated`).
-
-    Returns
-    -------
-    float
-        (rad/s)^2 or (m/s^2)^2.
-    """
-    return variance(term, 0, time, Uncalibrated(bias=0.0, on_time=on_time)) / time**2
-
-
-def _of_roundings(order: int, time: float, start: SensorStart) -> float:
-    """Return the variance of the roundings at the ends of window and motion, for Q = 1."""
-    # The rounding at the start ends the window and begins the motion.
-    first = time**order / math.factorial(order)
-    last = 1.0 if order == 0 else 0.0
-    mean = of_constant(order, time) / start.window if isinstance(start, Calibrated) else 0.0
-    return last + (first + mean) ** 2 + mean**2
-
-
-def _of_gauss_markov(order: int, time: float, T_B: float, start: SensorStart) -> float:
-    x = time / T_B
-    constant = of_constant(order, time)
-    driven = time ** (2 * order + 3) * squared_response(order, x)
-    if isinstance(start, Uncalibrated):
-        kept = math.factorial(order + 1) * decay(order + 1, x)
-        return driven + (constant * kept) ** 2 * T_B / 2.0
-    y = start.window / T_B
-    # Differences from 1 of what is kept: the difference of the two itself would cancel for
-    # long T_B.
-    lost = math.factorial(order + 1) * x * decay(order + 2, x) - y * decay(2, y)
-    in_window = start.window * squared_response(0, y)
-    return driven + constant**2 * (in_window + T_B * lost**2 / 2.0)
-
-
-def _of_line(order: int, time: float, omega: float, start: SensorStart) -> float:
-    constant, x = of_constant(order, time), omega * time
-    factorial = math.factorial(order + 1)
-    if isinstance(start, Uncalibrated):
-        return constant * abs(factorial * phi(order + 1, 1j * x))
-    y = omega * start.window
-    # Both less 1, see `_of_gauss_markov`.
-    return constant * abs(factorial * 1j * x * phi(order + 2, 1j * x) + 1j * y * phi(2, -1j * y))

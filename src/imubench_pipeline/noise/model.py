@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import block_diag
 
-from imubench_pipeline.noise.flicker import bank
 from imubench_pipeline.noise.state_space import StateSpace
 from imubench_pipeline.noise.terms import (
-    FLOOR,
-    PEAK_TAU,
+    PARAMETERS,
+    Deterministic,
     Flicker,
     GaussMarkov,
     Quantization,
@@ -23,34 +22,15 @@ from imubench_pipeline.noise.terms import (
     Sinusoid,
     Term,
     WhiteNoise,
-    bias_instability,
-    driving_density,
-    gauss_markov_shape,
-    sampled_gauss_markov_shape,
 )
 from imubench_pipeline.typing import Array
 
-__all__ = [
-    "FLOOR",
-    "PEAK_TAU",
-    "Flicker",
-    "GaussMarkov",
-    "NoiseModel",
-    "Quantization",
-    "Ramp",
-    "RandomWalk",
-    "Sinusoid",
-    "StateSpace",
-    "Term",
-    "WhiteNoise",
-    "bias_instability",
-    "driving_density",
-    "gauss_markov_shape",
-    "sampled_gauss_markov_shape",
-]
-
 _LONGEST_FLICKER = 1e5
 """Tau in s up to which a state space follows flicker noise, where nothing else is asked."""
+
+
+_OWN_PLACE = (Quantization, WhiteNoise, Flicker, RandomWalk, Deterministic)
+"""Kinds of terms that a model has in a parameter of their own."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,15 +51,17 @@ class NoiseModel:
         Random walk, rad/s/sqrt(s) or m/s^2/sqrt(s); 0: none.
     R : float
         Ramp, rad/s^2 or m/s^3; its sign is kept; 0: none.
-    further : sequence of GaussMarkov
-        More Gauss-Markov processes.
+    further : sequence of Term
+        More terms of noise, such as Gauss-Markov processes: of any kind that has no parameter
+        above.
     sinusoids : sequence of Sinusoid
         Lines.
 
     Raises
     ------
     ValueError
-        If a parameter is negative (R apart) or not finite, or T_B is not above 0.
+        If a parameter is negative (R apart) or not finite, T_B is not above 0, or a further term
+        has a place of its own.
     """
 
     Q: float = 0.0
@@ -88,18 +70,25 @@ class NoiseModel:
     T_B: float | None = None
     K: float = 0.0
     R: float = 0.0
-    further: Sequence[GaussMarkov] = ()
+    further: Sequence[Term] = ()
     sinusoids: Sequence[Sinusoid] = ()
 
     def __post_init__(self) -> None:
         for name in ("Q", "N", "B", "K"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0):
-                raise ValueError(f"{name} is {value}, expected a number from 0")
+                label = PARAMETERS[name].label
+                raise ValueError(f"the {label} {name} is {value}, expected a number from 0")
         if not math.isfinite(self.R):
-            raise ValueError(f"R is {self.R}, expected a finite number")
+            raise ValueError(f"the {PARAMETERS['R'].label} R is {self.R}, expected a finite number")
         if self.T_B is not None and not (math.isfinite(self.T_B) and self.T_B > 0):
-            raise ValueError(f"T_B is {self.T_B}, expected a time above 0, or None for flicker")
+            label = PARAMETERS["T_B"].label
+            raise ValueError(
+                f"the {label} T_B is {self.T_B} s, expected a time above 0, or None for flicker"
+            )
+        for term in self.further:
+            if isinstance(term, _OWN_PLACE):
+                raise ValueError(f"{term} is no further term, expected it in its own parameter")
 
     @property
     def terms(self) -> Sequence[Term]:
@@ -123,6 +112,22 @@ class NoiseModel:
     def name(self) -> str:
         """The terms, such as ``N+GM+K`` (F: flicker, S: a line); ``none`` where there are none."""
         return "+".join(term.symbol for term in self.terms) or "none"
+
+    @property
+    def further_processes(self) -> list[GaussMarkov]:
+        """The further terms as Gauss-Markov processes, for what knows no others.
+
+        Raises
+        ------
+        ValueError
+            If one is none.
+        """
+        processes = []
+        for term in self.further:
+            if term.gauss_markov is None:
+                raise ValueError(f"{term} is no Gauss-Markov process")
+            processes.append(term.gauss_markov)
+        return processes
 
     def psd(self, frequency: ArrayLike, rate: float | None = None) -> Array:
         """Return the two-sided power spectral density.
@@ -189,7 +194,7 @@ class NoiseModel:
         return _sum([term.sampled_spectrum(w, 1.0 / rate) for term in self.terms], w)
 
     def realised(self, interval: float, longest: float) -> Sequence[Term]:
-        """Return the terms with flicker noise as Gauss-Markov processes (`flicker.bank`).
+        """Return terms of finite state spaces: flicker noise is Gauss-Markov processes.
 
         Parameters
         ----------
@@ -200,7 +205,7 @@ class NoiseModel:
         """
         terms: list[Term] = []
         for term in self.terms:
-            terms.extend(bank(term.B, interval, longest) if isinstance(term, Flicker) else [term])
+            terms.extend(term.realised(interval, longest))
         return terms
 
     def state_space(self, rate: float, longest: float = _LONGEST_FLICKER) -> StateSpace:

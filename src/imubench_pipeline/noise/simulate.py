@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.allan import of_phase
 from imubench_pipeline.allan.phase import integrate
-from imubench_pipeline.noise.model import NoiseModel, Quantization, Ramp, Sinusoid, WhiteNoise
+from imubench_pipeline.noise.model import NoiseModel
+from imubench_pipeline.noise.state_space import root_of
 from imubench_pipeline.noise.variance_covariance import variance_covariance
 from imubench_pipeline.typing import Array
 
@@ -76,8 +77,12 @@ def simulate_blocks(
         for space, state, stream in zip(spaces, states, streams, strict=True):
             if len(state):
                 driven = np.flatnonzero(np.diag(space.process_noise))
+                root = root_of(space.process_noise)[np.ix_(driven, driven)]
                 drive = stream.standard_normal((size, len(driven)))
-                drive *= np.sqrt(np.diag(space.process_noise)[driven])
+                if len(driven) == 1:  # a product of matrices takes four times as long
+                    drive *= root[0, 0]
+                else:
+                    drive = drive @ root.T
                 _add_states(log, state, space.transition, driven, drive, space.output)
         yield log
 
@@ -209,65 +214,12 @@ def _variances(theta: Array, sizes: NDArray[np.int64]) -> Array:
 def block_sums(
     model: NoiseModel, rate: float, blocks: int, width: int, rng: np.random.Generator
 ) -> Array:
-    """Return the sums over adjacent blocks of ``width`` samples of a simulated log, exactly.
-
-    The sum over a block and the state after it are jointly Gaussian, given the state before.
-    """
+    """Return the sums over adjacent blocks of ``width`` samples of a simulated log, exactly."""
     interval = 1.0 / rate
     sums = np.zeros(blocks)
-    firsts = np.arange(blocks) * width
     for term in model.realised(interval, max(blocks * width, 2) * interval):
-        if isinstance(term, WhiteNoise):
-            sums += rng.standard_normal(blocks) * math.sqrt(width * term.N**2 * rate)
-            continue
-        if isinstance(term, Quantization):
-            sums += np.diff(rng.standard_normal(blocks + 1)) * term.Q * rate
-            continue
-        if isinstance(term, Ramp):
-            sums += term.R * interval * (firsts + (width - 1) / 2.0) * width
-            continue
-        if isinstance(term, Sinusoid):
-            half = math.pi * term.frequency * interval
-            gain = term.amplitude * math.sin(width * half) / math.sin(half)
-            phase = rng.uniform(0.0, 2.0 * math.pi)
-            sums += gain * np.cos(half * (2.0 * firsts + width - 1) + phase)
-            continue
-        space = term.state_space(interval)
-        p, drive = float(space.transition[0, 0]), float(space.process_noise[0, 0])
-        start = float(term.start(rng, interval)[0])
-        # The sample i of a block is p^i x + sum_{j<i} p^(i-1-j) w_j.
-        powers = p ** np.arange(width + 1)
-        reach = np.concatenate(([0.0], np.cumsum(powers)))
-        in_sum = reach[width - 1 - np.arange(width)]
-        in_state = powers[width - 1 - np.arange(width)]
-        moments = drive * np.array(
-            [[in_state @ in_state, in_state @ in_sum], [in_state @ in_sum, in_sum @ in_sum]]
-        )
-        to_state = math.sqrt(moments[0, 0])
-        shared = moments[0, 1] / to_state
-        own = math.sqrt(max(moments[1, 1] - shared**2, 0.0))
-        normal = rng.standard_normal((2, blocks))
-        _add_block_sums(
-            sums, start, powers[width], reach[width], normal[0], normal[1], to_state, shared, own
-        )
+        sums += term.block_sums(blocks, width, rate, rng)
     return sums
-
-
-@njit(cache=True, nogil=True)
-def _add_block_sums(
-    sums: Array,
-    state: float,
-    decay: float,
-    gain: float,
-    first: Array,
-    second: Array,
-    to_state: float,
-    shared: float,
-    own: float,
-) -> None:
-    for i in range(sums.size):
-        sums[i] += gain * state + shared * first[i] + own * second[i]
-        state = decay * state + to_state * first[i]
 
 
 def _from_covariance(

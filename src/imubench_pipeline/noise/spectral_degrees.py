@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.allan.presence import Presence
 from imubench_pipeline.allan.quadratic_forms import tail_degrees, variance_degrees
-from imubench_pipeline.noise.model import NoiseModel, Quantization, Ramp, Sinusoid
+from imubench_pipeline.noise.model import NoiseModel
+from imubench_pipeline.noise.terms import Deterministic, Quantization
 from imubench_pipeline.typing import Array
 
 Span = tuple[int, int]
@@ -90,11 +91,11 @@ def degrees_of_model(
     """
     spans = tuple(segments) if segments else ((0, samples),)
     left = np.ones(len(sizes)) if share is None else share
-    found = [
+    pairs = [
         _degrees(model, 1.0 / rate, int(n), spans, presence, float(part))
         for n, part in zip(sizes, left, strict=True)
     ]
-    edf, upper = (np.array(column, dtype=np.float64) for column in zip(*found, strict=True))
+    edf, upper = (np.array(column, dtype=np.float64) for column in zip(*pairs, strict=True))
     return Degrees(edf, upper)
 
 
@@ -145,9 +146,9 @@ class _Covariance:
 
     def __init__(self, model: NoiseModel, n: int, interval: float) -> None:
         self._n, self._interval = n, interval
-        self._noise = [t for t in model.terms if not isinstance(t, Quantization | Ramp | Sinusoid)]
-        rounded = Quantization(model.Q) if model.Q > 0 else None
-        self._rounding = rounded.Q**2 / interval**2 if rounded else 0.0
+        # Roundings are correlated at single lags, which the steps of a smooth covariance miss.
+        self._noise = [t for t in model.terms if not isinstance(t, Quantization | Deterministic)]
+        self._rounding = model.Q**2 / interval**2
         self.at_zero = float(self._smooth(np.zeros(1))[0]) + 6.0 * self._rounding
         self.ramp = model.R * interval * n**2
         self.lines = self.line_products = 0.0
@@ -224,7 +225,7 @@ class _Covariance:
         self, terms: NDArray[np.int64], mask: tuple[NDArray[np.bool_], int] | None
     ) -> Array | None:
         """Return those of the covariance of the differences, thinned; None where too many."""
-        found = []
+        eigenvalues = []
         if mask is not None:
             there, stride = mask
             thinning = max(1, round(self._n / _TAIL_STEPS / stride))
@@ -244,5 +245,5 @@ class _Covariance:
             smooth, rounding = self._at(lags)
             row = smooth + rounding / step
             matrix = row[np.abs(np.subtract.outer(places, places))]
-            found.append(np.maximum(np.linalg.eigvalsh(matrix), 0.0))
-        return np.concatenate(found)
+            eigenvalues.append(np.maximum(np.linalg.eigvalsh(matrix), 0.0))
+        return np.concatenate(eigenvalues)

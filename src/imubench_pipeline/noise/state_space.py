@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -53,6 +53,57 @@ class StateSpace:
         """Return a model of white noise alone."""
         none = np.zeros((0, 0))
         return cls(none, none, np.zeros(0), measurement_noise, np.zeros(0), none)
+
+    def of_either_sign(self) -> StateSpace:
+        """Return the model whose first state has no mean, and its square in the variance."""
+        squares = np.diag([mean**2 for mean in self.initial_mean.tolist()])
+        return replace(
+            self,
+            initial_mean=np.zeros_like(self.initial_mean),
+            initial_variance=self.initial_variance + squares,
+        )
+
+
+@dataclass(frozen=True)
+class ContinuousSpace:
+    """A continuous model x' = F x + w, z = H x.
+
+    Attributes
+    ----------
+    transition : ndarray, shape (m, m)
+        F, 1/s.
+    density : ndarray, shape (m, m)
+        Q of w.
+    output : ndarray, shape (m,)
+        H.
+    """
+
+    transition: Array
+    density: Array
+    output: Array
+
+    @classmethod
+    def without_states(cls) -> ContinuousSpace:
+        """Return a model of nothing but its measurement noise."""
+        none = np.zeros((0, 0))
+        return cls(none, none, np.zeros(0))
+
+
+def root_of(covariance: Array) -> Array:
+    """Return the lower triangular root of a covariance; what does not vary has a row of zeros.
+
+    Parameters
+    ----------
+    covariance : ndarray, shape (m, m)
+
+    Returns
+    -------
+    ndarray, shape (m, m)
+    """
+    varying = np.flatnonzero(np.diag(covariance))
+    root, own = np.zeros_like(covariance), np.ix_(varying, varying)
+    root[own] = np.linalg.cholesky(covariance[own])
+    return root
 
 
 def repeated(transition: Array, noise: Array, times: int) -> tuple[Array, Array]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from imubench_pipeline.estimators.estimate import COMPARED
-from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise import NoiseModel, Term
 from imubench_pipeline.report.palette import Appearance, method_appearance
 from imubench_pipeline.report.view import METHOD_NAMES, ChannelView
 from imubench_pipeline.typing import Row
@@ -159,16 +159,13 @@ def _curve(model: NoiseModel, tau: Any) -> Any:
     return np.sqrt(model.allan_variance(tau))
 
 
-def _named_terms(model: NoiseModel) -> list[tuple[str, Any]]:
-    names = {
-        "Q": "quantization Q",
-        "N": "white noise N",
-        "F": "flicker noise B",
-        "GM": "Gauss-Markov B, T_B",
-        "K": "random walk K",
-        "R": "ramp R",
-    }
-    return [(names[term.symbol], term) for term in model.terms if term.symbol in names]
+def _named_terms(model: NoiseModel) -> list[tuple[str, Term]]:
+    """Return the terms but the lines with their names, such as ``white noise N``."""
+    return [
+        (f"{term.label} {', '.join(term.values)}", term)
+        for term in model.terms
+        if term not in model.sinusoids
+    ]
 
 
 def _lines(model: NoiseModel) -> list[tuple[str, Any]]:

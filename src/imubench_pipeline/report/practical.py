@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Context, Decimal
 from typing import Any, Literal
 
+from imubench_pipeline.estimators.dimensions import DIMENSIONS
 from imubench_pipeline.settings.sensor import QUANTITIES
 from imubench_pipeline.units import conversion
 
@@ -210,19 +211,16 @@ def _chosen(quantity: str, system: System) -> str:
 
 
 def _unit(quantity: str, symbol: str, choice: str) -> PageUnit:
-    sign = _CHOICES[quantity][choice][symbol]
-    dimension = {
-        "Q": f"{quantity}_quantization",
-        "R": f"{quantity}_ramp",
+    dimensions = DIMENSIONS[quantity]
+    dimension = dimensions.get(symbol) or {
         "psd": f"{quantity}_density",
-        "N": f"{quantity}_density",
-        "K": f"{quantity}_random_walk",
-        "T_B": "time",
-        "tau_min": "time",
         "sensitivity": f"{quantity}_temperature_coefficient",
         "quadratic": f"{quantity}_temperature_curvature",
     }.get(symbol, QUANTITIES[quantity])
-    return _page_unit(sign, dimension)
+    signs = _CHOICES[quantity][choice]
+    # A parameter without a unit of its own has that of the first of its dimension.
+    alike = next((one for one in signs if dimensions.get(one) == dimension), symbol)
+    return _page_unit(signs.get(symbol) or signs[alike], dimension)
 
 
 def unit_of(dimension: str, system: System) -> PageUnit:

@@ -1,6 +1,6 @@
 """Flicker noise in continuous time, as it enters a filter: a bank of Gauss-Markov processes.
 
-`noise.flicker.bank` has the Allan variance of flicker noise that is sampled without a
+`noise.terms.flicker.bank` has the Allan variance of flicker noise that is sampled without a
 filter. Before a filter whose cut-off may lie above Nyquist, the density B^2 / (2 pi f) itself is
 needed, far beyond the cut-off. Processes of equal variance (ln r / pi) B^2 whose correlation
 times have the ratio r make up that density: the ripple is 4 e^(-pi^2 / ln r), below 1e-3 for two
@@ -52,12 +52,12 @@ def bank(B: float, lowest: float, highest: float) -> list[GaussMarkov]:
     if not 0 < lowest < highest:
         raise ValueError(f"the band from {lowest} to {highest} Hz is empty")
     times, variances = _unit_bank(round(math.log10(highest / lowest), 6))
-    found = []
+    processes = []
     for time, variance in zip(times / (2.0 * math.pi * lowest), variances, strict=True):
         if variance > 0:
             density = 2.0 * B**2 * variance / time  # of the driving noise
-            found.append(GaussMarkov(bias_instability(density, time), time))
-    return found
+            processes.append(GaussMarkov(bias_instability(density, time), time))
+    return processes
 
 
 def ripple(lowest: float, highest: float) -> float:

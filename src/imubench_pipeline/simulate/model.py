@@ -24,16 +24,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise.drives import drives_of
 from imubench_pipeline.noise.low_pass import LowPass
-from imubench_pipeline.noise.terms import (
-    Flicker,
-    GaussMarkov,
-    Quantization,
-    Ramp,
-    RandomWalk,
-    Sinusoid,
-    WhiteNoise,
-)
+from imubench_pipeline.noise.terms import GaussMarkov, Term
 from imubench_pipeline.simulate import flicker_band, spectra
 from imubench_pipeline.typing import Array
 
@@ -97,7 +90,7 @@ class SensorModel:
     Raises
     ------
     ValueError
-        If a figure is out of its range.
+        If a figure is out of its range, or a further term drives no filter.
     """
 
     noise: NoiseModel = field(default_factory=NoiseModel)
@@ -119,6 +112,9 @@ class SensorModel:
                 f"full_scale is {self.full_scale}, expected more than the resolution, "
                 f"{self.resolution}"
             )
+        for term in self.noise.further:
+            if term.drive is None:
+                raise ValueError(f"{term} drives no filter (`Term.drive`): no sensor can have it")
 
     def psd(self, frequency: ArrayLike) -> Array:
         """Return the two-sided power spectral density of the noise behind the low-pass.
@@ -135,8 +131,7 @@ class SensorModel:
             sampling folds it and adds quantization and rounding. Lines and a ramp have none.
         """
         f = np.asarray(frequency, dtype=np.float64)
-        left_out = (Quantization, Ramp, Sinusoid)
-        parts = [term.psd(f) for term in self.noise.terms if not isinstance(term, left_out)]
+        parts = [term.psd(f) for term in self.noise.terms if term.drive is not None]
         density = np.asarray(np.sum(parts, axis=0)) if parts else np.zeros_like(f)
         return density * self.low_pass.power(f) if self.low_pass else density
 
@@ -159,9 +154,11 @@ class SensorModel:
         rounding = self.resolution**2 / 12.0
         if self.low_pass is None:
             return self.noise.sampled_spectrum(w, rate) + rounding
-        behind = [t for t in self.noise.terms if isinstance(t, Quantization)]
-        found = np.sum([t.sampled_spectrum(w, 1.0 / rate) for t in behind], axis=0) + rounding
-        return np.asarray(found + spectra.sampled_spectrum(self.sources, self.low_pass, w, rate))
+        behind = [term for term in self.noise.terms if term.drive is None]
+        spectrum = (
+            np.sum([term.sampled_spectrum(w, 1.0 / rate) for term in behind], axis=0) + rounding
+        )
+        return np.asarray(spectrum + spectra.sampled_spectrum(self.sources, self.low_pass, w, rate))
 
     def allan_variance(self, tau: ArrayLike, rate: float) -> Array:
         """Return the Allan variance of the samples, exactly.
@@ -184,14 +181,12 @@ class SensorModel:
         rounding = self.resolution**2 / 12.0 / n
         if self.low_pass is None:
             return self.noise.allan_variance(n / rate, rate) + rounding
-        found = rounding + spectra.allan_variance(self.sources, self.low_pass, n, rate)
+        variance = rounding + spectra.allan_variance(self.sources, self.low_pass, n, rate)
         for term in self.noise.terms:
-            if isinstance(term, Sinusoid):
-                gain = float(self.low_pass.power(term.frequency))
-                found = found + gain * term.sampled_allan_variance(n, 1.0 / rate)
-            elif not isinstance(term, (WhiteNoise, Flicker, GaussMarkov, RandomWalk)):
-                found = found + term.sampled_allan_variance(n, 1.0 / rate)
-        return found
+            if term.drive is None:
+                left = term.passed(self.low_pass.power)
+                variance = variance + left * term.sampled_allan_variance(n, 1.0 / rate)
+        return variance
 
     @property
     def sources(self) -> spectra.Sources:
@@ -199,7 +194,7 @@ class SensorModel:
         return sources_of(self.noise.terms)
 
 
-def sources_of(terms: Sequence[object]) -> spectra.Sources:
+def sources_of(terms: Sequence[Term]) -> spectra.Sources:
     """Return the terms that drive a filter with a density.
 
     Parameters
@@ -211,12 +206,10 @@ def sources_of(terms: Sequence[object]) -> spectra.Sources:
     Sources
         White and flicker noise, Gauss-Markov processes and random walks; others have no density.
     """
-    white = sum(term.N**2 for term in terms if isinstance(term, WhiteNoise))
-    flicker = sum(term.B**2 for term in terms if isinstance(term, Flicker))
-    slow = [(term.T_B, term.density) for term in terms if isinstance(term, GaussMarkov)]
-    slow += [(math.inf, term.K**2) for term in terms if isinstance(term, RandomWalk)]
+    drives = drives_of(terms)
+    slow = [(part.T_B, part.density) for part in (*drives.processes, *drives.walks)]
     times, densities = np.array(slow, dtype=np.float64).reshape(-1, 2).T
-    return spectra.Sources(white, flicker, times, densities)
+    return spectra.Sources(drives.white, drives.flicker, times, densities)
 
 
 def bank_for(model: SensorModel, rate: float, duration: float) -> list[GaussMarkov]:
@@ -235,9 +228,9 @@ def bank_for(model: SensorModel, rate: float, duration: float) -> list[GaussMark
     list of GaussMarkov
         None without flicker noise, or without a filter.
     """
-    found: list[GaussMarkov] = []
+    processes: list[GaussMarkov] = []
     for term in model.noise.terms:
-        if isinstance(term, Flicker) and model.low_pass is not None:
+        if term.drive is not None and term.drive.flicker and model.low_pass is not None:
             highest = flicker_band.ABOVE * max(model.low_pass.cutoff, rate / 2.0)
-            found += flicker_band.bank(term.B, 0.5 / duration, highest)
-    return found
+            processes += flicker_band.bank(term.drive.flicker, 0.5 / duration, highest)
+    return processes

@@ -17,8 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imubench_pipeline.noise.flicker import bank as sampled_bank
-from imubench_pipeline.noise.terms import Flicker, Quantization, Sinusoid, Term
+from imubench_pipeline.noise.terms import Sinusoid, Term
 from imubench_pipeline.simulate.discretisation import (
     Held,
     SlowSources,
@@ -149,14 +148,10 @@ class _Axis:
         self._lag = np.array([held.lag_decay, held.lag_step])
         self._x, self._e = self._start(begin)
         self._memory = np.zeros(4)
-        terms = model.noise.terms
         self._sinusoids = [
-            (term, self._lines.uniform(0.0, 2.0 * math.pi))
-            for term in terms
-            if isinstance(term, Sinusoid)
+            (line, self._lines.uniform(0.0, 2.0 * math.pi)) for line in model.noise.sinusoids
         ]
-        # Only one of each in a model.
-        self._Q = next((term.Q for term in terms if isinstance(term, Quantization)), 0.0)
+        self._Q = model.noise.Q
         self._counted = self._counts.standard_normal() if self._Q else 0.0
         self._drift = np.zeros(3)
         if model.drift is not None:
@@ -207,11 +202,11 @@ class _Axis:
         """Return the next samples."""
         model, discrete, held = self._model, self._discrete, self._discrete.held
         size = stop - start
-        given = np.full(size, model.bias)
+        entering = np.full(size, model.bias)
         if true is not None:
-            given += (1.0 + model.scale_error) * _checked(true(start, stop), size, "motion")
+            entering += (1.0 + model.scale_error) * _checked(true(start, stop), size, "motion")
         if model.noise.R:
-            given += model.noise.R / self._rate * np.arange(start, stop)
+            entering += model.noise.R / self._rate * np.arange(start, stop)
         temperatures = np.empty(0)
         if temperature is not None and model.drift is not None:
             temperatures = _checked(temperature(start, stop), size, "temperature")
@@ -220,7 +215,7 @@ class _Axis:
         log = np.empty(size)
         run(
             log,
-            given,
+            entering,
             temperatures,
             normal,
             self._memory,
@@ -269,19 +264,17 @@ def _registered(log: Array, model: SensorModel) -> Array:
 
 def _realised(model: SensorModel, rate: float, duration: float) -> list[Term]:
     """Return the terms with flicker noise as a bank of processes."""
-    terms: list[Term] = [term for term in model.noise.terms if not isinstance(term, Flicker)]
+    flicker = [term for term in model.noise.terms if term.drive is not None and term.drive.flicker]
+    others = [term for term in model.noise.terms if term not in flicker]
     if model.low_pass is not None:
-        return [*terms, *bank_for(model, rate, duration)]
-    for term in model.noise.terms:
-        if isinstance(term, Flicker):
-            terms += sampled_bank(term.B, 1.0 / rate, duration)
-    return terms
+        return [*others, *bank_for(model, rate, duration)]
+    return [*others, *(part for term in flicker for part in term.realised(1.0 / rate, duration))]
 
 
 def _checked(values: Array, size: int, what: str) -> Array:
-    found = np.ascontiguousarray(values, dtype=np.float64)
-    if found.shape != (size,):
-        raise ValueError(f"{what} has shape {found.shape}, expected ({size},)")
-    if not np.isfinite(found.sum()):
+    signal = np.ascontiguousarray(values, dtype=np.float64)
+    if signal.shape != (size,):
+        raise ValueError(f"{what} has shape {signal.shape}, expected ({size},)")
+    if not np.isfinite(signal.sum()):
         raise ValueError(f"{what} has values that are not finite")
-    return found
+    return signal

@@ -8,8 +8,7 @@ from dataclasses import replace
 
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.spectrum import Spectrum
-from imubench_pipeline.noise import GaussMarkov, NoiseModel, RandomWalk, WhiteNoise
-from imubench_pipeline.noise.growth import mean_variance
+from imubench_pipeline.noise import NoiseModel
 
 _UPPER_OF_RMS = 2.24
 """The 97.5 % limit of the size of a normal variate, over its standard deviation."""
@@ -63,7 +62,7 @@ def _variance(model: NoiseModel, spectrum: Spectrum) -> float:
     T, whole = 1.0 / spectrum.rate, spectrum.duration
     # What begins at 0 has been on since the beginning of the log; a ramp is no part of the bias.
     return sum(
-        mean_variance(term, whole, 0.0)
+        term.mean_variance(whole, 0.0)
         for term in model.realised(T, whole)
-        if isinstance(term, WhiteNoise | GaussMarkov | RandomWalk)
+        if term.drive is not None
     )

@@ -19,7 +19,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from imubench_pipeline.experiments.earth_rate.experiment import Experiment
-from imubench_pipeline.noise import GaussMarkov, NoiseModel
+from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
 _START = 0.1
@@ -74,7 +74,8 @@ def track(log: Array, experiment: Experiment, model: NoiseModel, known_rate: flo
     ValueError
         If the model has no white noise, or its B no correlation time.
     """
-    term = next((one for one in model.terms if isinstance(one, GaussMarkov)), None)
+    processes = [term.gauss_markov for term in model.terms if term.gauss_markov is not None]
+    process = processes[0] if processes else None
     if model.N == 0 or (model.B > 0 and model.T_B is None):
         raise ValueError("the paper's filter needs N, and a Gauss-Markov process for B")
     sample = np.concatenate([np.arange(dwell.start, dwell.stop) for dwell in experiment.dwells])
@@ -82,8 +83,8 @@ def track(log: Array, experiment: Experiment, model: NoiseModel, known_rate: flo
     interval = 1.0 / experiment.rate
     drift = _tracked(
         log[sample] - known_rate,
-        math.exp(-interval / term.T_B) if term else 0.0,
-        interval * (term.density if term else 0.0),
+        math.exp(-interval / process.T_B) if process else 0.0,
+        interval * (process.density if process else 0.0),
         interval * model.K**2,
         model.N**2 / interval,
     )

@@ -16,17 +16,9 @@ from scipy.linalg import block_diag
 
 from imubench_pipeline.experiments.earth_rate.covariance import longest
 from imubench_pipeline.experiments.earth_rate.experiment import Blocks
-from imubench_pipeline.noise import (
-    GaussMarkov,
-    NoiseModel,
-    Quantization,
-    Ramp,
-    RandomWalk,
-    Sinusoid,
-    Term,
-)
+from imubench_pipeline.noise import NoiseModel, Role, Term
 from imubench_pipeline.noise.block_means import of_block_means
-from imubench_pipeline.noise.state_space import StateSpace, repeated
+from imubench_pipeline.noise.state_space import StateSpace, repeated, root_of
 from imubench_pipeline.typing import Array
 
 WIDE = 1.0
@@ -105,10 +97,10 @@ def block_states(model: NoiseModel, blocks: Blocks, turn_on_bias: float = WIDE) 
     spaces: list[StateSpace] = []
     white = drive = 0.0
     for term in model.realised(interval, longest(blocks)):
-        if isinstance(term, RandomWalk):
-            drive = term.K**2 * interval
+        space = term.state_space(interval).of_either_sign()
+        if term.role is Role.RANDOM_WALK:
+            drive += float(space.process_noise[0, 0])
             continue
-        space = _space(term, interval)
         white += space.measurement_noise
         spaces.append(space)
         names += _names(term, names)
@@ -123,32 +115,19 @@ def block_states(model: NoiseModel, blocks: Blocks, turn_on_bias: float = WIDE) 
     steps = tuple(_step(whole, int(gap), int(size)) for gap, size in kinds.T)
     return BlockStates(
         tuple(names),
-        np.sqrt(whole.initial_variance),
+        root_of(whole.initial_variance),
         steps,
         which.ravel(),
         np.sqrt(white / blocks.count),
     )
 
 
-def _space(term: Term, interval: float) -> StateSpace:
-    space = term.state_space(interval)
-    if isinstance(term, Ramp):
-        slope = np.diag([0.0, term.R**2])
-        return StateSpace(
-            space.transition, space.process_noise, space.output, 0.0, np.zeros(2), slope
-        )
-    return space
-
-
 def _names(term: Term, before: list[str]) -> list[str]:
-    if isinstance(term, GaussMarkov):
-        return [f"z_G{sum(name.startswith('z_G') for name in before) + 1}"]
-    pairs: dict[type, list[str]] = {
-        Quantization: ["z_Q", "z_Q before"],
-        Ramp: ["z_R", "z_R slope"],
-        Sinusoid: ["z_S", "z_S quadrature"],
-    }
-    return pairs.get(type(term), [])
+    """Return the names of a term's states; one that is alone is numbered."""
+    if len(term.states) != 1:
+        return list(term.states)
+    (name,) = term.states
+    return [f"{name}{sum(other.startswith(name) for other in before) + 1}"]
 
 
 def _together(spaces: list[StateSpace]) -> StateSpace:
@@ -169,8 +148,8 @@ def _step(space: StateSpace, gap: int, size: int) -> Step:
         transition[:m], transition[m] = space.transition, space.output
         noise[:m, :m] = space.process_noise
     else:
-        found = of_block_means(space, size)
-        transition[:], noise[:] = found.transition[:, :m], found.process_noise
+        means = of_block_means(space, size)
+        transition[:], noise[:] = means.transition[:, :m], means.process_noise
     over, added = repeated(space.transition, space.process_noise, gap)
     return Step(transition @ over, _root(noise + transition @ added @ transition.T))
 

@@ -45,23 +45,8 @@ from imubench_pipeline.navigation.error_budget.parts import (
     Quantity,
     of_figure,
 )
-from imubench_pipeline.noise import (
-    Flicker,
-    GaussMarkov,
-    NoiseModel,
-    Sinusoid,
-    Term,
-    WhiteNoise,
-)
-from imubench_pipeline.noise.growth import (
-    Calibrated,
-    SensorStart,
-    Uncalibrated,
-    mean_variance,
-    of_constant,
-    of_white_mean,
-    variance,
-)
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise.growth import Calibrated, SensorStart, Uncalibrated, of_constant
 
 _GYRO_ORDER: dict[Quantity, int] = {"attitude": 0, "heading": 0, "velocity": 1, "position": 2}
 _ACCEL_ORDER: dict[Quantity, int] = {"velocity": 0, "position": 1}
@@ -189,9 +174,9 @@ def budget(
 
     The noise of the gyro is integrated once to the attitude and the heading, twice and three
     times with g to velocity and position; that of the accelerometer once and twice; an initial
-    tilt adds g t and g t^2 / 2 times itself (see `growth.variance` for the formulas). From white
-    noise alone after t: N sqrt(t), g N sqrt(t^3/3) and g N sqrt(t^5/20) of the gyro, N sqrt(t)
-    and N sqrt(t^3/3) of the accelerometer.
+    tilt adds g t and g t^2 / 2 times itself (the formulas stand at `Term.growth` of each term).
+    From white noise alone after t: N sqrt(t), g N sqrt(t^3/3) and g N sqrt(t^5/20) of the gyro,
+    N sqrt(t) and N sqrt(t^3/3) of the accelerometer.
 
     White noise in the window is independent of that in motion and has a contribution of its own;
     of every other term window and motion are taken together, because they are correlated.
@@ -231,19 +216,19 @@ def budget(
         raise ValueError(f"quantity is {quantity!r}, expected one of {get_args(Quantity)}")
     if not (math.isfinite(time) and time > 0):
         raise ValueError(f"time is {time}, expected a time above 0")
-    found = _sources(quantity, time, gyro, accel, start)
+    contributions = _sources(quantity, time, gyro, accel, start)
     missing: list[Missing] = []
     assumptions: list[str] = []
     for measured, cause, source, lever in _levers(quantity, time, start, use):
         figures = gyro_figures if measured == "gyro" else accel_figures
         part = of_figure(measured, cause, source, lever, figures)
         if isinstance(part, Contribution):
-            found.append(part)
+            contributions.append(part)
         elif part is not None:
             missing.append(part)
             if cause == "turn_on_bias":
                 assumptions.append(f"turn-on bias of the {_WORDS[measured]}: not known, left out")
-    return Budget(time, quantity, found, assumptions, missing)
+    return Budget(time, quantity, contributions, assumptions, missing)
 
 
 def _sources(
@@ -251,18 +236,18 @@ def _sources(
 ) -> list[Contribution]:
     order = _GYRO_ORDER[quantity]
     gravity = STANDARD_GRAVITY if order > 0 else 1.0
-    found = list(of_sensor("gyro", gyro, order, time, start.gyro, gravity))
+    contributions = list(of_sensor("gyro", gyro, order, time, start.gyro, gravity))
     if quantity in _ACCEL_ORDER:
-        found.extend(of_sensor("accel", accel, _ACCEL_ORDER[quantity], time, start.accel))
+        contributions.extend(of_sensor("accel", accel, _ACCEL_ORDER[quantity], time, start.accel))
     if quantity == "heading":
-        found.append(Contribution("initial heading", start.heading, "start", STATED))
+        contributions.append(Contribution("initial heading", start.heading, "start", STATED))
     elif isinstance(start.tilt, Levelled):
         if quantity == "attitude" and isinstance(start.accel, Calibrated):
-            found.extend(_of_levelling(accel, start.accel.window, start.tilt))
+            contributions.extend(_of_levelling(accel, start.accel.window, start.tilt))
     else:
         lever = gravity * of_constant(order - 1, time)
-        found.append(Contribution("initial tilt", start.tilt * lever, "start", STATED))
-    return found
+        contributions.append(Contribution("initial tilt", start.tilt * lever, "start", STATED))
+    return contributions
 
 
 def _levers(
@@ -302,36 +287,17 @@ def of_sensor(
         By which the sigmas are multiplied.
     """
     for term in model.terms:
-        if isinstance(term, WhiteNoise) and isinstance(start, Calibrated):
-            mean = term.N * math.sqrt(of_white_mean(order, time, start))
-            moving = Uncalibrated(bias=0.0, on_time=0.0)
-            sigma = math.sqrt(variance(term, order, time, moving))
-            yield Contribution(f"{sensor} N", factor * sigma)
-            yield Contribution(f"{sensor} N in the static window", factor * mean)
-        else:
-            sigma = math.sqrt(variance(term, order, time, start))
-            yield Contribution(f"{sensor} {label(term)}", factor * sigma)
+        for source, sigma in term.sources(order, time, start):
+            yield Contribution(f"{sensor} {source}", factor * sigma)
     if isinstance(start, Uncalibrated) and start.bias is not None:
         grown = factor * start.bias * of_constant(order, time)
         yield Contribution(f"{sensor} turn-on bias", grown, "turn_on_bias", STATED)
 
 
-def label(term: Term) -> str:
-    """Return the name of a term in a source, such as ``K`` or ``GM 89.5 s``."""
-    match term:
-        case GaussMarkov():
-            return f"GM {term.T_B:.4g} s"
-        case Flicker():
-            return "flicker"
-        case Sinusoid():
-            return f"line {term.frequency:.4g} Hz"
-    return term.symbol
-
-
 def _of_levelling(accel: NoiseModel, window: float, levelled: Levelled) -> Iterator[Contribution]:
     for term in accel.terms:
-        sigma = math.sqrt(mean_variance(term, window, levelled.on_time)) / STANDARD_GRAVITY
-        yield Contribution(f"initial tilt by accel {label(term)}", sigma)
+        sigma = math.sqrt(term.mean_variance(window, levelled.on_time)) / STANDARD_GRAVITY
+        yield Contribution(f"initial tilt by accel {term.source}", sigma)
     if levelled.bias is not None:
         sigma = levelled.bias / STANDARD_GRAVITY
         source = "initial tilt by accel turn-on bias"

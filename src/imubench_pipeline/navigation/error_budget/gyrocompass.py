@@ -18,11 +18,9 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.navigation.error_budget.budget import label
 from imubench_pipeline.navigation.error_budget.in_use import BIASES, NAMES, STATED, Figures
 from imubench_pipeline.navigation.error_budget.parts import Budget, Contribution, Missing, of_figure
 from imubench_pipeline.noise import NoiseModel, Sinusoid, Term
-from imubench_pipeline.noise.growth import mean_variance
 
 _BIAS_LEFT_OUT = "turn-on bias of the gyro: left out; the heading is no better than this"
 
@@ -78,7 +76,7 @@ class Gyrocompass:
     def heading(self, time: float) -> Budget:
         """Return the heading error after a static window of a given length, by source.
 
-        At one position the error of the mean has, by term, the variance `growth.mean_variance`;
+        At one position the error of the mean has, by term, the variance `Term.mean_variance`;
         at two positions sigma^2(t/2) / 2, with sigma^2 the Allan variance.
 
         Parameters
@@ -190,15 +188,16 @@ class Gyrocompass:
 
     def _of_noise(self, time: float, *, swings: bool) -> Iterator[Contribution]:
         for term in self.gyro.terms:
+            # A line alone swings: its mean is nothing after each whole period.
             if isinstance(term, Sinusoid) and not swings:
                 sigma = self._envelope(term, time)
             else:
                 sigma = math.sqrt(self._variance(term, time))
-            yield Contribution(f"gyro {label(term)}", sigma / self._north)
+            yield Contribution(f"gyro {term.source}", sigma / self._north)
 
     def _variance(self, term: Term, time: float) -> float:
         if self.positions == 1:
-            return mean_variance(term, time, self.on_time)
+            return term.mean_variance(time, self.on_time)
         return float(term.allan_variance(np.array([time / 2.0]))[0]) / 2.0
 
     def _envelope(self, line: Sinusoid, time: float) -> float:

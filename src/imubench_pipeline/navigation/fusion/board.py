@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from imubench_pipeline.noise import GaussMarkov, NoiseModel
+from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
 _WHOLE = 1e-9
@@ -262,11 +262,7 @@ def divided(model: NoiseModel, correlation: Mapping[str, float]) -> tuple[NoiseM
                 model,
                 Q=0.0 if common else model.Q,
                 **{name: getattr(model, name) * share[name] for name in _AMPLITUDES},
-                further=[
-                    GaussMarkov(one.B * share["B"], one.T_B)
-                    for one in model.further
-                    if share["B"] > 0
-                ],
+                further=[term.scaled(share["B"]) for term in model.further if share["B"] > 0],
                 sinusoids=() if common else model.sinusoids,
             )
         )

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-_PARAMETERS = {
-    "N": frozenset({"N"}),
-    "Q": frozenset({"Q"}),
-    "GM": frozenset({"B", "B_curve", "sigma_min", "tau_min", "T_B"}),
-    "flicker": frozenset({"B", "B_curve", "sigma_min", "tau_min"}),
-    "K": frozenset({"K"}),
-    "R": frozenset({"R"}),
-    "line": frozenset({"amplitude", "frequency"}),
-}
-"""Parameters behind the name of a term (`navigation.error_budget.budget.label`)."""
+from imubench_pipeline.estimators.estimate import CURVE
+from imubench_pipeline.noise import TERMS, Term
+
+
+def _behind(kind: type[Term]) -> frozenset[str]:
+    symbols = frozenset(parameter.symbol for parameter in kind.parameters)
+    return symbols | frozenset(CURVE) if "B" in symbols else symbols
+
+
+_PARAMETERS = {kind.word: _behind(kind) for kind in TERMS}
+"""Parameters behind the first word of a term's name (`Term.source`); the lowest part of the curve
+is what its bias instability makes of it."""
 
 
 def quantity_behind(source: str) -> str | None:

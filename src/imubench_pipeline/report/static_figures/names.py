@@ -2,31 +2,24 @@
 
 from __future__ import annotations
 
+from imubench_pipeline.noise import PARAMETERS, TERMS
 from imubench_pipeline.report.view import QUANTITY_NAMES, ChannelView
 
-TERMS = {
-    "gyro": {
-        "Q": "angle quantization",
-        "N": "angle random walk",
-        "F": "bias instability (flicker)",
-        "GM": "bias instability (GM)",
-        "K": "rate random walk",
-        "R": "rate ramp",
-        "S": "lines",
-    },
-    "accel": {
-        "Q": "velocity quantization",
-        "N": "velocity random walk",
-        "F": "bias instability (flicker)",
-        "GM": "bias instability (GM)",
-        "K": "acceleration random walk",
-        "R": "acceleration ramp",
-        "S": "lines",
-    },
+_OF_CHANNEL = {
+    "gyro": {"signal": "rate", "integral": "angle"},
+    "accel": {"signal": "acceleration", "integral": "velocity"},
+}
+
+TERM_NAMES = {
+    quantity: {kind.symbol: kind.standard_name.format(**words) for kind in TERMS}
+    for quantity, words in _OF_CHANNEL.items()
 }
 """The field's names of the terms, by quantity and symbol of the term."""
 
-SYMBOLS = {"T_B": "$T_B$", "R": "$|R|$"} | {symbol: f"${symbol}$" for symbol in "QNBK"}
+SYMBOLS = {
+    symbol: f"$|{symbol}|$" if parameter.signed else f"${symbol}$"
+    for symbol, parameter in PARAMETERS.items()
+}
 SYMBOLS |= {"B_curve": "$B$ of the curve", "sigma_min": r"$\sigma_\mathrm{min}$"}
 SYMBOLS |= {"tau_min": r"$\tau_\mathrm{min}$"}
 """The parameters as they are set; a logarithmic axis has no sign of R."""

@@ -10,7 +10,7 @@ from scipy.special import chdtri
 
 from imubench_pipeline.report.practical import System, page_unit
 from imubench_pipeline.report.static_figures.curves import channel_axes
-from imubench_pipeline.report.static_figures.names import TERMS, log_name
+from imubench_pipeline.report.static_figures.names import TERM_NAMES, log_name
 from imubench_pipeline.report.static_figures.style import (
     GREY,
     MEASURED,
@@ -112,7 +112,7 @@ def _draw_terms(axes: Axes, view: ChannelView, scale: float) -> None:
                 grid,
                 np.sqrt(density) * scale,
                 lw=0.8,
-                label=TERMS[view.quantity][term.symbol],
+                label=TERM_NAMES[view.quantity][term.symbol],
                 zorder=2.8,
                 **TERM_LOOKS[term.symbol],
             )
@@ -127,7 +127,7 @@ def _draw_lines(axes: Axes, view: ChannelView) -> None:
     strongest = sorted(view.lines, key=lambda row: -row["ratio"])
     for number, row in enumerate(strongest):
         line = row["frequency"]
-        label = f"{TERMS[view.quantity]['S']} ({len(strongest)})" if number == 0 else None
+        label = f"{TERM_NAMES[view.quantity]['S']} ({len(strongest)})" if number == 0 else None
         axes.axvline(line, lw=0.5, label=label, zorder=1.5, **look)
         crowded = any(1.0 / apart < line / other < apart for other in named)
         if len(named) == _MOST_NAMED or crowded:

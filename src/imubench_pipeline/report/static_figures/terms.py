@@ -12,22 +12,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from imubench_pipeline.noise import (
-    FLOOR,
-    PEAK_TAU,
-    Flicker,
-    GaussMarkov,
-    NoiseModel,
-    Quantization,
-    Ramp,
-    RandomWalk,
-    Sinusoid,
-    Term,
-    WhiteNoise,
-)
+from imubench_pipeline.noise import NoiseModel, Term
 from imubench_pipeline.report.practical import System, page_unit
 from imubench_pipeline.report.static_figures.curves import channel_axes, draw_measured, finish
-from imubench_pipeline.report.static_figures.names import SYMBOLS, TERMS
+from imubench_pipeline.report.static_figures.names import SYMBOLS, TERM_NAMES
 from imubench_pipeline.report.static_figures.style import style
 from imubench_pipeline.report.view import ChannelView
 
@@ -41,6 +29,9 @@ TERM_LOOKS: dict[str, dict[str, Any]] = {
     "S": {"color": "#5B5FC7", "linestyle": (0, (2, 1))},
 }
 """Colour and dash of each term, the same in every figure."""
+
+_WRITTEN_BELOW = frozenset({"F", "K"})
+"""Terms whose parameter is written below its point: the curve of the sum is above."""
 
 SUM_LOOK: dict[str, Any] = {"color": "#008F6B", "linestyle": "-", "linewidth": 1.2}
 
@@ -79,14 +70,14 @@ def terms_figure(view: ChannelView, system: System = "practical") -> Figure | No
     draw_measured(axes, view, scale, limits=False)
     # Lines fold at the averaging times of the curve; between them they would be a smear.
     tau = view.tau if model.sinusoids else np.geomspace(view.tau[0], view.tau[-1], 200)
-    smooth = [term for term in model.terms if not isinstance(term, Sinusoid)]
+    smooth = [term for term in model.terms if term not in model.sinusoids]
     for term, look in _looks(smooth):
         deviation = np.sqrt(term.allan_variance(tau)) * scale
         axes.plot(tau, deviation, label=term_label(view, term, system), **look)
     name = "+".join(term.symbol for term in smooth)
     if model.sinusoids:
         lines = np.sqrt(NoiseModel(sinusoids=model.sinusoids).allan_variance(tau)) * scale
-        label = f"{TERMS[view.quantity]['S']} ({len(model.sinusoids)})"
+        label = f"{TERM_NAMES[view.quantity]['S']} ({len(model.sinusoids)})"
         axes.plot(tau, lines, label=label, **TERM_LOOKS["S"])
         name += " and lines"
     total = np.sqrt(model.allan_variance(tau)) * scale
@@ -128,15 +119,16 @@ def _mark_readings(
     """
     levels = []
     for term in terms:
-        reading = _reading(term, floor_tau)
+        reading = term.reading(floor_tau)
         if reading is None:
             continue
-        where, level, label = reading
+        where, level = reading.tau, reading.level
+        factor = "" if reading.factor == 1.0 else f"{reading.factor:.3f} "
         colour = TERM_LOOKS[term.symbol]["color"]
         at_end = where > tau[-1] * (tau[0] / tau[-1]) ** _END
-        below = isinstance(term, RandomWalk | Flicker)
+        below = term.symbol in _WRITTEN_BELOW
         levels.append(level * scale * (0.6 if below else 1.6))
-        if isinstance(term, GaussMarkov):
+        if reading.peak:
             axes.axhline(level * scale, color=colour, lw=0.5, ls=(0, (1, 2)))
         axes.plot(
             where,
@@ -150,7 +142,7 @@ def _mark_readings(
             zorder=3.2,
         )
         axes.annotate(
-            label,
+            f"{factor}${reading.symbol}$",
             (where, level * scale),
             xytext=(-5.0 if at_end else 5.0, -8.0 if below else 4.0),
             ha="right" if at_end else "left",
@@ -162,52 +154,20 @@ def _mark_readings(
     return levels
 
 
-def _reading(term: Term, floor_tau: float) -> tuple[float, float, str] | None:
-    """Return tau and level at which the parameter of a term is read, and what stands there."""
-    if isinstance(term, WhiteNoise):
-        return 1.0, term.N, "$N$"
-    if isinstance(term, GaussMarkov):
-        return PEAK_TAU * term.T_B, FLOOR * term.B, f"{FLOOR:.3f} $B$"
-    if isinstance(term, Flicker):
-        # It is as high everywhere; the curve shows it where it is lowest.
-        return floor_tau, FLOOR * term.B, f"{FLOOR:.3f} $B$"
-    if isinstance(term, RandomWalk):
-        return 3.0, term.K, "$K$"
-    return None
-
-
 def term_label(view: ChannelView, term: Term, system: System) -> str:
     """Return the name of a term with its parameters, and whether the log does not tell them."""
     values = ", ".join(
-        f"{SYMBOLS[symbol]} = {unit.text(value, 3)} {unit.sign}"
-        for symbol, value in parameters_of(term).items()
+        f"{SYMBOLS[symbol]} = {unit.text(abs(value), 3)} {unit.sign}"
+        for symbol, value in term.values.items()
         for unit in [page_unit(view.quantity, symbol, system)]
     )
     doubts = {
         row["status"].replace("_", " ")
-        for symbol, value in parameters_of(term).items()
+        for symbol, value in term.values.items()
         for row in view.named(view.recommended, symbol)
         if row["value"] is None and row["fitted"] is not None
-        if math.isclose(abs(row["fitted"]), value)
+        if math.isclose(row["fitted"], value)
     }
-    return f"{TERMS[view.quantity][term.symbol]}, {values}" + "".join(
+    return f"{TERM_NAMES[view.quantity][term.symbol]}, {values}" + "".join(
         f" ({doubt})" for doubt in sorted(doubts)
     )
-
-
-def parameters_of(term: Term) -> dict[str, float]:
-    """Return the parameters of a term, SI; of a ramp without its sign."""
-    match term:
-        case Quantization(Q):
-            return {"Q": Q}
-        case WhiteNoise(N):
-            return {"N": N}
-        case Flicker(B):
-            return {"B": B}
-        case GaussMarkov(B, T_B):
-            return {"B": B, "T_B": T_B}
-        case RandomWalk(K):
-            return {"K": K}
-        case Ramp(R):
-            return {"R": abs(R)}
-    return {}

@@ -1,0 +1,55 @@
+"""The noise terms of an inertial sensor, with all that follows from each (IEEE Std 952-2020, 647).
+
+A term knows its two-sided power spectral density, its Allan variance in continuous time and as
+sampled, the spectrum of its samples, the covariance of their sums and of block means, its state
+spaces, the growth of its integrals, what filters make of it, and how its parameters are called and
+measured. Models, fits, simulation, budgets, exports and pages take everything from here. A new kind
+of term is a module here, and an entry of `TERMS`.
+"""
+
+from imubench_pipeline.noise.terms.base import Deterministic, Term
+from imubench_pipeline.noise.terms.flicker import Flicker
+from imubench_pipeline.noise.terms.gauss_markov import (
+    FLOOR,
+    PEAK_TAU,
+    GaussMarkov,
+    bias_instability,
+    driving_density,
+    gauss_markov_shape,
+    sampled_gauss_markov_shape,
+)
+from imubench_pipeline.noise.terms.quantization import Quantization
+from imubench_pipeline.noise.terms.ramp import Ramp
+from imubench_pipeline.noise.terms.random_walk import RandomWalk
+from imubench_pipeline.noise.terms.registry import registered
+from imubench_pipeline.noise.terms.sinusoid import Sinusoid
+from imubench_pipeline.noise.terms.traits import Role, TermParameter
+from imubench_pipeline.noise.terms.white_noise import WhiteNoise
+
+__all__ = [
+    "FLOOR",
+    "PARAMETERS",
+    "PEAK_TAU",
+    "TERMS",
+    "Deterministic",
+    "Flicker",
+    "GaussMarkov",
+    "Quantization",
+    "Ramp",
+    "RandomWalk",
+    "Role",
+    "Sinusoid",
+    "Term",
+    "TermParameter",
+    "WhiteNoise",
+    "bias_instability",
+    "driving_density",
+    "gauss_markov_shape",
+    "sampled_gauss_markov_shape",
+]
+
+TERMS = registered(Quantization, WhiteNoise, Flicker, GaussMarkov, RandomWalk, Ramp, Sinusoid)
+"""Every kind of noise term, in the order of a model's name."""
+
+PARAMETERS = {parameter.symbol: parameter for kind in TERMS for parameter in kind.parameters}
+"""Every parameter of these by its symbol; flicker noise and a Gauss-Markov process share B."""

@@ -1,0 +1,316 @@
+"""What is asked of every noise term."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, ClassVar, Self
+
+import numpy as np
+
+from imubench_pipeline.noise.growth import SensorStart, Uncalibrated
+from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace, root_of
+from imubench_pipeline.noise.terms.traits import (
+    Drive,
+    Reading,
+    Role,
+    SampleBlocks,
+    TermParameter,
+)
+from imubench_pipeline.typing import Array
+
+if TYPE_CHECKING:
+    from imubench_pipeline.noise.terms.gauss_markov import GaussMarkov
+
+
+@dataclass(frozen=True)
+class Term(ABC):
+    """One noise process of a model; frequencies in Hz, tau and interval in s, results SI.
+
+    A term is a frozen dataclass of its parameters. What is abstract here, and the class variables
+    without a value, are its own; `noise.terms.registry` refuses a term that lacks one.
+    """
+
+    symbol: ClassVar[str]
+    """In the name of a model, such as ``GM`` in ``N+GM+K``."""
+
+    label: ClassVar[str]
+    """In words, such as ``white noise``."""
+
+    standard_name: ClassVar[str]
+    """The field's name; ``{signal}`` and ``{integral}``: rate and angle, or acceleration and
+    velocity."""
+
+    word: ClassVar[str]
+    """In the source of an error: its first word."""
+
+    role: ClassVar[Role]
+    parameters: ClassVar[tuple[TermParameter, ...]]
+
+    states: ClassVar[tuple[str, ...]]
+    """Names of the states of `state_space`."""
+
+    @abstractmethod
+    def psd(self, frequency: Array, interval: float | None = None) -> Array:
+        """Two-sided power spectral density in continuous time, SI^2/Hz."""
+
+    @abstractmethod
+    def allan_variance(self, tau: Array) -> Array:
+        """Allan variance of the process averaged continuously over tau, SI^2."""
+
+    @abstractmethod
+    def sampled_allan_variance(self, n: Array, interval: float) -> Array:
+        """Allan variance of the sampled process at n samples a cluster, SI^2."""
+
+    @abstractmethod
+    def sampled_spectrum(self, omega: Array, interval: float) -> Array:
+        """Spectrum of the samples, SI^2; its mean over -pi..pi is their variance."""
+
+    @abstractmethod
+    def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
+        """Generalised covariance of the cumulative sum of the samples at whole lags, SI^2.
+
+        It is that of the second differences at n samples a cluster: what these take out, a
+        constant and a square of the lag, may differ from n to n.
+        """
+
+    @abstractmethod
+    def state_space(self, interval: float) -> StateSpace:
+        """Discrete state space at a sampling interval, exact."""
+
+    @abstractmethod
+    def continuous_space(self) -> ContinuousSpace | None:
+        """State space in continuous time; None: it has none."""
+
+    @property
+    @abstractmethod
+    def drive(self) -> Drive | None:
+        """What it puts into a filter behind it; None: it has no density, or stands behind it."""
+
+    @abstractmethod
+    def growth(self, order: int, time: float, start: SensorStart) -> float:
+        """Return the variance of the error that it has grown to (`noise.growth`).
+
+        Parameters
+        ----------
+        order : int
+            m, 0 to 2: integrations but one.
+        time : float
+            t, s, above 0.
+        start : Calibrated or Uncalibrated
+            The turn-on bias is apart.
+
+        Returns
+        -------
+        float
+            SI: (rad/s)^2 or (m/s^2)^2 times s^(2m+2).
+        """
+
+    @abstractmethod
+    def growth_from_known(self, time: Array) -> tuple[Array, Array]:
+        """Return the variances of its first and second integral since its state was known.
+
+        0 for what does not grow as noise does.
+        """
+
+    @abstractmethod
+    def block_covariance(self, lags: Array, block: float) -> Array:
+        """Return the generalised covariance of means over blocks of continuous time.
+
+        Parameters
+        ----------
+        lags : ndarray
+            k, blocks, whole numbers from 0.
+        block : float
+            d, s.
+
+        Returns
+        -------
+        ndarray
+            (rad/s)^2 or (m/s^2)^2.
+
+        Raises
+        ------
+        TypeError
+            If the term is deterministic.
+
+        References
+        ----------
+        I. M. Gelfand and G. E. Shilov, "Generalized Functions", vol. 1, 1964, for those of 1/|f|
+        and 1/f^2: -ln|t| / pi and -|t| / 2, with the densities of IEEE Std 952-1997, annex C.
+        """
+
+    @abstractmethod
+    def mean_covariance(self, blocks: SampleBlocks) -> Array:
+        """Return the covariance of the means of blocks of samples, in closed form.
+
+        Parameters
+        ----------
+        blocks : SampleBlocks
+            b of them; a walk counts from the first sample of the first.
+
+        Returns
+        -------
+        ndarray, shape (b, b)
+            (rad/s)^2 or (m/s^2)^2.
+        """
+
+    @abstractmethod
+    def block_sums(self, blocks: int, width: int, rate: float, rng: np.random.Generator) -> Array:
+        """Draw the sums over adjacent blocks of samples of a simulated log, exactly.
+
+        Parameters
+        ----------
+        blocks : int
+        width : int
+            Samples a block.
+        rate : float
+            Hz.
+        rng : numpy.random.Generator
+
+        Returns
+        -------
+        ndarray, shape (blocks,)
+        """
+
+    @abstractmethod
+    def reading(self, lowest_tau: float) -> Reading | None:
+        """Return where a curve shows its parameter; None: nowhere.
+
+        Parameters
+        ----------
+        lowest_tau : float
+            Where the curve is lowest, s.
+        """
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Its parameters by symbol, SI."""
+        return {parameter.symbol: getattr(self, parameter.symbol) for parameter in self.parameters}
+
+    @property
+    def in_words(self) -> str:
+        """Its parameters with their values in SI."""
+        return ", ".join(f"{symbol} = {value:.3e}" for symbol, value in self.values.items())
+
+    @property
+    def source(self) -> str:
+        """Its name as the source of an error, such as ``K`` or ``GM 89.5 s``."""
+        return self.word
+
+    @property
+    def gauss_markov(self) -> GaussMarkov | None:
+        """The first-order Gauss-Markov process that it is, where its role is that."""
+        return None
+
+    def realised(self, interval: float, longest: float) -> Sequence[Term]:
+        """Return terms of a finite state space that stand for it, by default itself.
+
+        Parameters
+        ----------
+        interval : float
+            Sampling interval, s.
+        longest : float
+            Tau up to which it is followed, s.
+        """
+        return [self]
+
+    def scaled(self, factor: float) -> Self:
+        """Return the term of a signal that is a factor larger; times stay."""
+        scaled = {
+            parameter.symbol: getattr(self, parameter.symbol) * factor**parameter.signal
+            for parameter in self.parameters
+            if parameter.signal
+        }
+        return replace(self, **scaled)
+
+    def as_unit(self) -> tuple[float, Term]:
+        """Return a power and the term that is the same for all of the kind: together this one.
+
+        By default 1 and itself. Where one parameter alone scales the term, what is computed of
+        the other serves all models of a log.
+        """
+        return 1.0, self
+
+    def sources(self, order: int, time: float, start: SensorStart) -> Iterator[tuple[str, float]]:
+        """Yield name and standard deviation of what it adds to an error, see `growth`."""
+        yield self.source, math.sqrt(self.growth(order, time, start))
+
+    def mean_variance(self, time: float, on_time: float) -> float:
+        """Return the variance of its mean over a window.
+
+        Parameters
+        ----------
+        time : float
+            Length of the window, s.
+        on_time : float
+            Time from switch-on to the beginning of the window, s (see `noise.growth`).
+
+        Returns
+        -------
+        float
+            (rad/s)^2 or (m/s^2)^2.
+        """
+        return self.growth(0, time, Uncalibrated(bias=0.0, on_time=on_time)) / time**2
+
+    def passed(self, power: Callable[[float], Array]) -> float:
+        """Return the part of its Allan variance that a low-pass leaves; only asked without `drive`.
+
+        Parameters
+        ----------
+        power : callable
+            Squared gain at a frequency in Hz.
+        """
+        return 1.0
+
+    def start(self, rng: np.random.Generator, interval: float) -> Array:
+        """Draw the first state, shape (m,)."""
+        space = self.state_space(interval)
+        root = root_of(space.initial_variance)
+        return space.initial_mean + root @ rng.standard_normal(len(root))
+
+
+@dataclass(frozen=True)
+class Deterministic(Term):
+    """A term that is no noise: a course that goes on for ever."""
+
+    @abstractmethod
+    def swing(self, weights: Array, block: float) -> tuple[float, float]:
+        """Return the mean square and the frequency, Hz, of a weighted sum of means over blocks.
+
+        Parameters
+        ----------
+        weights : ndarray
+            Of adjacent blocks.
+        block : float
+            Length of a block, s.
+        """
+
+    @property
+    def drive(self) -> Drive | None:
+        """None: no density."""
+        return None
+
+    def sampled_spectrum(self, omega: Array, interval: float) -> Array:
+        """0: no density."""
+        return np.zeros_like(omega)
+
+    def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
+        """0: nothing varies."""
+        return np.zeros_like(lags)
+
+    def growth_from_known(self, time: Array) -> tuple[Array, Array]:
+        """0: a filter that knows it predicts it."""
+        return np.zeros_like(time), np.zeros_like(time)
+
+    def block_covariance(self, lags: Array, block: float) -> Array:
+        """Raise: it has a course instead (`swing`).
+
+        Raises
+        ------
+        TypeError
+            Always.
+        """
+        raise TypeError(f"{self} is deterministic")

@@ -1,0 +1,239 @@
+"""Flicker noise, and the bank of Gauss-Markov processes that realises it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from scipy.optimize import nnls
+
+from imubench_pipeline.noise.flicker_growth import after_window, since_switch_on
+from imubench_pipeline.noise.growth import Calibrated, SensorStart
+from imubench_pipeline.noise.sampled_flicker import sampled_flicker_shape, sampled_flicker_sums
+from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace
+from imubench_pipeline.noise.terms.base import Term
+from imubench_pipeline.noise.terms.gauss_markov import (
+    BIAS_INSTABILITY,
+    FLOOR,
+    PEAK_TAU,
+    GaussMarkov,
+    sampled_gauss_markov_shape,
+)
+from imubench_pipeline.noise.terms.traits import Drive, Reading, Role, SampleBlocks
+from imubench_pipeline.noise.terms.white_noise import WhiteNoise
+from imubench_pipeline.typing import Array
+
+_FAR = 100
+"""Blocks apart from which the series of their covariance is better than its closed form."""
+
+_MEMBERS_A_DECADE = 2.5
+_POINTS_A_DECADE = 20
+_BEYOND = 4.0
+"""How far the correlation times of the bank go beyond the one that peaks at the end of its band."""
+
+
+@dataclass(frozen=True)
+class Flicker(Term):
+    """Flicker noise, 1/f: bias instability B as IEEE Std 952 defines it.
+
+    It has no finite state space: `bank` realises it.
+    """
+
+    B: float
+    symbol = "F"
+    label = "flicker noise"
+    standard_name = "bias instability (flicker)"
+    word = "flicker"
+    role = Role.SLOW
+    parameters = (BIAS_INSTABILITY,)
+    states = ()
+
+    def psd(self, frequency: Array, interval: float | None = None) -> Array:
+        """B^2 / (2 pi f)."""
+        return self.B**2 / (2.0 * np.pi * np.abs(frequency))
+
+    def allan_variance(self, tau: Array) -> Array:
+        """(2 ln 2 / pi) B^2 at every tau."""
+        return np.full_like(tau, FLOOR**2 * self.B**2)
+
+    def sampled_allan_variance(self, n: Array, interval: float) -> Array:
+        """2 B^2 / (pi n^2) times the integral of sin^4(n x) / sin^3(x) from 0 to pi/2."""
+        return 2.0 / np.pi * self.B**2 * sampled_flicker_shape(n)
+
+    def sampled_spectrum(self, omega: Array, interval: float) -> Array:
+        """B^2 / sqrt(2 - 2 cos(omega))."""
+        return self.B**2 / np.abs(2.0 * np.sin(omega / 2.0))
+
+    def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
+        """B^2 / (2 pi) k^2 ln(k), as sampled."""
+        return 0.5 / np.pi * self.B**2 * sampled_flicker_sums(np.abs(lags))
+
+    def state_space(self, interval: float) -> StateSpace:
+        """Raise: there is none.
+
+        Raises
+        ------
+        ValueError
+            Always.
+        """
+        raise ValueError("flicker noise has no finite state space; take its Gauss-Markov bank")
+
+    def continuous_space(self) -> ContinuousSpace | None:
+        """None, see `state_space`."""
+        return None
+
+    @property
+    def drive(self) -> Drive:
+        """B of flicker noise."""
+        return Drive(flicker=self.B)
+
+    def realised(self, interval: float, longest: float) -> Sequence[Term]:
+        """Return its `bank`."""
+        return bank(self.B, interval, longest)
+
+    def as_unit(self) -> tuple[float, Term]:
+        """B^2 and B = 1."""
+        return self.B**2, Flicker(1.0)
+
+    def growth(self, order: int, time: float, start: SensorStart) -> float:
+        """B^2 t^(2m+2) times a function of the window, or the time since switch-on, over t.
+
+        See `noise.flicker_growth`.
+        """
+        scale = self.B**2 * time ** (2 * order + 2)
+        if isinstance(start, Calibrated):
+            return scale * after_window(order, start.window / time)
+        return scale * since_switch_on(order, start.on_time / time)
+
+    def growth_from_known(self, time: Array) -> tuple[Array, Array]:
+        """0: its state is never known; that of its `bank` is.
+
+        A filter predicts with the bank, see `realised`.
+        """
+        return np.zeros_like(time), np.zeros_like(time)
+
+    def block_covariance(self, lags: Array, block: float) -> Array:
+        """-(B^2 / pi) times the second difference of k^2 (ln k - 3/2) / 2."""
+        return -(self.B**2) / math.pi * _mean_logarithm(lags)
+
+    def mean_covariance(self, blocks: SampleBlocks) -> Array:
+        """Raise: it has no covariance.
+
+        Raises
+        ------
+        TypeError
+            Always.
+        """
+        raise TypeError("flicker noise has no covariance; take its Gauss-Markov bank")
+
+    def block_sums(self, blocks: int, width: int, rate: float, rng: np.random.Generator) -> Array:
+        """Raise: those of its bank are drawn.
+
+        Raises
+        ------
+        TypeError
+            Always.
+        """
+        raise TypeError("flicker noise has no finite state space; take its Gauss-Markov bank")
+
+    def reading(self, lowest_tau: float) -> Reading:
+        """0.664 B: it is as high everywhere; the curve shows it where it is lowest."""
+        return Reading(lowest_tau, FLOOR * self.B, "B", FLOOR)
+
+    @property
+    def in_words(self) -> str:
+        """B."""
+        return f"flicker noise B = {self.B:.3e}"
+
+
+def _mean_logarithm(lags: Array) -> Array:
+    """Return the mean of ln|s - s'| over two blocks of length 1, k apart."""
+    k = np.maximum(lags, 1.0)
+    far = np.maximum(k, _FAR)
+    series = np.log(far) - 1.0 / (12.0 * far**2) - 1.0 / (60.0 * far**4)
+    near = np.minimum(k, _FAR)
+    closed = 0.5 * (_twice(near + 1.0) - 2.0 * _twice(near) + _twice(near - 1.0))
+    return np.where(lags == 0.0, -1.5, np.where(k < _FAR, closed, series))
+
+
+def _twice(x: Array) -> Array:
+    """Return twice the integral of the integral of ln x."""
+    return x**2 * (np.log(np.maximum(x, 1e-300)) - 1.5)
+
+
+def bank(B: float, interval: float, longest: float) -> list[Term]:
+    """Return Gauss-Markov processes whose samples have the Allan variance of flicker noise.
+
+    Their correlation times are spaced evenly on a log scale from half a sampling interval, five
+    in two decades; a white part stands for the shorter ones. The variances are fitted to the
+    Allan variance of sampled flicker noise by non-negative least squares.
+
+    Parameters
+    ----------
+    B : float
+        Bias instability, rad/s or m/s²; the plateau is 0.664 B.
+    interval : float
+        Sampling interval, s: the shortest tau of the band.
+    longest : float
+        Longest tau of the band, s.
+
+    Returns
+    -------
+    list of Term
+        Gauss-Markov processes, and white noise.
+
+    Raises
+    ------
+    ValueError
+        If the band is empty.
+    """
+    if not 0 < interval < longest:
+        raise ValueError(f"the band from {interval} to {longest} s is empty")
+    times, levels, white = _unit_bank(round(math.log10(longest / interval), 6))
+    terms: list[Term] = [
+        GaussMarkov(B * level, interval * time)
+        for time, level in zip(times, levels, strict=True)
+        if level > 0
+    ]
+    return [*terms, WhiteNoise(B * white * math.sqrt(interval))] if white else terms
+
+
+def ripple(interval: float, longest: float) -> tuple[float, float]:
+    """Return the largest relative errors of a bank inside its band.
+
+    Returns
+    -------
+    (float, float)
+        Of the sampled Allan variance at tau from ``interval`` to ``longest``, and of the
+        spectrum of the samples at frequencies from 1 / (2 longest) to Nyquist, both against
+        sampled flicker noise.
+    """
+    terms = bank(1.0, interval, longest)
+    points = math.ceil(math.log10(longest / interval) * _POINTS_A_DECADE * 2)
+    n = np.unique(np.rint(np.geomspace(1.0, longest / interval, points)))
+    omega = np.pi / n
+    variance = np.sum([term.sampled_allan_variance(n, interval) for term in terms], axis=0)
+    density = np.sum([term.sampled_spectrum(omega, interval) for term in terms], axis=0)
+    flicker = Flicker(1.0)
+    return (
+        float(np.max(np.abs(variance / flicker.sampled_allan_variance(n, interval) - 1.0))),
+        float(np.max(np.abs(density / flicker.sampled_spectrum(omega, interval) - 1.0))),
+    )
+
+
+@lru_cache(maxsize=16)
+def _unit_bank(decades: float) -> tuple[Array, Array, float]:
+    """Return correlation times, their B, and N, for B = 1 and tau from 1 s to 10^decades s."""
+    first, last = 0.5, max(10.0**decades / PEAK_TAU * _BEYOND, 1.0)
+    members = 1 + math.ceil(math.log10(last / first) * _MEMBERS_A_DECADE)
+    times = np.geomspace(first, last, members)
+    n = np.unique(np.rint(np.geomspace(1.0, 10.0**decades, 2 + int(decades * _POINTS_A_DECADE))))
+    wanted = Flicker(1.0).sampled_allan_variance(n, 1.0)
+    shapes = [
+        GaussMarkov(1.0, time).density * sampled_gauss_markov_shape(n, 1.0, time) for time in times
+    ]
+    powers, _ = nnls(np.column_stack([*shapes, 1.0 / n]) / wanted[:, None], np.ones_like(n))
+    return times, np.sqrt(powers[:-1]), math.sqrt(powers[-1])

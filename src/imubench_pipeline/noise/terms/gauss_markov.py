@@ -1,0 +1,285 @@
+"""A first-order Gauss-Markov process, which stands for the bias instability."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from imubench_pipeline.noise.block_sums import of_scalar
+from imubench_pipeline.noise.exponentials import decay, squared_response
+from imubench_pipeline.noise.growth import SensorStart, Uncalibrated, of_constant
+from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace
+from imubench_pipeline.noise.terms.base import Term
+from imubench_pipeline.noise.terms.random_walk import RandomWalk
+from imubench_pipeline.noise.terms.traits import (
+    Drive,
+    Process,
+    Reading,
+    Role,
+    SampleBlocks,
+    SearchRange,
+    TermParameter,
+)
+from imubench_pipeline.typing import Array
+
+PEAK = 0.4365
+"""Peak of the Allan deviation of a Gauss-Markov process over sqrt(S_B T_B)."""
+
+PEAK_TAU = 1.8926
+"""Tau of that peak over T_B."""
+
+FLOOR = math.sqrt(2.0 * math.log(2.0) / math.pi)
+"""Bias instability plateau over B: 0.664."""
+
+BIAS_INSTABILITY = TermParameter("B", "bias instability", 1.0, 0.0)
+"""Of a Gauss-Markov process, and of flicker noise, which is as high."""
+
+CORRELATION_TIMES = SearchRange(samples=20.0, of_log=1 / 5)
+"""A shorter correlation is that of a filter, not a bias instability; a longer one cannot be told
+from a random walk."""
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
+
+_PIECES = (0.0, 0.003, 0.03, 0.2, 1.0)
+"""Ends of the pieces of an integral: the response of a short process bends early."""
+
+_SERIES_BELOW = 0.5
+_SERIES = [(-1) ** (k + 1) * (2.0**k - 4.0) / (2.0 * math.factorial(k)) for k in range(3, 24)]
+"""The bracket of 000 eq. 26 cancels for tau << T_B; its power series over tau/T_B does not."""
+
+_WALK_BELOW = 1e-3
+"""Cluster length over T_B below which a Gauss-Markov process is a random walk to a thousandth, and
+the second differences of its sum's covariance begin to cancel."""
+
+
+@dataclass(frozen=True)
+class GaussMarkov(Term):
+    """First-order Gauss-Markov process that stands for the bias instability B (000 eq. 4-8)."""
+
+    B: float
+    T_B: float
+    symbol = "GM"
+    label = "Gauss-Markov"
+    standard_name = "bias instability (GM)"
+    word = "GM"
+    role = Role.GAUSS_MARKOV
+    parameters = (
+        BIAS_INSTABILITY,
+        TermParameter("T_B", "correlation time", 0.0, 1.0, search=CORRELATION_TIMES),
+    )
+    states = ("z_G",)
+
+    @property
+    def density(self) -> float:
+        """S_B = 2 B^2 ln 2 / (pi 0.4365^2 T_B), density of the driving white noise."""
+        return driving_density(self.B, self.T_B)
+
+    def psd(self, frequency: Array, interval: float | None = None) -> Array:
+        """S_B T_B^2 / (1 + (2 pi f T_B)^2)."""
+        return self.density * self.T_B**2 / (1.0 + (2.0 * np.pi * frequency * self.T_B) ** 2)
+
+    def allan_variance(self, tau: Array) -> Array:
+        """000 eq. 26 with the sign mended: e^(-tau/T_B)."""
+        return self.density * gauss_markov_shape(tau, self.T_B)
+
+    def sampled_allan_variance(self, n: Array, interval: float) -> Array:
+        """Exact for samples of the process: sum of its covariances."""
+        return self.density * sampled_gauss_markov_shape(n, interval, self.T_B)
+
+    def sampled_spectrum(self, omega: Array, interval: float) -> Array:
+        """(S_B T_B / 2) (1 - p^2) / (1 - 2 p cos(omega) + p^2) with p = e^(-T/T_B)."""
+        p = math.exp(-interval / self.T_B)
+        variance = self.density * self.T_B / 2.0
+        gap = math.expm1(-interval / self.T_B) ** 2 + p * 4.0 * np.sin(omega / 2.0) ** 2
+        return -variance * math.expm1(-2.0 * interval / self.T_B) / gap
+
+    def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
+        """-v (p e^(-|k| T/T_B) / (1 - p)^2 + |k| (1 + p) / (2 (1 - p))), p = e^(-T/T_B).
+
+        v = S_B T_B / 2. For clusters that are short for T_B the process is a random walk.
+        """
+        if n * interval < _WALK_BELOW * self.T_B:
+            return RandomWalk(math.sqrt(self.density)).sum_covariance(lags, n, interval)
+        k, p, rest = np.abs(lags), math.exp(-interval / self.T_B), -math.expm1(-interval / self.T_B)
+        variance = self.density * self.T_B / 2.0
+        decayed = p / rest**2 * np.exp(-k * (interval / self.T_B))
+        return -variance * (decayed + k * ((1.0 + p) / (2.0 * rest)))
+
+    def state_space(self, interval: float) -> StateSpace:
+        """Phi = e^(-T/T_B), Q_d = S_B T_B / 2 (1 - e^(-2T/T_B)); it starts stationary."""
+        stationary = self.density * self.T_B / 2.0
+        return StateSpace.scalar(
+            math.exp(-interval / self.T_B),
+            -stationary * math.expm1(-2.0 * interval / self.T_B),
+            stationary,
+        )
+
+    def continuous_space(self) -> ContinuousSpace:
+        """F = -1/T_B, Q = S_B."""
+        return ContinuousSpace(
+            np.array([[-1.0 / self.T_B]]), np.array([[self.density]]), np.ones(1)
+        )
+
+    @property
+    def drive(self) -> Drive:
+        """S_B through T_B."""
+        return Drive(process=Process(self.T_B, self.density))
+
+    @property
+    def gauss_markov(self) -> GaussMarkov:
+        """Itself."""
+        return self
+
+    def growth(self, order: int, time: float, start: SensorStart) -> float:
+        """S_B (T_B^(2m+3) P_m(x) + c^2 T_B (P_0(y) / y^2 + (d_x - d_y)^2 / 2)).
+
+        x = t/T_B, y = W/T_B; with E_k(x) = x^k phi_k(-x) (`exponentials.phi`) P_m(x) is the
+        integral of E_{m+1}^2 from 0 to x, and d_x = (m+1)! x phi_{m+2}(-x) and
+        d_y = y phi_2(-y) are what is lost of the state at the start, forward and backward. Where
+        not calibrated S_B (T_B^(2m+3) P_m(x) + c^2 T_B (1 - d_x)^2 / 2).
+        """
+        return self.density * _grown(order, time, self.T_B, start)
+
+    def growth_from_known(self, time: Array) -> tuple[Array, Array]:
+        """S_B times the integral of h^2 from 0 to t.
+
+        h = T_B (1 - e^(-s/T_B)) and h = T_B s - T_B^2 (1 - e^(-s/T_B)).
+        """
+        T_B = self.T_B
+        first = _squared(lambda s: -T_B * np.expm1(-s / T_B), time)
+        second = _squared(lambda s: T_B**2 * _second_response(s / T_B), time)
+        return self.density * first, self.density * second
+
+    def block_covariance(self, lags: Array, block: float) -> Array:
+        """V ((1 - e^-x) / x)^2 e^(-(k-1) x), and 2 v (x - 1 + e^-x) / x^2 at k = 0.
+
+        x = d / T_B, v = S_B T_B / 2.
+        """
+        x = block / self.T_B
+        variance = self.density * self.T_B / 2.0
+        apart = (math.expm1(-x) / x) ** 2 * np.exp(-(np.maximum(lags, 1.0) - 1.0) * x)
+        return variance * np.where(lags == 0.0, 2.0 * (x + math.expm1(-x)) / x**2, apart)
+
+    def mean_covariance(self, blocks: SampleBlocks) -> Array:
+        """V s_n s_m p^lag, with s_n = (1 - p^n) / (n (1 - p)), p = e^(-T/T_B), v = S_B T_B / 2.
+
+        The lag is from the last sample of one block to the first of the other; on the diagonal
+        v (n (1 + p) / (1 - p) - 2 p (1 - p^n) / (1 - p)^2) / n^2.
+        """
+        n = (blocks.stop - blocks.start).astype(np.float64)
+        x = 1.0 / (blocks.rate * self.T_B)
+        lost = -math.expm1(-x)
+        decayed = -np.expm1(-n * x)
+        gain = decayed / (n * lost)
+        variance = 0.5 * self.density * self.T_B
+        covariance = np.empty((len(n), len(n)))
+        for later in range(len(n)):  # row by row: there may be thousands, and one matrix is enough
+            lag = blocks.start[later] - blocks.stop[:later] + 1
+            covariance[later, :later] = variance * gain[later] * gain[:later] * np.exp(-x * lag)
+            covariance[:later, later] = covariance[later, :later]
+        p = math.exp(-x)
+        own = (n * (1.0 + p) / lost - 2.0 * p * decayed / lost**2) / n**2
+        np.fill_diagonal(covariance, variance * own)
+        return covariance
+
+    def block_sums(self, blocks: int, width: int, rate: float, rng: np.random.Generator) -> Array:
+        """Draw them with the states at their ends."""
+        interval = 1.0 / rate
+        space = self.state_space(interval)
+        return of_scalar(space, self.start(rng, interval), blocks, width, rng)
+
+    def reading(self, lowest_tau: float) -> Reading:
+        """0.664 B at the peak."""
+        return Reading(PEAK_TAU * self.T_B, FLOOR * self.B, "B", FLOOR, peak=True)
+
+    @property
+    def in_words(self) -> str:
+        """B and T_B."""
+        return f"Gauss-Markov process B = {self.B:.3e}, T_B = {self.T_B:.4g} s"
+
+    @property
+    def source(self) -> str:
+        """Its correlation time tells it from another one."""
+        return f"{self.word} {self.T_B:.4g} s"
+
+
+def driving_density(B: float, T_B: float) -> float:
+    """Return S_B of a bias instability B with correlation time T_B (000 eq. 8)."""
+    return 2.0 * B**2 * math.log(2.0) / (math.pi * PEAK**2 * T_B)
+
+
+def bias_instability(density: float, T_B: float) -> float:
+    """Return B of a Gauss-Markov process with driving density S_B (000 eq. 8 solved for B)."""
+    return math.sqrt(density * T_B * math.pi * PEAK**2 / (2.0 * math.log(2.0)))
+
+
+def gauss_markov_shape(tau: Array, T_B: float) -> Array:
+    """Return the Allan variance of a Gauss-Markov process over S_B, s (000 eq. 26, Farrell 63).
+
+    (T_B^2/tau) (1 - (T_B/(2 tau)) (3 - 4 e^(-tau/T_B) + e^(-2 tau/T_B)))
+    """
+    ratio = np.asarray(tau, dtype=np.float64) / T_B
+    small = ratio < _SERIES_BELOW
+    r = np.where(small, ratio, 0.0)
+    x = np.where(small, 1.0, ratio)
+    series = r * np.polynomial.polynomial.polyval(r, _SERIES)
+    closed = (1.0 - (3.0 - 4.0 * np.exp(-x) + np.exp(-2.0 * x)) / (2.0 * x)) / x
+    return T_B * np.where(small, series, closed)
+
+
+def sampled_gauss_markov_shape(n: ArrayLike, interval: float, T_B: float) -> Array:
+    """Return the Allan variance of a sampled Gauss-Markov process over S_B, s.
+
+    (T_B / (2 n^2)) (n (1+p)/(1-p) - p (3 - 4 p^n + p^(2n)) / (1-p)^2) with p = e^(-T/T_B);
+    from the sum of the covariances of the samples.
+    """
+    n = np.asarray(n, dtype=np.float64)
+    p = math.exp(-interval / T_B)
+    q = -math.expm1(-interval / T_B)
+    x = n * interval / T_B
+    # 3 - 4 p^n + p^2n = 2 (1 - p^n) + (1 - p^n)^2 with the sign of its parts kept.
+    decay = -np.expm1(-x)
+    closed = (n * (1.0 + p) / q - p * decay * (2.0 + decay) / q**2) / n**2
+    # For clusters far shorter than T_B this cancels; the continuous form does not, and the
+    # moments sum_ij w_i w_j |i - j|^m of the samples tell what sampling adds to it.
+    h = interval / T_B
+    added = h / (3.0 * n) - h**3 / 6.0 * (n / 3.0 + 1.0 / (15.0 * n))
+    continuous = 2.0 / T_B * gauss_markov_shape(n * interval, T_B) + added
+    return T_B / 2.0 * np.where(x < 3e-3, continuous, closed)
+
+
+def _grown(order: int, time: float, T_B: float, start: SensorStart) -> float:
+    """Return the variance that a process of S_B = 1 has grown to (`GaussMarkov.growth`)."""
+    x = time / T_B
+    constant = of_constant(order, time)
+    driven = time ** (2 * order + 3) * squared_response(order, x)
+    if isinstance(start, Uncalibrated):
+        kept = math.factorial(order + 1) * decay(order + 1, x)
+        return driven + (constant * kept) ** 2 * T_B / 2.0
+    y = start.window / T_B
+    # Differences from 1 of what is kept: the difference of the two itself would cancel for
+    # long T_B.
+    lost = math.factorial(order + 1) * x * decay(order + 2, x) - y * decay(2, y)
+    in_window = start.window * squared_response(0, y)
+    return driven + constant**2 * (in_window + T_B * lost**2 / 2.0)
+
+
+def _second_response(x: Array) -> Array:
+    """Return x - 1 + e^(-x), which cancels for small x."""
+    series = x**2 / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0 * (1.0 - x / 6.0))))
+    return np.where(x < 1e-2, series, x + np.expm1(-x))
+
+
+def _squared(response: Callable[[Array], Array], time: Array) -> Array:
+    """Integrate the square of a response from 0 to each time."""
+    total = np.zeros_like(time)
+    for start, stop in pairwise(_PIECES):
+        half = (stop - start) / 2.0
+        at = time[:, None] * (start + half * (1.0 + _NODES))
+        total += time * half * (response(at) ** 2 @ _WEIGHTS)
+    return total

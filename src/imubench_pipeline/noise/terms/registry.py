@@ -1,0 +1,62 @@
+"""The check that a kind of term has all that is asked of it, when it is put into the registry."""
+
+from __future__ import annotations
+
+import inspect
+from dataclasses import fields
+
+from imubench_pipeline.noise.terms.base import Term
+from imubench_pipeline.noise.terms.traits import Role, TermParameter
+
+_STATED = ("symbol", "label", "standard_name", "word", "role", "parameters", "states")
+"""Class variables that every kind gives a value."""
+
+
+def registered(*kinds: type[Term]) -> tuple[type[Term], ...]:
+    """Return the kinds of terms, each of which lacks nothing.
+
+    Parameters
+    ----------
+    *kinds : type of Term
+
+    Raises
+    ------
+    TypeError
+        If a kind has an abstract method left, lacks a class variable, its parameters are not the
+        fields of its dataclass, a time constant has no range in which it is looked for, two
+        kinds share a symbol or a word, or mean different parameters by one symbol.
+    """
+    for kind in kinds:
+        _check(kind)
+    for name in ("symbol", "word"):
+        stated = [getattr(kind, name) for kind in kinds]
+        for value in stated:
+            if stated.count(value) > 1:
+                raise TypeError(f"{name} {value!r} is that of two noise terms")
+    known: dict[str, TermParameter] = {}
+    for kind in kinds:
+        for parameter in kind.parameters:
+            if known.setdefault(parameter.symbol, parameter) != parameter:
+                raise TypeError(f"{parameter.symbol} is another parameter in {kind.__name__}")
+    return kinds
+
+
+def _check(kind: type[Term]) -> None:
+    name = kind.__name__
+    if inspect.isabstract(kind):
+        missing = ", ".join(sorted(kind.__abstractmethods__))
+        raise TypeError(f"the noise term {name} lacks {missing}")
+    lacking = [variable for variable in _STATED if not hasattr(kind, variable)]
+    if lacking:
+        raise TypeError(f"the noise term {name} lacks the class variable {', '.join(lacking)}")
+    symbols = [parameter.symbol for parameter in kind.parameters]
+    own = [field.name for field in fields(kind)]
+    if symbols != own:
+        raise TypeError(f"the noise term {name} states the parameters {symbols}, and has {own}")
+    for parameter in kind.parameters:
+        if (parameter.signal, parameter.seconds) == (0.0, 1.0) and parameter.search is None:
+            raise TypeError(
+                f"{parameter.symbol} of {name} is a time, without the range of a search"
+            )
+    if (kind.role is Role.GAUSS_MARKOV) != (kind.gauss_markov is not Term.gauss_markov):
+        raise TypeError(f"the role of {name} and its process (`gauss_markov`) are not the same")

@@ -1,0 +1,141 @@
+"""A line: a sinusoid in the signal."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from imubench_pipeline.noise.exponentials import phi
+from imubench_pipeline.noise.growth import SensorStart, Uncalibrated, of_constant
+from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace
+from imubench_pipeline.noise.terms.base import Deterministic
+from imubench_pipeline.noise.terms.traits import (
+    Reading,
+    Role,
+    SampleBlocks,
+    TermParameter,
+)
+from imubench_pipeline.typing import Array
+
+
+@dataclass(frozen=True)
+class Sinusoid(Deterministic):
+    """A line: a sinusoid of amplitude Omega_0 and frequency f_0 (IEEE Std 952); deterministic."""
+
+    amplitude: float
+    frequency: float
+    symbol = "S"
+    label = "line"
+    standard_name = "lines"
+    word = "line"
+    role = Role.NO_NOISE
+    parameters = (
+        TermParameter("amplitude", "amplitude", 1.0, 0.0),
+        TermParameter("frequency", "frequency", 0.0, -1.0),
+    )
+    states = ("z_S", "z_S quadrature")
+
+    def psd(self, frequency: Array, interval: float | None = None) -> Array:
+        """0: the power amplitude^2 / 2 of a line has no density."""
+        return np.zeros_like(frequency)
+
+    def allan_variance(self, tau: Array) -> Array:
+        """amplitude^2 (sin^2(pi f_0 tau) / (pi f_0 tau))^2."""
+        x = np.pi * self.frequency * tau
+        return self.amplitude**2 * (np.sin(x) ** 2 / x) ** 2
+
+    def sampled_allan_variance(self, n: Array, interval: float) -> Array:
+        """amplitude^2 sin^4(n x) / (n sin(x))^2 with x = pi f_0 T."""
+        x = math.pi * self.frequency * interval
+        return self.amplitude**2 * np.sin(n * x) ** 4 / (n * math.sin(x)) ** 2
+
+    def state_space(self, interval: float) -> StateSpace:
+        """Rotate by 2 pi f_0 T a sample; the phase at the start is not known."""
+        angle = 2.0 * math.pi * self.frequency * interval
+        cosine, sine = math.cos(angle), math.sin(angle)
+        return StateSpace(
+            np.array([[cosine, sine], [-sine, cosine]]),
+            np.zeros((2, 2)),
+            np.array([1.0, 0.0]),
+            0.0,
+            np.zeros(2),
+            np.eye(2) * self.amplitude**2 / 2.0,
+        )
+
+    def continuous_space(self) -> ContinuousSpace:
+        """Turn at 2 pi f_0."""
+        speed = 2.0 * math.pi * self.frequency
+        return ContinuousSpace(
+            np.array([[0.0, speed], [-speed, 0.0]]), np.zeros((2, 2)), np.array([1.0, 0.0])
+        )
+
+    def start(self, rng: np.random.Generator, interval: float) -> Array:
+        """Draw the phase; the amplitude is as it is."""
+        phase = rng.uniform(0.0, 2.0 * math.pi)
+        return self.amplitude * np.array([math.cos(phase), math.sin(phase)])
+
+    def growth(self, order: int, time: float, start: SensorStart) -> float:
+        """A^2 c^2 |(m+1)! phi_{m+1}(i w t) - phi_1(-i w W)|^2 / 2 with w = 2 pi f_0.
+
+        The phase is random; without the last where not calibrated.
+        """
+        omega = 2.0 * math.pi * self.frequency
+        constant, x = of_constant(order, time), omega * time
+        factorial = math.factorial(order + 1)
+        if isinstance(start, Uncalibrated):
+            gain = constant * abs(factorial * phi(order + 1, 1j * x))
+        else:
+            y = omega * start.window
+            # Both less 1: the difference itself would cancel for slow lines.
+            gain = constant * abs(
+                factorial * 1j * x * phi(order + 2, 1j * x) + 1j * y * phi(2, -1j * y)
+            )
+        return 0.5 * (self.amplitude * gain) ** 2
+
+    def mean_covariance(self, blocks: SampleBlocks) -> Array:
+        """A^2 / 2 times the gains of both blocks and the cosine of their phase difference.
+
+        A gain is sin(n w T/2) / (n sin(w T/2)); the phase at the start is not known.
+        """
+        n = (blocks.stop - blocks.start).astype(np.float64)
+        half = math.pi * self.frequency * (1.0 / blocks.rate)
+        gain = np.sin(n * half) / (n * math.sin(half))
+        turned = 2.0 * math.pi * self.frequency * blocks.middle
+        turns = np.cos(np.subtract.outer(turned, turned))
+        return np.asarray(0.5 * self.amplitude**2 * np.outer(gain, gain) * turns)
+
+    def block_sums(self, blocks: int, width: int, rate: float, rng: np.random.Generator) -> Array:
+        """Draw the phase."""
+        half = math.pi * self.frequency * (1.0 / rate)
+        gain = self.amplitude * math.sin(width * half) / math.sin(half)
+        phase = rng.uniform(0.0, 2.0 * math.pi)
+        firsts = np.arange(blocks) * width
+        return gain * np.cos(half * (2.0 * firsts + width - 1) + phase)
+
+    def swing(self, weights: Array, block: float) -> tuple[float, float]:
+        """Return half the square of the amplitude that is left of it, at a random phase."""
+        turn = 2.0 * math.pi * self.frequency * block
+        middle = np.arange(len(weights)) + 0.5
+        seen = np.sinc(self.frequency * block) * (weights @ np.exp(1j * turn * middle))
+        return 0.5 * float(abs(self.amplitude * seen)) ** 2, self.frequency
+
+    def passed(self, power: Callable[[float], Array]) -> float:
+        """Return the squared gain at its frequency."""
+        return float(power(self.frequency))
+
+    def reading(self, lowest_tau: float) -> Reading | None:
+        """None."""
+        return None
+
+    @property
+    def in_words(self) -> str:
+        """Amplitude and frequency."""
+        return f"line of amplitude {self.amplitude:.3e} at {self.frequency:.6g} Hz"
+
+    @property
+    def source(self) -> str:
+        """Its frequency is its name."""
+        return f"{self.word} {self.frequency:.4g} Hz"

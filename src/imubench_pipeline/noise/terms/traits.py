@@ -1,0 +1,145 @@
+"""What a noise term says of itself: role, parameters, drive, reading."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imubench_pipeline.typing import Array
+
+
+class Role(Enum):
+    """What filters and simulators, most of which know few terms, make of a term."""
+
+    WHITE = "white noise"
+    RANDOM_WALK = "a random walk"
+    GAUSS_MARKOV = "a first-order Gauss-Markov process (`Term.gauss_markov`)"
+    SLOW = "expressed by none: a walk or a process of its Allan variance stands for it"
+    NOT_GROWING = "left out: its error does not grow"
+    NO_NOISE = "left out: it is no noise"
+
+
+@dataclass(frozen=True)
+class SearchRange:
+    """The times between which a fit looks for a time constant.
+
+    Attributes
+    ----------
+    samples : float
+        Shortest, sampling intervals.
+    of_log : float
+        Longest, as a part of the log.
+    """
+
+    samples: float
+    of_log: float
+
+
+@dataclass(frozen=True)
+class TermParameter:
+    """A parameter of a term: a field of its dataclass.
+
+    Attributes
+    ----------
+    symbol : str
+        Name of the field.
+    label : str
+        In words.
+    signal, seconds : float
+        Its dimension: powers of the unit of the signal, rad/s or m/s^2, and of seconds.
+    signed : bool
+        It may be negative.
+    search : SearchRange, optional
+        Of a time constant.
+    """
+
+    symbol: str
+    label: str
+    signal: float
+    seconds: float
+    signed: bool = False
+    search: SearchRange | None = None
+
+
+@dataclass(frozen=True)
+class Process:
+    """White noise through a first-order lag.
+
+    Attributes
+    ----------
+    T_B : float
+        Correlation time, s; infinite: a random walk.
+    density : float
+        Of the driving white noise, SI^2/s.
+    """
+
+    T_B: float
+    density: float
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What a term puts into a filter behind it.
+
+    Attributes
+    ----------
+    white : float
+        Density N^2, SI^2/Hz.
+    flicker : float
+        B of flicker noise, SI.
+    process : Process or None
+    """
+
+    white: float = 0.0
+    flicker: float = 0.0
+    process: Process | None = None
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Where a curve shows a parameter.
+
+    Attributes
+    ----------
+    tau, level : float
+        s, and Allan deviation, SI.
+    symbol : str
+    factor : float
+        Level over the parameter.
+    peak : bool
+        The term is nowhere higher.
+    """
+
+    tau: float
+    level: float
+    symbol: str
+    factor: float = 1.0
+    peak: bool = False
+
+
+class SampleBlocks(Protocol):
+    """Blocks of samples of a log, b of them."""
+
+    @property
+    def rate(self) -> float:
+        """Hz."""
+
+    @property
+    def start(self) -> NDArray[np.int64]:
+        """First sample of each."""
+
+    @property
+    def stop(self) -> NDArray[np.int64]:
+        """The one past the last of each."""
+
+    @property
+    def count(self) -> NDArray[np.int64]:
+        """Samples of each that are present."""
+
+    @property
+    def middle(self) -> Array:
+        """Mean time of each, s from the first sample of the first."""
