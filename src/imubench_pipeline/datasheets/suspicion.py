@@ -76,10 +76,6 @@ UsualFigures = Mapping[tuple[str, str], Usual]
 def usual_figures(sensors: Mapping[str, Sensor]) -> dict[tuple[str, str], Usual]:
     """Return what is usual of N and B in a catalogue.
 
-    Parameters
-    ----------
-    sensors : mapping of str to Sensor
-
     Returns
     -------
     dict
@@ -196,10 +192,6 @@ def _text(quantity: str, figure: str, value: float) -> str:
 
 def suspicious_datasheets(sensors: Mapping[str, Sensor]) -> dict[str, list[str]]:
     """Say which printed figures of a catalogue are twenty times off what is usual in it.
-
-    Parameters
-    ----------
-    sensors : mapping of str to Sensor
 
     Returns
     -------

@@ -193,13 +193,7 @@ class OnRateTable(Strict):
         return self
 
     def si(self, name: str, dimension: str) -> float:
-        """Return one of its figures in SI.
-
-        Parameters
-        ----------
-        name : str
-        dimension : str
-        """
+        """Return one of its figures in SI."""
         return quantity_to_si(getattr(self, name), dimension)
 
     def gyro(self, channels: Sequence[str], *, column: bool) -> str:

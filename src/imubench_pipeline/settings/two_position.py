@@ -106,12 +106,7 @@ class TwoPosition(Strict):
         return self
 
     def seconds(self, name: Literal["dwell", "turning", "start"]) -> float:
-        """Return one of its times in s.
-
-        Parameters
-        ----------
-        name : str
-        """
+        """Return one of its times in s."""
         return quantity_to_si(getattr(self, name), "time")
 
     @property

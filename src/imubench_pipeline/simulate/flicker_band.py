@@ -40,10 +40,6 @@ def bank(B: float, lowest: float, highest: float) -> list[GaussMarkov]:
     lowest, highest : float
         The band, Hz.
 
-    Returns
-    -------
-    list of GaussMarkov
-
     Raises
     ------
     ValueError

@@ -202,10 +202,6 @@ class SensorModel:
 def sources_of(terms: Sequence[object]) -> spectra.Sources:
     """Return the terms that drive a filter with a density.
 
-    Parameters
-    ----------
-    terms : sequence of Term
-
     Returns
     -------
     Sources

@@ -72,13 +72,7 @@ class Given:
     truth: Mapping[str, float] = field(default_factory=dict)
 
     def names(self, run: str, pointing: Pointing | None) -> dict[str, Any]:
-        """Return what every row of the table ``calibration`` says.
-
-        Parameters
-        ----------
-        run : str
-        pointing : Pointing or None
-        """
+        """Return what every row of the table ``calibration`` says."""
         found: dict[str, Any] = asdict(self.key) | {"run": run}
         if self.source is not None:
             found |= {"model": self.source.model.name, "model_from": self.source.words}
@@ -102,11 +96,6 @@ _OF_DIRECTION = ("latitude", "heading", "elevation")
 
 def at_rest(given: Given, declared: AtRest) -> Found:
     """Return the bias of a gyro at rest whose axis points where it is stated.
-
-    Parameters
-    ----------
-    given : Given
-    declared : AtRest
 
     Returns
     -------
@@ -154,11 +143,6 @@ def at_rest(given: Given, declared: AtRest) -> Found:
 
 def on_rate_table(given: Given, declared: OnRateTable) -> Found:
     """Return scale factor and bias of a gyro from a recording on a rate table.
-
-    Parameters
-    ----------
-    given : Given
-    declared : OnRateTable
 
     Returns
     -------

@@ -53,21 +53,11 @@ class NoiseSource:
     drawn: tuple[NoiseModel, ...] = ()
 
     def with_drift(self, drift: float) -> NoiseModel:
-        """Return the model with a steady drift of a standard deviation beside its own, rad/s^2.
-
-        Parameters
-        ----------
-        drift : float
-        """
+        """Return the model with a steady drift of a standard deviation beside its own, rad/s^2."""
         return _drifting(self.model, drift)
 
     def drawn_with_drift(self, drift: float) -> list[NoiseModel]:
-        """Return the drawn models with the same drift beside their own, rad/s^2.
-
-        Parameters
-        ----------
-        drift : float
-        """
+        """Return the drawn models with the same drift beside their own, rad/s^2."""
         return [_drifting(one, drift) for one in self.drawn]
 
 

@@ -69,12 +69,7 @@ class Searched:
 
 
 def search(ordinates: Ordinates) -> Searched:
-    """Find the regressors that noise does not explain.
-
-    Parameters
-    ----------
-    ordinates : Ordinates
-    """
+    """Find the regressors that noise does not explain."""
     without = ordinates.fit(())
     fit = without
     rival: Rival | None = None
@@ -101,14 +96,7 @@ def search(ordinates: Ordinates) -> Searched:
 
 
 def again(ordinates: Ordinates, searched: Searched, regressors: Sequence[Regressor]) -> Searched:
-    """Return a search with its regressors moved, those left out that are needless then.
-
-    Parameters
-    ----------
-    ordinates : Ordinates
-    searched : Searched
-    regressors : sequence of Regressor
-    """
+    """Return a search with its regressors moved, those left out that are needless then."""
     fit, gains = _eliminated(ordinates, ordinates.fit(regressors, searched.fit.density))
     return replace(searched, fit=fit, gains=gains)
 

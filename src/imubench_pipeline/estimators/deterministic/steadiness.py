@@ -62,10 +62,6 @@ class Steadiness:
 def steadiness_of(means: Means) -> Steadiness | None:
     """Return how the power of the fast noise changes over the longest part of a log.
 
-    Parameters
-    ----------
-    means : Means
-
     Returns
     -------
     Steadiness or None

@@ -31,11 +31,6 @@ def covariance_of_sizes(ordinates: Ordinates, fit: Fit) -> Array:
     All K are as likely beforehand; each counts by its restricted likelihood, in which the
     amplitudes are integrated over. The other noise is held.
 
-    Parameters
-    ----------
-    ordinates : Ordinates
-    fit : Fit
-
     Returns
     -------
     ndarray, shape (p, p)

@@ -50,10 +50,6 @@ def dwells(inside: NDArray[np.bool_], level: Array, half: float, q: float) -> It
         Half the width of a cell, K.
     q : float
         Density of the second derivative of the path (an integrated random walk), K² per block³.
-
-    Yields
-    ------
-    Dwell
     """
     if not inside.any():
         return

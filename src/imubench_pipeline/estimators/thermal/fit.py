@@ -93,10 +93,6 @@ def fit_temperature(
         The noise of the log as it is, where it is known already.
     rng : numpy.random.Generator
 
-    Returns
-    -------
-    ThermalFit
-
     Raises
     ------
     ValueError

@@ -38,10 +38,6 @@ def at_jumps(read: Readings) -> Readings:
     The sample of a jump follows from the mean of the block that it falls into. A single sample
     stands on each side, so that a path that is linear between the middles of blocks jumps there.
 
-    Parameters
-    ----------
-    read : Readings
-
     Returns
     -------
     Readings

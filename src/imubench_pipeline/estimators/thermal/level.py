@@ -27,10 +27,6 @@ def with_likely_walk(model: NoiseModel, K: Parameter) -> NoiseModel:
         With a random walk, of which nothing may be left.
     K : Parameter
         As it is told: its upper limit counts where it is absent.
-
-    Returns
-    -------
-    NoiseModel
     """
     if K.status != "absent" or K.upper is None:
         return model

@@ -152,10 +152,6 @@ def temperature_path(
     rng : numpy.random.Generator
         For the draws.
 
-    Returns
-    -------
-    TemperaturePath
-
     Raises
     ------
     ValueError

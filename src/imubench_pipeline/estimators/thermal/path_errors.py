@@ -52,10 +52,6 @@ def path_errors(regressors: Regressors, found: Regression, weights: Array) -> Pa
         Of these regressors.
     weights : ndarray, shape (b,)
         nu / S of the bins used, as `Regressors.at` takes them.
-
-    Returns
-    -------
-    PathErrors
     """
     path, p = regressors.path, regressors.thermal
     knots, slope = regressors.knots(found.lag), regressors.slope(found)

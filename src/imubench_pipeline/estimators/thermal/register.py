@@ -83,10 +83,6 @@ def readings(blocks: Iterable[Array], segments: Sequence[Span]) -> Readings:
     segments : sequence of (int, int)
         First and one-past-last sample of each part that no time relates to the others.
 
-    Returns
-    -------
-    Readings
-
     Raises
     ------
     ValueError

@@ -112,10 +112,6 @@ class Regressors:
         settling : float, optional
             s.
         used : ndarray of bool, shape (b,), optional
-
-        Returns
-        -------
-        Regressors
         """
         other = copy.copy(self)
         other.used = self.used if used is None else used
@@ -256,10 +252,6 @@ class Regressors:
         ----------
         lag : float
             s.
-
-        Returns
-        -------
-        Products
         """
         if lag not in self._known:
             self.prepare([lag])
@@ -277,10 +269,6 @@ class Regressors:
             s.
         weights : ndarray, shape (b,)
             nu / S of the bins used: their ordinates over the density of the noise, Hz/SI².
-
-        Returns
-        -------
-        Regression
         """
         products = self.products(lag)
         information = np.einsum("b,bij->ij", weights, products.gram)
@@ -319,10 +307,6 @@ class Regressors:
             As for `at`.
         lags : ndarray, shape (l,)
             s, rising (`lags`).
-
-        Returns
-        -------
-        Regression
         """
         self.prepare(lags)
         fits = [self.at(float(lag), weights) for lag in lags]
@@ -354,10 +338,6 @@ class Regressors:
             Of these regressors.
         weights : ndarray, shape (b,)
             As for `at`: those that the fit was made with.
-
-        Returns
-        -------
-        Spectrum
         """
         products = self.products(found.lag)
         p = self.thermal

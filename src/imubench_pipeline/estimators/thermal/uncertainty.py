@@ -96,10 +96,6 @@ def judge(
     gained : float
         BIC of the best noise without temperature, less that of the fit.
     rng : numpy.random.Generator
-
-    Returns
-    -------
-    Verdict
     """
     weights = whittle.spectrum.ordinates / whittle.density(candidates[0].found)
     p = regressors.thermal
@@ -165,10 +161,6 @@ def told_lag(value: float, draws: Array, longest: float, compensated: bool) -> P
         The longest lag that was looked for, s.
     compensated : bool
         Temperature is taken out of the noise.
-
-    Returns
-    -------
-    Parameter
     """
     if longest == 0.0:
         return Parameter(None, "absent", "no lag was asked for")
@@ -259,10 +251,6 @@ def shares(candidates: Sequence[Candidate]) -> list[tuple[Candidate, float]]:
     ----------
     candidates : sequence of Candidate
         The best first.
-
-    Returns
-    -------
-    list of (Candidate, float)
     """
     chosen = candidates[0]
     alike = {

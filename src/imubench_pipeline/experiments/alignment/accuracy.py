@@ -106,10 +106,6 @@ def accuracies(
         Triads that are simulated at the last time, for fine alignment; 0: none.
     rng : numpy.random.Generator, optional
         Needed where some are.
-
-    Yields
-    ------
-    Accuracy
     """
     for number in (1, 2):
         for time in times:

@@ -143,10 +143,6 @@ class FineAlignment:
         attitude : ndarray, shape (runs, 3, 3), optional
             Attitude of each run that is corrected, near to that of the filter; by default that.
 
-        Returns
-        -------
-        Aligned
-
         Raises
         ------
         ValueError

@@ -67,10 +67,6 @@ def simulate_triad(
         In the first position.
     runs : int
     rng : numpy.random.Generator
-
-    Returns
-    -------
-    Runs
     """
     drawn = [
         simulate_runs(

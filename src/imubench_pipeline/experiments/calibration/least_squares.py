@@ -68,10 +68,6 @@ class Fit:
     def interval(self, level: float = 0.95) -> tuple[Array, Array]:
         """Return confidence limits, normal with the standard errors of the noise model.
 
-        Parameters
-        ----------
-        level : float
-
         Returns
         -------
         (ndarray, ndarray), shapes (runs, p)
@@ -92,10 +88,6 @@ def half_width(level: float) -> float:
     ----------
     level : float
         0.95 gives 1.96.
-
-    Returns
-    -------
-    float
 
     Raises
     ------
@@ -168,10 +160,6 @@ class LeastSquares:
         Parameters
         ----------
         means : ndarray, shape (runs, b)
-
-        Returns
-        -------
-        Fit
 
         Raises
         ------

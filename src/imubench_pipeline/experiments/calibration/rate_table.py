@@ -73,10 +73,6 @@ class Term:
     def interval(self, level: float = 0.95) -> tuple[Array, Array]:
         """Return confidence limits.
 
-        Parameters
-        ----------
-        level : float
-
         Returns
         -------
         (ndarray, ndarray), shapes (runs,)
@@ -116,10 +112,6 @@ class Linearity:
 
         The limits hold of all rates together (Bonferroni): noise alone makes the largest of many
         deviations large.
-
-        Parameters
-        ----------
-        level : float
 
         Returns
         -------
@@ -175,10 +167,6 @@ class Calibration:
     def bias_interval(self, level: float = 0.95) -> tuple[Array, Array]:
         """Return confidence limits of the bias, rad/s.
 
-        Parameters
-        ----------
-        level : float
-
         Returns
         -------
         (ndarray, ndarray), shapes (runs,)
@@ -188,10 +176,6 @@ class Calibration:
 
     def scale_factor_interval(self, level: float = 0.95) -> tuple[Array, Array]:
         """Return confidence limits of the scale factor.
-
-        Parameters
-        ----------
-        level : float
 
         Returns
         -------
@@ -298,10 +282,6 @@ class RateTable:
         ----------
         means : ndarray, shape (runs, b)
             Block means, rad/s.
-
-        Returns
-        -------
-        Calibration
 
         Raises
         ------

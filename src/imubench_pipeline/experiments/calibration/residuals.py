@@ -68,10 +68,6 @@ def residuals(
     model : NoiseModel
     setting_sigma : float
         Standard deviation of the table's true rate about the stated one, rad/s.
-
-    Returns
-    -------
-    Residuals
     """
     blocks = measured.blocks
     dwell, place = np.unique(blocks.dwell, return_inverse=True)

@@ -94,10 +94,6 @@ class StillBias:
         Where the heading is not known they are those of the noise, widened to either side by all
         that the Earth's rate may be: they hold for every heading.
 
-        Parameters
-        ----------
-        level : float
-
         Returns
         -------
         (ndarray, ndarray), shapes (runs,)
@@ -106,10 +102,6 @@ class StillBias:
 
     def present_interval(self, level: float = 0.95) -> tuple[Array, Array]:
         """Return confidence limits of the present bias, as `fixed_interval` does.
-
-        Parameters
-        ----------
-        level : float
 
         Returns
         -------
@@ -155,10 +147,6 @@ class StillRun:
         means : ndarray, shape (runs, b)
             Block means, rad/s.
 
-        Returns
-        -------
-        StillBias
-
         Raises
         ------
         ValueError
@@ -183,16 +171,7 @@ class StillRun:
 
 
 def not_observable(pointing: Pointing) -> tuple[NotObservable, ...]:
-    """Return what one position does not tell of a gyro.
-
-    Parameters
-    ----------
-    pointing : Pointing
-
-    Returns
-    -------
-    tuple of NotObservable
-    """
+    """Return what one position does not tell of a gyro."""
     found = [
         NotObservable(
             "earth_rate",

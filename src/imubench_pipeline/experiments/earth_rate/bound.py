@@ -136,11 +136,6 @@ def block_length(experiment: Experiment, model: NoiseModel) -> int:
     Blocks are shortened, by halves, until a fourth of their length would lower the bound by less
     than 0.1 %; tried on the first four dwells, with 2,048 blocks at most.
 
-    Parameters
-    ----------
-    experiment : Experiment
-    model : NoiseModel
-
     Returns
     -------
     int

@@ -113,10 +113,6 @@ def estimated(
     turn_on_bias : float or None
         Standard deviation of the fixed bias, rad/s; None: not known.
 
-    Returns
-    -------
-    Courses
-
     Raises
     ------
     ValueError

@@ -48,12 +48,7 @@ def of_means(model: NoiseModel, blocks: Blocks) -> Array:
 
 
 def longest(blocks: Blocks) -> float:
-    """Return the tau in s up to which flicker noise is followed: the duration, 2 samples at least.
-
-    Parameters
-    ----------
-    blocks : Blocks
-    """
+    """Return the tau in s to which flicker noise is followed: the duration, 2 samples at least."""
     return max(blocks.duration, 2.0 / blocks.rate)
 
 
@@ -74,11 +69,6 @@ def of_term(term: Term, blocks: Blocks) -> Array:
       slope of another log says how large one may be, and no more;
     - a line: A^2 / 2 times the gains sin(n w T/2) / (n sin(w T/2)) of both, times the cosine of
       their phase difference; the phase at the start is not known.
-
-    Parameters
-    ----------
-    term : Term
-    blocks : Blocks
 
     Returns
     -------

@@ -118,10 +118,6 @@ class Experiment:
             rad.
         first : {1, -1}
             Sense of the first dwell.
-
-        Returns
-        -------
-        Experiment
         """
         length = max(round(dwell * rate), 1)
         period = length + max(round(turning * rate), 0)
@@ -143,10 +139,6 @@ class Experiment:
         ----------
         longest : int
             Samples of a block at most; a dwell is divided evenly (`block_length`).
-
-        Returns
-        -------
-        Blocks
 
         Raises
         ------
@@ -233,10 +225,6 @@ class Blocks:
         Parameters
         ----------
         which : ndarray of bool, shape (b,), or slice
-
-        Returns
-        -------
-        Blocks
         """
         return Blocks(
             self.start[which],
@@ -320,10 +308,6 @@ def block_means(parts: Iterable[Array], experiment: Experiment, longest: int) ->
     experiment : Experiment
     longest : int
         Samples of a block at most.
-
-    Returns
-    -------
-    Measured
 
     Raises
     ------

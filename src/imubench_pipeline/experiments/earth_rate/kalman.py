@@ -199,10 +199,6 @@ class RateFilter:
         means : ndarray, shape (runs, b)
             Block means, rad/s.
 
-        Returns
-        -------
-        Filtered
-
         Raises
         ------
         ValueError
@@ -230,16 +226,7 @@ class RateFilter:
         )
 
     def smooth(self, filtered: Filtered) -> Smoothed:
-        """Smooth what `run` has filtered (Rauch, Tung and Striebel), with roots.
-
-        Parameters
-        ----------
-        filtered : Filtered
-
-        Returns
-        -------
-        Smoothed
-        """
+        """Smooth what `run` has filtered (Rauch, Tung and Striebel), with roots."""
         states = filtered.states.copy()
         gains, sigma = self._backward
         for k in range(len(self.blocks) - 2, -1, -1):

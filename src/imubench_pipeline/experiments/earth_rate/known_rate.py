@@ -65,10 +65,6 @@ def track(log: Array, experiment: Experiment, model: NoiseModel, known_rate: flo
     known_rate : float
         The rate that the filter is given, rad/s, and returns.
 
-    Returns
-    -------
-    Tracked
-
     Raises
     ------
     ValueError

@@ -64,10 +64,6 @@ def by_pairs(means: Array, blocks: Blocks, model: NoiseModel) -> Differences:
     model : NoiseModel
         Of the gyro, for the standard errors.
 
-    Returns
-    -------
-    Differences
-
     Raises
     ------
     ValueError
@@ -98,10 +94,6 @@ def by_triples(means: Array, blocks: Blocks, model: NoiseModel) -> Differences:
     blocks : Blocks
     model : NoiseModel
         Of the gyro, for the standard errors.
-
-    Returns
-    -------
-    Differences
 
     Raises
     ------

@@ -135,10 +135,6 @@ class Outlook:
             Data in each dwell, s.
         turns : int
             The last one wanted, from 1.
-
-        Returns
-        -------
-        Prediction
         """
         found = self._information(dwell, turns + 1)
         number = np.arange(1, turns + 1)
@@ -191,10 +187,6 @@ class Outlook:
             Data in each dwell, s.
         relative : float
             Of the Earth's rate: 0.01 is 1 %.
-
-        Returns
-        -------
-        float
         """
         turns = self.turns_needed(dwell, relative)
         return (turns + 1) * dwell + turns * self.turning

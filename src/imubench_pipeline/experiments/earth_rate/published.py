@@ -50,12 +50,7 @@ class Schedule:
     latitude: float
 
     def run(self, duration: float) -> Experiment:
-        """Return the design of a run of so many s.
-
-        Parameters
-        ----------
-        duration : float
-        """
+        """Return the design of a run of so many s."""
         return Experiment.regular(
             dwell=self.dwell - self.turning,
             turning=self.turning,

@@ -254,10 +254,6 @@ def _at_end(event: Event, plan: Plan) -> bool:
 def disturbances(events: Sequence[Event]) -> list[tuple[float, float]]:
     """Return what to leave out of transients that are no turns, and are not noise.
 
-    Parameters
-    ----------
-    events : sequence of Event
-
     Returns
     -------
     list of (float, float)

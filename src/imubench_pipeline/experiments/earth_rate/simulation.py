@@ -54,10 +54,6 @@ def paper_run(
         rad.
     turning : float
         Part of the 30 s that turning takes, s.
-
-    Returns
-    -------
-    Experiment
     """
     return Experiment.regular(
         dwell=PAPER_PERIOD - turning,
@@ -108,10 +104,6 @@ def simulate_runs(
         Standard deviation of the fixed bias, which is drawn for each run, rad/s.
     runs : int
     rng : numpy.random.Generator
-
-    Returns
-    -------
-    Runs
     """
     known = block_states(model, blocks, turn_on_bias)
     m = len(known.names)

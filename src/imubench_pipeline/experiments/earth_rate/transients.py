@@ -364,10 +364,6 @@ def steps(
 def calm_means(blocks: Blocks) -> Array:
     """Return the means of the blocks, outliers drawn to 4 standard deviations; 0 where none is.
 
-    Parameters
-    ----------
-    blocks : Blocks
-
     Returns
     -------
     ndarray, shape (b,)

@@ -107,10 +107,6 @@ def find_turning(
     trust_schedule : bool
         Take the schedule's word where the log shows no turns at all.
 
-    Returns
-    -------
-    Turning
-
     Raises
     ------
     ValueError

@@ -125,10 +125,6 @@ def compare(
         Those that the log allows.
     efficient : bool
         They are drawn jointly from a likelihood (`Predicted`).
-
-    Returns
-    -------
-    Comparison
     """
     predicted = asked.sigma(model)
     lower, upper = np.quantile([asked.sigma(one) for one in drawn], [0.025, 0.975])

@@ -9,12 +9,7 @@ from imubench_pipeline.typing import Row
 
 
 def words(row: Row) -> str:
-    """Return a row of the table ``backtest`` in words.
-
-    Parameters
-    ----------
-    row : mapping
-    """
+    """Return a row of the table ``backtest`` in words."""
     if row["ratio"] is None:
         return str(row["reason"])
     return (

@@ -140,10 +140,6 @@ def errors(means: Sequence[Array], weights: Array, lags: int) -> Errors:
         Of the blocks of a window.
     lags : int
         How many lags to count pairs for.
-
-    Returns
-    -------
-    Errors
     """
     total, count = 0.0, 0
     pairs = np.zeros(lags)

@@ -211,10 +211,6 @@ def budget(
     gyro_figures, accel_figures : mapping of str to Figure
         What is known of these axes beside the noise.
 
-    Returns
-    -------
-    Budget
-
     Raises
     ------
     ValueError

@@ -13,12 +13,7 @@ from imubench_pipeline.units import SI_UNITS
 
 
 def source_row(contribution: Contribution) -> dict[str, Any]:
-    """Return what the table ``error_budget`` says of a source.
-
-    Parameters
-    ----------
-    contribution : Contribution
-    """
+    """Return what the table ``error_budget`` says of a source."""
     figure = contribution.figure
     return {
         "source": contribution.source,
@@ -91,12 +86,7 @@ class Largest:
         return self._figure(quantity, one.cause, one.sigma / one.figure.sigma)
 
     def of_missing(self, one: Missing) -> dict[str, Any]:
-        """Return the row of a source whose figure is not known.
-
-        Parameters
-        ----------
-        one : Missing
-        """
+        """Return the row of a source whose figure is not known."""
         return {
             "source": one.source,
             "cause": one.cause,

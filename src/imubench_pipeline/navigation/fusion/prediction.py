@@ -89,10 +89,6 @@ def fused_allan(board: Board, weights: Weights, tau: ArrayLike) -> FusedCurve:
         that are not quite what they were thought to be.
     tau : array_like, shape (m,)
         s; taken to the nearest whole number of fused samples, at least one.
-
-    Returns
-    -------
-    FusedCurve
     """
     sizes = np.maximum(np.rint(np.atleast_1d(np.asarray(tau)) * board.rate).astype(np.int64), 1)
     tau = sizes / board.rate

@@ -137,10 +137,6 @@ def figures_of(sensor: Sensor, quantity: str, ranges: MeasuredRanges) -> Figures
 def printed_ranges(sensors: Mapping[str, Sensor]) -> dict[tuple[str, str], tuple[float, float]]:
     """Return the range of B that each datasheet of a catalogue allows.
 
-    Parameters
-    ----------
-    sensors : mapping of str to Sensor
-
     Returns
     -------
     dict

@@ -150,12 +150,7 @@ def _within(total: Row) -> float | None:
 
 
 def unless_words(found: Unless) -> str:
-    """Return in words what the verdict would be.
-
-    Parameters
-    ----------
-    found : Unless
-    """
+    """Return in words what the verdict would be."""
     parts = []
     if found.logged is not None:
         parts.append(f"as logged it {_outcome(found.logged)}")

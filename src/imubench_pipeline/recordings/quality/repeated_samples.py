@@ -24,10 +24,6 @@ def repeats_beyond_chance(column: ColumnSummary) -> tuple[float, float]:
     order), and as many as rounding makes of normal noise of which as many changes are by one step
     (noise behind a low-pass, whose neighbours are alike).
 
-    Parameters
-    ----------
-    column : ColumnSummary
-
     Returns
     -------
     (beyond, chance) : float
