@@ -190,26 +190,6 @@ def _text(quantity: str, figure: str, value: float) -> str:
     return f"{from_si(value, unit, dimension):.3g} {unit}"
 
 
-def suspicious_datasheets(sensors: Mapping[str, Sensor]) -> dict[str, list[str]]:
-    """Say which printed figures of a catalogue are twenty times off what is usual in it.
-
-    Returns
-    -------
-    dict
-        Sentences (see `suspicious`) by sensor, of those that have any.
-    """
-    usual = usual_figures(sensors)
-    said = {
-        name: [
-            sentence
-            for quantity in QUANTITIES
-            for sentence in suspicious(quantity, printed_figures(sensor, quantity), usual)
-        ]
-        for name, sensor in sensors.items()
-    }
-    return {name: sentences for name, sentences in said.items() if sentences}
-
-
 def unusual_rows(
     parameters: Iterable[Mapping[str, Any]], sensors: Mapping[str, Sensor]
 ) -> Iterator[Mapping[str, Any]]:
