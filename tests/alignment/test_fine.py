@@ -15,7 +15,7 @@ from imubench_pipeline.experiments.alignment.coarse import (
 from imubench_pipeline.experiments.alignment.fine import UNKNOWN, FineAlignment, align
 from imubench_pipeline.experiments.alignment.simulation import simulate_triad, true_means
 from imubench_pipeline.experiments.alignment.triad import Positions, Triad
-from imubench_pipeline.experiments.calibration.observability import NotObservableError
+from imubench_pipeline.experiments.calibration.least_squares import NotObservableError
 from imubench_pipeline.experiments.earth_rate.experiment import Dwell, Experiment, block_means
 from imubench_pipeline.experiments.earth_rate.simulation import PAPER_MODEL
 from imubench_pipeline.noise import NoiseModel

@@ -28,7 +28,7 @@ from imubench_pipeline.experiments.earth_rate.turning import find_turning
 from imubench_pipeline.recordings.recording import ChannelLog, on_grid
 from imubench_pipeline.settings.config import EarthRateSettings
 from imubench_pipeline.settings.two_position import TwoPosition
-from imubench_pipeline.steps.noise_source import NO_MODEL, NoiseSource
+from imubench_pipeline.steps.noise_source import NO_MODEL, NoiseSource, segments_reason
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Array, Row
 from imubench_pipeline.units import quantity_to_si
@@ -94,11 +94,7 @@ def earth_rate_of(
     }
     names = asdict(key) | about
     if len(log.segments) > 1:
-        reason = (
-            f"the log is in {len(log.segments)} segments, with gaps of unknown length between "
-            "them; use one of them ('use:' beside the log)"
-        )
-        found.earth_rate += _without(names, WHOLE, "not_shown", reason)
+        found.earth_rate += _without(names, WHOLE, "not_shown", segments_reason(log))
         return found
     if log.position_elsewhere:
         reason = (

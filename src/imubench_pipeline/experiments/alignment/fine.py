@@ -30,7 +30,7 @@ from imubench_pipeline.experiments.alignment.attitude import (
 )
 from imubench_pipeline.experiments.alignment.coarse import coarse_alignment, mean_vectors
 from imubench_pipeline.experiments.alignment.triad import Positions, Site, Triad
-from imubench_pipeline.experiments.calibration.observability import (
+from imubench_pipeline.experiments.calibration.least_squares import (
     NotObservable,
     NotObservableError,
 )

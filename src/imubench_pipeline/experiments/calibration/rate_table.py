@@ -24,14 +24,15 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from imubench_pipeline.experiments.calibration.least_squares import (
+    LEVEL,
     Fit,
     LeastSquares,
-    block_length,
-    half_width,
-)
-from imubench_pipeline.experiments.calibration.observability import (
+    Limits,
     NotObservable,
     NotObservableError,
+    block_length,
+    half_width,
+    limits,
 )
 from imubench_pipeline.experiments.calibration.schedule import Schedule
 from imubench_pipeline.experiments.earth_rate.experiment import Blocks, Measured, block_means
@@ -70,15 +71,9 @@ class Term:
         """Chance of a value at least as far from 0 where the line is right, shape (runs,)."""
         return np.asarray(chi2.sf((self.value / self.sigma) ** 2, 1))
 
-    def interval(self, level: float = 0.95) -> tuple[Array, Array]:
-        """Return confidence limits.
-
-        Returns
-        -------
-        (ndarray, ndarray), shapes (runs,)
-        """
-        half = half_width(level) * self.sigma
-        return self.value - half, self.value + half
+    def interval(self) -> Limits:
+        """Return confidence limits, shapes (runs,)."""
+        return limits(self.value, self.sigma)
 
 
 @dataclass(frozen=True)
@@ -107,17 +102,13 @@ class Linearity:
         """The largest deviation, a fraction of full scale without sign, shape (runs,)."""
         return np.abs(self.deviation).max(axis=1)
 
-    def interval(self, level: float = 0.95) -> tuple[Array, Array]:
-        """Return confidence limits of the largest true deviation.
+    def interval(self) -> Limits:
+        """Return confidence limits of the largest true deviation, shapes (runs,).
 
         The limits hold of all rates together (Bonferroni): noise alone makes the largest of many
         deviations large.
-
-        Returns
-        -------
-        (ndarray, ndarray), shapes (runs,)
         """
-        half = half_width(1.0 - (1.0 - level) / self.sigma.size) * self.sigma
+        half = half_width(1.0 - (1.0 - LEVEL) / self.sigma.size) * self.sigma
         size = np.abs(self.deviation)
         return np.maximum(size - half, 0.0).max(axis=1), (size + half).max(axis=1)
 
@@ -164,25 +155,13 @@ class Calibration:
         """Its standard error."""
         return float(self.line.sigma[1])
 
-    def bias_interval(self, level: float = 0.95) -> tuple[Array, Array]:
-        """Return confidence limits of the bias, rad/s.
+    def bias_interval(self) -> Limits:
+        """Return confidence limits of the bias, rad/s, shapes (runs,)."""
+        return limits(self.bias, self.bias_sigma)
 
-        Returns
-        -------
-        (ndarray, ndarray), shapes (runs,)
-        """
-        half = half_width(level) * self.bias_sigma
-        return self.bias - half, self.bias + half
-
-    def scale_factor_interval(self, level: float = 0.95) -> tuple[Array, Array]:
-        """Return confidence limits of the scale factor.
-
-        Returns
-        -------
-        (ndarray, ndarray), shapes (runs,)
-        """
-        lower, upper = self.line.interval(level)
-        return lower[:, 1], upper[:, 1]
+    def scale_factor_interval(self) -> Limits:
+        """Return confidence limits of the scale factor, shapes (runs,)."""
+        return limits(self.scale_factor, self.scale_factor_sigma)
 
 
 class RateTable:
@@ -320,13 +299,13 @@ class RateTable:
         """Return the asymmetry over the mean scale factor of both senses."""
         if self._asymmetry is None:
             return None
-        found = self._asymmetry.fit(means)
-        scale = found.value[:, 1]
-        if np.any(np.abs(scale) <= half_width(0.95) * found.sigma[1]):
+        fit = self._asymmetry.fit(means)
+        scale = fit.value[:, 1]
+        if np.any(np.abs(scale) <= half_width() * fit.sigma[1]):
             return None
         # The scale factor's own error is of second order.
         sigma = float(self._asymmetry.sigma[-1] / np.abs(scale).mean())
-        return Term(found.value[:, -1] / scale, sigma)
+        return Term(fit.value[:, -1] / scale, sigma)
 
 
 def calibrate(
@@ -366,7 +345,8 @@ def calibrate(
         If the log ends before the schedule does, or too few samples are present.
     """
     run = schedule.experiment
-    _ = RateTable(schedule, run.blocks(_of_stretch(schedule)), model, pointing)
+    whole = max(stretch.stop - stretch.start for stretch in schedule.stretches)
+    _ = RateTable(schedule, run.blocks(whole), model, pointing)
     longest = block_length(
         run,
         model,
@@ -375,10 +355,6 @@ def calibrate(
     measured = block_means([log], run, longest)
     table = RateTable(schedule, measured.blocks, model, pointing, setting_sigma=setting_sigma)
     return table.fit(measured.means), measured
-
-
-def _of_stretch(schedule: Schedule) -> int:
-    return max(stretch.stop - stretch.start for stretch in schedule.stretches)
 
 
 def _levels(rate: Array) -> NDArray[np.int64]:
