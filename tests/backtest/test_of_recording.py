@@ -9,8 +9,8 @@ import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.likelihood import fit
+from imubench_pipeline.navigation.backtest.comparison import findings, words
 from imubench_pipeline.navigation.backtest.of_recording import backtest_rows
-from imubench_pipeline.navigation.backtest.verdicts import findings, words
 from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement
 from imubench_pipeline.navigation.selection import ranking_rows
 from imubench_pipeline.recordings.fitness import doubts, judged

@@ -15,8 +15,7 @@ from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.settings.sensor import CHANNELS, quantity_of
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.simulate.imu import ImuModel
-from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift
-from imubench_pipeline.simulate.noise_in_log import before_the_filter
+from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift, before_the_filter
 from imubench_pipeline.simulate.sources import Origin, Remark, Topic
 from imubench_pipeline.tables import read
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from imubench_pipeline.estimators.estimate import SI_UNITS
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.settings.simulated_sensor import AxisSettings
+from imubench_pipeline.simulate.model import in_the_log
 from imubench_pipeline.simulate.models import axis_model
-from imubench_pipeline.simulate.noise_in_log import in_the_log
 
 
 @dataclass(frozen=True)

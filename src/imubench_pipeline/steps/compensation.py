@@ -12,11 +12,10 @@ from imubench_pipeline.allan import AllanCurve, of_blocks
 from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate, Parameter
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.rows import limit_rows
-from imubench_pipeline.estimators.thermal.effect import shifted
 from imubench_pipeline.estimators.thermal.fit import fit_temperature
 from imubench_pipeline.estimators.thermal.path import TemperaturePath
 from imubench_pipeline.estimators.thermal.register import step_of
-from imubench_pipeline.estimators.thermal.result import ThermalFit
+from imubench_pipeline.estimators.thermal.result import ThermalFit, shifted
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables.keys import Key

@@ -13,8 +13,7 @@ from imubench_pipeline.experiments.calibration.least_squares import (
     NotObservable,
     NotObservableError,
 )
-from imubench_pipeline.experiments.calibration.rate_table import Calibration, calibrate
-from imubench_pipeline.experiments.calibration.residuals import residuals
+from imubench_pipeline.experiments.calibration.rate_table import Calibration, calibrate, residuals
 from imubench_pipeline.experiments.calibration.schedule import Schedule
 from imubench_pipeline.experiments.calibration.still import bias_at_rest
 from imubench_pipeline.recordings.recording import ChannelLog, on_grid

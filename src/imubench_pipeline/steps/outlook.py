@@ -18,8 +18,7 @@ import numpy as np
 from imubench_pipeline.estimators.rows import recommended_estimates
 from imubench_pipeline.experiments.alignment.accuracy import accuracies
 from imubench_pipeline.experiments.alignment.triad import Site, Triad
-from imubench_pipeline.experiments.earth_rate.needs import prediction_rows
-from imubench_pipeline.experiments.earth_rate.prediction import Outlook
+from imubench_pipeline.experiments.earth_rate.prediction import Outlook, prediction_rows
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.settings.config import EarthRateSettings

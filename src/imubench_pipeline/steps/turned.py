@@ -16,14 +16,13 @@ from imubench_pipeline.experiments.earth_rate.courses import (
     Course,
     Courses,
     estimated,
+    sigma_ranges,
     thinned,
     white_sigma,
 )
 from imubench_pipeline.experiments.earth_rate.experiment import Dwell, Experiment
 from imubench_pipeline.experiments.earth_rate.found import FoundDwell, Turning
-from imubench_pipeline.experiments.earth_rate.needs import prediction_rows
-from imubench_pipeline.experiments.earth_rate.prediction import Outlook
-from imubench_pipeline.experiments.earth_rate.ranges import sigma_ranges
+from imubench_pipeline.experiments.earth_rate.prediction import Outlook, prediction_rows
 from imubench_pipeline.experiments.earth_rate.turning import find_turning
 from imubench_pipeline.recordings.recording import ChannelLog, on_grid
 from imubench_pipeline.settings.config import EarthRateSettings

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.spectrum import Spectrum
-from imubench_pipeline.estimators.thermal.lag import lagged_path
+from imubench_pipeline.estimators.thermal.path import lagged_path
 from imubench_pipeline.estimators.thermal.regression import Regression, Regressors
 from imubench_pipeline.estimators.whittle import Terms, Whittle
 from imubench_pipeline.typing import Array

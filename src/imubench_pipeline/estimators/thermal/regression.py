@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from imubench_pipeline.estimators.spectrum import Spectrum
-from imubench_pipeline.estimators.thermal.lag import lagged_path
-from imubench_pipeline.estimators.thermal.path import TemperaturePath
+from imubench_pipeline.estimators.thermal.path import TemperaturePath, lagged_path
 from imubench_pipeline.estimators.thermal.products import Coefficients, Products
 from imubench_pipeline.typing import Array
 

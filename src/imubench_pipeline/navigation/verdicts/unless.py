@@ -17,7 +17,7 @@ from scipy.special import ndtr
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.navigation.verdicts.basis import Basis
-from imubench_pipeline.navigation.verdicts.sources import quantity_behind
+from imubench_pipeline.navigation.verdicts.evidence import quantity_behind
 from imubench_pipeline.navigation.verdicts.standing import Standing, deciding, limit_of, standings
 from imubench_pipeline.typing import Row
 
