@@ -120,11 +120,7 @@ def slow_sources(times: Array, interval: float, low_pass: LowPass | None) -> Slo
 def white_factor(low_pass: LowPass, interval: float) -> Array:
     """Return a factor of the noise that white noise of density 1 leaves in the filter.
 
-    Parameters
-    ----------
-    low_pass : LowPass
-    interval : float
-        s.
+    `low_pass` and `interval`: as of `filter_transition`.
 
     Returns
     -------

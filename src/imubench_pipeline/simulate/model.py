@@ -277,11 +277,7 @@ def before_the_filter(model: SensorModel, noise: NoiseModel, rate: float) -> Noi
 def folding(model: SensorModel, rate: float) -> float:
     """Return how many times N^2 the density of the samples is at low frequencies.
 
-    Parameters
-    ----------
-    model : SensorModel
-    rate : float
-        Hz.
+    `model` and `rate`: as of `bank_for`.
     """
     unit = replace(model, noise=NoiseModel(N=1.0), resolution=0.0)
     return float(unit.sampled_spectrum(np.array([_LOW]), rate)[0]) / rate

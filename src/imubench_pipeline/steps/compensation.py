@@ -84,12 +84,7 @@ def compensated_curve(log: ChannelLog, found: ThermalFit, measured: AllanCurve) 
 def temperature_curve(log: ChannelLog, found: ThermalFit, measured: AllanCurve) -> AllanCurve:
     """Return the Allan variance of what temperature adds to a log.
 
-    Parameters
-    ----------
-    log : ChannelLog
-    found : ThermalFit
-    measured : AllanCurve
-        Of the log as it is: the same clusters are taken.
+    Its parameters are those of `compensated_curve`.
     """
     nothing = (np.zeros(len(values)) for values in log.blocks())
     blocks = shifted(nothing, found.path, found.effect, 1.0)
@@ -145,9 +140,7 @@ def low_pass_rows(key: Key, found: Likelihood) -> Iterator[Row]:
 def resolution_of(log: ChannelLog) -> float:
     """Return the step of the register that the samples at the beginning of a log show, SI.
 
-    Parameters
-    ----------
-    log : ChannelLog
+    `log`: as of `temperature_of`.
 
     Returns
     -------

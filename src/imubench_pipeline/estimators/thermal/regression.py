@@ -169,10 +169,7 @@ class Regressors:
     def slope(self, found: Regression) -> Array:
         """Return how what temperature adds to the log changes with it, at the knots of the path.
 
-        Parameters
-        ----------
-        found : Regression
-            Of these regressors.
+        `found`: as of `effect`.
 
         Returns
         -------
@@ -195,10 +192,7 @@ class Regressors:
     def means(self, lag: float) -> Array:
         """Return the mean over the log of each regressor of temperature.
 
-        Parameters
-        ----------
-        lag : float
-            s.
+        `lag`: as of `knots`.
 
         Returns
         -------
@@ -210,10 +204,7 @@ class Regressors:
     def columns(self, lag: float) -> list[Array]:
         """Return the coefficients of the regressors, in the order of `Regression.beta`.
 
-        Parameters
-        ----------
-        lag : float
-            s.
+        `lag`: as of `knots`.
 
         Returns
         -------
@@ -247,10 +238,7 @@ class Regressors:
     def products(self, lag: float) -> Products:
         """Return the products of log and regressors in the bins used.
 
-        Parameters
-        ----------
-        lag : float
-            s.
+        `lag`: as of `knots`.
         """
         if lag not in self._known:
             self.prepare([lag])

@@ -174,6 +174,7 @@ class LeastSquares:
             raise NotObservableError(
                 f"{len(blocks)} means cannot tell {regressors.shape[1]} parameters{listed}"
             )
+        self._blocks = blocks
         covariance = of_means(model, blocks)
         if further is not None:
             covariance = covariance + further
@@ -206,12 +207,7 @@ class LeastSquares:
         ValueError
             If there is not one finite mean a block.
         """
-        if means.ndim != 2 or means.shape[1] != len(self._root):
-            raise ValueError(
-                f"the means have the shape {means.shape}, expected {len(self._root)} columns"
-            )
-        if not np.isfinite(means).all():
-            raise ValueError("a block mean is not finite; leave its block out")
+        self._blocks.check_means(means)
         white = solve_triangular(self._root, means.T, lower=True).T
         along = white @ self._basis
         left = white - along @ self._basis.T

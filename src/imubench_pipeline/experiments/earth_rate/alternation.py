@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imubench_pipeline.experiments.earth_rate.transients import Blocks, calm_means
+from imubench_pipeline.experiments.earth_rate.transients import LevelBlocks, calm_means
 from imubench_pipeline.typing import Array
 
 _WHITE = 16.0 / 6.0
@@ -34,7 +34,9 @@ class Alternation:
         return self.value / self.sigma
 
 
-def differences(blocks: Blocks, stretches: Sequence[tuple[float, float]]) -> tuple[Array, Array]:
+def differences(
+    blocks: LevelBlocks, stretches: Sequence[tuple[float, float]]
+) -> tuple[Array, Array]:
     """Return the A-B-A differences of the dwells, the sign of the middle one taken off.
 
     (-1)^i (2 m_i - m_(i-1) - m_(i+1)) / 4, in which a drift that is straight over three dwells is
@@ -42,7 +44,7 @@ def differences(blocks: Blocks, stretches: Sequence[tuple[float, float]]) -> tup
 
     Parameters
     ----------
-    blocks : Blocks
+    blocks : LevelBlocks
     stretches : sequence of (float, float)
         Start and stop of the dwells, s; at least two.
 
@@ -67,17 +69,13 @@ def differences(blocks: Blocks, stretches: Sequence[tuple[float, float]]) -> tup
     return sign * (2.0 * mean[1:-1] - mean[:-2] - mean[2:]) / 4.0, white
 
 
-def alternation(blocks: Blocks, stretches: Sequence[tuple[float, float]]) -> Alternation:
+def alternation(blocks: LevelBlocks, stretches: Sequence[tuple[float, float]]) -> Alternation:
     """Return the mean of the A-B-A differences, with its standard error.
 
     The error is that of white noise of the scatter seen, and no less than the white noise of the
     blocks says.
 
-    Parameters
-    ----------
-    blocks : Blocks
-    stretches : sequence of (float, float)
-        Start and stop of the dwells, s; at least two.
+    `blocks` and `stretches`: as of `differences`.
     """
     difference, white = differences(blocks, stretches)
     return _mean(difference, white)
@@ -96,7 +94,7 @@ def _mean(difference: Array, white: Array) -> Alternation:
 
 
 def contradiction(
-    blocks: Blocks, stretches: Sequence[tuple[float, float]], least: float = 3.5
+    blocks: LevelBlocks, stretches: Sequence[tuple[float, float]], least: float = 3.5
 ) -> int | None:
     """Return the dwell from which on the log alternates the other way, if it does.
 
@@ -105,7 +103,7 @@ def contradiction(
 
     Parameters
     ----------
-    blocks : Blocks
+    blocks : LevelBlocks
     stretches : sequence of (float, float)
         Start and stop of the dwells, s.
     least : float
@@ -125,7 +123,7 @@ def contradiction(
 
 
 def best_shift(
-    blocks: Blocks, turns: Array, half_width: float, longest: float, duration: float
+    blocks: LevelBlocks, turns: Array, half_width: float, longest: float, duration: float
 ) -> tuple[float, float, float]:
     """Return by how much the turns should come later to make the log alternate the most.
 
@@ -134,7 +132,7 @@ def best_shift(
 
     Parameters
     ----------
-    blocks : Blocks
+    blocks : LevelBlocks
     turns : ndarray, shape (n,)
         Middle of the turns that the schedule says, s.
     half_width : float

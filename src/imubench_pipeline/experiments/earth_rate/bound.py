@@ -190,12 +190,7 @@ def _of_rate(white: Array, turn_on_bias: float) -> Array:
 def bound(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> float:
     """Return what `cramer_rao` does at the end of a run, of many blocks faster, rad/s.
 
-    Parameters
-    ----------
-    blocks : Blocks
-    model : NoiseModel
-    turn_on_bias : float
-        rad/s; see `cramer_rao`.
+    Its parameters are those of `information`.
     """
     return float(sigma_of(information_by_states(blocks, model, turn_on_bias))[-1])
 

@@ -205,12 +205,7 @@ class RateFilter:
             If there is not one mean a block, or one is not finite: a block without a mean is no
             block (`experiment.block_means`).
         """
-        if means.ndim != 2 or means.shape[1] != len(self.blocks):
-            raise ValueError(
-                f"the means have the shape {means.shape}, expected {len(self.blocks)} columns"
-            )
-        if not np.isfinite(means).all():
-            raise ValueError("a block mean is not finite; leave its block out")
+        self.blocks.check_means(means)
         states, innovation = self._filter.run(means[:, :, None])
         roots = self._filter.roots
         return Filtered(

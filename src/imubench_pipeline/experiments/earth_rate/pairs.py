@@ -87,13 +87,7 @@ def by_triples(means: Array, blocks: Blocks, model: NoiseModel) -> Differences:
     what the line through the outer two has at its mean time. Triples overlap: each dwell but the
     first and the last is the middle of one.
 
-    Parameters
-    ----------
-    means : ndarray, shape (runs, b)
-        Block means, rad/s.
-    blocks : Blocks
-    model : NoiseModel
-        Of the gyro, for the standard errors.
+    Its parameters are those of `by_pairs`.
 
     Raises
     ------

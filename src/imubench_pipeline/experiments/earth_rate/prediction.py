@@ -193,12 +193,7 @@ class Outlook:
     def time_needed(self, dwell: float, relative: float) -> float:
         """Return how long a run gives the Earth's rate to a relative standard deviation, s.
 
-        Parameters
-        ----------
-        dwell : float
-            Data in each dwell, s.
-        relative : float
-            Of the Earth's rate: 0.01 is 1 %.
+        `dwell` and `relative`: as of `turns_needed`.
         """
         turns = self.turns_needed(dwell, relative)
         return (turns + 1) * dwell + turns * self.turning
@@ -254,12 +249,7 @@ class Outlook:
         is a heading error s / (w_ie cos(latitude)), the same as `error_budget.Gyrocompass` with
         two positions; with s = sigma cos(latitude), sigma that of the rate.
 
-        Parameters
-        ----------
-        dwell : float
-            Data in each dwell, s.
-        turns : int
-            The last one wanted, from 1.
+        `dwell` and `turns`: as of `against_time`.
 
         Returns
         -------

@@ -20,15 +20,15 @@ from imubench_pipeline.experiments.earth_rate.choice_of_turns import EDGE
 from imubench_pipeline.experiments.earth_rate.found import SURE, FoundDwell, Turn, Turning
 from imubench_pipeline.experiments.earth_rate.sight import (
     ALTERNATES,
-    Plan,
+    TurnSchedule,
     by_sight,
     disturbances,
     without,
 )
 from imubench_pipeline.experiments.earth_rate.transients import (
     CLEAR,
-    Blocks,
     Event,
+    LevelBlocks,
     blocks_of,
     outliers,
     steps,
@@ -199,7 +199,7 @@ def find_turning(
         shows that it was turned.
     """
     log = np.asarray(log, dtype=np.float64)
-    plan = _checked(log, rate, dwell, turning, start, first_sense, tolerance, margin)
+    schedule = _checked(log, rate, dwell, turning, start, first_sense, tolerance, margin)
     blocks = blocks_of(log, rate, dwell, model)
     events = _seen(blocks, log, rate, dwell, model)
     doubts = []
@@ -207,14 +207,14 @@ def find_turning(
         doubts.append("the noise of the log is not that of the model: the log's is used")
     column_sense = None
     if position is not None:
-        turns, knocks, column_sense, more = _by_column(position, log, rate, events, plan)
+        turns, knocks, column_sense, more = _by_column(position, log, rate, events, schedule)
     else:
-        turns, knocks, more = by_sight(blocks, events, plan, trust_schedule)
+        turns, knocks, more = by_sight(blocks, events, schedule, trust_schedule)
     doubts += more
-    stretches, more = _stretches(turns, knocks, plan)
+    stretches, more = _stretches(turns, knocks, schedule)
     doubts += more
     knocks = sorted([*knocks, *_lone(outliers(blocks, log, rate), turns, knocks)])
-    knocks = [(max(start, 0.0), min(stop, plan.duration)) for start, stop in knocks]
+    knocks = [(max(start, 0.0), min(stop, schedule.duration)) for start, stop in knocks]
     signs = without(blocks, knocks)
     size = alternation(signs, stretches)
     first, more = _first_sense(first_sense, column_sense, sense_by_rate, size.z)
@@ -227,7 +227,7 @@ def find_turning(
         )
     ambiguous = first_sense is None and column_sense is None and not sense_by_rate
     return Turning(
-        tuple(_dwells(stretches, turns, first, plan)),
+        tuple(_dwells(stretches, turns, first, schedule)),
         tuple(turns),
         tuple(knocks),
         ambiguous,
@@ -245,7 +245,7 @@ def _checked(
     first_sense: int | None,
     tolerance: float | None,
     margin: float,
-) -> Plan:
+) -> TurnSchedule:
     if not (math.isfinite(rate) and rate > 0.0):
         raise ValueError(f"rate is {rate}, expected Hz above 0")
     if not (math.isfinite(dwell) and dwell > 0.0):
@@ -265,11 +265,11 @@ def _checked(
     duration = len(log) / rate
     if duration < 2.0 * dwell - 1.0 / rate:
         raise ValueError(f"the log lasts {duration:g} s, less than two dwells of {dwell:g} s")
-    return Plan(dwell, start, turning, tolerance, margin, duration)
+    return TurnSchedule(dwell, start, turning, tolerance, margin, duration)
 
 
 def _seen(
-    blocks: Blocks, log: Array, rate: float, dwell: float, model: NoiseModel | None
+    blocks: LevelBlocks, log: Array, rate: float, dwell: float, model: NoiseModel | None
 ) -> list[Event]:
     """Return transients and steps in order of time, the greater where both are near."""
     found = transients(blocks, log, rate)
@@ -285,13 +285,13 @@ def _seen(
 
 
 def _by_column(
-    position: Array, log: Array, rate: float, events: list[Event], plan: Plan
+    position: Array, log: Array, rate: float, events: list[Event], schedule: TurnSchedule
 ) -> tuple[list[Turn], list[tuple[float, float]], int | None, list[str]]:
     if np.shape(position) != np.shape(log):
         raise ValueError(
             f"the position has the shape {np.shape(position)}, the log {np.shape(log)}"
         )
-    found = stays(np.asarray(position, dtype=np.float64), rate, 0.1 * plan.dwell)
+    found = stays(np.asarray(position, dtype=np.float64), rate, 0.1 * schedule.dwell)
     turns, used = [], set()
     for stop, start in zip(found.stop[:-1], found.start[1:], strict=True):
         first, last, peak = float(stop), float(start), None
@@ -302,7 +302,7 @@ def _by_column(
                 peak = max(peak or 0.0, event.peak)
                 used.add(k)
         time = 0.5 * float(stop + start)
-        turns.append(Turn(first - plan.margin, last + plan.margin, time, "column", peak))
+        turns.append(Turn(first - schedule.margin, last + schedule.margin, time, "column", peak))
     doubts = ["the column is in neither position for long: more than two?"] if found.away else []
     rest = [e for k, e in enumerate(events) if k not in used and e.kind == "transient"]
     sense = (1 if found.high[0] else -1) if found.senses else None
@@ -325,18 +325,18 @@ def _lone(
 
 
 def _stretches(
-    turns: Sequence[Turn], knocks: Sequence[tuple[float, float]], plan: Plan
+    turns: Sequence[Turn], knocks: Sequence[tuple[float, float]], schedule: TurnSchedule
 ) -> tuple[list[tuple[float, float]], list[str]]:
     """Return start and stop of the dwells between turns; handling at the ends is cut off."""
-    edge = EDGE * plan.dwell
+    edge = EDGE * schedule.dwell
     first = max((stop for _, stop in knocks if stop < min(edge, turns[0].start)), default=0.0)
-    late = max(plan.duration - edge, turns[-1].stop)
-    last = min((start for start, _ in knocks if start > late), default=plan.duration)
+    late = max(schedule.duration - edge, turns[-1].stop)
+    last = min((start for start, _ in knocks if start > late), default=schedule.duration)
     starts = [first, *(turn.stop for turn in turns)]
     stops = [*(turn.start for turn in turns), last]
     stretches = [(start, max(start, stop)) for start, stop in zip(starts, stops, strict=True)]
-    short = sum(stop - start < 0.1 * plan.dwell for start, stop in stretches)
-    doubts = [f"{short} dwells are shorter than a tenth of {plan.dwell:g} s"] if short else []
+    short = sum(stop - start < 0.1 * schedule.dwell for start, stop in stretches)
+    doubts = [f"{short} dwells are shorter than a tenth of {schedule.dwell:g} s"] if short else []
     return stretches, doubts
 
 
@@ -359,15 +359,18 @@ def _first_sense(
 
 
 def _dwells(
-    stretches: Sequence[tuple[float, float]], turns: Sequence[Turn], first: int, plan: Plan
+    stretches: Sequence[tuple[float, float]],
+    turns: Sequence[Turn],
+    first: int,
+    schedule: TurnSchedule,
 ) -> list[FoundDwell]:
     """Return the dwells with their senses; the sense goes on through one with no samples."""
     dwells = []
     for k, (start, stop) in enumerate(stretches):
         beside = turns[max(0, k - 1) : k + 1]
         doubts = [word for turn in beside for word in turn.doubts]
-        if stop - start > 1.5 * plan.dwell:
-            doubts.append(f"it lasts {(stop - start) / plan.dwell:.1f} dwells: a missed turn?")
+        if stop - start > 1.5 * schedule.dwell:
+            doubts.append(f"it lasts {(stop - start) / schedule.dwell:.1f} dwells: a missed turn?")
         if stop <= start:
             continue
         by = max((turn.found_by for turn in beside), key=SURE.index)

@@ -62,7 +62,7 @@ class Unless:
     doubts: Mapping[tuple[str, str], str]
 
 
-def unless(sensor: str, rows: Sequence[Row], found: Standing, basis: Basis) -> Unless | None:
+def unless(sensor: str, rows: Sequence[Row], basis: Basis) -> Unless | None:
     """Return what the verdict on a sensor would be if what is doubted were mended.
 
     Parameters
@@ -70,8 +70,6 @@ def unless(sensor: str, rows: Sequence[Row], found: Standing, basis: Basis) -> U
     sensor : str
     rows : sequence of mapping
         Of the table ``error_budget``, of one requirement, with the figures of all recordings.
-    found : Standing
-        The limit that decides.
     basis : Basis
 
     Returns
