@@ -11,6 +11,9 @@ import numpy as np
 from imubench_pipeline.experiments.earth_rate.transients import LevelBlocks, calm_means
 from imubench_pipeline.typing import Array
 
+_SURE = 3.5
+"""Standard errors that the alternation must have before and after a turn too many."""
+
 _WHITE = 16.0 / 6.0
 """Variance of a dwell's mean over that of its A-B-A difference / 4, where the noise is white."""
 
@@ -93,26 +96,18 @@ def _mean(difference: Array, white: Array) -> Alternation:
     return Alternation(float(difference[there].mean()), math.sqrt(variance))
 
 
-def contradiction(
-    blocks: LevelBlocks, stretches: Sequence[tuple[float, float]], least: float = 3.5
-) -> int | None:
+def contradiction(blocks: LevelBlocks, stretches: Sequence[tuple[float, float]]) -> int | None:
     """Return the dwell from which on the log alternates the other way, if it does.
 
     A turn too many or too few turns the sign of all that follows. Nothing is decided by it: it is
     a doubt.
 
-    Parameters
-    ----------
-    blocks : LevelBlocks
-    stretches : sequence of (float, float)
-        Start and stop of the dwells, s.
-    least : float
-        Standard errors that the alternation must have before and after it.
+    `blocks` and `stretches`: as of `differences`.
     """
     difference, white = differences(blocks, stretches)
     if len(difference) < 6:
         return None
-    worst, place = least, None
+    worst, place = _SURE, None
     for k in range(3, len(difference) - 2):
         before = _mean(difference[:k], white[: k + 2]).z
         after = _mean(difference[k:], white[k:]).z

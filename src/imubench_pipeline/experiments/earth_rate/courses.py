@@ -34,6 +34,8 @@ from imubench_pipeline.typing import Array
 METHODS = ("pairs", "triples", "filter", "smoother", "known_rate")
 """In the order in which they are shown; the last is given the rate, and cannot find it."""
 
+_KEPT = 400
+
 
 Range = dict[str, float]
 
@@ -185,21 +187,19 @@ def _tracked(log: Array, experiment: Experiment, papers: NoiseModel) -> Course:
     return Course("known_rate", found.sample / experiment.rate, found.mean, None)
 
 
-def thinned(points: int, most: int = 400) -> Iterator[int]:
+def thinned(points: int) -> Iterator[int]:
     """Yield places of a course that show it: as many at its begin as later, and its end.
 
     Parameters
     ----------
     points : int
-        Of the course.
-    most : int
-        About so many are kept.
+        Of the course; about 400 are kept.
     """
-    if points <= most:
+    if points <= _KEPT:
         yield from range(points)
         return
-    even = np.linspace(0, points - 1, most // 2)
-    early = np.geomspace(1, points, most // 2) - 1
+    even = np.linspace(0, points - 1, _KEPT // 2)
+    early = np.geomspace(1, points, _KEPT // 2) - 1
     yield from np.unique(np.rint(np.concatenate([even, early])).astype(np.int64)).tolist()
 
 

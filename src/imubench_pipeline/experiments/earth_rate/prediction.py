@@ -34,6 +34,9 @@ _LEAST_SUMMED = 8
 _ROUNDING = 1e-9
 """Relative error of the information that rounding may make."""
 
+_LITTLE = 0.01
+"""Relative rise of the standard deviation that is little."""
+
 _CURVE = 40
 """Numbers of dwells on a curve over the dwell, about."""
 
@@ -92,20 +95,15 @@ class DwellCurve:
         """Place of the least standard deviation."""
         return int(np.argmin(self.sigma))
 
-    def nearly_best(self, loss: float = 0.01) -> tuple[float, float]:
-        """Return the dwells between which little is lost: the best is mostly a broad one.
-
-        Parameters
-        ----------
-        loss : float
-            Relative rise of the standard deviation that counts as little.
+    def nearly_best(self) -> tuple[float, float]:
+        """Return the dwells between which 1 % is lost at most: the best is mostly a broad one.
 
         Returns
         -------
         (float, float)
             Shortest and longest dwell of the curve about the best one, s.
         """
-        little = self.sigma <= (1.0 + loss) * self.sigma[self.best]
+        little = self.sigma <= (1.0 + _LITTLE) * self.sigma[self.best]
         worse = np.flatnonzero(~little)
         first = int(np.max(worse[worse < self.best], initial=-1)) + 1
         last = int(np.min(worse[worse > self.best], initial=len(little))) - 1

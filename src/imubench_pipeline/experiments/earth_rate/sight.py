@@ -23,7 +23,7 @@ from imubench_pipeline.typing import Array
 _ENOUGH = 0.4
 """Part of the schedule's turns that must be seen, for what is seen to decide."""
 
-ALTERNATES = 3.0
+_ALTERNATES = 3.0
 """Standard errors of the alternation at which a log without transients is taken to be turned."""
 
 _SHIFTED = 6.0
@@ -39,8 +39,11 @@ class TurnSchedule:
 
     Attributes
     ----------
-    dwell, start, turning, tolerance, margin : float
+    dwell, start, turning, margin : float
         As `imubench_pipeline.experiments.earth_rate.turning.find_turning` takes them, s.
+    tolerance : float
+        How far a turn may be from the schedule, s (a standard deviation): a tenth of a dwell, and
+        at least 2 s. So much is left out on both sides of a turn that is not seen.
     duration : float
         Of the log, s.
     """
@@ -220,7 +223,7 @@ def _scheduled(
     else:
         # Of what is used, and not of the best shift: a search finds 3 in one log of 50 at rest.
         size = abs(alternation(calm, between(slots, half, schedule.duration)).z)
-        if not (size >= ALTERNATES or trust):
+        if not (size >= _ALTERNATES or trust):
             raise ValueError(
                 f"nothing shows that the log was turned every {schedule.dwell:g} s: no transients, "
                 f"and its level alternates by {size:.1f} standard errors (trust_schedule takes "

@@ -19,7 +19,6 @@ from imubench_pipeline.experiments.earth_rate.alternation import alternation, co
 from imubench_pipeline.experiments.earth_rate.choice_of_turns import EDGE
 from imubench_pipeline.experiments.earth_rate.found import SURE, FoundDwell, Turn, Turning
 from imubench_pipeline.experiments.earth_rate.sight import (
-    ALTERNATES,
     TurnSchedule,
     by_sight,
     disturbances,
@@ -131,10 +130,8 @@ def find_turning(
     turning: float = 2.0,
     start: float = 0.0,
     first_sense: int | None = None,
-    sense_by_rate: bool = False,
     position: Array | None = None,
     model: NoiseModel | None = None,
-    tolerance: float | None = None,
     margin: float = 0.5,
     trust_schedule: bool = False,
 ) -> Turning:
@@ -155,9 +152,7 @@ def find_turning(
     where the level then alternates the other way clearly, a doubt says so. Which is first is what
     ``first_sense`` says, or the column if it has +1 and -1. Otherwise +1 is assumed and the result
     is ``ambiguous``: all senses may be the other way round, and so may be the sign of a rate
-    estimated from them. The known rate of the Earth chooses only where ``sense_by_rate`` asks for
-    it; then the estimate is positive by construction, and its sign says nothing. Neither its sign
-    nor its size is used otherwise.
+    estimated from them. The known rate of the Earth chooses nothing.
 
     Without a transient, the log must alternate by 3 standard errors with the schedule: runs in
     which chance hides the alternation are then refused, which favours large estimates.
@@ -178,15 +173,10 @@ def find_turning(
         are not seen.
     first_sense : {1, -1}, optional
         Sense of the first dwell.
-    sense_by_rate : bool
-        Let the sign of the Earth's rate, positive, choose the sense of the first dwell.
     position : ndarray, shape (n,), optional
-        How the sensor stands (`experiments.earth_rate.position.stays`), sampled as the log.
+        How the sensor stands (`stays`), sampled as the log.
     model : NoiseModel, optional
         Noise of the sensor at rest, SI; without it, it is found in the log.
-    tolerance : float, optional
-        How far a turn may be from the schedule, s (a standard deviation); a tenth of a dwell, and
-        at least 2 s. So much is left out on both sides of a turn that is not seen.
     margin : float
         Left out on both sides of a turn that is seen, s.
     trust_schedule : bool
@@ -199,7 +189,7 @@ def find_turning(
         shows that it was turned.
     """
     log = np.asarray(log, dtype=np.float64)
-    schedule = _checked(log, rate, dwell, turning, start, first_sense, tolerance, margin)
+    schedule = _checked(log, rate, dwell, turning, start, first_sense, margin)
     blocks = blocks_of(log, rate, dwell, model)
     events = _seen(blocks, log, rate, dwell, model)
     doubts = []
@@ -217,7 +207,7 @@ def find_turning(
     knocks = [(max(start, 0.0), min(stop, schedule.duration)) for start, stop in knocks]
     signs = without(blocks, knocks)
     size = alternation(signs, stretches)
-    first, more = _first_sense(first_sense, column_sense, sense_by_rate, size.z)
+    first, more = _first_sense(first_sense, column_sense)
     doubts += more
     place = contradiction(signs, stretches)
     if place is not None:
@@ -225,7 +215,7 @@ def find_turning(
             f"from {stretches[place][0]:.0f} s on the log alternates the other way: "
             "a turn too many or too few near there?"
         )
-    ambiguous = first_sense is None and column_sense is None and not sense_by_rate
+    ambiguous = first_sense is None and column_sense is None
     return Turning(
         tuple(_dwells(stretches, turns, first, schedule)),
         tuple(turns),
@@ -243,7 +233,6 @@ def _checked(
     turning: float,
     start: float,
     first_sense: int | None,
-    tolerance: float | None,
     margin: float,
 ) -> TurnSchedule:
     if not (math.isfinite(rate) and rate > 0.0):
@@ -254,10 +243,6 @@ def _checked(
         raise ValueError(f"turning is {turning}, expected s from 0 to half the dwell of {dwell} s")
     if first_sense not in (None, 1, -1):
         raise ValueError(f"first_sense is {first_sense}, expected 1, -1 or None")
-    if tolerance is None:
-        tolerance = max(0.1 * dwell, min(2.0, 0.2 * dwell))
-    if not 0.0 < tolerance < 0.5 * dwell:
-        raise ValueError(f"tolerance is {tolerance}, expected s below half the dwell")
     if not margin >= 0.0:
         raise ValueError(f"margin is {margin}, expected s from 0")
     if log.ndim != 1:
@@ -265,6 +250,7 @@ def _checked(
     duration = len(log) / rate
     if duration < 2.0 * dwell - 1.0 / rate:
         raise ValueError(f"the log lasts {duration:g} s, less than two dwells of {dwell:g} s")
+    tolerance = max(0.1 * dwell, min(2.0, 0.2 * dwell))
     return TurnSchedule(dwell, start, turning, tolerance, margin, duration)
 
 
@@ -340,21 +326,14 @@ def _stretches(
     return stretches, doubts
 
 
-def _first_sense(
-    given: int | None, column: int | None, by_rate: bool, z: float
-) -> tuple[int, list[str]]:
+def _first_sense(stated: int | None, column: int | None) -> tuple[int, list[str]]:
     """Return the sense of the first dwell, and what to doubt about it."""
     if column is not None:
-        if given not in (None, column):
-            return column, [f"the first sense is {column:+d} by the column, {given:+d} was given"]
+        if stated not in (None, column):
+            return column, [f"the first sense is {column:+d} by the column, {stated:+d} was given"]
         return column, []
-    if given is not None:
-        return given, []
-    if by_rate:
-        doubts = ["the sign of the Earth's rate chose the senses: that of an estimate says nothing"]
-        if abs(z) < ALTERNATES:
-            doubts.append(f"it chose on {abs(z):.1f} standard errors")
-        return (1 if z >= 0.0 else -1), doubts
+    if stated is not None:
+        return stated, []
     return 1, ["the sense of the first dwell is assumed: all may be the other way round"]
 
 

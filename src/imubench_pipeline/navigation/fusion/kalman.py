@@ -112,8 +112,6 @@ class KalmanFusion:
     ----------
     board : Board
         Every sensor needs white noise.
-    longest : float
-        Tau up to which flicker noise and random walks are followed, s.
 
     Raises
     ------
@@ -121,9 +119,9 @@ class KalmanFusion:
         If a sensor has no white noise.
     """
 
-    def __init__(self, board: Board, longest: float = _LONGEST) -> None:
+    def __init__(self, board: Board) -> None:
         self.sensors = board.sensors
-        space = _space(board, longest)
+        space = _space(board)
         if not np.all(np.diag(space.white) > 0.0):
             raise ValueError("a filter needs white noise, N, of every sensor")
         inverse = _without_common(space.white)
@@ -221,7 +219,7 @@ class _Space:
     white: Array
 
 
-def _space(board: Board, longest: float) -> _Space:
+def _space(board: Board) -> _Space:
     spaces, outputs = [], []
     white = np.zeros((board.sensors, board.sensors))
     members = [
@@ -229,7 +227,7 @@ def _space(board: Board, longest: float) -> _Space:
         *((one.model, board.rate, 1, np.asarray(one.sensitivity)) for one in board.shared),
     ]
     for model, rate, size, gains in members:
-        space = of_block_means(_steady(model, longest).state_space(rate, longest), size)
+        space = of_block_means(_steady(model).state_space(rate, _LONGEST), size)
         spaces.append(space)
         outputs.append(np.outer(gains, space.output))
         white += space.measurement_noise * np.outer(gains, gains)
@@ -241,12 +239,12 @@ def _space(board: Board, longest: float) -> _Space:
     )
 
 
-def _steady(model: NoiseModel, longest: float) -> NoiseModel:
+def _steady(model: NoiseModel) -> NoiseModel:
     """Return a model without what is deterministic, its walk bound to 0 by a long time."""
     found = stochastic(model)
     if not found.K:
         return found
-    time = _WALK * longest
+    time = _WALK * _LONGEST
     walk = GaussMarkov(bias_instability(found.K**2, time), time)
     return replace(found, K=0.0, further=[*found.further, walk])
 
