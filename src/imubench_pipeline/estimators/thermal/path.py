@@ -25,10 +25,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import ndtri
 
-from imubench_pipeline.estimators.thermal.dwells import dwells
-from imubench_pipeline.estimators.thermal.jumps import at_jumps
 from imubench_pipeline.estimators.thermal.path_kernels import drawn, propagate
-from imubench_pipeline.estimators.thermal.register import Readings, Span, readings
+from imubench_pipeline.estimators.thermal.register import Readings, Span, at_jumps, dwells, readings
 from imubench_pipeline.typing import Array
 
 DRAWS = 24
