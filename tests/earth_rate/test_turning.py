@@ -7,9 +7,9 @@ from scipy.signal import lfilter
 from imubench_pipeline.experiments.earth_rate.alternation import alternation, between
 from imubench_pipeline.experiments.earth_rate.choice_of_turns import interval_density
 from imubench_pipeline.experiments.earth_rate.experiment import Dwell
-from imubench_pipeline.experiments.earth_rate.found import Turning
 from imubench_pipeline.experiments.earth_rate.transients import CLEAR, blocks_of, transients
 from imubench_pipeline.experiments.earth_rate.turning import find_turning
+from imubench_pipeline.experiments.earth_rate.turns import Turning
 from imubench_pipeline.noise import NoiseModel
 from tests.earth_rate.runs import DEGREE, EARTH, PAPER, RATE, TURN, bump, turned
 

@@ -114,8 +114,8 @@ def parse(model: type[_Model], data: object, file: str) -> _Model:
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        told = "\n".join(_fault(file, fault, model) for fault in _first_faults(error.errors()))
-        raise ConfigError(told) from None
+        faults = "\n".join(_fault(file, fault, model) for fault in _first_faults(error.errors()))
+        raise ConfigError(faults) from None
 
 
 def _first_faults(faults: list[Any]) -> list[Any]:

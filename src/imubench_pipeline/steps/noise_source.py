@@ -198,11 +198,11 @@ def segments_reason(log: ChannelLog) -> str:
 
 
 def _words(row: Mapping[str, Any], own: Mapping[str, Any], name: str, channel: str) -> str:
-    said = [f"static recording {row['recording']}"]
+    words = [f"static recording {row['recording']}"]
     if row["device"] != own["device"]:
-        said.append(f"of another device, {row['device']}")
+        words.append(f"of another device, {row['device']}")
     if row["simulated"]:
-        said.append("simulated")
+        words.append("simulated")
     if name != channel:
-        said.append(f"of its {name}, as {channel} has no estimate there")
-    return ", ".join(said)
+        words.append(f"of its {name}, as {channel} has no estimate there")
+    return ", ".join(words)

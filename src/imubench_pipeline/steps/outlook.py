@@ -73,12 +73,12 @@ class Noise:
             ``gyro`` or ``accel``; at least one axis of it is there.
         """
         names = [name for name in self.models if name.startswith(quantity)]
-        found = {}
+        models = {}
         for place, axis in enumerate("xyz"):
             own = f"{quantity}_{axis}"
             name = own if own in self.models else names[place % len(names)]
-            found[f"{axis}: {name}"] = self.models[name]
-        return found
+            models[f"{axis}: {name}"] = self.models[name]
+        return models
 
     @property
     def middle_gyro(self) -> str | None:
@@ -202,8 +202,8 @@ def _bias(printed: Datasheet, quantity: str, how: EarthRateSettings) -> tuple[fl
         for figure in sheet.printed(name) if sheet else ():
             value = figure.on_axis("x")
             if figure.kind == kind and isinstance(value, float):
-                said = f"{name.replace('_', ' ')} {value:g} {figure.unit} ({kind}), datasheet"
-                return quantity_to_si(f"{value!r} {figure.unit}", dimension), said
+                source = f"{name.replace('_', ' ')} {value:g} {figure.unit} ({kind}), datasheet"
+                return quantity_to_si(f"{value!r} {figure.unit}", dimension), source
     key = {"gyro": "gyro_bias", "accel": "accelerometer_bias"}[quantity]
     assumed = getattr(how, key)
     return quantity_to_si(assumed, dimension), f"{assumed} (earth_rate.{key}), assumed"

@@ -179,8 +179,8 @@ def accuracies(
     for number in (1, 2):
         for time in times:
             positions = _positions(number, time, rate)
-            found = coarse_accuracy(triad, positions, site, _LEVEL)
-            yield Accuracy(number, "coarse", time, found.sigma)
+            coarse = coarse_accuracy(triad, positions, site, _LEVEL)
+            yield Accuracy(number, "coarse", time, coarse.sigma)
             fine = FineAlignment(triad, positions, site, _LEVEL)
             errors = None
             if runs and rng is not None and time == times[-1]:
@@ -208,8 +208,8 @@ def _errors(
     sigma = fine.sigma[-1]
     if sigma[2] < _LINEAR:
         start = coarse_alignment(*mean_vectors(drawn.means, fine.positions), site)
-        found = fine.run(drawn.means, start)
-        return np.asarray(np.sqrt(np.mean(euler_angles(found.attitude) ** 2, axis=0)) / sigma)
+        aligned = fine.run(drawn.means, start)
+        return np.asarray(np.sqrt(np.mean(euler_angles(aligned.attitude) ** 2, axis=0)) / sigma)
     # Level and to the north: attitude is off by the angles about north, east and down.
     ratios = np.sqrt(np.mean(fine.run(drawn.means).psi[:, -1] ** 2, axis=0)) / sigma
     return np.where([True, True, sigma[2] < OPEN], ratios, math.nan)

@@ -409,7 +409,7 @@ class Residuals:
 
 
 def residuals(
-    found: Calibration,
+    calibration: Calibration,
     measured: Measured,
     rates: Array,
     model: NoiseModel,
@@ -419,7 +419,7 @@ def residuals(
 
     Parameters
     ----------
-    found : Calibration
+    calibration : Calibration
         Of one run.
     measured : Measured
         Its block means.
@@ -437,11 +437,11 @@ def residuals(
     regressors = np.column_stack([np.ones(len(blocks)), rates])
     covariance = of_means(model, blocks)
     covariance = covariance + setting_sigma**2 * np.equal.outer(blocks.dwell, blocks.dwell)
-    covariance -= regressors @ found.line.covariance @ regressors.T
+    covariance -= regressors @ calibration.line.covariance @ regressors.T
     variance = np.einsum("ki,ij,kj->k", mean_of, covariance, mean_of)
     return Residuals(
         dwell.astype(np.int64),
         mean_of @ measured.means[0],
-        mean_of @ (regressors @ found.line.value[0]),
+        mean_of @ (regressors @ calibration.line.value[0]),
         np.sqrt(np.maximum(variance, 0.0)),
     )

@@ -61,7 +61,7 @@ def whitened(model: NoiseModel, blocks: Blocks, columns: Array) -> Array:
         If a mean has no noise, given those before it.
     """
     known = block_states(model, blocks, turn_on_bias=0.0)
-    found = _innovations(
+    innovations = _innovations(
         np.stack([step.transition for step in known.steps]),
         np.stack([step.factor @ step.factor.T for step in known.steps]),
         known.which,
@@ -69,9 +69,9 @@ def whitened(model: NoiseModel, blocks: Blocks, columns: Array) -> Array:
         known.white**2,
         np.ascontiguousarray(columns),
     )
-    if not np.isfinite(found).all():
+    if not np.isfinite(innovations).all():
         raise ValueError(f"the noise model {model.name} leaves a mean without noise")
-    return found
+    return innovations
 
 
 @njit(cache=True, nogil=True)
@@ -85,22 +85,22 @@ def _innovations(
 ) -> Array:
     """Return innovations over their deviations; the last row of a transition gives the mean."""
     m = covariance.shape[0]
-    held = np.zeros((m, columns.shape[1]))
-    found = np.zeros_like(columns)
+    filtered = np.zeros((m, columns.shape[1]))
+    innovations = np.zeros_like(columns)
     for k in range(len(which)):
         transition = transitions[which[k]]
         predicted = transition @ covariance @ transition.T + noises[which[k]]
-        states = transition @ held
+        states = transition @ filtered
         variance = predicted[m, m] + white[k]
         missed = columns[k] - states[m]
         if not variance > 0.0:
-            found[k] = np.nan
-            return found
-        found[k] = missed / np.sqrt(variance)
+            innovations[k] = np.nan
+            return innovations
+        innovations[k] = missed / np.sqrt(variance)
         gain = predicted[:m, m] / variance
         covariance = predicted[:m, :m] - np.outer(gain, gain) * variance
-        held = states[:m] + np.outer(gain, missed)
-    return found
+        filtered = states[:m] + np.outer(gain, missed)
+    return innovations
 
 
 def cramer_rao(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> Array:
@@ -226,12 +226,12 @@ def block_length(experiment: Experiment, model: NoiseModel) -> int:
     return length
 
 
-def sigma_of(found: Array) -> Array:
+def sigma_of(fisher: Array) -> Array:
     """Return the standard deviations that go with information, infinite where there is none.
 
     Parameters
     ----------
-    found : ndarray, shape (n,)
+    fisher : ndarray, shape (n,)
         1/(rad/s)².
 
     Returns
@@ -240,4 +240,4 @@ def sigma_of(found: Array) -> Array:
         rad/s.
     """
     with np.errstate(divide="ignore"):
-        return np.asarray(1.0 / np.sqrt(found))
+        return np.asarray(1.0 / np.sqrt(fisher))

@@ -172,19 +172,19 @@ def estimated(
 
 def _differences(method: str, blocks: Blocks, estimate: Callable[[], Differences]) -> Course:
     try:
-        found = estimate()
+        differences = estimate()
     except ValueError as error:
         return Course(method, np.empty(0), np.empty(0), np.empty(0), str(error))
     first = blocks.start[0] / blocks.rate
-    return Course(method, first + found.time, found.rate[0], found.sigma)
+    return Course(method, first + differences.time, differences.rate[0], differences.sigma)
 
 
 def _tracked(log: Array, experiment: Experiment, papers: NoiseModel) -> Course:
     try:
-        found = track(log, experiment, papers, EARTH_RATE)
+        tracked = track(log, experiment, papers, EARTH_RATE)
     except ValueError as error:
         return Course("known_rate", np.empty(0), np.empty(0), None, str(error))
-    return Course("known_rate", found.sample / experiment.rate, found.mean, None)
+    return Course("known_rate", tracked.sample / experiment.rate, tracked.mean, None)
 
 
 def thinned(points: int) -> Iterator[int]:
@@ -237,13 +237,13 @@ def sigma_ranges(
         "triples": lambda one: float(by_triples(nothing, blocks, one).sigma[-1]),
         "filter": filtered,
     }
-    found: dict[str, Range] = {}
+    ranges: dict[str, Range] = {}
     for method, sigma in methods.items():
         try:
             limits = sigma_range(sigma, model, drawn)
         except (ValueError, LinAlgError):
             continue  # no pair or triple in these dwells, which the estimate says
-        found[method] = {"sigma_lower": float(limits.lower), "sigma_upper": float(limits.upper)}
-    if "filter" in found:
-        found["smoother"] = found["filter"]  # at the end of the run they are one
-    return found
+        ranges[method] = {"sigma_lower": float(limits.lower), "sigma_upper": float(limits.upper)}
+    if "filter" in ranges:
+        ranges["smoother"] = ranges["filter"]  # at the end of the run they are one
+    return ranges

@@ -94,10 +94,10 @@ def of_term(term: Term, blocks: Blocks) -> Array:
         case RandomWalk(K):
             first = (blocks.start - blocks.start[0]).astype(np.float64)
             means = first + (n - 1.0) / 2.0
-            found = np.minimum.outer(means, means)
-            np.fill_diagonal(found, first + (n - 1.0) * (2.0 * n - 1.0) / (6.0 * n))
-            found *= K**2 * interval
-            return np.asarray(found)
+            covariance = np.minimum.outer(means, means)
+            np.fill_diagonal(covariance, first + (n - 1.0) * (2.0 * n - 1.0) / (6.0 * n))
+            covariance *= K**2 * interval
+            return np.asarray(covariance)
         case Ramp(R):
             return np.asarray(R**2 * np.outer(blocks.middle, blocks.middle))
         case Sinusoid(amplitude, frequency):
@@ -115,12 +115,12 @@ def _of_gauss_markov(term: GaussMarkov, blocks: Blocks, n: Array) -> Array:
     decayed = -np.expm1(-n * x)
     gain = decayed / (n * lost)
     variance = 0.5 * term.density * term.T_B
-    found = np.empty((len(n), len(n)))
+    covariance = np.empty((len(n), len(n)))
     for later in range(len(n)):  # row by row: there may be thousands, and one matrix is enough
         lag = blocks.start[later] - blocks.stop[:later] + 1
-        found[later, :later] = variance * gain[later] * gain[:later] * np.exp(-x * lag)
-        found[:later, later] = found[later, :later]
+        covariance[later, :later] = variance * gain[later] * gain[:later] * np.exp(-x * lag)
+        covariance[:later, later] = covariance[later, :later]
     p = math.exp(-x)
     own = (n * (1.0 + p) / lost - 2.0 * p * decayed / lost**2) / n**2
-    np.fill_diagonal(found, variance * own)
-    return found
+    np.fill_diagonal(covariance, variance * own)
+    return covariance

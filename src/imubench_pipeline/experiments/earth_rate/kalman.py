@@ -112,11 +112,11 @@ class Filtered:
         error = self.states[:, :, :-1].copy()
         error[:, :, 0] -= rate
         error[:, :, 1:] -= states
-        found = np.empty(error.shape[:2])
+        squares = np.empty(error.shape[:2])
         for k, root in enumerate(self.roots[:, :-1, :-1]):
             white = solve_triangular(root, error[:, k].T, lower=True)
-            found[:, k] = np.sum(white**2, axis=0)
-        return found
+            squares[:, k] = np.sum(white**2, axis=0)
+        return squares
 
 
 @dataclass(frozen=True)

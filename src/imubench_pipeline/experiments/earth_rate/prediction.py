@@ -146,10 +146,10 @@ class Outlook:
         turns : int
             The last one wanted, from 1.
         """
-        found = self._information(dwell, turns + 1)
+        information = self._information(dwell, turns + 1)
         number = np.arange(1, turns + 1)
         time = (number + 1) * dwell + number * self.turning
-        return Prediction(number, time, sigma_of(found[1:]))
+        return Prediction(number, time, sigma_of(information[1:]))
 
     def turns_needed(self, dwell: float, relative: float) -> int:
         """Return how many turns give the Earth's rate to a relative standard deviation.
@@ -174,18 +174,20 @@ class Outlook:
         if not relative > 0:
             raise ValueError(f"relative is {relative}, expected a number above 0")
         wanted = (relative * EARTH_RATE) ** -2
-        found = self._information(dwell, _SUMMED)
-        reached = np.flatnonzero(found >= wanted * (1.0 - _ROUNDING))
+        information = self._information(dwell, _SUMMED)
+        reached = np.flatnonzero(information >= wanted * (1.0 - _ROUNDING))
         if len(reached):
             return int(reached[0])
-        left = (wanted - found[-1]) / _growth(found)
+        left = (wanted - information[-1]) / _growth(information)
         return _SUMMED - 1 + math.ceil(left - _ROUNDING * left)
 
     def sigma_after(self, dwell: float, turns: int) -> float:
         """Return the bound after a number of turns and the dwell after the last, rad/s."""
-        found = self._information(dwell, _SUMMED)
+        information = self._information(dwell, _SUMMED)
         beyond = max(turns + 1 - _SUMMED, 0)
-        last = found[min(turns, _SUMMED - 1)] + (_growth(found) * beyond if beyond else 0.0)
+        last = information[min(turns, _SUMMED - 1)] + (
+            _growth(information) * beyond if beyond else 0.0
+        )
         return float(sigma_of(np.array([last]))[0])
 
     def time_needed(self, dwell: float, relative: float) -> float:
@@ -271,9 +273,13 @@ class Outlook:
         summed = max(MOST_BLOCKS // each, _LEAST_SUMMED)
         blocks = replace(design, dwells=design.dwells[:summed]).blocks(longest)
         last = np.flatnonzero(np.diff(blocks.dwell, append=-1))
-        found = information_by_states(blocks, self.model, self.turn_on_bias)[last]
-        more = np.arange(1, dwells - len(found) + 1)
-        return np.concatenate([found, found[-1] + _growth(found) * more]) if len(more) else found
+        information = information_by_states(blocks, self.model, self.turn_on_bias)[last]
+        more = np.arange(1, dwells - len(information) + 1)
+        return (
+            np.concatenate([information, information[-1] + _growth(information) * more])
+            if len(more)
+            else information
+        )
 
 
 def _growth(found: Array) -> float:

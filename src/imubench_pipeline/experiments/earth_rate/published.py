@@ -98,10 +98,10 @@ def published_row(value: float, schedule: Schedule, duration: float, model: Nois
     model : NoiseModel
         As published.
     """
-    found = allowed(schedule, duration, model)
-    off = (value - EARTH_RATE) / found["sigma"]
+    noise = allowed(schedule, duration, model)
+    off = (value - EARTH_RATE) / noise["sigma"]
     verdict = "within the noise" if abs(off) <= _WITHIN else "beyond the noise"
-    return found | {
+    return noise | {
         "duration": duration,
         "published": value,
         "truth": EARTH_RATE,

@@ -16,8 +16,8 @@ from imubench_pipeline.experiments.earth_rate.choice_of_turns import (
     may_be_silent,
     shorter_dwell,
 )
-from imubench_pipeline.experiments.earth_rate.found import Turn
 from imubench_pipeline.experiments.earth_rate.transients import CLEAR, Event, LevelBlocks
+from imubench_pipeline.experiments.earth_rate.turns import Turn
 from imubench_pipeline.typing import Array
 
 _ENOUGH = 0.4

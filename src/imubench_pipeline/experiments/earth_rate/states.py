@@ -165,8 +165,8 @@ def _step(space: StateSpace, gap: int, size: int) -> Step:
         transition[:m], transition[m] = space.transition, space.output
         noise[:m, :m] = space.process_noise
     else:
-        found = of_block_means(space, size)
-        transition[:], noise[:] = found.transition[:, :m], found.process_noise
+        block = of_block_means(space, size)
+        transition[:], noise[:] = block.transition[:, :m], block.process_noise
     over, added = repeated(space.transition, space.process_noise, gap)
     return Step(transition @ over, _root(noise + transition @ added @ transition.T))
 

@@ -205,18 +205,18 @@ def transients(blocks: LevelBlocks, log: Array, rate: float) -> list[Event]:
     """
     correlation = _correlation(blocks)
     ratios = [_ratio(blocks, window, correlation) for window in _WINDOWS if window < len(blocks.z)]
-    found: list[tuple[int, int, float]] = []
-    while len(found) < _MOST:
+    stretches: list[tuple[int, int, float]] = []
+    while len(stretches) < _MOST:
         best = [int(np.argmax(ratio)) for ratio in ratios]
         k = int(np.argmax([ratio[b] for ratio, b in zip(ratios, best, strict=True)]))
         likelihood = float(ratios[k][best[k]])
         if likelihood < _LEAST:
             break
         first, last = _edges(blocks.z, best[k], best[k] + _WINDOWS[k])
-        found.append((first, last, likelihood))
+        stretches.append((first, last, likelihood))
         for window, ratio in zip(_WINDOWS, ratios, strict=False):
             ratio[max(0, first - window + 1) : last] = 0.0
-    return list(_events(blocks, log, rate, sorted(found)))
+    return list(_events(blocks, log, rate, sorted(stretches)))
 
 
 def _correlation(blocks: LevelBlocks) -> Array:
@@ -224,14 +224,14 @@ def _correlation(blocks: LevelBlocks) -> Array:
     calm = np.where(blocks.there & (np.abs(blocks.z) < _EDGE), blocks.z, 0.0)
     seen = (calm != 0.0).astype(float)
     square = float(np.mean(calm[seen > 0.0] ** 2))
-    found: list[float] = []
+    correlations: list[float] = []
     for k in range(1, min(_WINDOWS[-1], len(calm))):
         pairs = max(float(seen[k:] @ seen[:-k]), 1.0)
         value = float(calm[k:] @ calm[:-k]) / pairs / square
         if value < 3.0 / math.sqrt(pairs):
             break
-        found.append(value)
-    return np.array(found)
+        correlations.append(value)
+    return np.array(correlations)
 
 
 def _ratio(blocks: LevelBlocks, window: int, correlation: Array) -> Array:
@@ -263,11 +263,11 @@ def _edges(z: Array, first: int, last: int) -> tuple[int, int]:
 
 
 def _events(
-    blocks: LevelBlocks, log: Array, rate: float, found: list[tuple[int, int, float]]
+    blocks: LevelBlocks, log: Array, rate: float, stretches: list[tuple[int, int, float]]
 ) -> Iterator[Event]:
     """Yield what was found, stretches that touch as one, with the peak and the duration."""
     joined: list[tuple[int, int, float]] = []
-    for first, last, likelihood in found:
+    for first, last, likelihood in stretches:
         if joined and first - joined[-1][1] < _BRIDGE:
             before = joined.pop()
             first, last = before[0], max(last, before[1])
@@ -346,15 +346,15 @@ def steps(
     if model is not None:
         variance = np.maximum(variance, 2.0 * model.allan_variance(width * blocks.length, rate))
     z = np.where(enough > width / 2, np.abs(difference) / np.sqrt(variance), 0.0)
-    found: list[Event] = []
-    while (k := int(np.argmax(z))) >= 0 and z[k] > _STEP and len(found) < _MOST:
+    events: list[Event] = []
+    while (k := int(np.argmax(z))) >= 0 and z[k] > _STEP and len(events) < _MOST:
         at = (k + width) * blocks.length
         height = float(np.abs(difference[k]))
         strength = math.log(float(z[k]) / _STEP)
         likelihood = min(0.5 * float(z[k]) ** 2, 200.0)
-        found.append(Event(at, at, "step", likelihood, height, strength, 0.0))
+        events.append(Event(at, at, "step", likelihood, height, strength, 0.0))
         z[max(0, k - width) : k + width] = 0.0
-    return sorted(found, key=lambda event: event.start)
+    return sorted(events, key=lambda event: event.start)
 
 
 def calm_means(blocks: LevelBlocks) -> Array:

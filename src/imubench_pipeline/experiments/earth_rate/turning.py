@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.experiments.earth_rate.alternation import alternation, contradiction
 from imubench_pipeline.experiments.earth_rate.choice_of_turns import EDGE
-from imubench_pipeline.experiments.earth_rate.found import SURE, FoundDwell, Turn, Turning
 from imubench_pipeline.experiments.earth_rate.sight import (
     TurnSchedule,
     by_sight,
@@ -33,6 +32,7 @@ from imubench_pipeline.experiments.earth_rate.transients import (
     steps,
     transients,
 )
+from imubench_pipeline.experiments.earth_rate.turns import SURE, FoundDwell, Turn, Turning
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
@@ -258,16 +258,16 @@ def _seen(
     blocks: LevelBlocks, log: Array, rate: float, dwell: float, model: NoiseModel | None
 ) -> list[Event]:
     """Return transients and steps in order of time, the greater where both are near."""
-    found = transients(blocks, log, rate)
+    events = transients(blocks, log, rate)
     near = max(3.0, 0.1 * dwell)
     for step in steps(blocks, dwell, model, rate):
-        beside = [e for e in found if e.start - near < step.time < e.stop + near]
+        beside = [e for e in events if e.start - near < step.time < e.stop + near]
         # The level follows a step at once, but for the blocks in which it comes about.
         greater = [e for e in beside if e.kind == "transient" and e.peak > 1.5 * step.peak]
         if all(event.haste for event in greater):
-            found = [e for e in found if e not in beside or e in greater]
-            found.append(step)
-    return sorted(found, key=lambda event: event.time)
+            events = [e for e in events if e not in beside or e in greater]
+            events.append(step)
+    return sorted(events, key=lambda event: event.time)
 
 
 def _by_column(

@@ -93,9 +93,9 @@ def unless(sensor: str, rows: Sequence[Row], basis: Basis) -> Unless | None:
         mended = None
     if not logged.known or (mended is None and not unjudged):
         return None
-    said = {key: basis.doubted(key) for key in (doubted or apart)}
+    doubts = {key: basis.doubted(key) for key in (doubted or apart)}
     together = {name: f for one in factors.values() for name, f in one.items()}
-    return Unless(logged if unjudged else None, mended, together, said)
+    return Unless(logged if unjudged else None, mended, together, doubts)
 
 
 def _mended(rows: Iterable[Row], factors: Mapping[tuple[str, str], Factors]) -> Iterator[Row]:
