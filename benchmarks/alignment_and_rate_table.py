@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.experiments.alignment.accuracy import simulate_triad
 from imubench_pipeline.experiments.alignment.attitude import euler_angles, matrix
 from imubench_pipeline.experiments.alignment.coarse import (
     coarse_accuracy,
@@ -31,7 +32,6 @@ from imubench_pipeline.experiments.alignment.coarse import (
     mean_vectors,
 )
 from imubench_pipeline.experiments.alignment.fine import FineAlignment, align
-from imubench_pipeline.experiments.alignment.simulation import simulate_triad
 from imubench_pipeline.experiments.alignment.triad import Positions, Site, Triad
 from imubench_pipeline.experiments.calibration.rate_table import RateTable
 from imubench_pipeline.experiments.calibration.schedule import Schedule

@@ -36,8 +36,8 @@ from numpy.typing import NDArray
 import simulators
 from imubench_pipeline.allan import cluster_sizes, of_blocks
 from imubench_pipeline.estimators.rows import recommended_estimates
+from imubench_pipeline.navigation.backtest.comparison import words
 from imubench_pipeline.navigation.backtest.of_recording import backtest_rows
-from imubench_pipeline.navigation.backtest.verdicts import words
 from imubench_pipeline.recordings.recording import LogWriter, channel_logs
 from imubench_pipeline.settings.config import ErrorBudgetSettings, EstimateSettings
 from imubench_pipeline.settings.requirements import read_requirements

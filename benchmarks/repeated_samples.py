@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
-from imubench_pipeline.recordings.quality.repeated_samples import repeats_beyond_chance
+from imubench_pipeline.recordings.quality.columns import repeats_beyond_chance
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
 from imubench_pipeline.settings.quality import QualitySettings
 

@@ -6,7 +6,6 @@ import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.navigation.pooled import pooled_rows
-from imubench_pipeline.navigation.selection import ranking_rows
 from imubench_pipeline.recordings.fitness import (
     UNFIT,
     doubts,
@@ -19,6 +18,7 @@ from imubench_pipeline.recordings.fitness import (
 )
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.tables import build
+from tests.ranking import ranking_rows
 from tests.test_selection import errors_of
 
 ABOUT = {"sensor": "s", "recording": "a", "status": "ok"}

@@ -7,9 +7,9 @@ import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement, standard
-from imubench_pipeline.navigation.selection import ranking_rows
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.tables import build
+from tests.ranking import ranking_rows
 
 DEGREE = math.pi / 180
 G = 9.80665

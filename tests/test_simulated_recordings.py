@@ -20,7 +20,7 @@ from imubench_pipeline.settings.simulated_recordings import (
     read_simulated,
 )
 from imubench_pipeline.settings.validation import ConfigError, parse
-from imubench_pipeline.simulate.truth import figures_of
+from imubench_pipeline.simulate.models import figures_of
 from imubench_pipeline.steps.simulate import write_simulated
 from imubench_pipeline.units import quantity_to_si
 from tests.conftest import PROJECT

@@ -8,7 +8,6 @@ from imubench_pipeline.datasheets.suspicion import (
     Usual,
     printed_figures,
     suspicious,
-    suspicious_datasheets,
     usual_figures,
 )
 from imubench_pipeline.settings.sensor import Sensor, read_sensors
@@ -87,6 +86,10 @@ def with_walk(value: float) -> Sensor:
 def test_a_printed_figure_is_held_against_the_others() -> None:
     sensors = {f"s{i}": with_walk(0.3) for i in range(5)} | {"odd": with_walk(19.6)}
     assert printed_figures(sensors["odd"], "gyro") == {"N": pytest.approx(19.6 / 60 * DEG)}
-    assert list(suspicious_datasheets(sensors)) == ["odd"]
-    few = {name: sensors[name] for name in ("s0", "s1", "odd")}
-    assert suspicious_datasheets(few) == {}
+    usual = usual_figures(sensors)
+    said = {
+        name: suspicious("gyro", printed_figures(sensor, "gyro"), usual)
+        for name, sensor in sensors.items()
+    }
+    assert [name for name in said if said[name]] == ["odd"]
+    assert usual_figures({name: sensors[name] for name in ("s0", "s1", "odd")}) == {}

@@ -6,6 +6,7 @@ from scipy.linalg import block_diag
 from scipy.stats import chi2
 
 from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.experiments.alignment.accuracy import simulate_triad, true_means
 from imubench_pipeline.experiments.alignment.attitude import cross_matrix, euler_angles, matrix
 from imubench_pipeline.experiments.alignment.coarse import (
     coarse_accuracy,
@@ -13,9 +14,8 @@ from imubench_pipeline.experiments.alignment.coarse import (
     mean_vectors,
 )
 from imubench_pipeline.experiments.alignment.fine import UNKNOWN, FineAlignment, align
-from imubench_pipeline.experiments.alignment.simulation import simulate_triad, true_means
 from imubench_pipeline.experiments.alignment.triad import Positions, Triad
-from imubench_pipeline.experiments.calibration.observability import NotObservableError
+from imubench_pipeline.experiments.calibration.least_squares import NotObservableError
 from imubench_pipeline.experiments.earth_rate.experiment import Dwell, Experiment, block_means
 from imubench_pipeline.experiments.earth_rate.simulation import PAPER_MODEL
 from imubench_pipeline.noise import NoiseModel

@@ -9,14 +9,14 @@ import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.likelihood import fit
+from imubench_pipeline.navigation.backtest.comparison import findings, words
 from imubench_pipeline.navigation.backtest.of_recording import backtest_rows
-from imubench_pipeline.navigation.backtest.verdicts import findings, words
 from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement
-from imubench_pipeline.navigation.selection import ranking_rows
 from imubench_pipeline.recordings.fitness import doubts, judged
 from imubench_pipeline.recordings.recording import ChannelLog, LogWriter, channel_logs
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.tables import build
+from tests.ranking import ranking_rows
 
 RATE, SAMPLES, N = 5.0, 40_000, 1e-4
 NAMES = {"sensor": "s", "recording": "r"}

@@ -3,8 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from imubench_pipeline.navigation.backtest.block_means import block_means
-from imubench_pipeline.navigation.backtest.windows import Window, errors, window
+from imubench_pipeline.navigation.backtest.windows import Window, block_means, errors, window
 
 RATE = 10.0
 

@@ -8,10 +8,10 @@ from scipy.stats import chi2
 
 from imubench_pipeline.experiments.calibration.least_squares import (
     LeastSquares,
+    NotObservableError,
     block_length,
     half_width,
 )
-from imubench_pipeline.experiments.calibration.observability import NotObservableError
 from imubench_pipeline.experiments.earth_rate.experiment import Dwell, Experiment
 from imubench_pipeline.experiments.earth_rate.simulation import simulate_runs
 from imubench_pipeline.noise import NoiseModel

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from imubench_pipeline.experiments.calibration.observability import NotObservableError
+from imubench_pipeline.experiments.calibration.least_squares import NotObservableError
 from imubench_pipeline.experiments.calibration.rate_table import RateTable, calibrate
 from imubench_pipeline.experiments.calibration.schedule import Schedule
 from imubench_pipeline.experiments.earth_rate.simulation import simulate_runs

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.estimators.deterministic.means import means_of
-from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates
+from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates, covariance_of_sizes
 from imubench_pipeline.estimators.deterministic.regressors import Regressor
-from imubench_pipeline.estimators.deterministic.uncertainty import covariance_of_sizes
 from tests.deterministic.logs import RATE, static_log
 
 

@@ -7,9 +7,9 @@ from scipy.signal import lfilter
 from imubench_pipeline.experiments.earth_rate.alternation import alternation, between
 from imubench_pipeline.experiments.earth_rate.choice_of_turns import interval_density
 from imubench_pipeline.experiments.earth_rate.experiment import Dwell
-from imubench_pipeline.experiments.earth_rate.found import Turning
 from imubench_pipeline.experiments.earth_rate.transients import CLEAR, blocks_of, transients
 from imubench_pipeline.experiments.earth_rate.turning import find_turning
+from imubench_pipeline.experiments.earth_rate.turns import Turning
 from imubench_pipeline.noise import NoiseModel
 from tests.earth_rate.runs import DEGREE, EARTH, PAPER, RATE, TURN, bump, turned
 
@@ -48,16 +48,12 @@ def test_turns_that_are_sensed_are_found_and_left_out(first: int, model: NoiseMo
 
 
 @pytest.mark.parametrize("first", [1, -1])
-def test_the_known_rate_chooses_the_first_sense_only_where_it_is_asked(first: int) -> None:
+def test_the_known_rate_does_not_choose_the_first_sense(first: int) -> None:
     log = turned(30.0 * np.arange(1, 40), 1200.0, first=first)
     assumed = find_turning(log, RATE, 30.0)
     assert assumed.ambiguous and assumed.dwells[0].sense == 1
     assert any("assumed" in doubt for doubt in assumed.doubts)
     assert np.sign(assumed.alternation.value) == first
-    asked = find_turning(log, RATE, 30.0, sense_by_rate=True)
-    assert not asked.ambiguous and asked.dwells[0].sense == first
-    assert asked.alternation.value > 0.0
-    assert any("chose the senses" in doubt for doubt in asked.doubts)
 
 
 def test_dwells_may_be_unequal() -> None:
@@ -256,7 +252,6 @@ def test_a_dead_log_is_refused(log: np.ndarray) -> None:
         {"dwell": -1.0},
         {"turning": 20.0},
         {"first_sense": 2},
-        {"tolerance": 0.0},
         {"margin": -1.0},
         {"position": np.zeros(3)},
     ],

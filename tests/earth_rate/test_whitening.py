@@ -4,9 +4,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import cholesky, solve_triangular
 
+from imubench_pipeline.experiments.earth_rate.bound import whitened
 from imubench_pipeline.experiments.earth_rate.covariance import of_means
 from imubench_pipeline.experiments.earth_rate.simulation import PAPER_MODEL, paper_run
-from imubench_pipeline.experiments.earth_rate.whitening import whitened
 from imubench_pipeline.noise import NoiseModel
 from tests.earth_rate.brute import MODELS, of_blocks
 from tests.earth_rate.test_experiment import experiments

@@ -7,7 +7,7 @@ import pytest
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.navigation.fusion.board import Board
 from imubench_pipeline.navigation.fusion.equivalence import (
-    Candidate,
+    FusionChannel,
     TemperaturePart,
     equivalence_rows,
     number_needed,
@@ -30,13 +30,13 @@ def known(spread: float = 1.1, **values: float) -> dict[str, Parameter]:
     }
 
 
-def candidate(sensor: str, parameters: dict[str, Parameter], **about: Any) -> Candidate:
+def candidate(sensor: str, parameters: dict[str, Parameter], **about: Any) -> FusionChannel:
     given = {"recording": "r", "channel": "gyro_x", "simulated": False, "duration": 10 * HOURS}
-    return Candidate(sensor, estimate=Estimate("likelihood", parameters), **{**given, **about})
+    return FusionChannel(sensor, estimate=Estimate("likelihood", parameters), **{**given, **about})
 
 
 def rows_of(
-    *candidates: Candidate,
+    *candidates: FusionChannel,
     tau: float = 10.0,
     common: dict[str, float] | None = None,
     draws: int = 400,

@@ -11,7 +11,7 @@ import yaml
 
 from imubench_pipeline.estimators.estimate import FAMILY, SI_UNITS
 from imubench_pipeline.estimators.model_choice import CANDIDATES
-from imubench_pipeline.navigation.verdicts.sources import parameters_behind
+from imubench_pipeline.navigation.verdicts.evidence import parameters_behind
 from imubench_pipeline.noise import (
     PARAMETERS,
     TERMS,

@@ -6,8 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from imubench_pipeline.datasheets.plausibility import implausible
-from imubench_pipeline.datasheets.rates import implausible_rates
+from imubench_pipeline.datasheets.plausibility import implausible, implausible_rates
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from imubench_pipeline.recordings.quality.repeated_samples import _parts, repeats_beyond_chance
+from imubench_pipeline.recordings.quality.columns import _parts, repeats_beyond_chance
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
 
 

@@ -2,7 +2,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from imubench_pipeline.recordings.fitness import UNFIT
-from imubench_pipeline.recordings.quality.twins import recorded_twice
+from imubench_pipeline.recordings.quality.copies import recorded_twice
 
 
 def rows(name: str, *figures: float) -> Iterator[dict[str, Any]]:

@@ -5,10 +5,10 @@ import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement, standard
-from imubench_pipeline.navigation.selection import ranking_rows
 from imubench_pipeline.report.meaning import budget_tables, budget_words, rankings
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.tables import build
+from tests.ranking import ranking_rows
 from tests.report.tables import ROBOT
 
 SIMULATED = {("good", "r"): True, ("poor", "r"): False, ("gyro", "r"): False}

@@ -5,8 +5,7 @@ import pytest
 
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.low_pass import LowPass
-from imubench_pipeline.simulate.model import SensorModel
-from imubench_pipeline.simulate.noise_in_log import before_the_filter, folding, in_the_log
+from imubench_pipeline.simulate.model import SensorModel, before_the_filter, folding, in_the_log
 from imubench_pipeline.simulate.simulation import simulate
 
 N = 2e-4

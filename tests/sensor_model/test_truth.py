@@ -7,9 +7,8 @@ import pytest
 from imubench_pipeline.estimators.estimate import CURVE
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.settings.simulated_sensor import AxisSettings
-from imubench_pipeline.simulate.models import axis_model
+from imubench_pipeline.simulate.models import Figure, axis_model, figures_of
 from imubench_pipeline.simulate.simulation import simulate
-from imubench_pipeline.simulate.truth import Figure, figures_of
 
 DEGREE = math.pi / 180
 AXIS: dict[str, Any] = {

@@ -7,11 +7,11 @@ import pytest
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.navigation.error_budget.printed_errors import in_use
 from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement
-from imubench_pipeline.navigation.selection import ranking_rows
 from imubench_pipeline.navigation.suitability.conditions import in_words
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.tables import build
+from tests.ranking import ranking_rows
 
 CHANNELS = ("gyro_x", "accel_x")
 GYRO = {

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from imubench_pipeline.estimators.thermal.dwells import dwells
 from imubench_pipeline.estimators.thermal.path import temperature_path
+from imubench_pipeline.estimators.thermal.register import dwells
 
 Q = 3e-3
 """K² per block³: such a path crosses a cell of a degree in ten blocks."""

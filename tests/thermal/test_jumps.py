@@ -1,9 +1,8 @@
 import numpy as np
 import pytest
 
-from imubench_pipeline.estimators.thermal.jumps import at_jumps
 from imubench_pipeline.estimators.thermal.path import temperature_path
-from imubench_pipeline.estimators.thermal.register import readings, step_of
+from imubench_pipeline.estimators.thermal.register import at_jumps, readings, step_of
 
 SAMPLES = 120_000
 LEVELS = np.array([21.3, 17.8, 33.1, 24.6, 38.9, 12.2])

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from imubench_pipeline.estimators.thermal.lag import lagged
+from imubench_pipeline.estimators.thermal.path import lagged
 
 TIMES = np.array([0.0, 1.0, 2.5, 4.0, 9.0, 9.5, 20.0])
 VALUES = np.array([20.0, 21.0, 19.5, 25.0, 25.0, 18.0, 30.0])

@@ -1,7 +1,7 @@
 import pytest
 
 from imubench_pipeline.estimators.estimate import Parameter
-from imubench_pipeline.estimators.thermal.level import with_likely_walk
+from imubench_pipeline.estimators.thermal.uncertainty import with_likely_walk
 from imubench_pipeline.noise import NoiseModel
 
 

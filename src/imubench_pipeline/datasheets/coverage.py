@@ -97,16 +97,7 @@ def coverage(sensors: Mapping[str, Sensor]) -> list[Coverage]:
 
 
 def by_vendor(rows: Iterable[Coverage]) -> list[VendorCoverage]:
-    """Count the rows of `coverage` by vendor, quantity and figure, in the order of the vendors.
-
-    Parameters
-    ----------
-    rows : iterable of Coverage
-
-    Returns
-    -------
-    list of VendorCoverage
-    """
+    """Count the rows of `coverage` by vendor, quantity and figure, in the order of the vendors."""
     counts: dict[tuple[str, str, str], Counter[str]] = {}
     for row in rows:
         key = (row.vendor, row.quantity, row.figure)

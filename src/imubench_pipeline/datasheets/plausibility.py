@@ -2,25 +2,59 @@
 
 It is told from the levels that a recording leaves, beside what the file of its sensor prints: so an
 edit of a datasheet need not read the log again.
+
+The figures of a resting sensor are held against what its file prints, or what is usual. The rate of
+a log is held against what a sensor can do, and the unit of time is named that would explain it.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from imubench_pipeline.datasheets.expected import Expected, expected
-from imubench_pipeline.datasheets.rates import implausible_rates
-from imubench_pipeline.datasheets.suspicion import NEAR_PRINTED
+from imubench_pipeline.datasheets.comparable import bias_comparables
+from imubench_pipeline.datasheets.suspicion import NEAR_PRINTED, printed_figures
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.recordings.quality.rotation import GravityTurn
 from imubench_pipeline.recordings.quality_file import Quality
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor, quantity_of
 from imubench_pipeline.tables.findings import Finding
-from imubench_pipeline.units import conversion, from_si
+from imubench_pipeline.units import conversion, from_si, to_si
+
+_UNDER_PRINTED = 2.5
+"""Times below a printed noise density that is usual: a low-pass hides nothing from
+`levels.density_of`."""
+
+_USUAL_GYRO = (math.radians(5e-4), math.radians(0.06))
+"""rad/s/√Hz: beyond the figures that the shipped sensor files print, 0.0015 to 0.035 °/s/√Hz."""
+
+_LARGEST_OFFSET = math.radians(30.0)
+_LEAST_OFFSET = math.radians(2.0)
+_OFFSET_OF_CLASS = {"industrial": math.radians(12.0), "tactical": _LEAST_OFFSET}
+"""rad/s. The shipped sensor files print at most 3 °/s (typ) of industrial sensors, 0.2 °/s of
+tactical ones, and 20 °/s of others."""
+
+_OVER_PRINTED = {"max": 1.5}
+_OVER_TYPICAL = 4.0
+"""Times the printed offset that one has: where typ and max are both printed, max is three times
+typ, and mounting adds to it."""
+
+_SLOWEST, _FASTEST = 0.105, 1e4
+"""Hz, of any log. 0.1 Hz is what stamps in ms at 100 Hz come to where they are taken for s."""
+
+_READ_OVER = 100.0
+_SAMPLED_OVER = 10.0
+"""Times the bandwidth that a log is read at, at most; and that a sensor samples at, at most: those
+that the shipped sensor files print are sampled at 2 to 8 times theirs."""
+
+_USUAL = 100.0
+_FACTORS: Mapping[float, float] = {60.0: 1.0, 1e3: 0.0, 1e6: 0.0, 1e9: 0.0}
+"""Ratios of two units of time, and decades from the usual rate (Hz) that each is taken to be less
+likely: no sensor file can state minutes."""
 
 Level = Mapping[str, Any]
 """Of a channel, as `imubench_pipeline.recordings.quality.levels.kept_level` returns it."""
@@ -62,6 +96,153 @@ _TILTED = math.radians(10.0)
 _TILTING = math.radians(1.0)
 _AGREES = 0.25
 """The same where gyros turn with it, and part of its rate that they may be off."""
+
+_MEND = "state the right 'unit' in the sensor file"
+
+
+@dataclass(frozen=True)
+class Expected:
+    """What is usual of a quantity of a sensor at rest.
+
+    Attributes
+    ----------
+    noise : (float, float) or None
+        Least and most white noise density, SI/√Hz, two-sided.
+    noise_from : str
+        What says so.
+    offset : float
+        Largest mean of a gyro that an offset explains, rad/s.
+    offset_from : str
+    bandwidth : float or None
+        The widest that is printed, Hz.
+    printed : float or None
+        White noise density that the datasheet prints, SI/√Hz, two-sided.
+    """
+
+    noise: tuple[float, float] | None
+    noise_from: str
+    offset: float = _LARGEST_OFFSET
+    offset_from: str = "of any gyro"
+    bandwidth: float | None = None
+    printed: float | None = None
+
+
+def expected(sensor: Sensor | None, quantity: str) -> Expected:
+    """Return what is usual of a quantity of a sensor, by its file where that prints it.
+
+    Parameters
+    ----------
+    sensor : Sensor or None
+        None: nothing is known of it.
+    quantity : str
+        ``gyro`` or ``accel``.
+    """
+    usual = _USUAL_GYRO if quantity == "gyro" else None
+    if sensor is None:
+        return Expected(usual, "of a gyro")
+    printed = printed_figures(sensor, quantity).get("N")
+    noise = usual if printed is None else (printed / _UNDER_PRINTED, printed * NEAR_PRINTED)
+    noise_from = "of a gyro" if printed is None else "that its datasheet prints"
+    return Expected(noise, noise_from, *_offset(sensor), _bandwidth(sensor, quantity), printed)
+
+
+def _offset(sensor: Sensor) -> tuple[float, str]:
+    """Return the largest offset of the gyro of a sensor, rad/s, and what says so."""
+    printed = [
+        row.value * _OVER_PRINTED.get(row.figure.kind, _OVER_TYPICAL)
+        for axis in "xyz"
+        for row in bias_comparables(sensor.datasheet, f"gyro_{axis}")
+        if row.quantity in ("offset", "bias_repeatability")
+        and row.figure is not None
+        and row.value is not None
+    ]
+    if printed:
+        largest = min(max(*printed, _LEAST_OFFSET), _LARGEST_OFFSET)
+        return largest, "by the offset that its datasheet prints"
+    words = (sensor.price_class or "").lower().replace(",", " ").split()
+    word = next((word for word in words if word in _OFFSET_OF_CLASS), None)
+    if word is None:
+        return _LARGEST_OFFSET, "of any gyro"
+    return _OFFSET_OF_CLASS[word], f"of a gyro of price class {word}"
+
+
+def _bandwidth(sensor: Sensor, quantity: str) -> float | None:
+    """Return the widest bandwidth that a sensor file prints, Hz."""
+    assert quantity in QUANTITIES
+    sheet = getattr(sensor.datasheet, quantity)
+    widest = [
+        to_si(value, figure.unit, "frequency")
+        for figure in (sheet.printed("bandwidth") if sheet else ())
+        for axis in "xyz"
+        for value in _values(figure.on_axis(axis))
+    ]
+    return max(widest, default=None)
+
+
+def _values(printed: float | tuple[float, ...] | None) -> tuple[float, ...]:
+    if printed is None:
+        return ()
+    return printed if isinstance(printed, tuple) else (printed,)
+
+
+def implausible_rates(
+    rates: Mapping[str, float], bandwidths: Mapping[str, float | None]
+) -> list[Finding]:
+    """Return the rates that are far from what a sensor can do.
+
+    Parameters
+    ----------
+    rates : mapping of str to float
+        Of each channel, Hz.
+    bandwidths : mapping of str to float or None
+        The widest that the datasheet of the sensor prints for each channel, Hz.
+
+    Returns
+    -------
+    list of Finding
+        The value of each is the factor that mends times.
+    """
+    by_rate: dict[tuple[float, float], list[str]] = {}
+    for name, rate in rates.items():
+        fastest = _fastest(bandwidths[name])
+        if not _SLOWEST <= rate <= fastest:
+            by_rate.setdefault((rate, fastest), []).append(name)
+    found = []
+    for (rate, fastest), names in by_rate.items():
+        factor = time_factor(rate, fastest)
+        longer = factor if factor > 1.0 else 1.0 / factor
+        detail = (
+            f"the rate is {rate:.4g} Hz; expected {_SLOWEST:.1g} to {fastest:.5g} Hz: is the unit "
+            f"of time {longer:g} times as {'long' if factor > 1.0 else 'short'}? It would be "
+            f"{rate / factor:.4g} Hz then; mend 'unit' of 'time', or 'rate', in the sensor file"
+        )
+        channels = [None] if len(names) == len(rates) else names
+        found += [Finding("rate_implausible", "warning", detail, factor, one) for one in channels]
+    return found
+
+
+def time_factor(rate: float, fastest: float = _FASTEST) -> float:
+    """Return by what times are to be multiplied, so that a rate is likely.
+
+    Parameters
+    ----------
+    rate : float
+        Hz.
+    fastest : float
+        That the sensor can do, Hz.
+    """
+    sign = 1.0 if rate > fastest else -1.0
+    return min(
+        (factor**sign for factor in _FACTORS),
+        key=lambda one: abs(math.log10(rate / one / _USUAL)) + _FACTORS[round(one**sign)],
+    )
+
+
+def _fastest(bandwidth: float | None) -> float:
+    """Return the highest rate of a log of a sensor, Hz."""
+    if bandwidth is None:
+        return _FASTEST
+    return min(max(_FASTEST, _SAMPLED_OVER * bandwidth), _READ_OVER * bandwidth)
 
 
 def implausible(
@@ -158,9 +339,6 @@ def _gravity(channels: Mapping[str, Level]) -> Iterator[Finding]:
     if norm < 0.05 * STANDARD_GRAVITY:
         advice = "gravity seems to be taken off already (linear acceleration); use the raw figures"
     yield Finding("gravity_norm", "warning", f"{detail}: {advice}", norm)
-
-
-_MEND = "state the right 'unit' in the sensor file"
 
 
 def _noise(channels: Mapping[str, Level], of: Mapping[str, Expected]) -> Iterator[Finding]:

@@ -76,10 +76,6 @@ UsualFigures = Mapping[tuple[str, str], Usual]
 def usual_figures(sensors: Mapping[str, Sensor]) -> dict[tuple[str, str], Usual]:
     """Return what is usual of N and B in a catalogue.
 
-    Parameters
-    ----------
-    sensors : mapping of str to Sensor
-
     Returns
     -------
     dict
@@ -192,30 +188,6 @@ def _explained(quantity: str, figure: str, value: float, least: float, most: flo
 def _text(quantity: str, figure: str, value: float) -> str:
     unit, dimension = _SHOWN[quantity, figure]
     return f"{from_si(value, unit, dimension):.3g} {unit}"
-
-
-def suspicious_datasheets(sensors: Mapping[str, Sensor]) -> dict[str, list[str]]:
-    """Say which printed figures of a catalogue are twenty times off what is usual in it.
-
-    Parameters
-    ----------
-    sensors : mapping of str to Sensor
-
-    Returns
-    -------
-    dict
-        Sentences (see `suspicious`) by sensor, of those that have any.
-    """
-    usual = usual_figures(sensors)
-    said = {
-        name: [
-            sentence
-            for quantity in QUANTITIES
-            for sentence in suspicious(quantity, printed_figures(sensor, quantity), usual)
-        ]
-        for name, sensor in sensors.items()
-    }
-    return {name: sentences for name, sentences in said.items() if sentences}
 
 
 def unusual_rows(

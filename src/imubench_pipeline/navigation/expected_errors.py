@@ -27,7 +27,7 @@ from imubench_pipeline.navigation.error_budget import (
     interval,
     time_until,
 )
-from imubench_pipeline.navigation.error_budget.largest import Largest, source_row
+from imubench_pipeline.navigation.error_budget.parts import Largest, source_row
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.settings.requirements import (

@@ -97,7 +97,7 @@ class TurnOnBias:
     Attributes
     ----------
     recordings, left_out : int
-    mean, smallest, largest, lower, upper : float or None
+    mean, lower, upper : float or None
         rad/s or m/s^2; the limits are the mean's, 95 %, by Student's t.
     deviation, deviation_lower, deviation_upper : float or None
         Standard deviation between recordings with its chi-squared 95 % limits.
@@ -106,8 +106,6 @@ class TurnOnBias:
     recordings: int
     left_out: int
     mean: float | None = None
-    smallest: float | None = None
-    largest: float | None = None
     lower: float | None = None
     upper: float | None = None
     deviation: float | None = None
@@ -267,7 +265,7 @@ def turn_on_bias(means: Iterable[float | None]) -> TurnOnBias:
     Returns
     -------
     TurnOnBias
-        Of one mean only itself and the range, of none only the counts.
+        Of one mean only itself, of none only the counts.
     """
     listed = list(means)
     found = [mean for mean in listed if mean is not None and math.isfinite(mean)]
@@ -275,16 +273,15 @@ def turn_on_bias(means: Iterable[float | None]) -> TurnOnBias:
     if not found:
         return TurnOnBias(*counts)
     mean = math.fsum(found) / len(found)
-    extremes = (mean, min(found), max(found))
     freedom = len(found) - 1
     if not freedom:
-        return TurnOnBias(*counts, *extremes)
+        return TurnOnBias(*counts, mean)
     squares = math.fsum((value - mean) ** 2 for value in found)
     low_q, high_q, t = _quantiles(freedom)
     deviation = math.sqrt(squares / freedom)
     half = t * deviation / math.sqrt(len(found))
     limits = (math.sqrt(squares / high_q), math.sqrt(squares / low_q))
-    return TurnOnBias(*counts, *extremes, mean - half, mean + half, deviation, *limits)
+    return TurnOnBias(*counts, mean, mean - half, mean + half, deviation, *limits)
 
 
 def _same_devices(pairs: Sequence[tuple[float, str]]) -> float | None:

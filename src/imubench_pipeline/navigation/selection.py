@@ -2,48 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
 
 from imubench_pipeline.navigation.verdicts.basis import Basis
-from imubench_pipeline.navigation.verdicts.judgement import Judgement, judgements
+from imubench_pipeline.navigation.verdicts.judgement import Judgement
 from imubench_pipeline.navigation.verdicts.standing import Standing
 from imubench_pipeline.navigation.verdicts.unless import unless_words
-from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.typing import Row
 
 _SHOWN = 3
 """Recordings whose doubts are named; of more the number."""
-
-
-def ranking_rows(
-    errors: Iterable[Row],
-    requirements: Mapping[str, Requirement],
-    sensors: Mapping[str, Mapping[str, Any]],
-    recordings: Iterable[Row] = (),
-    doubts: Iterable[Row] = (),
-    parameters: Iterable[Row] = (),
-    backtests: Iterable[Row] = (),
-) -> Iterator[Row]:
-    """Rank the sensors for each requirement (see `ranked`).
-
-    Parameters
-    ----------
-    errors : iterable of mapping
-        Rows of the table ``error_budget``.
-    requirements : mapping of str to Requirement
-    sensors : mapping of str to mapping
-        ``price_class`` of each sensor, and its ``abilities``, where known.
-    recordings, doubts, parameters, backtests : iterable of mapping
-        Rows of the tables of these names: what is known of the recordings beside their errors.
-
-    Yields
-    ------
-    mapping
-        One a requirement, sensor and limit.
-    """
-    basis = Basis.of(recordings, doubts, parameters, backtests)
-    yield from ranked(list(judgements(errors, requirements, sensors, basis)), basis)
 
 
 def ranked(judged: Sequence[Judgement], basis: Basis) -> Iterator[Row]:

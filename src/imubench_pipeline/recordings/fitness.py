@@ -202,12 +202,7 @@ def judged(
 
 
 def words(of_recording: Iterable[Doubt]) -> str:
-    """Return the doubts of a recording in a line, the unfit first; empty where there are none.
-
-    Parameters
-    ----------
-    of_recording : iterable of Doubt
-    """
+    """Return the doubts of a recording in a line, the unfit first; empty where there are none."""
     channels: dict[str, dict[str, None]] = {}
     for one in of_recording:
         if one.of_recording:

@@ -373,15 +373,15 @@ def write_failed(settings: str, failure: Failure, path: Path) -> None:
         The ``quality.json`` of the recording.
     """
     given = json.loads(settings)
-    told = given.get("notes", {})
+    notes = given.get("notes", {})
     recording = {
         "sensor": failure.sensor,
-        "device": told.get("device") or failure.recording,
+        "device": notes.get("device") or failure.recording,
         "recording": failure.recording,
         "kind": given.get("kind", "static"),
         "simulated": given["simulated"],
         "status": "failed",
-        "started": told.get("started"),
+        "started": notes.get("started"),
         "reason": failure.reason,
     }
     finding = dict(failure.finding().row(failure.sensor, str(failure.recording)))

@@ -272,7 +272,7 @@ def _ended(
 
 def _folded(origin: Origin, rate: float) -> list[str]:
     """Say how much of the white noise beyond Nyquist sampling folds into the log."""
-    from imubench_pipeline.simulate.noise_in_log import folding
+    from imubench_pipeline.simulate.model import folding
 
     found = []
     for channel, axis in origin.imu.axes.items():

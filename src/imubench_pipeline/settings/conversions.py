@@ -1,4 +1,4 @@
-"""White noise as vendors and papers state it -> N; what a quantisation step makes of it.
+"""White noise as vendors and papers state it -> N.
 
 Everything is SI. N is two-sided, S(f) = N² at positive and negative frequencies, so that
 σ²(τ) = N²/τ; the angle or velocity random walk that vendors print is N. A one-sided density has
@@ -15,8 +15,6 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-from imubench_pipeline.units import dimension_of, to_si
-
 Sidedness = Literal["one-sided", "two-sided"]
 Filter = Literal["stated", "first-order", "second-order"]
 
@@ -25,8 +23,6 @@ _NOISE_OVER_CUT_OFF: dict[Filter, float] = {
     "first-order": math.pi / 2.0,
     "second-order": math.pi / (2.0 * math.sqrt(2.0)),
 }
-_AGREEMENT = 0.05
-"""Relative difference of two printed figures that rounding explains."""
 
 
 def noise_of_density(density: float, sidedness: Sidedness) -> float:
@@ -34,7 +30,7 @@ def noise_of_density(density: float, sidedness: Sidedness) -> float:
 
     N = density, or density / √2 where it is one-sided. (Engers, eq. 7, for the ordinate of an
     FFT; as printed it holds for a two-sided one. His section 3 divides a datasheet's density by
-    √500 to have the noise of a sample: it is multiplied, see `noise_of_a_sample`.)
+    √500 to have the noise of a sample: it is multiplied, σ = N √rate.)
 
     Parameters
     ----------
@@ -110,11 +106,6 @@ def noise_of_rms(rms: float, bandwidth: float, sidedness: Sidedness = "one-sided
     return noise_of_density(rms / math.sqrt(bandwidth), sidedness)
 
 
-def rms_of_noise(N: float, bandwidth: float) -> float:
-    """Return the standard deviation of white noise over a noise bandwidth from 0, in Hz."""
-    return N * math.sqrt(2.0 * bandwidth)
-
-
 def noise_bandwidth(cut_off: float, filter_: Filter = "stated") -> float:
     """Return the noise bandwidth of a low-pass filter.
 
@@ -136,135 +127,3 @@ def noise_bandwidth(cut_off: float, filter_: Filter = "stated") -> float:
         Hz.
     """
     return cut_off * _NOISE_OVER_CUT_OFF[filter_]
-
-
-def noise_at(deviation: float, tau: float) -> float:
-    """Return N of an ordinate of the falling line: N = σ(τ) √τ.
-
-    Parameters
-    ----------
-    deviation : float
-        Allan deviation on the line of slope -1/2, rad/s or m/s².
-    tau : float
-        Where it is read, s. Engers reads it at one hour and prints it as a density: his figures
-        are N / 60.
-
-    Returns
-    -------
-    float
-        N, rad/√s or m/s^1.5.
-    """
-    return deviation * math.sqrt(tau)
-
-
-def noise_of_a_sample(N: float, rate: float) -> float:
-    """Return the standard deviation that white noise gives each sample: N √rate.
-
-    Parameters
-    ----------
-    N : float
-        rad/√s or m/s^1.5.
-    rate : float
-        Sampling rate, Hz; the noise is taken to be white up to half of it.
-
-    Returns
-    -------
-    float
-        rad/s or m/s².
-    """
-    return N * math.sqrt(rate)
-
-
-def quantisation_step(value: float, unit: str, quantity: str) -> float:
-    """Return the step of one count.
-
-    Parameters
-    ----------
-    value : float
-        As printed: a step (mdps/LSB), a sensitivity (LSB/g), or a plain unit that is meant by the
-        count (deg/s*2^-12).
-    unit : str
-    quantity : str
-        ``gyro`` or ``accel``.
-
-    Returns
-    -------
-    float
-        rad/s or m/s² by count.
-
-    Raises
-    ------
-    UnitError
-        If the unit is none of these.
-    ValueError
-        If the value is not above 0.
-    """
-    if value <= 0:
-        raise ValueError(f"a sensitivity of {value:g} {unit}; expected one above 0")
-    plain = "angular_rate" if quantity == "gyro" else "acceleration"
-    sensitivity = f"{quantity}_sensitivity"
-    dimension = dimension_of(unit, (f"{quantity}_step", sensitivity, plain))
-    found = to_si(value, unit, dimension)
-    return 1.0 / found if dimension == sensitivity else found
-
-
-def noise_of_step(step: float, rate: float) -> float:
-    """Return N of rounding each sample to a step, where the noise spans several steps.
-
-    The error of a sample has the variance step²/12 and is white: N = step / √(12 rate).
-
-    Parameters
-    ----------
-    step : float
-        rad/s or m/s².
-    rate : float
-        Sampling rate, Hz.
-
-    Returns
-    -------
-    float
-        N, rad/√s or m/s^1.5.
-    """
-    return step / math.sqrt(12.0 * rate)
-
-
-def quantization_of_step(step: float, rate: float) -> float:
-    """Return Q of a sensor that integrates and rounds its increments: Q = step / (rate √12).
-
-    This is the noise of slope -1 of IEEE Std 952, and not that of a register of rate or
-    acceleration, whose rounding is white (`noise_of_step`).
-
-    Parameters
-    ----------
-    step : float
-        Of the increments, as rate or acceleration: increment times rate, rad/s or m/s².
-    rate : float
-        Of the increments, Hz.
-
-    Returns
-    -------
-    float
-        Q, rad or m/s.
-    """
-    return step / (rate * math.sqrt(12.0))
-
-
-def sidedness_of(density: float, N: float) -> Sidedness | None:
-    """Return the side of a printed density that a printed random walk, or rms, gives away.
-
-    Parameters
-    ----------
-    density : float
-        Amplitude density as printed, rad/s/√Hz or m/s²/√Hz.
-    N : float
-        Angle or velocity random walk as printed beside it, or `noise_of_rms`, in SI.
-
-    Returns
-    -------
-    str or None
-        None: the two fit neither reading to 5 %.
-    """
-    for sidedness in ("one-sided", "two-sided"):
-        if abs(noise_of_density(density, sidedness) / N - 1.0) <= _AGREEMENT:
-            return sidedness
-    return None

@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field, model_validator
 from imubench_pipeline.settings.pointing import Pointing
 from imubench_pipeline.settings.requirements import Latitude, Time
 from imubench_pipeline.settings.stated_gyro import Gyro, stated_gyro
-from imubench_pipeline.settings.validation import Strict, Text
+from imubench_pipeline.settings.validation import Strict, Text, checked
 from imubench_pipeline.units import quantity_to_si
 
 _NO_EARTH = 1e-9
@@ -19,26 +19,13 @@ _NO_EARTH = 1e-9
 
 
 def _from_zero(dimension: str) -> AfterValidator:
-    def check(text: str) -> str:
-        if quantity_to_si(text, dimension) < 0:
-            raise ValueError("expected a figure from 0")
-        return text
-
-    return AfterValidator(check)
-
-
-def _of(dimension: str) -> AfterValidator:
-    def check(text: str) -> str:
-        quantity_to_si(text, dimension)
-        return text
-
-    return AfterValidator(check)
+    return checked(dimension, "a figure from 0", from_zero=True)
 
 
 TimeFromZero = Annotated[Text, _from_zero("time"), Field(examples=["2 s"])]
-Angle = Annotated[Text, _of("angle"), Field(examples=["30 deg"])]
+Angle = Annotated[Text, checked("angle"), Field(examples=["30 deg"])]
 AngleFromZero = Annotated[Text, _from_zero("angle"), Field(examples=["0.5 deg"])]
-Rate = Annotated[Text, _of("angular_rate"), Field(examples=["-10 deg/s"])]
+Rate = Annotated[Text, checked("angular_rate"), Field(examples=["-10 deg/s"])]
 RateFromZero = Annotated[Text, _from_zero("angular_rate"), Field(examples=["0.05 deg/s"])]
 AccelerationFromZero = Annotated[Text, _from_zero("acceleration"), Field(examples=["20 mg"])]
 
@@ -193,13 +180,7 @@ class OnRateTable(Strict):
         return self
 
     def si(self, name: str, dimension: str) -> float:
-        """Return one of its figures in SI.
-
-        Parameters
-        ----------
-        name : str
-        dimension : str
-        """
+        """Return one of its figures in SI."""
         return quantity_to_si(getattr(self, name), dimension)
 
     def gyro(self, channels: Sequence[str], *, column: bool) -> str:

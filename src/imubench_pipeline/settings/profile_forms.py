@@ -172,13 +172,7 @@ FormOrNone = TypeVar("FormOrNone", bound=Form | None)
 
 
 def found_from(form: FormOrNone, folder: Path) -> FormOrNone:
-    """Return the same form, whose file is named from a folder.
-
-    Parameters
-    ----------
-    form : Form or None
-    folder : Path
-    """
+    """Return the same form, whose file is named from a folder."""
     if isinstance(form, FileForm):
         return form.model_copy(update={"file": folder / form.file})
     return form

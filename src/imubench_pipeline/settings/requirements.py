@@ -16,6 +16,7 @@ from imubench_pipeline.settings.validation import (
     Frequency,
     Strict,
     Text,
+    checked,
     of_size,
     parse,
     read_yaml,
@@ -38,12 +39,6 @@ Axis = Literal["worst", "median"]
 """The axis of a sensor that a requirement is held against."""
 
 
-def _time(text: str) -> str:
-    if quantity_to_si(text, "time") <= 0:
-        raise ValueError("expected a time above zero")
-    return text
-
-
 def _latitude(text: str) -> str:
     if not abs(quantity_to_si(text, "angle")) < 1.5707:
         raise ValueError(
@@ -53,7 +48,7 @@ def _latitude(text: str) -> str:
     return text
 
 
-Time = Annotated[Text, AfterValidator(_time), Field(examples=["60 s"])]
+Time = Annotated[Text, checked("time", "a time above zero"), Field(examples=["60 s"])]
 Latitude = Annotated[Text, AfterValidator(_latitude), Field(examples=["45 deg"])]
 
 
@@ -86,12 +81,6 @@ class Limit(Strict):
         return f"{self.error} within {self.at_most} after {self.after}"
 
 
-def _change(text: str) -> str:
-    if not difference_to_si(text, "temperature") > 0:
-        raise ValueError("expected a difference above zero, such as 20 K")
-    return text
-
-
 def _axes(text: str) -> str:
     _, _, axes = text.partition("_")
     if not re.fullmatch("(gyro|accel)_[xyz]+", text) or len(set(axes)) < len(axes):
@@ -99,8 +88,11 @@ def _axes(text: str) -> str:
     return text
 
 
-Rate = Annotated[Text, AfterValidator(of_size("angular_rate")), Field(examples=["300 deg/s"])]
-Acceleration = Annotated[Text, AfterValidator(of_size("acceleration")), Field(examples=["8 g"])]
+Rate = Annotated[Text, of_size("angular_rate"), Field(examples=["300 deg/s"])]
+Acceleration = Annotated[Text, of_size("acceleration"), Field(examples=["8 g"])]
+
+
+_change = checked("temperature", "a difference above zero, such as 20 K", to_si=difference_to_si)
 
 
 class TurnOn(Strict):
@@ -126,15 +118,15 @@ class TurnOn(Strict):
 class Environment(Strict):
     """What a sensor meets in use that a static log does not show; what is left out is not there."""
 
-    temperature_change: Annotated[Text, AfterValidator(_change)] | None = Field(
+    temperature_change: Annotated[Text, _change] | None = Field(
         None,
         examples=["20 K"],
         description="±, from the static window to the end; with turn_on, from where its bias holds",
     )
-    turns: Annotated[Text, AfterValidator(of_size("angle"))] | None = Field(
+    turns: Annotated[Text, of_size("angle")] | None = Field(
         None, examples=["360 deg"], description="± about the axis of the gyro, by the end"
     )
-    speed_change: Annotated[Text, AfterValidator(of_size("velocity"))] | None = Field(
+    speed_change: Annotated[Text, of_size("velocity")] | None = Field(
         None, examples=["10 m/s"], description="± along the axis of the accelerometer, by the end"
     )
     vibration: Acceleration | None = Field(None, description="rms of one axis")
@@ -157,10 +149,10 @@ class Must(Strict):
     axes: tuple[Annotated[str, AfterValidator(_axes)], ...] = Field(
         (), description="such as [gyro_xyz, accel_xyz]"
     )
-    mass: Annotated[Text, AfterValidator(of_size("mass"))] | None = Field(
+    mass: Annotated[Text, of_size("mass")] | None = Field(
         None, examples=["30 g"], description="at most"
     )
-    power: Annotated[Text, AfterValidator(of_size("power"))] | None = Field(
+    power: Annotated[Text, of_size("power")] | None = Field(
         None, examples=["1 W"], description="at most"
     )
 

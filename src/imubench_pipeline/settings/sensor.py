@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from imubench_pipeline.settings.known_rates import AtRest, OnRateTable
 from imubench_pipeline.settings.printed import Datasheet
@@ -237,10 +237,10 @@ class Sensor(Strict):
     model: str
     price_class: str | None = None
     price: Text | None = Field(None, description="with its currency and number, such as 12 EUR")
-    mass: Annotated[Text, AfterValidator(of_size("mass"))] | None = Field(
+    mass: Annotated[Text, of_size("mass")] | None = Field(
         None, examples=["15 g"], description="null: not known"
     )
-    power: Annotated[Text, AfterValidator(of_size("power"))] | None = Field(
+    power: Annotated[Text, of_size("power")] | None = Field(
         None, examples=["0.2 W"], description="that it takes; null: not known"
     )
     temperature_range: Between | None = Field(

@@ -2,43 +2,33 @@
 
 from __future__ import annotations
 
-from typing import Self
+from typing import Annotated, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from imubench_pipeline.settings.known_rates import Angle, AtRest, OnRateTable
 from imubench_pipeline.settings.pointing import Pointing
 from imubench_pipeline.settings.two_position import TwoPosition
-from imubench_pipeline.settings.validation import Strict, Text
+from imubench_pipeline.settings.validation import Strict, Text, checked
 from imubench_pipeline.units import quantity_to_si
+
+_Rate = Annotated[Text, checked("angular_rate")]
 
 
 class PublishedRate(Strict):
     """What a source prints of the Earth's rate that it found."""
 
     where: Text = Field(description="such as section 6")
-    printed: Text = Field(description="with its unit, as printed")
+    printed: _Rate = Field(description="with its unit, as printed")
     part: Text = Field("whole", description="of the run: whole, or such as 'last 13 min'")
-
-    @field_validator("printed")
-    @classmethod
-    def _a_rate(cls, text: str) -> str:
-        quantity_to_si(text, "angular_rate")
-        return text
 
 
 class SimulatedTurns(TwoPosition):
     """A gyro that is turned between north and south, by the clock."""
 
-    transient: Text = Field("0 deg/s", description="largest rate that is sensed of a turn, about")
+    transient: _Rate = Field("0 deg/s", description="largest rate that is sensed of a turn, about")
     assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
     published: tuple[PublishedRate, ...] = ()
-
-    @field_validator("transient")
-    @classmethod
-    def _a_rate(cls, text: str) -> str:
-        quantity_to_si(text, "angular_rate")
-        return text
 
     @model_validator(mode="after")
     def _parts_are_there(self) -> Self:

@@ -233,11 +233,6 @@ class ToSimulate:
 def read_simulated(path: Path | None, sensors: Mapping[str, Sensor]) -> ToSimulate:
     """Read what is simulated; nothing where ``path`` is None.
 
-    Parameters
-    ----------
-    path : Path or None
-    sensors : mapping of str to Sensor
-
     Raises
     ------
     ConfigError
@@ -316,12 +311,7 @@ def _found_from(around: _Around, path: Path, key: str = "") -> _Around:
 
 
 def profile_files(recording: SimulatedRecording) -> list[Path]:
-    """Return the files that its temperature and motion are read from.
-
-    Parameters
-    ----------
-    recording : SimulatedRecording
-    """
+    """Return the files that its temperature and motion are read from."""
     forms = (recording.temperature, *recording.motion.values())
     return sorted({form.file for form in forms if isinstance(form, FileForm)})
 

@@ -8,29 +8,16 @@ from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from imubench_pipeline.settings.requirements import Latitude, Time
 from imubench_pipeline.settings.stated_gyro import Gyro, stated_gyro
-from imubench_pipeline.settings.validation import Strict, Text
+from imubench_pipeline.settings.validation import Strict, Text, checked
 from imubench_pipeline.units import quantity_to_si
 
 
-def _not_negative(text: str) -> str:
-    if quantity_to_si(text, "time") < 0:
-        raise ValueError("expected a time from 0")
-    return text
+def _deviation(dimension: str) -> AfterValidator:
+    return checked(dimension, "a standard deviation from 0", from_zero=True)
 
 
-def _deviation_of_rate(text: str) -> str:
-    if quantity_to_si(text, "angular_rate") < 0:
-        raise ValueError("expected a standard deviation from 0")
-    return text
-
-
-def _deviation_of_slope(text: str) -> str:
-    if quantity_to_si(text, "gyro_ramp") < 0:
-        raise ValueError("expected a standard deviation from 0")
-    return text
-
-
-TimeFromZero = Annotated[Text, AfterValidator(_not_negative), Field(examples=["2 s"])]
+_from_zero = checked("time", "a time from 0", from_zero=True)
+TimeFromZero = Annotated[Text, _from_zero, Field(examples=["2 s"])]
 
 _NEEDED = {
     "latitude": "where the log was recorded, such as latitude: 45.1 deg (south: negative)",
@@ -65,11 +52,11 @@ class TwoPosition(Strict):
     trust_schedule: bool = Field(
         False, description="take the schedule's word where nothing of the turns is seen"
     )
-    turn_on_bias: Annotated[Text, AfterValidator(_deviation_of_rate)] | None = Field(
+    turn_on_bias: Annotated[Text, _deviation("angular_rate")] | None = Field(
         None,
         description="standard deviation of the fixed bias, such as 0.1 deg/s; null: not known",
     )
-    drift: Annotated[Text, AfterValidator(_deviation_of_slope)] | None = Field(
+    drift: Annotated[Text, _deviation("gyro_ramp")] | None = Field(
         None,
         description="standard deviation of a steady drift beside the noise, such as 20 deg/h/h "
         "while the sensor warms up; null: none",
@@ -106,12 +93,7 @@ class TwoPosition(Strict):
         return self
 
     def seconds(self, name: Literal["dwell", "turning", "start"]) -> float:
-        """Return one of its times in s.
-
-        Parameters
-        ----------
-        name : str
-        """
+        """Return one of its times in s."""
         return quantity_to_si(getattr(self, name), "time")
 
     @property

@@ -43,33 +43,39 @@ def as_text(value: object) -> object:
     return value
 
 
-def _frequency(text: str) -> str:
-    if quantity_to_si(text, "frequency") <= 0:
-        raise ValueError("expected a frequency above zero")
-    return text
-
-
-def _duration(text: str) -> str:
-    if not quantity_to_si(text, "time") > 0:
-        raise ValueError("expected a time above 0")
-    return text
-
-
-def of_size(dimension: str) -> Callable[[str], str]:
-    """Return a check that a text is a number above zero with a unit of a dimension.
+def checked(
+    dimension: str,
+    expected: str | None = None,
+    *,
+    from_zero: bool = False,
+    to_si: Callable[[str, str], float] = quantity_to_si,
+) -> AfterValidator:
+    """Return a check that a text is a figure with a unit of a dimension, and in its range.
 
     Parameters
     ----------
     dimension : str
         A key of `imubench_pipeline.units.SI_UNITS`.
+    expected : str, optional
+        What the error says of a figure that is not above 0; by default it may be any.
+    from_zero : bool
+        0 itself is in the range.
+    to_si : callable
+        How a text is read.
     """
 
     def check(text: str) -> str:
-        if not quantity_to_si(text, dimension) > 0:
-            raise ValueError(f"expected more than zero, with its unit of {dimension}")
+        value = to_si(text, dimension)
+        if expected is not None and not (value > 0 or (from_zero and value == 0)):
+            raise ValueError(f"expected {expected}")
         return text
 
-    return check
+    return AfterValidator(check)
+
+
+def of_size(dimension: str) -> AfterValidator:
+    """Return a check that a text is a number above zero with a unit of a dimension."""
+    return checked(dimension, f"more than zero, with its unit of {dimension}")
 
 
 def _between(ends: tuple[str, str]) -> tuple[str, str]:
@@ -81,10 +87,12 @@ def _between(ends: tuple[str, str]) -> tuple[str, str]:
 
 FractionOfLog = Annotated[float, BeforeValidator(_fraction, json_schema_input_type=float | str)]
 Text = Annotated[str, BeforeValidator(as_text)]
-Frequency = Annotated[Text, AfterValidator(_frequency), Field(examples=["100 Hz"])]
+Frequency = Annotated[
+    Text, checked("frequency", "a frequency above zero"), Field(examples=["100 Hz"])
+]
 Between = Annotated[tuple[Text, Text], AfterValidator(_between)]
 """A lower and an upper temperature, with their units."""
-Duration = Annotated[Text, AfterValidator(_duration), Field(examples=["10 h"])]
+Duration = Annotated[Text, checked("time", "a time above 0"), Field(examples=["10 h"])]
 
 
 # The same loader, ten times as fast where it is compiled.
@@ -106,8 +114,8 @@ def parse(model: type[_Model], data: object, file: str) -> _Model:
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        told = "\n".join(_fault(file, fault, model) for fault in _first_faults(error.errors()))
-        raise ConfigError(told) from None
+        faults = "\n".join(_fault(file, fault, model) for fault in _first_faults(error.errors()))
+        raise ConfigError(faults) from None
 
 
 def _first_faults(faults: list[Any]) -> list[Any]:

@@ -88,10 +88,6 @@ def slow_sources(times: Array, interval: float, low_pass: LowPass | None) -> Slo
         Sampling interval, s.
     low_pass : LowPass or None
         None: m = 0.
-
-    Returns
-    -------
-    SlowSources
     """
     n, m = len(times), low_pass.order if low_pass else 0
     x = interval / times
@@ -124,11 +120,7 @@ def slow_sources(times: Array, interval: float, low_pass: LowPass | None) -> Slo
 def white_factor(low_pass: LowPass, interval: float) -> Array:
     """Return a factor of the noise that white noise of density 1 leaves in the filter.
 
-    Parameters
-    ----------
-    low_pass : LowPass
-    interval : float
-        s.
+    `low_pass` and `interval`: as of `filter_transition`.
 
     Returns
     -------
@@ -203,10 +195,6 @@ def held_input(low_pass: LowPass | None, lag: float, interval: float) -> Held:
         Time constant, s; 0: none.
     interval : float
         s.
-
-    Returns
-    -------
-    Held
     """
     m = low_pass.order if low_pass else 0
     x = interval / lag if lag > 0 else math.inf

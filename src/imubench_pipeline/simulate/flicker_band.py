@@ -40,10 +40,6 @@ def bank(B: float, lowest: float, highest: float) -> list[GaussMarkov]:
     lowest, highest : float
         The band, Hz.
 
-    Returns
-    -------
-    list of GaussMarkov
-
     Raises
     ------
     ValueError
@@ -63,10 +59,7 @@ def bank(B: float, lowest: float, highest: float) -> list[GaussMarkov]:
 def ripple(lowest: float, highest: float) -> float:
     """Return the largest relative error of the density of a bank inside its band.
 
-    Parameters
-    ----------
-    lowest, highest : float
-        The band, Hz.
+    `lowest` and `highest`: as of `bank`.
 
     Returns
     -------

@@ -15,8 +15,7 @@ from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.settings.sensor import CHANNELS, quantity_of
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.simulate.imu import ImuModel
-from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift
-from imubench_pipeline.simulate.noise_in_log import before_the_filter
+from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift, before_the_filter
 from imubench_pipeline.simulate.sources import Origin, Remark, Topic
 from imubench_pipeline.tables import read
 
@@ -61,7 +60,7 @@ def with_estimates(found: Origin, results: Path, name: str, recording: str | Non
     }
     axes: dict[str, SensorModel] = {}
     figures: dict[str, list[Remark]] = {}
-    told: list[set[Topic]] = []
+    topics: list[set[Topic]] = []
     for channel in CHANNELS:
         of_channel = {
             table: rows.filter(pc.field("channel") == channel).to_pylist()
@@ -70,15 +69,15 @@ def with_estimates(found: Origin, results: Path, name: str, recording: str | Non
         if of_channel["parameters"]:
             axis = _Axis(found, channel, of_channel, f"{name}/{chosen}")
             axes[channel] = axis.model(float(about["rate"]))
-            told.append({remark.topic for remark in axis.said})
+            topics.append({remark.topic for remark in axis.said})
             of_datasheet = found.figures.get(channel, [])
             figures[channel] = [
                 *axis.said,
-                *(one for one in of_datasheet if one.topic not in told[-1]),
+                *(one for one in of_datasheet if one.topic not in topics[-1]),
             ]
     if not axes:
         raise ConfigError(f"{folder}: no estimate of {name}/{chosen}")
-    known = set[Topic].intersection(*told)
+    known = set[Topic].intersection(*topics)
     origin = Origin(
         ImuModel(axes=axes),
         f"the estimates of a run in {results}, from the recording {name}/{chosen}",

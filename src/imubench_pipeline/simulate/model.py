@@ -12,13 +12,16 @@ a register of rate, which is done as such, to the nearest step; with noise of at
 it adds LSB^2 / 12 to the variance of each sample, and that is what spectrum and Allan variance
 count for it. A sensor has one of the two, seldom both: an estimate of N from a log that is rounded
 contains the rounding already.
+
+White noise before the low-pass and rounding is not N as a log shows it (`in_the_log`): sampling
+folds into the log what lies above Nyquist, and a register adds LSB^2 / 12 a sample.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,6 +32,9 @@ from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.noise.terms import GaussMarkov, Term
 from imubench_pipeline.simulate import flicker_band, spectra
 from imubench_pipeline.typing import Array
+
+_LOW = 1e-4
+"""rad a sample, far below every cut-off."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,10 +203,6 @@ class SensorModel:
 def sources_of(terms: Sequence[Term]) -> spectra.Sources:
     """Return the terms that drive a filter with a density.
 
-    Parameters
-    ----------
-    terms : sequence of Term
-
     Returns
     -------
     Sources
@@ -234,3 +236,45 @@ def bank_for(model: SensorModel, rate: float, duration: float) -> list[GaussMark
             highest = flicker_band.ABOVE * max(model.low_pass.cutoff, rate / 2.0)
             processes += flicker_band.bank(term.drive.flicker, 0.5 / duration, highest)
     return processes
+
+
+def in_the_log(model: SensorModel, rate: float) -> float:
+    """Return N as the low frequencies of a log show it, SI.
+
+    Parameters
+    ----------
+    model : SensorModel
+        Its noise is that before the low-pass.
+    rate : float
+        Of the log, Hz.
+    """
+    return math.sqrt(model.noise.N**2 * folding(model, rate) + _rounding(model, rate))
+
+
+def before_the_filter(model: SensorModel, noise: NoiseModel, rate: float) -> NoiseModel:
+    """Return noise with N as it is before filter and rounding, from N as a log shows it.
+
+    Parameters
+    ----------
+    model : SensorModel
+        Of which filter and resolution are taken.
+    noise : NoiseModel
+        As estimated from a log.
+    rate : float
+        Of the log, Hz.
+    """
+    left = max(noise.N**2 - _rounding(model, rate), 0.0)
+    return replace(noise, N=math.sqrt(left / folding(model, rate)))
+
+
+def folding(model: SensorModel, rate: float) -> float:
+    """Return how many times N^2 the density of the samples is at low frequencies.
+
+    `model` and `rate`: as of `bank_for`.
+    """
+    unit = replace(model, noise=NoiseModel(N=1.0), resolution=0.0)
+    return float(unit.sampled_spectrum(np.array([_LOW]), rate)[0]) / rate
+
+
+def _rounding(model: SensorModel, rate: float) -> float:
+    return model.resolution**2 / (12.0 * rate)

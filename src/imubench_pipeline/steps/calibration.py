@@ -8,13 +8,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from imubench_pipeline.recordings.quality_file import Quality
 from imubench_pipeline.recordings.recording import channel_logs, read_metadata
 from imubench_pipeline.settings.known_rates import AtRest, OnRateTable
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
-from imubench_pipeline.steps.known_rates import Given, at_rest, on_rate_table, unusable
-from imubench_pipeline.steps.noise_source import from_printed, from_static
+from imubench_pipeline.steps.known_rates import GyroLog, at_rest, on_rate_table, unusable
+from imubench_pipeline.steps.noise_source import noise_source
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.tables.of_calibration import CALIBRATION_TABLES
 from imubench_pipeline.typing import Row
@@ -51,24 +50,20 @@ def calibration_tables(
     metadata = read_metadata(next(iter(logs.values())).path)
     gyros = (name for name in [*logs, *metadata["unusable"]] if name.startswith("gyro_"))
     channel: str = declared.channel or next(gyros)
+    key = Key(sensor, recording, channel)
     if channel not in logs:
-        key = asdict(Key(sensor, recording, channel))
-        rows["calibration"] = list(unusable(key, isinstance(declared, OnRateTable)))
+        rows["calibration"] = list(unusable(asdict(key), isinstance(declared, OnRateTable)))
         return rows
-    own = Quality.read(folder / "quality.json").recording
-    source = from_static(static, own, channel) or from_printed(
-        sensor, Sensor.model_validate(given["sensor"]), channel
-    )
-    about = Given(
-        Key(sensor, recording, channel),
+    log = GyroLog(
+        key,
         logs[channel],
-        source,
+        noise_source(folder, static, key, Sensor.model_validate(given["sensor"])),
         metadata.get("begins", 0.0),
         _truth(simulated, channel),
     )
     if isinstance(declared, OnRateTable):
-        return rows | asdict(on_rate_table(about, declared))
-    return rows | asdict(at_rest(about, declared))
+        return rows | asdict(on_rate_table(log, declared))
+    return rows | asdict(at_rest(log, declared))
 
 
 def _declared(
@@ -90,11 +85,11 @@ def _truth(simulated: SimulatedRecording | None, channel: str) -> dict[str, floa
     """Return the true figures of a simulation: its bias, and what it has of a line."""
     if simulated is None:
         return {}
-    found = {}
+    truth = {}
     for name, axis in simulated.channels.items():
         if name == channel and axis.bias is not None:
-            found["bias"] = quantity_to_si(axis.bias, "angular_rate")
+            truth["bias"] = quantity_to_si(axis.bias, "angular_rate")
     if simulated.rate_table is not None:
-        found |= {"scale_factor": simulated.rate_table.scale_factor}
-        found |= {"quadratic": 0.0, "asymmetry": 0.0}
-    return found
+        truth |= {"scale_factor": simulated.rate_table.scale_factor}
+        truth |= {"quadratic": 0.0, "asymmetry": 0.0}
+    return truth

@@ -12,11 +12,10 @@ from imubench_pipeline.allan import AllanCurve, of_blocks
 from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate, Parameter
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.rows import limit_rows
-from imubench_pipeline.estimators.thermal.effect import shifted
 from imubench_pipeline.estimators.thermal.fit import fit_temperature
 from imubench_pipeline.estimators.thermal.path import TemperaturePath
 from imubench_pipeline.estimators.thermal.register import step_of
-from imubench_pipeline.estimators.thermal.result import ThermalFit
+from imubench_pipeline.estimators.thermal.result import ThermalFit, shifted
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables.keys import Key
@@ -85,12 +84,7 @@ def compensated_curve(log: ChannelLog, found: ThermalFit, measured: AllanCurve) 
 def temperature_curve(log: ChannelLog, found: ThermalFit, measured: AllanCurve) -> AllanCurve:
     """Return the Allan variance of what temperature adds to a log.
 
-    Parameters
-    ----------
-    log : ChannelLog
-    found : ThermalFit
-    measured : AllanCurve
-        Of the log as it is: the same clusters are taken.
+    Its parameters are those of `compensated_curve`.
     """
     nothing = (np.zeros(len(values)) for values in log.blocks())
     blocks = shifted(nothing, found.path, found.effect, 1.0)
@@ -146,9 +140,7 @@ def low_pass_rows(key: Key, found: Likelihood) -> Iterator[Row]:
 def resolution_of(log: ChannelLog) -> float:
     """Return the step of the register that the samples at the beginning of a log show, SI.
 
-    Parameters
-    ----------
-    log : ChannelLog
+    `log`: as of `temperature_of`.
 
     Returns
     -------

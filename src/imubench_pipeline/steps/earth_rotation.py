@@ -8,14 +8,13 @@ from dataclasses import asdict
 from pathlib import Path
 
 from imubench_pipeline.experiments.earth_rate.published import Schedule, published_row
-from imubench_pipeline.recordings.quality_file import Quality
 from imubench_pipeline.recordings.recording import channel_logs, read_metadata
 from imubench_pipeline.settings.config import EarthRateSettings
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.settings.two_position import TwoPosition
 from imubench_pipeline.simulate.models import axis_model
-from imubench_pipeline.steps.noise_source import from_printed, from_static
+from imubench_pipeline.steps.noise_source import noise_source
 from imubench_pipeline.steps.turned import WHOLE, earth_rate_of, unusable
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.tables.of_earth_rate import EARTH_RATE_TABLES
@@ -55,26 +54,22 @@ def earth_rate_tables(
         declared = simulated.two_position.declared
     else:
         declared = TwoPosition.model_validate(given["two_position"])
-    own = Quality.read(folder / "quality.json").recording
     metadata = read_metadata(next(iter(logs.values())).path)
     channel = declared.turned([*logs, *metadata["unusable"]])
+    key = Key(sensor, recording, channel)
     if channel not in logs:
-        key = Key(sensor, recording, channel)
         rows["earth_rate"] = list(unusable(asdict(key), declared))
         return rows
     how = EarthRateSettings.model_validate(given["earth_rate"])
-    source = from_static(static, own, channel, how.draws) or from_printed(
-        sensor, Sensor.model_validate(given["sensor"]), channel
-    )
-    key, log = Key(sensor, recording, channel), logs[channel]
-    found = earth_rate_of(key, log, declared, source, how, begins=metadata.get("begins", 0.0))
-    rows |= asdict(found)
+    source = noise_source(folder, static, key, Sensor.model_validate(given["sensor"]), how.draws)
+    begins = metadata.get("begins", 0.0)
+    rows |= asdict(earth_rate_of(key, logs[channel], declared, source, how, begins=begins))
     if simulated is not None:
         rows["earth_rate_published"] = list(_published(key, simulated, rows["earth_rate"]))
     return rows
 
 
-def _published(key: Key, simulated: SimulatedRecording, found: Sequence[Row]) -> Iterator[Row]:
+def _published(key: Key, simulated: SimulatedRecording, estimates: Sequence[Row]) -> Iterator[Row]:
     """Yield what the source of a simulated recording prints, beside what is found of it."""
     turns = simulated.two_position
     if turns is None:
@@ -86,17 +81,18 @@ def _published(key: Key, simulated: SimulatedRecording, found: Sequence[Row]) ->
         for name, axis in simulated.channels.items()
         if name == key.channel
     )
-    values = {(row["part"], row["method"]): row.get("value") for row in found}
-    for one in turns.published:
-        text = simulated.duration if one.part == WHOLE else one.part.removeprefix("last ")
-        value = quantity_to_si(one.printed, "angular_rate")
+    values = {(row["part"], row["method"]): row.get("value") for row in estimates}
+    for figure in turns.published:
+        part = figure.part
+        text = simulated.duration if part == WHOLE else part.removeprefix("last ")
+        value = quantity_to_si(figure.printed, "angular_rate")
         yield (
             asdict(key)
-            | {"part": one.part, "place": one.where, "printed": one.printed}
+            | {"part": part, "place": figure.where, "printed": figure.printed}
             | published_row(value, schedule, quantity_to_si(text, "time"), noise)
             | {
-                "simulated": values.get((one.part, "pairs")),
-                "simulated_filter": values.get((one.part, "filter")),
+                "simulated": values.get((part, "pairs")),
+                "simulated_filter": values.get((part, "filter")),
                 "assumed": ", ".join(turns.assumed) or None,
             }
         )

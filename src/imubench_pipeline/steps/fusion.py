@@ -14,7 +14,7 @@ import pyarrow.compute as pc
 from imubench_pipeline.estimators.estimate import JointDraws
 from imubench_pipeline.estimators.rows import draws, estimate_of
 from imubench_pipeline.navigation.fusion.equivalence import (
-    Candidate,
+    FusionChannel,
     TemperaturePart,
     equivalence_rows,
 )
@@ -33,7 +33,7 @@ _OF_LIMIT = 1.96
 
 def candidates(
     tables: Mapping[str, pa.Table], joint: Mapping[tuple[str, str], Path] | None = None
-) -> Iterator[Candidate]:
+) -> Iterator[FusionChannel]:
     """Yield the channels of recordings that decide, each with the estimate of the method to use.
 
     Where temperature is taken out of a channel, its estimate is that of what temperature leaves.
@@ -47,7 +47,7 @@ def candidates(
 
     Yields
     ------
-    Candidate
+    FusionChannel
     """
     recordings, parameters = tables["recordings"], tables["parameters"]
     warm = _temperature_parts(tables)
@@ -71,7 +71,7 @@ def candidates(
             continue
         path = (joint or {}).get((sensor, recording))
         of = about[sensor, recording]
-        yield Candidate(
+        yield FusionChannel(
             sensor,
             recording,
             channel,

@@ -8,21 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from imubench_pipeline.experiments.calibration.least_squares import half_width
-from imubench_pipeline.experiments.calibration.observability import (
+from imubench_pipeline.experiments.calibration.least_squares import (
+    Limits,
     NotObservable,
     NotObservableError,
 )
-from imubench_pipeline.experiments.calibration.rate_table import Calibration, Term, calibrate
-from imubench_pipeline.experiments.calibration.residuals import residuals
+from imubench_pipeline.experiments.calibration.rate_table import Calibration, calibrate, residuals
 from imubench_pipeline.experiments.calibration.schedule import Schedule
 from imubench_pipeline.experiments.calibration.still import bias_at_rest
 from imubench_pipeline.recordings.recording import ChannelLog, on_grid
 from imubench_pipeline.settings.known_rates import AtRest, OnRateTable
 from imubench_pipeline.settings.pointing import Pointing
-from imubench_pipeline.steps.noise_source import NO_MODEL, NoiseSource
+from imubench_pipeline.steps.noise_source import NO_MODEL, NoiseSource, segments_reason
 from imubench_pipeline.tables.keys import Key
-from imubench_pipeline.typing import Row
+from imubench_pipeline.typing import Array, Row
 from imubench_pipeline.units import quantity_to_si
 
 UNITS = {
@@ -41,7 +40,7 @@ _OF_RUN = {"rate_table": ("bias", "scale_factor"), "at_rest": ("bias", "present_
 
 
 @dataclass
-class Found:
+class Rows:
     """Rows of the tables that a calibration leaves."""
 
     calibration: list[Row] = field(default_factory=list)
@@ -49,8 +48,8 @@ class Found:
 
 
 @dataclass(frozen=True)
-class Given:
-    """What a calibration is about.
+class GyroLog:
+    """The log of a gyro that is calibrated, with what is known of it.
 
     Attributes
     ----------
@@ -72,137 +71,97 @@ class Given:
     truth: Mapping[str, float] = field(default_factory=dict)
 
     def names(self, run: str, pointing: Pointing | None) -> dict[str, Any]:
-        """Return what every row of the table ``calibration`` says.
-
-        Parameters
-        ----------
-        run : str
-        pointing : Pointing or None
-        """
-        found: dict[str, Any] = asdict(self.key) | {"run": run}
+        """Return what every row of the table ``calibration`` says."""
+        row: dict[str, Any] = asdict(self.key) | {"run": run}
         if self.source is not None:
-            found |= {"model": self.source.model.name, "model_from": self.source.words}
+            row |= {"model": self.source.model.name, "model_from": self.source.words}
         if pointing is not None:
-            found |= {name: getattr(pointing, name) for name in _OF_DIRECTION}
-            found |= {"earth_rate": pointing.rate, "earth_rate_sigma": pointing.rate_sigma}
-        return found
-
-    def whole(self) -> str | None:
-        """Return why the log cannot be used as one; None where it can."""
-        if len(self.log.segments) == 1:
-            return None
-        return (
-            f"the log is in {len(self.log.segments)} segments, with gaps of unknown length between "
-            "them; use one of them ('use:' beside the log)"
-        )
+            row |= {name: getattr(pointing, name) for name in _OF_DIRECTION}
+            row |= {"earth_rate": pointing.rate, "earth_rate_sigma": pointing.rate_sigma}
+        return row
 
 
 _OF_DIRECTION = ("latitude", "heading", "elevation")
 
 
-def at_rest(given: Given, declared: AtRest) -> Found:
+def at_rest(gyro: GyroLog, declared: AtRest) -> Rows:
     """Return the bias of a gyro at rest whose axis points where it is stated.
-
-    Parameters
-    ----------
-    given : Given
-    declared : AtRest
 
     Returns
     -------
-    Found
+    Rows
         Where nothing can be estimated, the rows say why.
     """
     pointing = declared.pointing
-    names = given.names("at_rest", pointing)
-    if (reason := given.whole()) is not None:
-        return Found(list(_without(names, "not_shown", reason)))
-    if given.source is None:
-        return Found(list(_without(names, "no_model", NO_MODEL)))
-    samples = on_grid(given.log.blocks(), given.log.grid)
+    names = gyro.names("at_rest", pointing)
+    if len(gyro.log.segments) > 1:
+        return Rows(list(_without(names, "not_shown", segments_reason(gyro.log))))
+    if gyro.source is None:
+        return Rows(list(_without(names, "no_model", NO_MODEL)))
+    samples = on_grid(gyro.log.blocks(), gyro.log.grid)
     try:
-        found = bias_at_rest(samples, given.log.rate, given.source.model, pointing)
+        bias = bias_at_rest(samples, gyro.log.rate, gyro.source.model, pointing)
     except ValueError as error:
-        return Found(list(_without(names, "too_short", str(error))))
+        return Rows(list(_without(names, "too_short", str(error))))
     about = names | {
-        "duration": len(samples) / given.log.rate,
+        "duration": len(samples) / gyro.log.rate,
         "samples": int(np.isfinite(samples).sum()),
-        "scatter": _finite(found.p_value[0]),
-        "half_width": found.bound,
+        "scatter": _finite(bias.p_value[0]),
+        "half_width": bias.bound,
     }
-    rows = []
-    for name, value, noise, sigma, limits in (
-        (
-            "bias",
-            found.fixed,
-            found.fixed_noise_sigma,
-            found.fixed_sigma,
-            found.fixed_interval(),
-        ),
-        (
-            "present_bias",
-            found.present,
-            found.present_noise_sigma,
-            found.present_sigma,
-            found.present_interval(),
-        ),
-    ):
-        figures = _figure(given, name, value[0], sigma, (limits[0][0], limits[1][0]))
-        rows.append(about | figures | {"sigma_noise": noise})
-    return Found([*rows, *_open(names, found.not_observable)])
+    limits, noise = bias.fixed_interval(), bias.fixed_noise_sigma
+    fixed = _figure(gyro, "bias", bias.fixed, bias.fixed_sigma, limits, noise)
+    limits, noise = bias.present_interval(), bias.present_noise_sigma
+    present = _figure(gyro, "present_bias", bias.present, bias.present_sigma, limits, noise)
+    return Rows([about | fixed, about | present, *_open(names, bias.not_observable)])
 
 
-def on_rate_table(given: Given, declared: OnRateTable) -> Found:
+def on_rate_table(gyro: GyroLog, declared: OnRateTable) -> Rows:
     """Return scale factor and bias of a gyro from a recording on a rate table.
-
-    Parameters
-    ----------
-    given : Given
-    declared : OnRateTable
 
     Returns
     -------
-    Found
+    Rows
         Where nothing can be estimated, the rows say why.
     """
     pointing = None if declared.axis is None else declared.axis.pointing
-    names = given.names("rate_table", pointing)
-    if (reason := given.whole()) is not None:
-        return Found(list(_without(names, "not_shown", reason)))
+    names = gyro.names("rate_table", pointing)
+    if len(gyro.log.segments) > 1:
+        return Rows(list(_without(names, "not_shown", segments_reason(gyro.log))))
     try:
-        schedule = _schedule(given, declared)
+        schedule = _schedule(gyro, declared)
     except ValueError as error:
-        return Found(list(_without(names, "too_short", str(error))))
-    if given.source is None:
-        return Found(list(_without(names, "no_model", NO_MODEL)))
-    model = given.source.model
+        return Rows(list(_without(names, "too_short", str(error))))
+    if gyro.source is None:
+        return Rows(list(_without(names, "no_model", NO_MODEL)))
+    model = gyro.source.model
     setting = declared.si("setting_sigma", "angular_rate")
-    samples = on_grid(given.log.blocks(), given.log.grid)
+    samples = on_grid(gyro.log.blocks(), gyro.log.grid)
     try:
-        found, measured = calibrate(samples, schedule, model, pointing, setting_sigma=setting)
+        fit, measured = calibrate(samples, schedule, model, pointing, setting_sigma=setting)
     except NotObservableError as error:
-        return Found(list(_without(names, "not_observable", str(error))))
+        return Rows(list(_without(names, "not_observable", str(error))))
     except ValueError as error:
-        return Found(list(_without(names, "too_short", str(error))))
+        return Rows(list(_without(names, "too_short", str(error))))
     earth = 0.0 if pointing is None else pointing.rate
     rates = schedule.of_blocks(measured.blocks) + earth
-    left = residuals(found, measured, rates, model, setting)
+    left = residuals(fit, measured, rates, model, setting)
     about = names | {
         "duration": measured.blocks.duration,
         "samples": int(measured.blocks.count.sum()),
         "rates": len(left.dwell),
-        "scatter": _finite(found.line.p_value[0]) if found.line.freedom else None,
+        "scatter": _finite(fit.line.p_value[0]) if fit.line.freedom else None,
     }
-    rows = Found([about | one for one in _line(given, found)])
-    rows.calibration += _open(names, found.not_observable)
+    rows = Rows([about | row for row in _line(gyro, fit)])
+    rows.calibration += _open(names, fit.not_observable)
     for k, dwell in enumerate(left.dwell.tolist()):
         stretch = schedule.stretches[dwell]
         rows.calibration_points.append(
-            asdict(given.key)
+            asdict(gyro.key)
             | {
                 "number": dwell + 1,
-                "start": stretch.start / schedule.rate + given.begins,
-                "stop": stretch.stop / schedule.rate + given.begins,
+                "start": stretch.start / schedule.rate + gyro.begins,
+                "stop": stretch.stop / schedule.rate + gyro.begins,
                 "table_rate": float(schedule.table_rates[dwell]),
                 "earth_rate": earth,
                 "mean": float(left.mean[k]),
@@ -214,7 +173,7 @@ def on_rate_table(given: Given, declared: OnRateTable) -> Found:
     return rows
 
 
-def _schedule(given: Given, declared: OnRateTable) -> Schedule:
+def _schedule(gyro: GyroLog, declared: OnRateTable) -> Schedule:
     """Return the steady rates in samples of the log.
 
     Raises
@@ -222,7 +181,7 @@ def _schedule(given: Given, declared: OnRateTable) -> Schedule:
     ValueError
         If there are none, or they lie outside of the log; the text names the key.
     """
-    log, settling = given.log, declared.si("settling", "time")
+    log, settling = gyro.log, declared.si("settling", "time")
     if not declared.steps:
         if not log.table_rate:
             raise ValueError(
@@ -242,82 +201,64 @@ def _schedule(given: Given, declared: OnRateTable) -> Schedule:
                 f"log.table_rate: {error}; check the column and its unit, or change rate_table: "
                 f"tolerance ({declared.tolerance}) and shortest ({declared.shortest})"
             ) from None
-    ends = given.begins + log.grid / log.rate
+    ends = gyro.begins + log.grid / log.rate
     steps = []
     for number, step in enumerate(declared.steps, 1):
         start, stop = step.seconds
-        if start < given.begins or stop > ends + 1.0 / log.rate:
+        if start < gyro.begins or stop > ends + 1.0 / log.rate:
             raise ValueError(
                 f"rate_table.steps: step {number} lasts from {start:g} to {stop:g} s; expected "
-                f"steps within the log, which is used from {given.begins:g} to {ends:g} s: mend "
+                f"steps within the log, which is used from {gyro.begins:g} to {ends:g} s: mend "
                 "the step, or 'use:' beside the log"
             )
         rate = quantity_to_si(step.rate, "angular_rate")
-        steps.append((start - given.begins, min(stop, ends) - given.begins, rate))
+        steps.append((start - gyro.begins, min(stop, ends) - gyro.begins, rate))
     return Schedule.from_steps(steps, log.rate, settling=settling)
 
 
-def _line(given: Given, found: Calibration) -> Iterator[dict[str, Any]]:
+def _line(gyro: GyroLog, fit: Calibration) -> Iterator[dict[str, Any]]:
     """Yield what is found of the line, and of its straightness."""
-    bias, scale = found.bias_interval(), found.scale_factor_interval()
-    limits = float(bias[0][0]), float(bias[1][0])
-    yield _figure(given, "bias", found.bias[0], found.bias_sigma, limits) | {
-        "sigma_noise": float(found.line.sigma[0])
-    }
-    limits = float(scale[0][0]), float(scale[1][0])
-    sigma = found.scale_factor_sigma
-    yield _figure(given, "scale_factor", found.scale_factor[0], sigma, limits) | {
-        "sigma_noise": sigma
-    }
-    for name, term in (("quadratic", found.quadratic), ("asymmetry", found.asymmetry)):
+    noise = float(fit.line.sigma[0])
+    yield _figure(gyro, "bias", fit.bias, fit.bias_sigma, fit.bias_interval(), noise)
+    sigma, interval = fit.scale_factor_sigma, fit.scale_factor_interval()
+    yield _figure(gyro, "scale_factor", fit.scale_factor, sigma, interval, sigma)
+    for name, term in (("quadratic", fit.quadratic), ("asymmetry", fit.asymmetry)):
         if term is not None:
-            yield _term(given, name, term)
-    if (straight := found.linearity) is not None:
-        lower, upper = straight.interval()
-        worst = int(np.abs(straight.deviation[0]).argmax())
-        sigma = float(straight.sigma[worst])
-        limits = float(lower[0]), float(upper[0])
-        yield _figure(given, "linearity", straight.value[0], sigma, limits) | {
-            "sigma_noise": sigma,
-            "chance": float(straight.p_value[0]),
-        }
-
-
-def _term(given: Given, name: str, term: Term) -> dict[str, Any]:
-    half = half_width(0.95) * term.sigma
-    value = float(term.value[0])
-    limits = value - half, value + half
-    return _figure(given, name, value, term.sigma, limits) | {
-        "sigma_noise": term.sigma,
-        "chance": float(term.p_value[0]),
-    }
+            row = _figure(gyro, name, term.value, term.sigma, term.interval(), term.sigma)
+            yield row | {"chance": float(term.p_value[0])}
+    if (straight := fit.linearity) is not None:
+        sigma = float(straight.sigma[int(np.abs(straight.deviation[0]).argmax())])
+        row = _figure(gyro, "linearity", straight.value, sigma, straight.interval(), sigma)
+        yield row | {"chance": float(straight.p_value[0])}
 
 
 def _figure(
-    given: Given, name: str, value: float, sigma: float, limits: tuple[float, float]
+    gyro: GyroLog, name: str, value: Array, sigma: float, interval: Limits, noise: float
 ) -> dict[str, Any]:
+    lower, upper = interval
     return {
         "parameter": name,
-        "value": float(value),
-        "lower": float(limits[0]),
-        "upper": float(limits[1]),
+        "value": float(value[0]),
+        "lower": float(lower[0]),
+        "upper": float(upper[0]),
         "unit": UNITS[name],
         "status": "ok",
         "sigma": float(sigma),
-        "truth": given.truth.get(name),
+        "sigma_noise": noise,
+        "truth": gyro.truth.get(name),
     }
 
 
-def _open(names: Mapping[str, Any], found: tuple[NotObservable, ...]) -> Iterator[Row]:
+def _open(names: Row, quantities: tuple[NotObservable, ...]) -> Iterator[Row]:
     """Yield what the run cannot tell, each with its reason."""
-    for one in found:
+    for unknown in quantities:
         yield {
             **names,
-            "parameter": one.quantity,
-            "unit": UNITS[one.quantity],
+            "parameter": unknown.quantity,
+            "unit": UNITS[unknown.quantity],
             "status": "not_observable",
-            "reason": one.reason,
-            "half_width": one.half_width,
+            "reason": unknown.reason,
+            "half_width": unknown.half_width,
         }
 
 

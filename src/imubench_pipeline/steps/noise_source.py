@@ -7,7 +7,7 @@ several; without any, that of the typical figures of its datasheet.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,15 +17,21 @@ from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.simulate.from_datasheet import from_datasheet
+from imubench_pipeline.tables.keys import Key
+from imubench_pipeline.typing import Row
 
 NO_MODEL = (
     "the noise of this sensor is not known: no static recording of it could be used, and its "
     "datasheet prints no noise; add a static log of this sensor"
 )
 """Why nothing is found without a `NoiseSource`."""
+
+Kept = tuple[Row, Path]
+"""Row of the table ``recordings``, and the folder."""
 
 _SEED = 20260101
 """Of the drawn models: each recording and channel has a stream of its own."""
@@ -53,21 +59,11 @@ class NoiseSource:
     drawn: tuple[NoiseModel, ...] = ()
 
     def with_drift(self, drift: float) -> NoiseModel:
-        """Return the model with a steady drift of a standard deviation beside its own, rad/s^2.
-
-        Parameters
-        ----------
-        drift : float
-        """
+        """Return the model with a steady drift of a standard deviation beside its own, rad/s^2."""
         return _drifting(self.model, drift)
 
     def drawn_with_drift(self, drift: float) -> list[NoiseModel]:
-        """Return the drawn models with the same drift beside their own, rad/s^2.
-
-        Parameters
-        ----------
-        drift : float
-        """
+        """Return the drawn models with the same drift beside their own, rad/s^2."""
         return [_drifting(one, drift) for one in self.drawn]
 
 
@@ -97,21 +93,11 @@ def from_static(
     NoiseSource or None
         None where no recording has an estimate of a gyro with white noise in it.
     """
-    found = [(Quality.read(folder / "quality.json").recording, folder) for folder in folders]
-    usable = [
-        (row, folder) for row, folder in found if row["status"] == "ok" and row["kind"] == "static"
-    ]
 
-    def far(item: tuple[Mapping[str, Any], Path]) -> tuple[bool, bool, float, str]:
-        row = item[0]
-        return (
-            row["simulated"] != own["simulated"],
-            row["device"] != own["device"],
-            -(row["duration"] or 0.0),
-            row["recording"],
-        )
+    def far(row: Row) -> tuple[bool, bool]:
+        return row["simulated"] != own["simulated"], row["device"] != own["device"]
 
-    for row, folder in sorted(usable, key=far):
+    for row, folder in static_recordings(folders, far):
         parameters = folder / "parameters.parquet"
         joint = folder / "draws.parquet" if draws else None
         best = recommended_estimates(parameters, joint)
@@ -125,6 +111,52 @@ def from_static(
             drawn = tuple(draw_models(best[name], draws, rng)) if draws else ()
             return NoiseSource(best[name].model, papers, words, drawn)
     return None
+
+
+def static_recordings(
+    folders: Sequence[Path], far: Callable[[Row], tuple[bool, ...]]
+) -> list[Kept]:
+    """Return the static recordings that can be used: the nearest first, of these the longest.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+        With their ``quality.json``.
+    far : callable
+        What speaks against a recording, from its row.
+    """
+
+    def order(kept: Kept) -> tuple[Any, ...]:
+        row = kept[0]
+        return *far(row), -(row["duration"] or 0.0), row["recording"]
+
+    every = [(Quality.read(folder / "quality.json").recording, folder) for folder in folders]
+    usable = [kept for kept in every if kept[0]["status"] == "ok" and kept[0]["kind"] == "static"]
+    return sorted(usable, key=order)
+
+
+def noise_source(
+    folder: Path, static: Sequence[Path], key: Key, sensor: Sensor, draws: int = 0
+) -> NoiseSource | None:
+    """Return the noise of a gyro: `from_static`, or else `from_printed`.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the recording that was turned.
+    static : sequence of Path
+        Folders of the static recordings of its sensor.
+    key : Key
+        Of the recording, and the gyro.
+    sensor : Sensor
+        Its file.
+    draws : int
+        Models that are drawn from what a static log leaves open.
+    """
+    own = Quality.read(folder / "quality.json").recording
+    return from_static(static, own, key.channel, draws) or from_printed(
+        key.sensor, sensor, key.channel
+    )
 
 
 def from_printed(name: str, sensor: Sensor, channel: str) -> NoiseSource | None:
@@ -157,12 +189,20 @@ def from_printed(name: str, sensor: Sensor, channel: str) -> NoiseSource | None:
     )
 
 
+def segments_reason(log: ChannelLog) -> str:
+    """Return why a log of several segments cannot be used as one."""
+    return (
+        f"the log is in {len(log.segments)} segments, with gaps of unknown length between "
+        "them; use one of them ('use:' beside the log)"
+    )
+
+
 def _words(row: Mapping[str, Any], own: Mapping[str, Any], name: str, channel: str) -> str:
-    said = [f"static recording {row['recording']}"]
+    words = [f"static recording {row['recording']}"]
     if row["device"] != own["device"]:
-        said.append(f"of another device, {row['device']}")
+        words.append(f"of another device, {row['device']}")
     if row["simulated"]:
-        said.append("simulated")
+        words.append("simulated")
     if name != channel:
-        said.append(f"of its {name}, as {channel} has no estimate there")
-    return ", ".join(said)
+        words.append(f"of its {name}, as {channel} has no estimate there")
+    return ", ".join(words)

@@ -8,25 +8,23 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from imubench_pipeline.estimators.rows import recommended_estimates
 from imubench_pipeline.experiments.alignment.accuracy import accuracies
 from imubench_pipeline.experiments.alignment.triad import Site, Triad
-from imubench_pipeline.experiments.earth_rate.needs import prediction_rows
-from imubench_pipeline.experiments.earth_rate.prediction import Outlook
+from imubench_pipeline.experiments.earth_rate.prediction import Outlook, prediction_rows
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
-from imubench_pipeline.recordings.quality_file import Quality
 from imubench_pipeline.settings.config import EarthRateSettings
 from imubench_pipeline.settings.printed import Datasheet, QuantityDatasheet
 from imubench_pipeline.settings.sensor import QUANTITIES
+from imubench_pipeline.steps.noise_source import static_recordings
 from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si
 
@@ -75,12 +73,12 @@ class Noise:
             ``gyro`` or ``accel``; at least one axis of it is there.
         """
         names = [name for name in self.models if name.startswith(quantity)]
-        found = {}
+        models = {}
         for place, axis in enumerate("xyz"):
             own = f"{quantity}_{axis}"
             name = own if own in self.models else names[place % len(names)]
-            found[f"{axis}: {name}"] = self.models[name]
-        return found
+            models[f"{axis}: {name}"] = self.models[name]
+        return models
 
     @property
     def middle_gyro(self) -> str | None:
@@ -104,16 +102,7 @@ def noise_at_rest(folders: Sequence[Path]) -> Noise | None:
     folders : sequence of Path
         Of those recordings, with their ``quality.json`` and ``parameters.parquet``.
     """
-    found = [(Quality.read(folder / "quality.json").recording, folder) for folder in folders]
-    usable = [
-        (row, folder) for row, folder in found if row["status"] == "ok" and row["kind"] == "static"
-    ]
-
-    def far(item: tuple[Mapping[str, Any], Path]) -> tuple[bool, float, str]:
-        row = item[0]
-        return row["simulated"], -(row["duration"] or 0.0), row["recording"]
-
-    for row, folder in sorted(usable, key=far):
+    for row, folder in static_recordings(folders, lambda row: (row["simulated"],)):
         best = recommended_estimates(folder / "parameters.parquet")
         models = {name: one.model for name, one in best.items() if one.model.N}
         if any(name.startswith("gyro_") for name in models):
@@ -213,8 +202,8 @@ def _bias(printed: Datasheet, quantity: str, how: EarthRateSettings) -> tuple[fl
         for figure in sheet.printed(name) if sheet else ():
             value = figure.on_axis("x")
             if figure.kind == kind and isinstance(value, float):
-                said = f"{name.replace('_', ' ')} {value:g} {figure.unit} ({kind}), datasheet"
-                return quantity_to_si(f"{value!r} {figure.unit}", dimension), said
+                source = f"{name.replace('_', ' ')} {value:g} {figure.unit} ({kind}), datasheet"
+                return quantity_to_si(f"{value!r} {figure.unit}", dimension), source
     key = {"gyro": "gyro_bias", "accel": "accelerometer_bias"}[quantity]
     assumed = getattr(how, key)
     return quantity_to_si(assumed, dimension), f"{assumed} (earth_rate.{key}), assumed"

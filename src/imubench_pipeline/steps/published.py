@@ -14,7 +14,7 @@ from imubench_pipeline.estimators.estimate import SI_UNITS
 from imubench_pipeline.noise import FLOOR
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
-from imubench_pipeline.simulate.truth import figures_of
+from imubench_pipeline.simulate.models import figures_of
 from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si
 

@@ -11,7 +11,7 @@ import pyarrow as pa
 from imubench_pipeline.datasheets.plausibility import implausible_of
 from imubench_pipeline.datasheets.suspicion import unusual_rows
 from imubench_pipeline.estimators.spectral_findings import band_finding, line_findings
-from imubench_pipeline.navigation.backtest import verdicts
+from imubench_pipeline.navigation.backtest import comparison
 from imubench_pipeline.navigation.drift import drift_rows
 from imubench_pipeline.navigation.pooled import pooled_rows
 from imubench_pipeline.recordings.fitness import (
@@ -22,7 +22,7 @@ from imubench_pipeline.recordings.fitness import (
     with_doubts,
     with_doubts_of_all,
 )
-from imubench_pipeline.recordings.quality.twins import recorded_twice
+from imubench_pipeline.recordings.quality.copies import recorded_twice
 from imubench_pipeline.recordings.quality_file import Quality
 from imubench_pipeline.settings.sensor import sensors_of
 from imubench_pipeline.steps.published import published_rows, truth_rows
@@ -83,7 +83,7 @@ def joined_tables(
     twins = recorded_twice(joined["models"].to_pylist(), biases)
     found = [*of_logs, *of_levels, *of_estimates, *spectral_rows(joined), *unusual, *twins]
     if "backtest" in joined:
-        found += verdicts.findings(joined["backtest"].to_pylist())
+        found += comparison.findings(joined["backtest"].to_pylist())
     joined["findings"] = build("findings", found)
     doubted = list(doubts(joined["findings"].to_pylist(), estimated, joined["models"].to_pylist()))
     about = judged(about, doubted, json.loads(decide).get("include", ()))

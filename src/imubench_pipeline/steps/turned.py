@@ -16,19 +16,18 @@ from imubench_pipeline.experiments.earth_rate.courses import (
     Course,
     Courses,
     estimated,
+    sigma_ranges,
     thinned,
     white_sigma,
 )
 from imubench_pipeline.experiments.earth_rate.experiment import Dwell, Experiment
-from imubench_pipeline.experiments.earth_rate.found import FoundDwell, Turning
-from imubench_pipeline.experiments.earth_rate.needs import prediction_rows
-from imubench_pipeline.experiments.earth_rate.prediction import Outlook
-from imubench_pipeline.experiments.earth_rate.ranges import sigma_ranges
+from imubench_pipeline.experiments.earth_rate.prediction import Outlook, prediction_rows
 from imubench_pipeline.experiments.earth_rate.turning import find_turning
+from imubench_pipeline.experiments.earth_rate.turns import FoundDwell, Turning
 from imubench_pipeline.recordings.recording import ChannelLog, on_grid
 from imubench_pipeline.settings.config import EarthRateSettings
 from imubench_pipeline.settings.two_position import TwoPosition
-from imubench_pipeline.steps.noise_source import NO_MODEL, NoiseSource
+from imubench_pipeline.steps.noise_source import NO_MODEL, NoiseSource, segments_reason
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Array, Row
 from imubench_pipeline.units import quantity_to_si
@@ -86,7 +85,7 @@ def earth_rate_of(
     EarthRate
         Where nothing can be estimated, the rows of ``earth_rate`` say why.
     """
-    found = EarthRate()
+    tables = EarthRate()
     about = {
         "latitude": declared.latitude_si,
         "model": source.model.name if source else None,
@@ -94,21 +93,17 @@ def earth_rate_of(
     }
     names = asdict(key) | about
     if len(log.segments) > 1:
-        reason = (
-            f"the log is in {len(log.segments)} segments, with gaps of unknown length between "
-            "them; use one of them ('use:' beside the log)"
-        )
-        found.earth_rate += _without(names, WHOLE, "not_shown", reason)
-        return found
+        tables.earth_rate += _without(names, WHOLE, "not_shown", segments_reason(log))
+        return tables
     if log.position_elsewhere:
         reason = (
             "the position has a clock of its own; give it as a column of the file that the gyro is "
             "in, or leave 'position' out"
         )
-        found.earth_rate += _without(names, WHOLE, "not_shown", reason)
-        return found
+        tables.earth_rate += _without(names, WHOLE, "not_shown", reason)
+        return tables
     if source is not None:
-        _predict(key, log.rate, declared, source, settings, found)
+        _predict(key, log.rate, declared, source, settings, tables)
     samples = on_grid(log.blocks(), log.grid)
     try:
         turning = find_turning(
@@ -128,12 +123,12 @@ def earth_rate_of(
             f"no turns: {error}; check 'dwell' and 'channel' of two_position, or give the log a "
             "column with the position (log: position)"
         )
-        found.earth_rate += _without(names, WHOLE, "no_turns", reason)
-        return found
-    found.turning += _later(_turning_rows(key, turning, samples, log.rate), begins)
+        tables.earth_rate += _without(names, WHOLE, "no_turns", reason)
+        return tables
+    tables.turning += _later(_turning_rows(key, turning, samples, log.rate), begins)
     if source is None:
-        found.earth_rate += _without(names, WHOLE, "no_model", NO_MODEL)
-        return found
+        tables.earth_rate += _without(names, WHOLE, "no_model", NO_MODEL)
+        return tables
     used = _used(samples, turning, log.rate)
     dwells = [dwell for _, dwell in _dwells(turning, log.rate)]
     model = source.with_drift(declared.drift_si)
@@ -143,16 +138,16 @@ def earth_rate_of(
             experiment = _experiment(chosen, log.rate, declared)
             courses = estimated(used, experiment, model, source.papers, declared.turn_on_bias_si)
         except (ValueError, LinAlgError) as error:
-            found.earth_rate += _without(names, part, "too_short", str(error))
+            tables.earth_rate += _without(names, part, "too_short", str(error))
             continue
         extent = {"dwells": len(chosen), "turns": len(chosen) - 1}
         drawn = source.drawn_with_drift(declared.drift_si)
         ranges = sigma_ranges(courses.measured.blocks, model, drawn, declared.turn_on_bias_si)
         unsure = _unsure(turning, declared.trust_schedule)
         rows = _estimates(names | extent, part, courses, source, unsure, log.rate)
-        found.earth_rate += [row | ranges.get(row["method"], {}) for row in rows]
-        found.earth_rate_series += _later(_series(key, part, courses), begins)
-    return found
+        tables.earth_rate += [row | ranges.get(row["method"], {}) for row in rows]
+        tables.earth_rate_series += _later(_series(key, part, courses), begins)
+    return tables
 
 
 def _predict(

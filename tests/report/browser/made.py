@@ -25,7 +25,6 @@ from imubench_pipeline.estimators.rows import parameter_rows
 from imubench_pipeline.navigation.drift import drift_rows
 from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement, standard
 from imubench_pipeline.navigation.pooled import pooled_rows
-from imubench_pipeline.navigation.selection import ranking_rows
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng, simulate
 from imubench_pipeline.recordings.overview import overview
@@ -41,6 +40,7 @@ from imubench_pipeline.tables import build, write
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
+from tests.ranking import ranking_rows
 
 Rows = dict[str, list[Mapping[str, Any]]]
 

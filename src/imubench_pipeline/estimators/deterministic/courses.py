@@ -10,11 +10,10 @@ from typing import Literal
 import numpy as np
 
 from imubench_pipeline.estimators.deterministic.means import Means, means_of
-from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates
+from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates, covariance_of_sizes
 from imubench_pipeline.estimators.deterministic.regressors import Regressor
 from imubench_pipeline.estimators.deterministic.scores import FEWEST_CYCLES, Gain
 from imubench_pipeline.estimators.deterministic.search import Searched, again, search
-from imubench_pipeline.estimators.deterministic.uncertainty import covariance_of_sizes
 from imubench_pipeline.typing import Array
 
 Kind = Literal["bias_step", "warm_up_drift", "periodic_drift"]

@@ -11,8 +11,8 @@ from scipy.special import ndtri
 
 from imubench_pipeline.estimators.deterministic.courses import Course, Courses
 from imubench_pipeline.estimators.deterministic.halves import Halves, compare_halves
+from imubench_pipeline.estimators.deterministic.means import Steadiness, steadiness_of
 from imubench_pipeline.estimators.deterministic.search import MOST
-from imubench_pipeline.estimators.deterministic.steadiness import Steadiness, steadiness_of
 from imubench_pipeline.estimators.estimate import FAMILY, Estimate, JointDraws, Parameter, Status
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.typing import Row

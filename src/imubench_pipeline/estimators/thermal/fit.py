@@ -22,15 +22,19 @@ from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.missing import block_means, divided
 from imubench_pipeline.estimators.model_choice import Candidate, compare
 from imubench_pipeline.estimators.spectrum import LineSpectrum, Spectrum, block_of, spectra
-from imubench_pipeline.estimators.thermal.effect import complete, shifted
-from imubench_pipeline.estimators.thermal.level import mean_error, with_likely_walk
 from imubench_pipeline.estimators.thermal.path import TemperaturePath
 from imubench_pipeline.estimators.thermal.path_errors import without_errors
 from imubench_pipeline.estimators.thermal.products import BlockSeries, Coefficients
 from imubench_pipeline.estimators.thermal.register import Span
 from imubench_pipeline.estimators.thermal.regression import Regression, Regressors
-from imubench_pipeline.estimators.thermal.result import ThermalFit
-from imubench_pipeline.estimators.thermal.uncertainty import Verdict, judge, shares
+from imubench_pipeline.estimators.thermal.result import ThermalFit, complete, shifted
+from imubench_pipeline.estimators.thermal.uncertainty import (
+    Verdict,
+    judge,
+    mean_error,
+    shares,
+    with_likely_walk,
+)
 from imubench_pipeline.estimators.whittle import Whittle, model_of
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
@@ -92,10 +96,6 @@ def fit_temperature(
     plain : Likelihood, optional
         The noise of the log as it is, where it is known already.
     rng : numpy.random.Generator
-
-    Returns
-    -------
-    ThermalFit
 
     Raises
     ------

@@ -2,7 +2,8 @@
 
 The temperature is an integrated random walk; a block of equal readings says into which cell of
 the register it falls, a block that the register crosses where the edge of the cell was reached.
-How fast it varies and how much noise the register adds are those of the greatest evidence.
+How fast it varies and how much noise the register adds are those of the greatest evidence. The
+temperature that acts is that of a first-order lag behind the one that is measured (`lagged`).
 
 References
 ----------
@@ -19,14 +20,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import ndtri
 
-from imubench_pipeline.estimators.thermal.dwells import dwells
-from imubench_pipeline.estimators.thermal.jumps import at_jumps
 from imubench_pipeline.estimators.thermal.path_kernels import drawn, propagate
-from imubench_pipeline.estimators.thermal.register import Readings, Span, readings
+from imubench_pipeline.estimators.thermal.register import Readings, Span, at_jumps, dwells, readings
 from imubench_pipeline.typing import Array
 
 DRAWS = 24
@@ -151,10 +151,6 @@ def temperature_path(
         First and one-past-last sample of each part that no time relates to the others.
     rng : numpy.random.Generator
         For the draws.
-
-    Returns
-    -------
-    TemperaturePath
 
     Raises
     ------
@@ -326,3 +322,80 @@ class _Evidence:
         )
         best = float(found.x[0]), float(found.x[1])
         return self._spread**2 * 10.0 ** best[0], 10.0 ** best[1], -float(found.fun)
+
+
+@njit(cache=True)
+def _lagged(times: Array, values: Array, lag: float) -> Array:
+    result = np.empty_like(values)
+    if values.size == 0:
+        return result
+    result[0] = values[0]
+    # T_lag - T, as it decays and as a ramp of the temperature adds to it: weights of T_lag itself
+    # would be differences of nearly equal numbers over short steps.
+    behind = 0.0
+    for i in range(1, values.size):
+        h = (times[i] - times[i - 1]) / lag
+        behind = math.exp(-h) * behind + math.expm1(-h) / h * (values[i] - values[i - 1])
+        result[i] = values[i] + behind
+    return result
+
+
+def lagged(times: Array, values: Array, lag: float) -> Array:
+    """Return a temperature behind a first-order lag: L dT_lag/dt = T - T_lag.
+
+    Exact at the knots for a temperature that is linear between them. It is in equilibrium at the
+    first knot.
+
+    Parameters
+    ----------
+    times : ndarray, shape (k,)
+        Knots, s, rising.
+    values : ndarray, shape (k,)
+        Temperature, °C.
+    lag : float
+        L, s; 0: none.
+
+    Returns
+    -------
+    ndarray, shape (k,)
+        °C.
+
+    Raises
+    ------
+    ValueError
+        If the lag is below 0 or not finite.
+    """
+    if not (lag >= 0.0 and math.isfinite(lag)):
+        raise ValueError(f"the lag is {lag} s, expected a time from 0")
+    values = np.asarray(values, dtype=np.float64)
+    if lag == 0.0:
+        return values.copy()
+    return np.asarray(_lagged(np.asarray(times, dtype=np.float64), values, lag))
+
+
+def lagged_path(path: TemperaturePath, values: Array, rate: float, lag: float) -> Array:
+    """Return a path's knots behind a lag; each segment begins in equilibrium.
+
+    Parameters
+    ----------
+    path : TemperaturePath
+    values : ndarray, shape (k,)
+        Temperatures at its knots, °C: its own, or one of its draws.
+    rate : float
+        Of the log, Hz.
+    lag : float
+        s; 0: none.
+
+    Returns
+    -------
+    ndarray, shape (k,)
+        °C.
+
+    Raises
+    ------
+    ValueError
+        If the lag is below 0 or not finite.
+    """
+    return np.concatenate(
+        [lagged(path.sample[part] / rate, values[part], lag) for part in path.parts]
+    )

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.spectrum import Spectrum
-from imubench_pipeline.estimators.thermal.lag import lagged_path
+from imubench_pipeline.estimators.thermal.path import lagged_path
 from imubench_pipeline.estimators.thermal.regression import Regression, Regressors
 from imubench_pipeline.estimators.whittle import Terms, Whittle
 from imubench_pipeline.typing import Array
@@ -52,10 +52,6 @@ def path_errors(regressors: Regressors, found: Regression, weights: Array) -> Pa
         Of these regressors.
     weights : ndarray, shape (b,)
         nu / S of the bins used, as `Regressors.at` takes them.
-
-    Returns
-    -------
-    PathErrors
     """
     path, p = regressors.path, regressors.thermal
     knots, slope = regressors.knots(found.lag), regressors.slope(found)

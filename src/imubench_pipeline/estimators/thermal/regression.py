@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from imubench_pipeline.estimators.spectrum import Spectrum
-from imubench_pipeline.estimators.thermal.lag import lagged_path
-from imubench_pipeline.estimators.thermal.path import TemperaturePath
+from imubench_pipeline.estimators.thermal.path import TemperaturePath, lagged_path
 from imubench_pipeline.estimators.thermal.products import Coefficients, Products
 from imubench_pipeline.typing import Array
 
@@ -112,10 +111,6 @@ class Regressors:
         settling : float, optional
             s.
         used : ndarray of bool, shape (b,), optional
-
-        Returns
-        -------
-        Regressors
         """
         other = copy.copy(self)
         other.used = self.used if used is None else used
@@ -174,10 +169,7 @@ class Regressors:
     def slope(self, found: Regression) -> Array:
         """Return how what temperature adds to the log changes with it, at the knots of the path.
 
-        Parameters
-        ----------
-        found : Regression
-            Of these regressors.
+        `found`: as of `effect`.
 
         Returns
         -------
@@ -200,10 +192,7 @@ class Regressors:
     def means(self, lag: float) -> Array:
         """Return the mean over the log of each regressor of temperature.
 
-        Parameters
-        ----------
-        lag : float
-            s.
+        `lag`: as of `knots`.
 
         Returns
         -------
@@ -215,10 +204,7 @@ class Regressors:
     def columns(self, lag: float) -> list[Array]:
         """Return the coefficients of the regressors, in the order of `Regression.beta`.
 
-        Parameters
-        ----------
-        lag : float
-            s.
+        `lag`: as of `knots`.
 
         Returns
         -------
@@ -252,14 +238,7 @@ class Regressors:
     def products(self, lag: float) -> Products:
         """Return the products of log and regressors in the bins used.
 
-        Parameters
-        ----------
-        lag : float
-            s.
-
-        Returns
-        -------
-        Products
+        `lag`: as of `knots`.
         """
         if lag not in self._known:
             self.prepare([lag])
@@ -277,10 +256,6 @@ class Regressors:
             s.
         weights : ndarray, shape (b,)
             nu / S of the bins used: their ordinates over the density of the noise, Hz/SI².
-
-        Returns
-        -------
-        Regression
         """
         products = self.products(lag)
         information = np.einsum("b,bij->ij", weights, products.gram)
@@ -319,10 +294,6 @@ class Regressors:
             As for `at`.
         lags : ndarray, shape (l,)
             s, rising (`lags`).
-
-        Returns
-        -------
-        Regression
         """
         self.prepare(lags)
         fits = [self.at(float(lag), weights) for lag in lags]
@@ -354,10 +325,6 @@ class Regressors:
             Of these regressors.
         weights : ndarray, shape (b,)
             As for `at`: those that the fit was made with.
-
-        Returns
-        -------
-        Spectrum
         """
         products = self.products(found.lag)
         p = self.thermal

@@ -3,22 +3,26 @@
 The noise is drawn from its posterior, over the models that the log does not rule out; the lag from
 its likelihood for that noise (flat from 0 to the longest); s and q from their Gaussian for both.
 What the register leaves open of the temperature moves the estimate as its drawn paths do.
+
+`mean_error` says how well the mean of a log is known, with the noise that it has.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.posterior import sample
+from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.thermal.path_errors import path_errors
 from imubench_pipeline.estimators.thermal.regression import Regression, Regressors
 from imubench_pipeline.estimators.whittle import Maximum, Whittle
+from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
 _DRAWS = 1_000
@@ -45,6 +49,10 @@ _WIDE_LAG = 0.5
 _AS_SHORT = 1.02
 """Width of the interval from 0 over that of the shortest, up to which it is that from 0: draws are
 uneven."""
+
+
+_UPPER_OF_RMS = 2.24
+"""The 97.5 % limit of the size of a normal variate, over its standard deviation."""
 
 
 @dataclass(frozen=True)
@@ -96,10 +104,6 @@ def judge(
     gained : float
         BIC of the best noise without temperature, less that of the fit.
     rng : numpy.random.Generator
-
-    Returns
-    -------
-    Verdict
     """
     weights = whittle.spectrum.ordinates / whittle.density(candidates[0].found)
     p = regressors.thermal
@@ -165,10 +169,6 @@ def told_lag(value: float, draws: Array, longest: float, compensated: bool) -> P
         The longest lag that was looked for, s.
     compensated : bool
         Temperature is taken out of the noise.
-
-    Returns
-    -------
-    Parameter
     """
     if longest == 0.0:
         return Parameter(None, "absent", "no lag was asked for")
@@ -259,10 +259,6 @@ def shares(candidates: Sequence[Candidate]) -> list[tuple[Candidate, float]]:
     ----------
     candidates : sequence of Candidate
         The best first.
-
-    Returns
-    -------
-    list of (Candidate, float)
     """
     chosen = candidates[0]
     alike = {
@@ -331,3 +327,53 @@ def _densities(whittle: Whittle, found: Maximum, number: int, rng: np.random.Gen
         powers, times = posterior.parameters[row] ** 2, posterior.times[row]
         rows.append(whittle.matrix(found.terms, times) @ powers)
     return np.array(rows)
+
+
+def with_likely_walk(model: NoiseModel, K: Parameter) -> NoiseModel:
+    """Return a model with a random walk as strong as it may be where the log does not show one.
+
+    The most likely walk is then often none at all, which would leave the mean all too sure: the
+    rms of K over its posterior, half a normal distribution, is taken.
+
+    Parameters
+    ----------
+    model : NoiseModel
+        With a random walk, of which nothing may be left.
+    K : Parameter
+        As it is told: its upper limit counts where it is absent.
+    """
+    if K.status != "absent" or K.upper is None:
+        return model
+    return replace(model, K=max(model.K, K.upper / _UPPER_OF_RMS))
+
+
+def mean_error(models: Iterable[tuple[NoiseModel, float]], spectrum: Spectrum) -> float:
+    """Return the standard deviation of the mean of a log about the bias at its beginning.
+
+    A random walk counts from 0 at the beginning of the log: sigma^2 = N^2 / D + K^2 D / 3 and, of
+    a process of variance v, 2 v T_B / D (1 - T_B / D (1 - e^(-D / T_B))), D long.
+
+    Parameters
+    ----------
+    models : iterable of (NoiseModel, float)
+        Models that the log does not rule out and their shares of 1: a walk that is too weak to be
+        the choice may still carry the mean away.
+    spectrum : Spectrum
+        Of the log: its rate, and its length.
+
+    Returns
+    -------
+    float
+        rad/s or m/s².
+    """
+    return math.sqrt(sum(share * _variance(model, spectrum) for model, share in models))
+
+
+def _variance(model: NoiseModel, spectrum: Spectrum) -> float:
+    T, whole = 1.0 / spectrum.rate, spectrum.duration
+    # What begins at 0 has been on since the beginning of the log; a ramp is no part of the bias.
+    return sum(
+        term.mean_variance(whole, 0.0)
+        for term in model.realised(T, whole)
+        if term.drive is not None
+    )

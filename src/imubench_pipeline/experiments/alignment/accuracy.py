@@ -23,9 +23,78 @@ from imubench_pipeline.experiments.alignment.coarse import (
     mean_vectors,
 )
 from imubench_pipeline.experiments.alignment.fine import OPEN, FineAlignment
-from imubench_pipeline.experiments.alignment.simulation import simulate_triad
 from imubench_pipeline.experiments.alignment.triad import Positions, Site, Triad
+from imubench_pipeline.experiments.earth_rate.simulation import simulate_runs
 from imubench_pipeline.typing import Array
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Simulated runs of one design, and their truth.
+
+    Attributes
+    ----------
+    means : ndarray, shape (runs, b, 6)
+        Block means of gyros and accelerometers x, y, z, rad/s and m/s^2.
+    drift : ndarray, shape (runs, b, 6)
+        Mean of each axis' slow error over each block, its bias included.
+    """
+
+    means: Array
+    drift: Array
+
+
+def true_means(positions: Positions, site: Site, attitude: Array) -> Array:
+    """Return what a triad without error shows.
+
+    Parameters
+    ----------
+    positions : Positions
+    site : Site
+    attitude : ndarray, shape (3, 3)
+        In the first position.
+
+    Returns
+    -------
+    ndarray, shape (b, 6)
+        Gyros and accelerometers x, y, z, rad/s and m/s^2.
+    """
+    to_body = np.swapaxes(attitude @ positions.of_blocks, 1, 2)
+    return np.concatenate([to_body @ site.earth_rate, to_body @ site.specific_force], axis=1)
+
+
+def simulate_triad(
+    triad: Triad,
+    positions: Positions,
+    site: Site,
+    attitude: Array,
+    *,
+    runs: int,
+    rng: np.random.Generator,
+) -> Runs:
+    """Draw the block means of many runs.
+
+    Parameters
+    ----------
+    triad : Triad
+        The fixed biases are drawn for each run.
+    positions : Positions
+    site : Site
+    attitude : ndarray, shape (3, 3)
+        In the first position.
+    runs : int
+    rng : numpy.random.Generator
+    """
+    drawn = [
+        simulate_runs(
+            model, positions.blocks, earth_rate=0.0, turn_on_bias=bias, runs=runs, rng=stream
+        )
+        for (model, bias), stream in zip(triad.axes, rng.spawn(6), strict=True)
+    ]
+    errors = np.stack([one.means for one in drawn], axis=2)
+    drift = np.stack([one.drift for one in drawn], axis=2)
+    return Runs(errors + true_means(positions, site, attitude), drift)
+
 
 TURNING = 2.0
 """Time between two positions, s."""
@@ -106,16 +175,12 @@ def accuracies(
         Triads that are simulated at the last time, for fine alignment; 0: none.
     rng : numpy.random.Generator, optional
         Needed where some are.
-
-    Yields
-    ------
-    Accuracy
     """
     for number in (1, 2):
         for time in times:
             positions = _positions(number, time, rate)
-            found = coarse_accuracy(triad, positions, site, _LEVEL)
-            yield Accuracy(number, "coarse", time, found.sigma)
+            coarse = coarse_accuracy(triad, positions, site, _LEVEL)
+            yield Accuracy(number, "coarse", time, coarse.sigma)
             fine = FineAlignment(triad, positions, site, _LEVEL)
             errors = None
             if runs and rng is not None and time == times[-1]:
@@ -143,8 +208,8 @@ def _errors(
     sigma = fine.sigma[-1]
     if sigma[2] < _LINEAR:
         start = coarse_alignment(*mean_vectors(drawn.means, fine.positions), site)
-        found = fine.run(drawn.means, start)
-        return np.asarray(np.sqrt(np.mean(euler_angles(found.attitude) ** 2, axis=0)) / sigma)
+        aligned = fine.run(drawn.means, start)
+        return np.asarray(np.sqrt(np.mean(euler_angles(aligned.attitude) ** 2, axis=0)) / sigma)
     # Level and to the north: attitude is off by the angles about north, east and down.
     ratios = np.sqrt(np.mean(fine.run(drawn.means).psi[:, -1] ** 2, axis=0)) / sigma
     return np.where([True, True, sigma[2] < OPEN], ratios, math.nan)

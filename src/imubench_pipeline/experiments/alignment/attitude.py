@@ -80,9 +80,9 @@ def cross_matrix(vector: ArrayLike) -> Array:
     ndarray, shape (..., 3, 3)
     """
     v = np.asarray(vector, dtype=np.float64)
-    found = np.zeros((*v.shape, 3))
-    found[..., 0, 1], found[..., 0, 2], found[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
-    return found - np.swapaxes(found, -1, -2)
+    cross = np.zeros((*v.shape, 3))
+    cross[..., 0, 1], cross[..., 0, 2], cross[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
+    return cross - np.swapaxes(cross, -1, -2)
 
 
 def rotation(vector: ArrayLike) -> Array:

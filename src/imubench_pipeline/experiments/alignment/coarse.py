@@ -95,10 +95,6 @@ def coarse_accuracy(triad: Triad, positions: Positions, site: Site, attitude: Ar
     attitude : ndarray, shape (3, 3)
         The true one, in the first position.
 
-    Returns
-    -------
-    Accuracy
-
     Raises
     ------
     ValueError

@@ -30,7 +30,7 @@ from imubench_pipeline.experiments.alignment.attitude import (
 )
 from imubench_pipeline.experiments.alignment.coarse import coarse_alignment, mean_vectors
 from imubench_pipeline.experiments.alignment.triad import Positions, Site, Triad
-from imubench_pipeline.experiments.calibration.observability import (
+from imubench_pipeline.experiments.calibration.least_squares import (
     NotObservable,
     NotObservableError,
 )
@@ -143,10 +143,6 @@ class FineAlignment:
         attitude : ndarray, shape (runs, 3, 3), optional
             Attitude of each run that is corrected, near to that of the filter; by default that.
 
-        Returns
-        -------
-        Aligned
-
         Raises
         ------
         ValueError
@@ -159,8 +155,10 @@ class FineAlignment:
             )
         if not np.isfinite(means).all():
             raise ValueError("a block mean is not finite; leave its block out")
-        given = np.broadcast_to(self.attitude if attitude is None else attitude, (len(means), 3, 3))
-        to_navigation = np.einsum("rij,bjk->rbik", given, self.positions.of_blocks)
+        attitudes = np.broadcast_to(
+            self.attitude if attitude is None else attitude, (len(means), 3, 3)
+        )
+        to_navigation = np.einsum("rij,bjk->rbik", attitudes, self.positions.of_blocks)
         left = np.empty_like(means)
         for part, true in ((slice(0, 3), self.site.earth_rate), (slice(3, 6), self._force)):
             missed = np.einsum("rbij,rbj->rbi", to_navigation, means[:, :, part]) - true
@@ -169,7 +167,7 @@ class FineAlignment:
         psi = states[:, :, :3]
         white = np.linalg.solve(self._filter.innovation_roots, innovations[..., None])[..., 0]
         return Aligned(
-            corrected(given, psi[:, -1]), psi, states[:, :, -6:], np.sum(white**2, axis=2)
+            corrected(attitudes, psi[:, -1]), psi, states[:, :, -6:], np.sum(white**2, axis=2)
         )
 
     @property
@@ -213,11 +211,11 @@ def align(
         fine = FineAlignment(triad, positions, site, attitude)
         if fine.not_observable:
             raise NotObservableError(f"heading: {fine.not_observable[0].reason}")
-        found = fine.run(means[None])
-        attitude = found.attitude[0]
-        step = float(np.abs(found.psi[0, -1]).max())
+        aligned = fine.run(means[None])
+        attitude = aligned.attitude[0]
+        step = float(np.abs(aligned.psi[0, -1]).max())
         if step < _SETTLED:
-            return found, fine
+            return aligned, fine
     raise ValueError(
         f"the attitude does not settle; its last correction was {step:.2g} rad, the heading's "
         f"standard deviation {fine.sigma[-1, 2]:.2g} rad"

@@ -102,10 +102,6 @@ class Triad:
         gyro, accelerometer : NoiseModel
         gyro_bias, accelerometer_bias : float
             rad/s and m/s^2.
-
-        Returns
-        -------
-        Triad
         """
         return cls(
             gyros=(gyro,) * 3,
@@ -164,10 +160,6 @@ class Positions:
             Of a block at most, s.
         rate : float
             Sampling rate, Hz.
-
-        Returns
-        -------
-        Positions
         """
         samples = max(round(duration * rate), 1)
         run = Experiment((Dwell(0, samples, 1),), rate, 0.0)
@@ -189,10 +181,6 @@ class Positions:
             Of a block at most, s.
         rate : float
             Sampling rate, Hz.
-
-        Returns
-        -------
-        Positions
         """
         run = Experiment.regular(
             dwell=dwell, turning=turning, dwells=len(headings), rate=rate, latitude=0.0

@@ -13,12 +13,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.stats import chi2, norm
 
-from imubench_pipeline.experiments.calibration.observability import NotObservableError
 from imubench_pipeline.experiments.earth_rate.covariance import of_means
 from imubench_pipeline.experiments.earth_rate.experiment import Blocks, Experiment
 from imubench_pipeline.noise import NoiseModel
@@ -32,6 +32,39 @@ _MOST_BLOCKS = 1024
 
 _RANK = 1e-8
 """Least singular value of whitened regressors of unit length that is not rounding."""
+
+LEVEL = 0.95
+"""Of confidence limits."""
+
+Quantity = Literal[
+    "earth_rate", "bias", "heading", "scale_factor", "asymmetry", "quadratic", "linearity"
+]
+
+
+@dataclass(frozen=True)
+class NotObservable:
+    """A quantity that the recording does not tell.
+
+    Attributes
+    ----------
+    quantity : str
+    reason : str
+        In words.
+    half_width : float or None
+        What is known of its effect all the same: half of the range of the bias that it leaves
+        open, rad/s; None where nothing bounds it.
+    """
+
+    quantity: Quantity
+    reason: str
+    half_width: float | None = None
+
+
+class NotObservableError(ValueError):
+    """What is asked for cannot be told from the data, however little noise there is."""
+
+
+Limits = tuple[Array, Array]
 
 
 @dataclass(frozen=True)
@@ -65,37 +98,36 @@ class Fit:
         """Chance of residuals at least as large where model and noise are right, shape (runs,)."""
         return np.asarray(chi2.sf(self.chi_squared, self.freedom))
 
-    def interval(self, level: float = 0.95) -> tuple[Array, Array]:
-        """Return confidence limits, normal with the standard errors of the noise model.
-
-        Parameters
-        ----------
-        level : float
-
-        Returns
-        -------
-        (ndarray, ndarray), shapes (runs, p)
-
-        Raises
-        ------
-        ValueError
-            If the level is not between 0 and 1.
-        """
-        half = half_width(level) * self.sigma
-        return self.value - half, self.value + half
+    def interval(self) -> Limits:
+        """Return confidence limits, by the noise model, shapes (runs, p)."""
+        return limits(self.value, self.sigma)
 
 
-def half_width(level: float) -> float:
+def limits(value: Array, sigma: Array | float) -> Limits:
+    """Return the 95 % limits of estimates with normal errors of a standard error.
+
+    Parameters
+    ----------
+    value : ndarray
+    sigma : ndarray or float
+        In the unit of the values, of a shape that goes with theirs.
+
+    Returns
+    -------
+    (ndarray, ndarray)
+        Lower and upper, in the shape of the values.
+    """
+    half = half_width() * sigma
+    return value - half, value + half
+
+
+def half_width(level: float = LEVEL) -> float:
     """Return half of a two-sided interval of the normal distribution, in standard deviations.
 
     Parameters
     ----------
     level : float
         0.95 gives 1.96.
-
-    Returns
-    -------
-    float
 
     Raises
     ------
@@ -137,11 +169,12 @@ class LeastSquares:
         further: Array | None = None,
         names: Sequence[str] = (),
     ) -> None:
-        said = f" ({', '.join(names)})" if names else ""
+        listed = f" ({', '.join(names)})" if names else ""
         if len(blocks) < regressors.shape[1]:
             raise NotObservableError(
-                f"{len(blocks)} means cannot tell {regressors.shape[1]} parameters{said}"
+                f"{len(blocks)} means cannot tell {regressors.shape[1]} parameters{listed}"
             )
+        self._blocks = blocks
         covariance = of_means(model, blocks)
         if further is not None:
             covariance = covariance + further
@@ -149,10 +182,10 @@ class LeastSquares:
         white = solve_triangular(self._root, regressors, lower=True)
         length = np.linalg.norm(white, axis=0)
         if np.any(length == 0.0):
-            raise NotObservableError(f"a regressor is 0 throughout{said}")
+            raise NotObservableError(f"a regressor is 0 throughout{listed}")
         basis, values, turn = np.linalg.svd(white / length, full_matrices=False)
         if values[-1] < _RANK:
-            raise NotObservableError(f"the data cannot tell these from each other{said}")
+            raise NotObservableError(f"the data cannot tell these from each other{listed}")
         self._basis = basis
         self._back = (turn.T / values) / length[:, None]
         self.covariance = self._back @ self._back.T
@@ -169,21 +202,12 @@ class LeastSquares:
         ----------
         means : ndarray, shape (runs, b)
 
-        Returns
-        -------
-        Fit
-
         Raises
         ------
         ValueError
             If there is not one finite mean a block.
         """
-        if means.ndim != 2 or means.shape[1] != len(self._root):
-            raise ValueError(
-                f"the means have the shape {means.shape}, expected {len(self._root)} columns"
-            )
-        if not np.isfinite(means).all():
-            raise ValueError("a block mean is not finite; leave its block out")
+        self._blocks.check_means(means)
         white = solve_triangular(self._root, means.T, lower=True).T
         along = white @ self._basis
         left = white - along @ self._basis.T
@@ -229,7 +253,7 @@ def block_length(
             sigmas[longest] = LeastSquares(blocks, model, regressors(blocks)).sigma
         return sigmas[longest]
 
-    while len(experiment.blocks(length)) < _columns(experiment, length, regressors) and length > 1:
+    while len(blocks := experiment.blocks(length)) < regressors(blocks).shape[1] and length > 1:
         length //= 2
     while length > 1:
         shorter = max(length // 4, 1)
@@ -239,7 +263,3 @@ def block_length(
             break
         length //= 2
     return length
-
-
-def _columns(experiment: Experiment, longest: int, regressors: Callable[[Blocks], Array]) -> int:
-    return regressors(experiment.blocks(longest)).shape[1]

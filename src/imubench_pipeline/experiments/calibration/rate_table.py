@@ -12,6 +12,14 @@ test stands.
 The axis is along that of the table. Then the Earth's rate along it is constant and, not known, it
 is a bias; across it, it averages out over whole turns. An angle a between the two axes lowers the
 scale factor by the factor cos(a), and is not told from it.
+
+What the line leaves of each steady rate, and how much of that is noise (`residuals`):
+
+    r = A (m - X b),   cov(r) = A (C + D - X (X^T (C + D)^-1 X)^-1 X^T) A^T,
+
+m the block means, X and b the regressors and estimates of the line by generalised least squares, A
+the mean over the blocks of a steady rate, C the covariance of the noise model and D that of the
+true rates about the stated ones.
 """
 
 from __future__ import annotations
@@ -24,16 +32,18 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from imubench_pipeline.experiments.calibration.least_squares import (
+    LEVEL,
     Fit,
     LeastSquares,
-    block_length,
-    half_width,
-)
-from imubench_pipeline.experiments.calibration.observability import (
+    Limits,
     NotObservable,
     NotObservableError,
+    block_length,
+    half_width,
+    limits,
 )
 from imubench_pipeline.experiments.calibration.schedule import Schedule
+from imubench_pipeline.experiments.earth_rate.covariance import of_means
 from imubench_pipeline.experiments.earth_rate.experiment import Blocks, Measured, block_means
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.settings.pointing import Pointing
@@ -70,19 +80,9 @@ class Term:
         """Chance of a value at least as far from 0 where the line is right, shape (runs,)."""
         return np.asarray(chi2.sf((self.value / self.sigma) ** 2, 1))
 
-    def interval(self, level: float = 0.95) -> tuple[Array, Array]:
-        """Return confidence limits.
-
-        Parameters
-        ----------
-        level : float
-
-        Returns
-        -------
-        (ndarray, ndarray), shapes (runs,)
-        """
-        half = half_width(level) * self.sigma
-        return self.value - half, self.value + half
+    def interval(self) -> Limits:
+        """Return confidence limits, shapes (runs,)."""
+        return limits(self.value, self.sigma)
 
 
 @dataclass(frozen=True)
@@ -111,21 +111,13 @@ class Linearity:
         """The largest deviation, a fraction of full scale without sign, shape (runs,)."""
         return np.abs(self.deviation).max(axis=1)
 
-    def interval(self, level: float = 0.95) -> tuple[Array, Array]:
-        """Return confidence limits of the largest true deviation.
+    def interval(self) -> Limits:
+        """Return confidence limits of the largest true deviation, shapes (runs,).
 
         The limits hold of all rates together (Bonferroni): noise alone makes the largest of many
         deviations large.
-
-        Parameters
-        ----------
-        level : float
-
-        Returns
-        -------
-        (ndarray, ndarray), shapes (runs,)
         """
-        half = half_width(1.0 - (1.0 - level) / self.sigma.size) * self.sigma
+        half = half_width(1.0 - (1.0 - LEVEL) / self.sigma.size) * self.sigma
         size = np.abs(self.deviation)
         return np.maximum(size - half, 0.0).max(axis=1), (size + half).max(axis=1)
 
@@ -172,33 +164,13 @@ class Calibration:
         """Its standard error."""
         return float(self.line.sigma[1])
 
-    def bias_interval(self, level: float = 0.95) -> tuple[Array, Array]:
-        """Return confidence limits of the bias, rad/s.
+    def bias_interval(self) -> Limits:
+        """Return confidence limits of the bias, rad/s, shapes (runs,)."""
+        return limits(self.bias, self.bias_sigma)
 
-        Parameters
-        ----------
-        level : float
-
-        Returns
-        -------
-        (ndarray, ndarray), shapes (runs,)
-        """
-        half = half_width(level) * self.bias_sigma
-        return self.bias - half, self.bias + half
-
-    def scale_factor_interval(self, level: float = 0.95) -> tuple[Array, Array]:
-        """Return confidence limits of the scale factor.
-
-        Parameters
-        ----------
-        level : float
-
-        Returns
-        -------
-        (ndarray, ndarray), shapes (runs,)
-        """
-        lower, upper = self.line.interval(level)
-        return lower[:, 1], upper[:, 1]
+    def scale_factor_interval(self) -> Limits:
+        """Return confidence limits of the scale factor, shapes (runs,)."""
+        return limits(self.scale_factor, self.scale_factor_sigma)
 
 
 class RateTable:
@@ -299,10 +271,6 @@ class RateTable:
         means : ndarray, shape (runs, b)
             Block means, rad/s.
 
-        Returns
-        -------
-        Calibration
-
         Raises
         ------
         ValueError
@@ -340,13 +308,13 @@ class RateTable:
         """Return the asymmetry over the mean scale factor of both senses."""
         if self._asymmetry is None:
             return None
-        found = self._asymmetry.fit(means)
-        scale = found.value[:, 1]
-        if np.any(np.abs(scale) <= half_width(0.95) * found.sigma[1]):
+        fit = self._asymmetry.fit(means)
+        scale = fit.value[:, 1]
+        if np.any(np.abs(scale) <= half_width() * fit.sigma[1]):
             return None
         # The scale factor's own error is of second order.
         sigma = float(self._asymmetry.sigma[-1] / np.abs(scale).mean())
-        return Term(found.value[:, -1] / scale, sigma)
+        return Term(fit.value[:, -1] / scale, sigma)
 
 
 def calibrate(
@@ -386,7 +354,8 @@ def calibrate(
         If the log ends before the schedule does, or too few samples are present.
     """
     run = schedule.experiment
-    _ = RateTable(schedule, run.blocks(_of_stretch(schedule)), model, pointing)
+    whole = max(stretch.stop - stretch.start for stretch in schedule.stretches)
+    _ = RateTable(schedule, run.blocks(whole), model, pointing)
     longest = block_length(
         run,
         model,
@@ -395,10 +364,6 @@ def calibrate(
     measured = block_means([log], run, longest)
     table = RateTable(schedule, measured.blocks, model, pointing, setting_sigma=setting_sigma)
     return table.fit(measured.means), measured
-
-
-def _of_stretch(schedule: Schedule) -> int:
-    return max(stretch.stop - stretch.start for stretch in schedule.stretches)
 
 
 def _levels(rate: Array) -> NDArray[np.int64]:
@@ -414,3 +379,69 @@ def _term(squares: LeastSquares | None, means: Array) -> Term | None:
     if squares is None:
         return None
     return Term(squares.fit(means).value[:, -1], float(squares.sigma[-1]))
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """Steady rates and what the line leaves of them.
+
+    Attributes
+    ----------
+    dwell : ndarray of int, shape (k,)
+        Number of each among those of the schedule, from 0; one without samples is left out.
+    mean : ndarray, shape (k,)
+        Mean reading, rad/s.
+    line : ndarray, shape (k,)
+        What the line has there, rad/s.
+    sigma : ndarray, shape (k,)
+        Standard deviation of mean less line, rad/s.
+    """
+
+    dwell: NDArray[np.int64]
+    mean: Array
+    line: Array
+    sigma: Array
+
+    @property
+    def value(self) -> Array:
+        """Mean less line, rad/s, shape (k,)."""
+        return self.mean - self.line
+
+
+def residuals(
+    calibration: Calibration,
+    measured: Measured,
+    rates: Array,
+    model: NoiseModel,
+    setting_sigma: float = 0.0,
+) -> Residuals:
+    """Return what the line leaves of each steady rate.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        Of one run.
+    measured : Measured
+        Its block means.
+    rates : ndarray, shape (b,)
+        Rate that each block sensed, table and Earth, rad/s.
+    model : NoiseModel
+    setting_sigma : float
+        Standard deviation of the table's true rate about the stated one, rad/s.
+    """
+    blocks = measured.blocks
+    dwell, place = np.unique(blocks.dwell, return_inverse=True)
+    mean_of = np.zeros((len(dwell), len(blocks)))
+    mean_of[place, np.arange(len(blocks))] = blocks.count
+    mean_of /= mean_of.sum(axis=1, keepdims=True)
+    regressors = np.column_stack([np.ones(len(blocks)), rates])
+    covariance = of_means(model, blocks)
+    covariance = covariance + setting_sigma**2 * np.equal.outer(blocks.dwell, blocks.dwell)
+    covariance -= regressors @ calibration.line.covariance @ regressors.T
+    variance = np.einsum("ki,ij,kj->k", mean_of, covariance, mean_of)
+    return Residuals(
+        dwell.astype(np.int64),
+        mean_of @ measured.means[0],
+        mean_of @ (regressors @ calibration.line.value[0]),
+        np.sqrt(np.maximum(variance, 0.0)),
+    )

@@ -64,10 +64,6 @@ class Schedule:
         settling : float
             Time at the start of each that is left out, s.
 
-        Returns
-        -------
-        Schedule
-
         Raises
         ------
         ValueError
@@ -113,10 +109,6 @@ class Schedule:
             Stretches that are shorter are left out, s, before settling is taken off.
         settling : float
             Time at the start of each stretch that is left out, s.
-
-        Returns
-        -------
-        Schedule
 
         Raises
         ------

@@ -18,10 +18,12 @@ import numpy as np
 
 from imubench_pipeline.experiments.calibration.least_squares import (
     LeastSquares,
+    Limits,
+    NotObservable,
     block_length,
     half_width,
+    limits,
 )
-from imubench_pipeline.experiments.calibration.observability import NotObservable
 from imubench_pipeline.experiments.earth_rate.experiment import (
     Blocks,
     Dwell,
@@ -88,40 +90,22 @@ class StillBias:
         """Standard error of the present bias, noise and direction together, rad/s."""
         return math.hypot(self.present_noise_sigma, self.rate_sigma)
 
-    def fixed_interval(self, level: float = 0.95) -> tuple[Array, Array]:
-        """Return confidence limits of the fixed bias.
+    def fixed_interval(self) -> Limits:
+        """Return confidence limits of the fixed bias, rad/s, shapes (runs,).
 
         Where the heading is not known they are those of the noise, widened to either side by all
         that the Earth's rate may be: they hold for every heading.
-
-        Parameters
-        ----------
-        level : float
-
-        Returns
-        -------
-        (ndarray, ndarray), shapes (runs,)
         """
-        return self._interval(self.fixed, self.fixed_noise_sigma, level)
+        return self._interval(self.fixed, self.fixed_noise_sigma)
 
-    def present_interval(self, level: float = 0.95) -> tuple[Array, Array]:
-        """Return confidence limits of the present bias, as `fixed_interval` does.
+    def present_interval(self) -> Limits:
+        """Return confidence limits of the present bias, as `fixed_interval` does."""
+        return self._interval(self.present, self.present_noise_sigma)
 
-        Parameters
-        ----------
-        level : float
-
-        Returns
-        -------
-        (ndarray, ndarray), shapes (runs,)
-        """
-        return self._interval(self.present, self.present_noise_sigma, level)
-
-    def _interval(self, value: Array, noise: float, level: float) -> tuple[Array, Array]:
+    def _interval(self, value: Array, noise: float) -> Limits:
         if self.bound is None:
-            half = half_width(level) * math.hypot(noise, self.rate_sigma)
-        else:
-            half = half_width(level) * math.hypot(noise, self.tilt_sigma) + self.bound
+            return limits(value, math.hypot(noise, self.rate_sigma))
+        half = half_width() * math.hypot(noise, self.tilt_sigma) + self.bound
         return value - half, value + half
 
 
@@ -155,10 +139,6 @@ class StillRun:
         means : ndarray, shape (runs, b)
             Block means, rad/s.
 
-        Returns
-        -------
-        StillBias
-
         Raises
         ------
         ValueError
@@ -166,10 +146,10 @@ class StillRun:
         """
         pointing = self.pointing
         error = means - pointing.rate
-        found, filtered = self._fixed.fit(error), self._filter.run(error)
+        fit, filtered = self._fixed.fit(error), self._filter.run(error)
         open_heading = pointing.heading is None
         return StillBias(
-            found.value[:, 0],
+            fit.value[:, 0],
             self.fixed_noise_sigma,
             filtered.drift[:, -1],
             float(filtered.drift_sigma[-1]),
@@ -177,23 +157,14 @@ class StillRun:
             pointing.rate_sigma,
             pointing.half_width if open_heading else None,
             pointing.tilt_sigma,
-            found.p_value if found.freedom else np.full(len(means), np.nan),
+            fit.p_value if fit.freedom else np.full(len(means), np.nan),
             not_observable(pointing),
         )
 
 
 def not_observable(pointing: Pointing) -> tuple[NotObservable, ...]:
-    """Return what one position does not tell of a gyro.
-
-    Parameters
-    ----------
-    pointing : Pointing
-
-    Returns
-    -------
-    tuple of NotObservable
-    """
-    found = [
+    """Return what one position does not tell of a gyro."""
+    quantities = [
         NotObservable(
             "earth_rate",
             "in one position the Earth's rate and the bias enter every reading as the same sum: "
@@ -206,7 +177,7 @@ def not_observable(pointing: Pointing) -> tuple[NotObservable, ...]:
         ),
     ]
     if pointing.heading is None and pointing.half_width > _LEVEL * abs(pointing.rate):
-        found.append(
+        quantities.append(
             NotObservable(
                 "heading",
                 "the heading is not known: the bias is told only to plus or minus w_ie "
@@ -214,7 +185,7 @@ def not_observable(pointing: Pointing) -> tuple[NotObservable, ...]:
                 pointing.half_width,
             )
         )
-    return tuple(found)
+    return tuple(quantities)
 
 
 def bias_at_rest(

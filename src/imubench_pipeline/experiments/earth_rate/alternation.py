@@ -8,8 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imubench_pipeline.experiments.earth_rate.transients import Blocks, calm_means
+from imubench_pipeline.experiments.earth_rate.transients import LevelBlocks, calm_means
 from imubench_pipeline.typing import Array
+
+_SURE = 3.5
+"""Standard errors that the alternation must have before and after a turn too many."""
 
 _WHITE = 16.0 / 6.0
 """Variance of a dwell's mean over that of its A-B-A difference / 4, where the noise is white."""
@@ -34,7 +37,9 @@ class Alternation:
         return self.value / self.sigma
 
 
-def differences(blocks: Blocks, stretches: Sequence[tuple[float, float]]) -> tuple[Array, Array]:
+def differences(
+    blocks: LevelBlocks, stretches: Sequence[tuple[float, float]]
+) -> tuple[Array, Array]:
     """Return the A-B-A differences of the dwells, the sign of the middle one taken off.
 
     (-1)^i (2 m_i - m_(i-1) - m_(i+1)) / 4, in which a drift that is straight over three dwells is
@@ -42,7 +47,7 @@ def differences(blocks: Blocks, stretches: Sequence[tuple[float, float]]) -> tup
 
     Parameters
     ----------
-    blocks : Blocks
+    blocks : LevelBlocks
     stretches : sequence of (float, float)
         Start and stop of the dwells, s; at least two.
 
@@ -67,17 +72,13 @@ def differences(blocks: Blocks, stretches: Sequence[tuple[float, float]]) -> tup
     return sign * (2.0 * mean[1:-1] - mean[:-2] - mean[2:]) / 4.0, white
 
 
-def alternation(blocks: Blocks, stretches: Sequence[tuple[float, float]]) -> Alternation:
+def alternation(blocks: LevelBlocks, stretches: Sequence[tuple[float, float]]) -> Alternation:
     """Return the mean of the A-B-A differences, with its standard error.
 
     The error is that of white noise of the scatter seen, and no less than the white noise of the
     blocks says.
 
-    Parameters
-    ----------
-    blocks : Blocks
-    stretches : sequence of (float, float)
-        Start and stop of the dwells, s; at least two.
+    `blocks` and `stretches`: as of `differences`.
     """
     difference, white = differences(blocks, stretches)
     return _mean(difference, white)
@@ -95,26 +96,18 @@ def _mean(difference: Array, white: Array) -> Alternation:
     return Alternation(float(difference[there].mean()), math.sqrt(variance))
 
 
-def contradiction(
-    blocks: Blocks, stretches: Sequence[tuple[float, float]], least: float = 3.5
-) -> int | None:
+def contradiction(blocks: LevelBlocks, stretches: Sequence[tuple[float, float]]) -> int | None:
     """Return the dwell from which on the log alternates the other way, if it does.
 
     A turn too many or too few turns the sign of all that follows. Nothing is decided by it: it is
     a doubt.
 
-    Parameters
-    ----------
-    blocks : Blocks
-    stretches : sequence of (float, float)
-        Start and stop of the dwells, s.
-    least : float
-        Standard errors that the alternation must have before and after it.
+    `blocks` and `stretches`: as of `differences`.
     """
     difference, white = differences(blocks, stretches)
     if len(difference) < 6:
         return None
-    worst, place = least, None
+    worst, place = _SURE, None
     for k in range(3, len(difference) - 2):
         before = _mean(difference[:k], white[: k + 2]).z
         after = _mean(difference[k:], white[k:]).z
@@ -125,7 +118,7 @@ def contradiction(
 
 
 def best_shift(
-    blocks: Blocks, turns: Array, half_width: float, longest: float, duration: float
+    blocks: LevelBlocks, turns: Array, half_width: float, longest: float, duration: float
 ) -> tuple[float, float, float]:
     """Return by how much the turns should come later to make the log alternate the most.
 
@@ -134,7 +127,7 @@ def best_shift(
 
     Parameters
     ----------
-    blocks : Blocks
+    blocks : LevelBlocks
     turns : ndarray, shape (n,)
         Middle of the turns that the schedule says, s.
     half_width : float

@@ -72,10 +72,6 @@ class BlockFilter:
     def matrices(self, block: int) -> tuple[Array, Array]:
         """Return the transition into a block, and a root of its noise.
 
-        Parameters
-        ----------
-        block : int
-
         Returns
         -------
         (ndarray, ndarray), shapes (n, n) and (n, r)

@@ -8,6 +8,12 @@ the fixed bias and C their covariance,
 
 It uses nothing of the filter. White noise alone gives N / sqrt(T) / cos(latitude) for T seconds in
 dwells, where the bias is known; all else only adds to it.
+
+Block means are made independent in a time that grows with their number and not with its cube
+(`whitened`). What `covariance.of_means` and a Cholesky root do for any blocks, the innovations of a
+Kalman filter do for those whose noise has states: divided by their standard deviations they are
+L^-1 y, L the root of the same covariance (R. E. Kalman 1960). The covariance is closed form against
+states; they are checked against each other.
 """
 
 from __future__ import annotations
@@ -15,11 +21,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import njit
+from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 
 from imubench_pipeline.experiments.earth_rate.covariance import of_means
 from imubench_pipeline.experiments.earth_rate.experiment import Blocks, Experiment
-from imubench_pipeline.experiments.earth_rate.whitening import whitened
+from imubench_pipeline.experiments.earth_rate.states import block_states
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
@@ -31,6 +39,68 @@ _TRIED = 4
 
 MOST_BLOCKS = 2048
 """Blocks whose covariance is still formed."""
+
+
+def whitened(model: NoiseModel, blocks: Blocks, columns: Array) -> Array:
+    """Return L^-1 columns, L L^T the covariance of the block means of a noise model.
+
+    Parameters
+    ----------
+    model : NoiseModel
+        With some noise in every sample.
+    blocks : Blocks
+    columns : ndarray, shape (b, c)
+
+    Returns
+    -------
+    ndarray, shape (b, c)
+
+    Raises
+    ------
+    ValueError
+        If a mean has no noise, given those before it.
+    """
+    known = block_states(model, blocks, turn_on_bias=0.0)
+    innovations = _innovations(
+        np.stack([step.transition for step in known.steps]),
+        np.stack([step.factor @ step.factor.T for step in known.steps]),
+        known.which,
+        known.initial @ known.initial.T,
+        known.white**2,
+        np.ascontiguousarray(columns),
+    )
+    if not np.isfinite(innovations).all():
+        raise ValueError(f"the noise model {model.name} leaves a mean without noise")
+    return innovations
+
+
+@njit(cache=True, nogil=True)
+def _innovations(
+    transitions: Array,
+    noises: Array,
+    which: NDArray[np.int64],
+    covariance: Array,
+    white: Array,
+    columns: Array,
+) -> Array:
+    """Return innovations over their deviations; the last row of a transition gives the mean."""
+    m = covariance.shape[0]
+    filtered = np.zeros((m, columns.shape[1]))
+    innovations = np.zeros_like(columns)
+    for k in range(len(which)):
+        transition = transitions[which[k]]
+        predicted = transition @ covariance @ transition.T + noises[which[k]]
+        states = transition @ filtered
+        variance = predicted[m, m] + white[k]
+        missed = columns[k] - states[m]
+        if not variance > 0.0:
+            innovations[k] = np.nan
+            return innovations
+        innovations[k] = missed / np.sqrt(variance)
+        gain = predicted[:m, m] / variance
+        covariance = predicted[:m, :m] - np.outer(gain, gain) * variance
+        filtered = states[:m] + np.outer(gain, missed)
+    return innovations
 
 
 def cramer_rao(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> Array:
@@ -120,12 +190,7 @@ def _of_rate(white: Array, turn_on_bias: float) -> Array:
 def bound(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> float:
     """Return what `cramer_rao` does at the end of a run, of many blocks faster, rad/s.
 
-    Parameters
-    ----------
-    blocks : Blocks
-    model : NoiseModel
-    turn_on_bias : float
-        rad/s; see `cramer_rao`.
+    Its parameters are those of `information`.
     """
     return float(sigma_of(information_by_states(blocks, model, turn_on_bias))[-1])
 
@@ -135,11 +200,6 @@ def block_length(experiment: Experiment, model: NoiseModel) -> int:
 
     Blocks are shortened, by halves, until a fourth of their length would lower the bound by less
     than 0.1 %; tried on the first four dwells, with 2,048 blocks at most.
-
-    Parameters
-    ----------
-    experiment : Experiment
-    model : NoiseModel
 
     Returns
     -------
@@ -166,12 +226,12 @@ def block_length(experiment: Experiment, model: NoiseModel) -> int:
     return length
 
 
-def sigma_of(found: Array) -> Array:
+def sigma_of(fisher: Array) -> Array:
     """Return the standard deviations that go with information, infinite where there is none.
 
     Parameters
     ----------
-    found : ndarray, shape (n,)
+    fisher : ndarray, shape (n,)
         1/(rad/s)².
 
     Returns
@@ -180,4 +240,4 @@ def sigma_of(found: Array) -> Array:
         rad/s.
     """
     with np.errstate(divide="ignore"):
-        return np.asarray(1.0 / np.sqrt(found))
+        return np.asarray(1.0 / np.sqrt(fisher))

@@ -224,10 +224,6 @@ def _at_edge(interval: float, dwell: float) -> float:
 def strength(turns: Sequence[Event]) -> tuple[float, float]:
     """Return what the strengths of turns are about, and how they scatter.
 
-    Parameters
-    ----------
-    turns : sequence of Event
-
     Returns
     -------
     usual, scatter : float
@@ -244,10 +240,6 @@ def may_be_silent(turns: Sequence[Event]) -> bool:
     """Tell whether a turn as these are may leave nothing to see.
 
     By the median and scatter of their strengths, or where some are hardly above what can be seen.
-
-    Parameters
-    ----------
-    turns : sequence of Event
     """
     usual, scatter = strength(turns)
     weak = np.mean([event.kind == "transient" and event.strength < _WEAK for event in turns])

@@ -1,15 +1,22 @@
-"""The estimates of an Earth-rate experiment by every method, as they grow with time."""
+"""The estimates of an Earth-rate experiment by every method, as they grow with time.
+
+How sure their standard deviations are is told by their range over noise models (`sigma_ranges`):
+the noise model is an estimate with limits. Each standard deviation is computed again for models
+drawn from these; 95 % of the values lie between its limits. What weights that come of another
+model than the true one add to it is of the second order, and left out.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.linalg import LinAlgError
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.experiments.earth_rate.bound import block_length
+from imubench_pipeline.experiments.earth_rate.bound import block_length, bound
 from imubench_pipeline.experiments.earth_rate.experiment import (
     Blocks,
     Experiment,
@@ -21,10 +28,16 @@ from imubench_pipeline.experiments.earth_rate.known_rate import track
 from imubench_pipeline.experiments.earth_rate.pairs import Differences, by_pairs, by_triples
 from imubench_pipeline.experiments.earth_rate.states import WIDE
 from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise.sigma_range import sigma_range
 from imubench_pipeline.typing import Array
 
 METHODS = ("pairs", "triples", "filter", "smoother", "known_rate")
 """In the order in which they are shown; the last is given the rate, and cannot find it."""
+
+_KEPT = 400
+
+
+Range = dict[str, float]
 
 
 @dataclass(frozen=True)
@@ -113,10 +126,6 @@ def estimated(
     turn_on_bias : float or None
         Standard deviation of the fixed bias, rad/s; None: not known.
 
-    Returns
-    -------
-    Courses
-
     Raises
     ------
     ValueError
@@ -163,34 +172,78 @@ def estimated(
 
 def _differences(method: str, blocks: Blocks, estimate: Callable[[], Differences]) -> Course:
     try:
-        found = estimate()
+        differences = estimate()
     except ValueError as error:
         return Course(method, np.empty(0), np.empty(0), np.empty(0), str(error))
     first = blocks.start[0] / blocks.rate
-    return Course(method, first + found.time, found.rate[0], found.sigma)
+    return Course(method, first + differences.time, differences.rate[0], differences.sigma)
 
 
 def _tracked(log: Array, experiment: Experiment, papers: NoiseModel) -> Course:
     try:
-        found = track(log, experiment, papers, EARTH_RATE)
+        tracked = track(log, experiment, papers, EARTH_RATE)
     except ValueError as error:
         return Course("known_rate", np.empty(0), np.empty(0), None, str(error))
-    return Course("known_rate", found.sample / experiment.rate, found.mean, None)
+    return Course("known_rate", tracked.sample / experiment.rate, tracked.mean, None)
 
 
-def thinned(points: int, most: int = 400) -> Iterator[int]:
+def thinned(points: int) -> Iterator[int]:
     """Yield places of a course that show it: as many at its begin as later, and its end.
 
     Parameters
     ----------
     points : int
-        Of the course.
-    most : int
-        About so many are kept.
+        Of the course; about 400 are kept.
     """
-    if points <= most:
+    if points <= _KEPT:
         yield from range(points)
         return
-    even = np.linspace(0, points - 1, most // 2)
-    early = np.geomspace(1, points, most // 2) - 1
+    even = np.linspace(0, points - 1, _KEPT // 2)
+    early = np.geomspace(1, points, _KEPT // 2) - 1
     yield from np.unique(np.rint(np.concatenate([even, early])).astype(np.int64)).tolist()
+
+
+def sigma_ranges(
+    blocks: Blocks, model: NoiseModel, drawn: Sequence[NoiseModel], turn_on_bias: float | None
+) -> dict[str, Range]:
+    """Return the limits of the standard deviation of each method at the end of a run.
+
+    Parameters
+    ----------
+    blocks : Blocks
+    model : NoiseModel
+        As estimated.
+    drawn : sequence of NoiseModel
+        From the limits of its parameters.
+    turn_on_bias : float or None
+        Standard deviation of the fixed bias, rad/s; None: not known.
+
+    Returns
+    -------
+    dict
+        By method, ``sigma_lower`` and ``sigma_upper``, rad/s; none where nothing is drawn, or the
+        method has no estimate.
+    """
+    if not drawn:
+        return {}
+    nothing = np.zeros((1, len(blocks)))
+    bias = math.inf if turn_on_bias is None else turn_on_bias
+
+    def filtered(one: NoiseModel) -> float:
+        return bound(blocks, one, bias)
+
+    methods: dict[str, Callable[[NoiseModel], float]] = {
+        "pairs": lambda one: float(by_pairs(nothing, blocks, one).sigma[-1]),
+        "triples": lambda one: float(by_triples(nothing, blocks, one).sigma[-1]),
+        "filter": filtered,
+    }
+    ranges: dict[str, Range] = {}
+    for method, sigma in methods.items():
+        try:
+            limits = sigma_range(sigma, model, drawn)
+        except (ValueError, LinAlgError):
+            continue  # no pair or triple in these dwells, which the estimate says
+        ranges[method] = {"sigma_lower": float(limits.lower), "sigma_upper": float(limits.upper)}
+    if "filter" in ranges:
+        ranges["smoother"] = ranges["filter"]  # at the end of the run they are one
+    return ranges

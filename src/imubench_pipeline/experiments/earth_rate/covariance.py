@@ -37,10 +37,5 @@ def of_means(model: NoiseModel, blocks: Blocks) -> Array:
 
 
 def longest(blocks: Blocks) -> float:
-    """Return the tau in s up to which flicker noise is followed: the duration, 2 samples at least.
-
-    Parameters
-    ----------
-    blocks : Blocks
-    """
+    """Return the tau in s to which flicker noise is followed: the duration, 2 samples at least."""
     return max(blocks.duration, 2.0 / blocks.rate)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -118,10 +118,6 @@ class Experiment:
             rad.
         first : {1, -1}
             Sense of the first dwell.
-
-        Returns
-        -------
-        Experiment
         """
         length = max(round(dwell * rate), 1)
         period = length + max(round(turning * rate), 0)
@@ -143,10 +139,6 @@ class Experiment:
         ----------
         longest : int
             Samples of a block at most; a dwell is divided evenly (`block_length`).
-
-        Returns
-        -------
-        Blocks
 
         Raises
         ------
@@ -227,40 +219,48 @@ class Blocks:
         """Time that the samples present stand for, s."""
         return float(self.count.sum()) / self.rate
 
-    def chosen(self, which: NDArray[np.bool_] | slice) -> Blocks:
+    def check_means(self, means: Array) -> None:
+        """Check that there is one finite mean a block: without one a block is none.
+
+        Parameters
+        ----------
+        means : ndarray, shape (runs, b)
+            See `block_means`.
+
+        Raises
+        ------
+        ValueError
+            If it is not so.
+        """
+        if means.ndim != 2 or means.shape[1] != len(self):
+            raise ValueError(
+                f"the means have the shape {means.shape}, expected {len(self)} columns"
+            )
+        if not np.isfinite(means).all():
+            raise ValueError("a block mean is not finite; leave its block out")
+
+    def chosen(self, which: NDArray[np.bool_] | NDArray[np.int64] | slice) -> Blocks:
         """Return some of the blocks.
 
         Parameters
         ----------
-        which : ndarray of bool, shape (b,), or slice
-
-        Returns
-        -------
-        Blocks
+        which : ndarray of bool, shape (b,), or of int, or slice
         """
-        return Blocks(
-            self.start[which],
-            self.stop[which],
-            self.count[which],
-            self.sense[which],
-            self.dwell[which],
-            self.rate,
-            self.latitude,
+        return replace(
+            self,
+            start=self.start[which],
+            stop=self.stop[which],
+            count=self.count[which],
+            sense=self.sense[which],
+            dwell=self.dwell[which],
         )
 
     def of_dwells(self) -> Blocks:
         """Return one block a dwell, from the first sample of its blocks to the last."""
         first = np.flatnonzero(np.diff(self.dwell, prepend=-1))
         last = np.append(first[1:], len(self)) - 1
-        return Blocks(
-            self.start[first],
-            self.stop[last],
-            np.add.reduceat(self.count, first),
-            self.sense[first],
-            self.dwell[first],
-            self.rate,
-            self.latitude,
-        )
+        count = np.add.reduceat(self.count, first)
+        return replace(self.chosen(first), stop=self.stop[last], count=count)
 
     def means_of_dwells(self, means: Array) -> Array:
         """Return the mean of each dwell over its samples present.
@@ -321,10 +321,6 @@ def block_means(parts: Iterable[Array], experiment: Experiment, longest: int) ->
     longest : int
         Samples of a block at most.
 
-    Returns
-    -------
-    Measured
-
     Raises
     ------
     ValueError
@@ -348,12 +344,8 @@ def block_means(parts: Iterable[Array], experiment: Experiment, longest: int) ->
     enough = count >= np.maximum(_LEAST_PRESENT * whole.count, 1)
     if not enough.any():
         raise ValueError("no block has enough samples: all of the dwells is missing")
-    kept = whole.chosen(enough)
-    blocks = Blocks(
-        kept.start, kept.stop, count[enough], kept.sense, kept.dwell, kept.rate, kept.latitude
-    )
     return Measured(
-        blocks,
+        replace(whole.chosen(enough), count=count[enough]),
         (total[enough] / count[enough])[None, :],
         int((whole.count - count).sum()),
         int(count[~enough].sum()),

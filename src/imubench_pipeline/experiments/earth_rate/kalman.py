@@ -112,11 +112,11 @@ class Filtered:
         error = self.states[:, :, :-1].copy()
         error[:, :, 0] -= rate
         error[:, :, 1:] -= states
-        found = np.empty(error.shape[:2])
+        squares = np.empty(error.shape[:2])
         for k, root in enumerate(self.roots[:, :-1, :-1]):
             white = solve_triangular(root, error[:, k].T, lower=True)
-            found[:, k] = np.sum(white**2, axis=0)
-        return found
+            squares[:, k] = np.sum(white**2, axis=0)
+        return squares
 
 
 @dataclass(frozen=True)
@@ -199,22 +199,13 @@ class RateFilter:
         means : ndarray, shape (runs, b)
             Block means, rad/s.
 
-        Returns
-        -------
-        Filtered
-
         Raises
         ------
         ValueError
             If there is not one mean a block, or one is not finite: a block without a mean is no
             block (`experiment.block_means`).
         """
-        if means.ndim != 2 or means.shape[1] != len(self.blocks):
-            raise ValueError(
-                f"the means have the shape {means.shape}, expected {len(self.blocks)} columns"
-            )
-        if not np.isfinite(means).all():
-            raise ValueError("a block mean is not finite; leave its block out")
+        self.blocks.check_means(means)
         states, innovation = self._filter.run(means[:, :, None])
         roots = self._filter.roots
         return Filtered(
@@ -230,16 +221,7 @@ class RateFilter:
         )
 
     def smooth(self, filtered: Filtered) -> Smoothed:
-        """Smooth what `run` has filtered (Rauch, Tung and Striebel), with roots.
-
-        Parameters
-        ----------
-        filtered : Filtered
-
-        Returns
-        -------
-        Smoothed
-        """
+        """Smooth what `run` has filtered (Rauch, Tung and Striebel), with roots."""
         states = filtered.states.copy()
         gains, sigma = self._backward
         for k in range(len(self.blocks) - 2, -1, -1):

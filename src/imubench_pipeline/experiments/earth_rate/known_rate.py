@@ -36,15 +36,13 @@ class Tracked:
         Number of each sample in the log.
     drift : ndarray, shape (n,)
         Tracked error of the gyro, z_f + z_rrw, rad/s.
-    corrected : ndarray, shape (n,)
-        What it calls the Earth's rate: reading less drift, rad/s.
     mean : ndarray, shape (n,)
-        Cumulative mean of that, as in the paper's figures 10 to 13, rad/s.
+        Cumulative mean of what it calls the Earth's rate, reading less drift, as in the paper's
+        figures 10 to 13, rad/s.
     """
 
     sample: NDArray[np.int64]
     drift: Array
-    corrected: Array
     mean: Array
 
 
@@ -64,10 +62,6 @@ def track(log: Array, experiment: Experiment, model: NoiseModel, known_rate: flo
         N, B with T_B, and K are used.
     known_rate : float
         The rate that the filter is given, rad/s, and returns.
-
-    Returns
-    -------
-    Tracked
 
     Raises
     ------
@@ -89,7 +83,7 @@ def track(log: Array, experiment: Experiment, model: NoiseModel, known_rate: flo
         model.N**2 / interval,
     )
     corrected = log[sample] - drift
-    return Tracked(sample, drift, corrected, np.cumsum(corrected) / np.arange(1, len(sample) + 1))
+    return Tracked(sample, drift, np.cumsum(corrected) / np.arange(1, len(sample) + 1))
 
 
 @njit(cache=True, nogil=True)

@@ -64,24 +64,20 @@ def by_pairs(means: Array, blocks: Blocks, model: NoiseModel) -> Differences:
     model : NoiseModel
         Of the gyro, for the standard errors.
 
-    Returns
-    -------
-    Differences
-
     Raises
     ------
     ValueError
         If there is no pair.
     """
     dwells = blocks.of_dwells()
-    found, i = [], 0
+    differences, i = [], 0
     while i + 1 < len(dwells):
         if dwells.sense[i] == dwells.sense[i + 1]:
             i += 1
             continue
-        found.append([(i, dwells.sense[i] / 2.0), (i + 1, dwells.sense[i + 1] / 2.0)])
+        differences.append([(i, dwells.sense[i] / 2.0), (i + 1, dwells.sense[i + 1] / 2.0)])
         i += 2
-    return _estimated(found, means, blocks, dwells, model, "pair of dwells north and south")
+    return _estimated(differences, means, blocks, dwells, model, "pair of dwells north and south")
 
 
 def by_triples(means: Array, blocks: Blocks, model: NoiseModel) -> Differences:
@@ -91,17 +87,7 @@ def by_triples(means: Array, blocks: Blocks, model: NoiseModel) -> Differences:
     what the line through the outer two has at its mean time. Triples overlap: each dwell but the
     first and the last is the middle of one.
 
-    Parameters
-    ----------
-    means : ndarray, shape (runs, b)
-        Block means, rad/s.
-    blocks : Blocks
-    model : NoiseModel
-        Of the gyro, for the standard errors.
-
-    Returns
-    -------
-    Differences
+    Its parameters are those of `by_pairs`.
 
     Raises
     ------
@@ -111,40 +97,40 @@ def by_triples(means: Array, blocks: Blocks, model: NoiseModel) -> Differences:
     dwells = blocks.of_dwells()
     # The mean time of the samples present is that of the blocks they lie in.
     middle = blocks.means_of_dwells(blocks.middle[None, :])[0]
-    found = []
+    differences = []
     for i in range(1, len(dwells) - 1):
         before, sense, after = dwells.sense[i - 1 : i + 2]
         if before == sense or after == sense:
             continue
         part = (middle[i] - middle[i - 1]) / (middle[i + 1] - middle[i - 1])
-        found.append(
+        differences.append(
             [
                 (i - 1, -sense * (1.0 - part) / 2.0),
                 (i, sense / 2.0),
                 (i + 1, -sense * part / 2.0),
             ]
         )
-    return _estimated(found, means, blocks, dwells, model, "three dwells of alternate sense")
+    return _estimated(differences, means, blocks, dwells, model, "three dwells of alternate sense")
 
 
 def _estimated(
-    found: list[list[tuple[int, float]]],
+    differences: list[list[tuple[int, float]]],
     means: Array,
     blocks: Blocks,
     dwells: Blocks,
     model: NoiseModel,
     wanted: str,
 ) -> Differences:
-    if not found:
+    if not differences:
         raise ValueError(f"the experiment has no {wanted} one after the other")
-    weights = np.zeros((len(found), len(dwells)))
-    for row, parts in zip(weights, found, strict=True):
+    weights = np.zeros((len(differences), len(dwells)))
+    for row, parts in zip(weights, differences, strict=True):
         for place, weight in parts:
             row[place] = weight
     weights /= np.cos(blocks.latitude)
     each = blocks.means_of_dwells(means) @ weights.T
     covariance = weights @ of_means(model, dwells) @ weights.T
-    number = np.arange(1, len(found) + 1)
+    number = np.arange(1, len(differences) + 1)
     # Sums of the leading parts of the covariance.
     total = np.diag(np.cumsum(np.cumsum(covariance, axis=0), axis=1))
     rate = np.cumsum(each, axis=1) / number
@@ -152,7 +138,7 @@ def _estimated(
     with np.errstate(divide="ignore", invalid="ignore"):
         scatter = np.sqrt(np.maximum(squares, 0.0) / (number - 1.0))
     scatter[:, 0] = np.nan
-    last = np.array([parts[-1][0] for parts in found])
+    last = np.array([parts[-1][0] for parts in differences])
     return Differences(
         dwells.end[last],
         each,

@@ -1,12 +1,15 @@
 """How well a gyro can find the Earth's rate and north, before anything is measured: the best dwell.
 
 All of it is the Cramér-Rao bound of runs of equal dwells (`experiments.earth_rate.bound`).
+`prediction_rows` gives what a gyro needs to find the rate and north: rows of the table.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,11 +34,23 @@ _LEAST_SUMMED = 8
 _ROUNDING = 1e-9
 """Relative error of the information that rounding may make."""
 
+_LITTLE = 0.01
+"""Relative rise of the standard deviation that is little."""
+
 _CURVE = 40
 """Numbers of dwells on a curve over the dwell, about."""
 
 _BETWEEN = 15
 """Numbers of dwells about the best of these."""
+
+
+Row = dict[str, Any]
+
+_POINTS = 60
+"""Numbers of turns on the curve over time."""
+
+_MOST_TURNS = 20_000
+"""The curve over time goes no further; what is needed is found beyond."""
 
 
 @dataclass(frozen=True)
@@ -80,20 +95,15 @@ class DwellCurve:
         """Place of the least standard deviation."""
         return int(np.argmin(self.sigma))
 
-    def nearly_best(self, loss: float = 0.01) -> tuple[float, float]:
-        """Return the dwells between which little is lost: the best is mostly a broad one.
-
-        Parameters
-        ----------
-        loss : float
-            Relative rise of the standard deviation that counts as little.
+    def nearly_best(self) -> tuple[float, float]:
+        """Return the dwells between which 1 % is lost at most: the best is mostly a broad one.
 
         Returns
         -------
         (float, float)
             Shortest and longest dwell of the curve about the best one, s.
         """
-        little = self.sigma <= (1.0 + loss) * self.sigma[self.best]
+        little = self.sigma <= (1.0 + _LITTLE) * self.sigma[self.best]
         worse = np.flatnonzero(~little)
         first = int(np.max(worse[worse < self.best], initial=-1)) + 1
         last = int(np.min(worse[worse > self.best], initial=len(little))) - 1
@@ -135,15 +145,11 @@ class Outlook:
             Data in each dwell, s.
         turns : int
             The last one wanted, from 1.
-
-        Returns
-        -------
-        Prediction
         """
-        found = self._information(dwell, turns + 1)
+        information = self._information(dwell, turns + 1)
         number = np.arange(1, turns + 1)
         time = (number + 1) * dwell + number * self.turning
-        return Prediction(number, time, sigma_of(found[1:]))
+        return Prediction(number, time, sigma_of(information[1:]))
 
     def turns_needed(self, dwell: float, relative: float) -> int:
         """Return how many turns give the Earth's rate to a relative standard deviation.
@@ -168,33 +174,26 @@ class Outlook:
         if not relative > 0:
             raise ValueError(f"relative is {relative}, expected a number above 0")
         wanted = (relative * EARTH_RATE) ** -2
-        found = self._information(dwell, _SUMMED)
-        reached = np.flatnonzero(found >= wanted * (1.0 - _ROUNDING))
+        information = self._information(dwell, _SUMMED)
+        reached = np.flatnonzero(information >= wanted * (1.0 - _ROUNDING))
         if len(reached):
             return int(reached[0])
-        left = (wanted - found[-1]) / _growth(found)
+        left = (wanted - information[-1]) / _growth(information)
         return _SUMMED - 1 + math.ceil(left - _ROUNDING * left)
 
     def sigma_after(self, dwell: float, turns: int) -> float:
         """Return the bound after a number of turns and the dwell after the last, rad/s."""
-        found = self._information(dwell, _SUMMED)
+        information = self._information(dwell, _SUMMED)
         beyond = max(turns + 1 - _SUMMED, 0)
-        last = found[min(turns, _SUMMED - 1)] + (_growth(found) * beyond if beyond else 0.0)
+        last = information[min(turns, _SUMMED - 1)] + (
+            _growth(information) * beyond if beyond else 0.0
+        )
         return float(sigma_of(np.array([last]))[0])
 
     def time_needed(self, dwell: float, relative: float) -> float:
         """Return how long a run gives the Earth's rate to a relative standard deviation, s.
 
-        Parameters
-        ----------
-        dwell : float
-            Data in each dwell, s.
-        relative : float
-            Of the Earth's rate: 0.01 is 1 %.
-
-        Returns
-        -------
-        float
+        `dwell` and `relative`: as of `turns_needed`.
         """
         turns = self.turns_needed(dwell, relative)
         return (turns + 1) * dwell + turns * self.turning
@@ -250,12 +249,7 @@ class Outlook:
         is a heading error s / (w_ie cos(latitude)), the same as `error_budget.Gyrocompass` with
         two positions; with s = sigma cos(latitude), sigma that of the rate.
 
-        Parameters
-        ----------
-        dwell : float
-            Data in each dwell, s.
-        turns : int
-            The last one wanted, from 1.
+        `dwell` and `turns`: as of `against_time`.
 
         Returns
         -------
@@ -279,12 +273,79 @@ class Outlook:
         summed = max(MOST_BLOCKS // each, _LEAST_SUMMED)
         blocks = replace(design, dwells=design.dwells[:summed]).blocks(longest)
         last = np.flatnonzero(np.diff(blocks.dwell, append=-1))
-        found = information_by_states(blocks, self.model, self.turn_on_bias)[last]
-        more = np.arange(1, dwells - len(found) + 1)
-        return np.concatenate([found, found[-1] + _growth(found) * more]) if len(more) else found
+        information = information_by_states(blocks, self.model, self.turn_on_bias)[last]
+        more = np.arange(1, dwells - len(information) + 1)
+        return (
+            np.concatenate([information, information[-1] + _growth(information) * more])
+            if len(more)
+            else information
+        )
 
 
 def _growth(found: Array) -> float:
     """Return what each of the latter half of the dwells adds on average."""
     half = len(found) // 2
     return float(found[-1] - found[-1 - half]) / half
+
+
+def prediction_rows(
+    outlook: Outlook, dwell: float, goals: Sequence[float], run_time: float
+) -> Iterator[Row]:
+    """Yield the rows of the table ``earth_rate_prediction``, without the names.
+
+    Parameters
+    ----------
+    outlook : Outlook
+    dwell : float
+        Data in each dwell, s.
+    goals : sequence of float
+        Standard deviations that are wanted, relative to the Earth's rate.
+    run_time : float
+        For which the best dwell is sought, s.
+
+    Raises
+    ------
+    ValueError
+        If the run time does not hold two dwells and a turn.
+    """
+    for row in _rows(outlook, dwell, goals, run_time):
+        yield {"latitude": outlook.latitude, **row}
+
+
+def _rows(outlook: Outlook, dwell: float, goals: Sequence[float], run_time: float) -> Iterator[Row]:
+    most = 1
+    for goal in sorted(goals, reverse=True):
+        turns = outlook.turns_needed(dwell, goal)
+        most = max(most, turns)
+        time = (turns + 1) * dwell + turns * outlook.turning
+        # What is reached: the last turn that is needed may give far more than was asked for.
+        sigma = outlook.sigma_after(dwell, turns)
+        yield {"of": "goal", "goal": goal} | _row(dwell, turns, time, sigma)
+    course = outlook.against_time(dwell, min(max(most, 2), _MOST_TURNS))
+    shown = np.unique(np.rint(np.geomspace(1, len(course.turns), _POINTS)).astype(np.int64)) - 1
+    for k in shown.tolist():
+        point = int(course.turns[k]), float(course.time[k]), float(course.sigma[k])
+        yield {"of": "time"} | _row(dwell, *point)
+    curve = outlook.over_dwell(run_time)
+    low, high = curve.nearly_best()
+    for k, number in enumerate(curve.dwells.tolist()):
+        length = float(curve.dwell[k])
+        yield (
+            {"of": "dwell", "best": k == curve.best, "nearly_best": low <= length <= high}
+            | _row(length, number - 1, run_time, float(curve.sigma[k]))
+        )
+
+
+def _row(dwell: float, turns: int, time: float, sigma: float) -> Row:
+    known = sigma if math.isfinite(sigma) else None
+    relative = None if known is None else known / EARTH_RATE
+    # The heading that a gyro across north finds is off by sigma cos(latitude) over what it would
+    # see of the Earth's rate, w_ie cos(latitude): `Outlook.heading`.
+    return {
+        "dwell": dwell,
+        "turns": turns,
+        "time": time,
+        "sigma": known,
+        "relative": relative,
+        "heading": relative,
+    }

@@ -50,12 +50,7 @@ class Schedule:
     latitude: float
 
     def run(self, duration: float) -> Experiment:
-        """Return the design of a run of so many s.
-
-        Parameters
-        ----------
-        duration : float
-        """
+        """Return the design of a run of so many s."""
         return Experiment.regular(
             dwell=self.dwell - self.turning,
             turning=self.turning,
@@ -103,10 +98,10 @@ def published_row(value: float, schedule: Schedule, duration: float, model: Nois
     model : NoiseModel
         As published.
     """
-    found = allowed(schedule, duration, model)
-    off = (value - EARTH_RATE) / found["sigma"]
+    noise = allowed(schedule, duration, model)
+    off = (value - EARTH_RATE) / noise["sigma"]
     verdict = "within the noise" if abs(off) <= _WITHIN else "beyond the noise"
-    return found | {
+    return noise | {
         "duration": duration,
         "published": value,
         "truth": EARTH_RATE,

@@ -16,14 +16,14 @@ from imubench_pipeline.experiments.earth_rate.choice_of_turns import (
     may_be_silent,
     shorter_dwell,
 )
-from imubench_pipeline.experiments.earth_rate.found import Turn
-from imubench_pipeline.experiments.earth_rate.transients import CLEAR, Blocks, Event
+from imubench_pipeline.experiments.earth_rate.transients import CLEAR, Event, LevelBlocks
+from imubench_pipeline.experiments.earth_rate.turns import Turn
 from imubench_pipeline.typing import Array
 
 _ENOUGH = 0.4
 """Part of the schedule's turns that must be seen, for what is seen to decide."""
 
-ALTERNATES = 3.0
+_ALTERNATES = 3.0
 """Standard errors of the alternation at which a log without transients is taken to be turned."""
 
 _SHIFTED = 6.0
@@ -34,13 +34,16 @@ _CALMING = 0.25
 
 
 @dataclass(frozen=True)
-class Plan:
-    """What is known before the log is looked at.
+class TurnSchedule:
+    """The turns as they are stated, before the log is looked at.
 
     Attributes
     ----------
-    dwell, start, turning, tolerance, margin : float
+    dwell, start, turning, margin : float
         As `imubench_pipeline.experiments.earth_rate.turning.find_turning` takes them, s.
+    tolerance : float
+        How far a turn may be from the schedule, s (a standard deviation): a tenth of a dwell, and
+        at least 2 s. So much is left out on both sides of a turn that is not seen.
     duration : float
         Of the log, s.
     """
@@ -54,16 +57,16 @@ class Plan:
 
 
 def by_sight(
-    blocks: Blocks, events: list[Event], plan: Plan, trust: bool
+    blocks: LevelBlocks, events: list[Event], schedule: TurnSchedule, trust: bool
 ) -> tuple[list[Turn], list[tuple[float, float]], list[str]]:
     """Return turns, knocks and doubts where there is no column.
 
     Parameters
     ----------
-    blocks : Blocks
+    blocks : LevelBlocks
     events : list of Event
         In order of time.
-    plan : Plan
+    schedule : TurnSchedule
     trust : bool
         Take the schedule's word where nothing is seen.
 
@@ -80,26 +83,26 @@ def by_sight(
     ValueError
         If nothing shows that the log was turned, and the schedule is not trusted.
     """
-    chosen = choose(events, plan.dwell, plan.tolerance, plan.duration)
-    declared = plan.dwell
+    chosen = choose(events, schedule.dwell, schedule.tolerance, schedule.duration)
+    declared = schedule.dwell
     pace = shorter_dwell(events, chosen, declared)
     if pace is not None:
-        plan = replace(
-            plan,
+        schedule = replace(
+            schedule,
             dwell=pace,
-            tolerance=plan.tolerance * pace / declared,
-            turning=min(plan.turning, 0.4 * pace),
+            tolerance=schedule.tolerance * pace / declared,
+            turning=min(schedule.turning, 0.4 * pace),
         )
-        chosen = choose(events, plan.dwell, plan.tolerance, plan.duration)
-    expected = max(1.0, round((plan.duration - plan.start) / plan.dwell) - 1.0)
+        chosen = choose(events, schedule.dwell, schedule.tolerance, schedule.duration)
+    expected = max(1.0, round((schedule.duration - schedule.start) / schedule.dwell) - 1.0)
     doubts: list[str] = []
     if len(chosen) >= _ENOUGH * expected:
-        turns, rest = _of_events(events, chosen, plan)
-        seen = _filled([events[k] for k in chosen], turns, plan, blocks)
+        turns, rest = _of_events(events, chosen, schedule)
+        seen = _filled([events[k] for k in chosen], turns, schedule, blocks)
     else:
-        seen, rest, doubts = _scheduled(blocks, events, plan, trust)
+        seen, rest, doubts = _scheduled(blocks, events, schedule, trust)
     quick = [e for e in rest if e.kind == "transient"]
-    ends = sum(_at_end(event, plan) and event.likelihood > CLEAR for event in quick)
+    ends = sum(_at_end(event, schedule) and event.likelihood > CLEAR for event in quick)
     if ends:
         doubts.append("handling at the ends of the log is left out")
     silent = sum(turn.found_by == "schedule" for turn in seen)
@@ -112,10 +115,10 @@ def by_sight(
 
 
 def _of_events(
-    events: list[Event], chosen: Sequence[int], plan: Plan
+    events: list[Event], chosen: Sequence[int], schedule: TurnSchedule
 ) -> tuple[list[Turn], list[Event]]:
     """Return the turns of the events chosen, with what came of the same turn, and the others."""
-    near = closest(plan.dwell)
+    near = closest(schedule.dwell)
     turns: list[Turn] = []
     used = set(chosen)
     for k in chosen:
@@ -143,28 +146,30 @@ def _of_events(
         if event.kind == "step":
             doubts.append("no transient: a step of the level alone")
         middle = 0.5 * (start + stop)
-        margin = plan.margin + (0.5 * plan.turning if event.kind == "step" else 0.0)
+        margin = schedule.margin + (0.5 * schedule.turning if event.kind == "step" else 0.0)
         turns.append(Turn(start - margin, stop + margin, middle, event.kind, peak, tuple(doubts)))
     return turns, [event for i, event in enumerate(events) if i not in used]
 
 
-def _filled(chosen: list[Event], turns: list[Turn], plan: Plan, blocks: Blocks) -> list[Turn]:
+def _filled(
+    chosen: list[Event], turns: list[Turn], schedule: TurnSchedule, blocks: LevelBlocks
+) -> list[Turn]:
     """Put turns of the schedule where turns may be unseen: too weak, or without samples."""
     silent = may_be_silent(chosen)
     time = np.array([turn.time for turn in turns])
     gaps = np.diff(time)
-    single = gaps[(gaps > 0.5 * plan.dwell) & (gaps < 1.5 * plan.dwell)]
-    usual = float(np.median(single)) if len(single) else plan.dwell
+    single = gaps[(gaps > 0.5 * schedule.dwell) & (gaps < 1.5 * schedule.dwell)]
+    usual = float(np.median(single)) if len(single) else schedule.dwell
     filled: list[Turn] = []
     if silent:
-        more = np.arange(time[0] - usual, (EDGE + 0.3) * plan.dwell, -usual)[::-1]
-        filled += [_silent(float(at), plan) for at in more]
+        more = np.arange(time[0] - usual, (EDGE + 0.3) * schedule.dwell, -usual)[::-1]
+        filled += [_silent(float(at), schedule) for at in more]
     for k, turn in enumerate(turns):
         many = max(1, round(float(gaps[k - 1]) / usual)) if k else 1
         missed = 0
         for at in np.linspace(time[k - 1], time[k], many + 1)[1:-1].tolist() if many > 1 else []:
-            if silent or _hole(blocks, at, plan):
-                filled.append(_silent(at, plan))
+            if silent or _hole(blocks, at, schedule):
+                filled.append(_silent(at, schedule))
             else:
                 missed += 1
         if missed:
@@ -172,55 +177,57 @@ def _filled(chosen: list[Event], turns: list[Turn], plan: Plan, blocks: Blocks) 
             turn = replace(turn, doubts=(*turn.doubts, words))
         filled.append(turn)
     if silent:
-        last = plan.duration - (EDGE + 0.3) * plan.dwell
-        filled += [_silent(float(at), plan) for at in np.arange(time[-1] + usual, last, usual)]
+        last = schedule.duration - (EDGE + 0.3) * schedule.dwell
+        filled += [_silent(float(at), schedule) for at in np.arange(time[-1] + usual, last, usual)]
     return filled
 
 
-def _hole(blocks: Blocks, time: float, plan: Plan) -> bool:
+def _hole(blocks: LevelBlocks, time: float, schedule: TurnSchedule) -> bool:
     """Tell whether the samples are missing where a turn would be."""
-    first = max(0, int((time - 0.5 * plan.turning) / blocks.length))
-    return not blocks.there[first : int((time + 0.5 * plan.turning) / blocks.length) + 1].any()
+    first = max(0, int((time - 0.5 * schedule.turning) / blocks.length))
+    return not blocks.there[first : int((time + 0.5 * schedule.turning) / blocks.length) + 1].any()
 
 
-def _silent(time: float, plan: Plan) -> Turn:
-    half = _half(plan)
+def _silent(time: float, schedule: TurnSchedule) -> Turn:
+    half = _half(schedule)
     words = ("nothing is seen of it: the schedule says so",)
     return Turn(time - half, time + half, time, "schedule", None, words)
 
 
-def _half(plan: Plan) -> float:
+def _half(schedule: TurnSchedule) -> float:
     """Return half of what is left out about a turn that is not seen."""
-    return min(plan.tolerance + 0.5 * plan.turning, 0.4 * plan.dwell)
+    return min(schedule.tolerance + 0.5 * schedule.turning, 0.4 * schedule.dwell)
 
 
 def _scheduled(
-    blocks: Blocks, events: list[Event], plan: Plan, trust: bool
+    blocks: LevelBlocks, events: list[Event], schedule: TurnSchedule, trust: bool
 ) -> tuple[list[Turn], list[Event], list[str]]:
     """Return the turns of the schedule; where a clear transient is near one, that is it."""
-    half, longest = _half(plan), plan.duration - EDGE * plan.dwell
-    count = max(0, math.ceil((longest - plan.start) / plan.dwell))
-    slots: Array = plan.start + plan.dwell * np.arange(1.0, count) + 0.5 * plan.turning
+    half, longest = _half(schedule), schedule.duration - EDGE * schedule.dwell
+    count = max(0, math.ceil((longest - schedule.start) / schedule.dwell))
+    slots: Array = schedule.start + schedule.dwell * np.arange(1.0, count) + 0.5 * schedule.turning
     slots = slots[(slots > half) & (slots < longest)]
     if len(slots) == 0:
         raise ValueError("the schedule has no turn within the log")
     calm = without(blocks, disturbances([e for e in events if e.kind == "transient"]))
-    longest_shift = min(plan.dwell / 3.0, 3.0 * plan.tolerance)
-    shift, z, unshifted = best_shift(calm, slots, 0.5 * plan.turning, longest_shift, plan.duration)
+    longest_shift = min(schedule.dwell / 3.0, 3.0 * schedule.tolerance)
+    shift, z, unshifted = best_shift(
+        calm, slots, 0.5 * schedule.turning, longest_shift, schedule.duration
+    )
     doubts: list[str] = []
     by_step = abs(z) > _SHIFTED and z**2 - unshifted**2 > 2.0 * CLEAR
     if by_step:
         slots = slots + shift
-        slots = slots[(slots > half) & (slots < plan.duration - half)]
+        slots = slots[(slots > half) & (slots < schedule.duration - half)]
         doubts.append(f"the level alternates {shift:+.1f} s from the schedule: that is used")
     else:
         # Of what is used, and not of the best shift: a search finds 3 in one log of 50 at rest.
-        size = abs(alternation(calm, between(slots, half, plan.duration)).z)
-        if not (size >= ALTERNATES or trust):
+        size = abs(alternation(calm, between(slots, half, schedule.duration)).z)
+        if not (size >= _ALTERNATES or trust):
             raise ValueError(
-                f"nothing shows that the log was turned every {plan.dwell:g} s: no transients, and "
-                f"its level alternates by {size:.1f} standard errors (trust_schedule takes the "
-                "schedule's word)"
+                f"nothing shows that the log was turned every {schedule.dwell:g} s: no transients, "
+                f"and its level alternates by {size:.1f} standard errors (trust_schedule takes "
+                "the schedule's word)"
             )
         doubts.append(
             f"no turns are seen: the schedule decides, and the level alternates with it by "
@@ -231,32 +238,28 @@ def _scheduled(
         near = [
             k
             for k, e in enumerate(events)
-            if abs(e.time - slot) < 2.0 * plan.tolerance
+            if abs(e.time - slot) < 2.0 * schedule.tolerance
             and (e.likelihood > CLEAR and not e.haste and k not in used)
         ]
         if near:
             best = max(near, key=lambda k: events[k].likelihood)
             used.update(near)
-            turns += _of_events([events[best]], [0], plan)[0]
+            turns += _of_events([events[best]], [0], schedule)[0]
         elif by_step:
             words = ("no transient: the level alternates with the schedule",)
             turns.append(Turn(slot - half, slot + half, slot, "step", None, words))
         else:
-            turns.append(_silent(slot, plan))
+            turns.append(_silent(slot, schedule))
     return turns, [e for k, e in enumerate(events) if k not in used], doubts
 
 
-def _at_end(event: Event, plan: Plan) -> bool:
-    edge = EDGE * plan.dwell
-    return not event.haste and not edge <= event.time <= plan.duration - edge
+def _at_end(event: Event, schedule: TurnSchedule) -> bool:
+    edge = EDGE * schedule.dwell
+    return not event.haste and not edge <= event.time <= schedule.duration - edge
 
 
 def disturbances(events: Sequence[Event]) -> list[tuple[float, float]]:
     """Return what to leave out of transients that are no turns, and are not noise.
-
-    Parameters
-    ----------
-    events : sequence of Event
 
     Returns
     -------
@@ -270,12 +273,12 @@ def disturbances(events: Sequence[Event]) -> list[tuple[float, float]]:
     ]
 
 
-def without(blocks: Blocks, knocks: Sequence[tuple[float, float]]) -> Blocks:
+def without(blocks: LevelBlocks, knocks: Sequence[tuple[float, float]]) -> LevelBlocks:
     """Return the blocks without those of knocks.
 
     Parameters
     ----------
-    blocks : Blocks
+    blocks : LevelBlocks
     knocks : sequence of (float, float)
         Start and stop, s.
     """

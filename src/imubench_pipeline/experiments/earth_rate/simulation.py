@@ -41,30 +41,20 @@ ASSUMED_TURNING = 2.0
 """Time of each 30 s that turning takes, s: the paper prints none."""
 
 
-def paper_run(
-    minutes: float, latitude: float = ASSUMED_LATITUDE, turning: float = ASSUMED_TURNING
-) -> Experiment:
+def paper_run(minutes: float) -> Experiment:
     """Return the design of a run of the paper: north first, a turn every 30 s.
 
     Parameters
     ----------
     minutes : float
         Its length, such as in `PAPER_MINUTES`.
-    latitude : float
-        rad.
-    turning : float
-        Part of the 30 s that turning takes, s.
-
-    Returns
-    -------
-    Experiment
     """
     return Experiment.regular(
-        dwell=PAPER_PERIOD - turning,
-        turning=turning,
+        dwell=PAPER_PERIOD - ASSUMED_TURNING,
+        turning=ASSUMED_TURNING,
         dwells=round(60.0 * minutes / PAPER_PERIOD),
         rate=PAPER_RATE,
-        latitude=latitude,
+        latitude=ASSUMED_LATITUDE,
     )
 
 
@@ -108,10 +98,6 @@ def simulate_runs(
         Standard deviation of the fixed bias, which is drawn for each run, rad/s.
     runs : int
     rng : numpy.random.Generator
-
-    Returns
-    -------
-    Runs
     """
     known = block_states(model, blocks, turn_on_bias)
     m = len(known.names)

@@ -81,10 +81,6 @@ def block_states(model: NoiseModel, blocks: Blocks, turn_on_bias: float = WIDE) 
     turn_on_bias : float
         Standard deviation of the fixed bias, rad/s, with which z_K starts.
 
-    Returns
-    -------
-    BlockStates
-
     Raises
     ------
     ValueError

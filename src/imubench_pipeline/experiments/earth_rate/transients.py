@@ -60,7 +60,7 @@ _MOST = 2000
 
 
 @dataclass(frozen=True)
-class Blocks:
+class LevelBlocks:
     """A log as means of short blocks.
 
     Attributes
@@ -122,7 +122,9 @@ class Event:
         return 0.5 * (self.start + self.stop)
 
 
-def blocks_of(log: Array, rate: float, dwell: float, model: NoiseModel | None = None) -> Blocks:
+def blocks_of(
+    log: Array, rate: float, dwell: float, model: NoiseModel | None = None
+) -> LevelBlocks:
     """Take a log together to blocks, with their level and noise.
 
     The level is a running median over less than a dwell, which follows a step at once. The noise
@@ -169,7 +171,7 @@ def blocks_of(log: Array, rate: float, dwell: float, model: NoiseModel | None = 
         known = math.sqrt(float(model.allan_variance(length, rate)))
         rough = not 2 / 3 < own / known < 1.5
         sigma = own if rough else known
-    return Blocks(length, mean, level, residual / sigma, there, sigma, rough)
+    return LevelBlocks(length, mean, level, residual / sigma, there, sigma, rough)
 
 
 def _spread(residual: Array) -> float:
@@ -185,7 +187,7 @@ def _spread(residual: Array) -> float:
     return sigma
 
 
-def transients(blocks: Blocks, log: Array, rate: float) -> list[Event]:
+def transients(blocks: LevelBlocks, log: Array, rate: float) -> list[Event]:
     """Return the transients in order of time.
 
     A window of n blocks whose mean square is r times that of the noise has the log-likelihood
@@ -195,7 +197,7 @@ def transients(blocks: Blocks, log: Array, rate: float) -> list[Event]:
 
     Parameters
     ----------
-    blocks : Blocks
+    blocks : LevelBlocks
     log : ndarray, shape (n,)
         rad/s; the same log.
     rate : float
@@ -203,36 +205,36 @@ def transients(blocks: Blocks, log: Array, rate: float) -> list[Event]:
     """
     correlation = _correlation(blocks)
     ratios = [_ratio(blocks, window, correlation) for window in _WINDOWS if window < len(blocks.z)]
-    found: list[tuple[int, int, float]] = []
-    while len(found) < _MOST:
+    stretches: list[tuple[int, int, float]] = []
+    while len(stretches) < _MOST:
         best = [int(np.argmax(ratio)) for ratio in ratios]
         k = int(np.argmax([ratio[b] for ratio, b in zip(ratios, best, strict=True)]))
         likelihood = float(ratios[k][best[k]])
         if likelihood < _LEAST:
             break
         first, last = _edges(blocks.z, best[k], best[k] + _WINDOWS[k])
-        found.append((first, last, likelihood))
+        stretches.append((first, last, likelihood))
         for window, ratio in zip(_WINDOWS, ratios, strict=False):
             ratio[max(0, first - window + 1) : last] = 0.0
-    return list(_events(blocks, log, rate, sorted(found)))
+    return list(_events(blocks, log, rate, sorted(stretches)))
 
 
-def _correlation(blocks: Blocks) -> Array:
+def _correlation(blocks: LevelBlocks) -> Array:
     """Return the correlation of calm blocks, from that of neighbours on until it is lost."""
     calm = np.where(blocks.there & (np.abs(blocks.z) < _EDGE), blocks.z, 0.0)
     seen = (calm != 0.0).astype(float)
     square = float(np.mean(calm[seen > 0.0] ** 2))
-    found: list[float] = []
+    correlations: list[float] = []
     for k in range(1, min(_WINDOWS[-1], len(calm))):
         pairs = max(float(seen[k:] @ seen[:-k]), 1.0)
         value = float(calm[k:] @ calm[:-k]) / pairs / square
         if value < 3.0 / math.sqrt(pairs):
             break
-        found.append(value)
-    return np.array(found)
+        correlations.append(value)
+    return np.array(correlations)
 
 
-def _ratio(blocks: Blocks, window: int, correlation: Array) -> Array:
+def _ratio(blocks: LevelBlocks, window: int, correlation: Array) -> Array:
     """Return the log-likelihood ratio of the windows that begin at each block."""
     square = np.minimum(blocks.z**2, _CLIP**2)
     energy = _sums(square, window)
@@ -261,11 +263,11 @@ def _edges(z: Array, first: int, last: int) -> tuple[int, int]:
 
 
 def _events(
-    blocks: Blocks, log: Array, rate: float, found: list[tuple[int, int, float]]
+    blocks: LevelBlocks, log: Array, rate: float, stretches: list[tuple[int, int, float]]
 ) -> Iterator[Event]:
     """Yield what was found, stretches that touch as one, with the peak and the duration."""
     joined: list[tuple[int, int, float]] = []
-    for first, last, likelihood in found:
+    for first, last, likelihood in stretches:
         if joined and first - joined[-1][1] < _BRIDGE:
             before = joined.pop()
             first, last = before[0], max(last, before[1])
@@ -292,16 +294,10 @@ def _events(
         yield Event(start, stop, "transient", likelihood, peak, strength, haste)
 
 
-def outliers(blocks: Blocks, log: Array, rate: float) -> list[tuple[float, float]]:
+def outliers(blocks: LevelBlocks, log: Array, rate: float) -> list[tuple[float, float]]:
     """Return where single samples are far out, which in the mean of a block may not be seen.
 
-    Parameters
-    ----------
-    blocks : Blocks
-    log : ndarray, shape (n,)
-        rad/s; the same log.
-    rate : float
-        Hz.
+    Its parameters are those of `transients`.
 
     Returns
     -------
@@ -320,7 +316,7 @@ def outliers(blocks: Blocks, log: Array, rate: float) -> list[tuple[float, float
 
 
 def steps(
-    blocks: Blocks, dwell: float, model: NoiseModel | None = None, rate: float | None = None
+    blocks: LevelBlocks, dwell: float, model: NoiseModel | None = None, rate: float | None = None
 ) -> list[Event]:
     """Return steps of the level that stand out alone, in order of time.
 
@@ -330,7 +326,7 @@ def steps(
 
     Parameters
     ----------
-    blocks : Blocks
+    blocks : LevelBlocks
     dwell : float
         Nominal, s.
     model : NoiseModel, optional
@@ -350,23 +346,19 @@ def steps(
     if model is not None:
         variance = np.maximum(variance, 2.0 * model.allan_variance(width * blocks.length, rate))
     z = np.where(enough > width / 2, np.abs(difference) / np.sqrt(variance), 0.0)
-    found: list[Event] = []
-    while (k := int(np.argmax(z))) >= 0 and z[k] > _STEP and len(found) < _MOST:
+    events: list[Event] = []
+    while (k := int(np.argmax(z))) >= 0 and z[k] > _STEP and len(events) < _MOST:
         at = (k + width) * blocks.length
         height = float(np.abs(difference[k]))
         strength = math.log(float(z[k]) / _STEP)
         likelihood = min(0.5 * float(z[k]) ** 2, 200.0)
-        found.append(Event(at, at, "step", likelihood, height, strength, 0.0))
+        events.append(Event(at, at, "step", likelihood, height, strength, 0.0))
         z[max(0, k - width) : k + width] = 0.0
-    return sorted(found, key=lambda event: event.start)
+    return sorted(events, key=lambda event: event.start)
 
 
-def calm_means(blocks: Blocks) -> Array:
+def calm_means(blocks: LevelBlocks) -> Array:
     """Return the means of the blocks, outliers drawn to 4 standard deviations; 0 where none is.
-
-    Parameters
-    ----------
-    blocks : Blocks
 
     Returns
     -------

@@ -3,39 +3,123 @@
 Turning a sensitive axis end for end is a rotation about an axis perpendicular to it: the gyro
 senses cross-axis coupling and handling, which may be much or nothing. What is sensed decides
 where there is something, a column with the position where there is one, and the schedule where
-there is nothing.
+there is nothing. `stays` reads turns from such a column.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from imubench_pipeline.experiments.earth_rate.alternation import alternation, contradiction
 from imubench_pipeline.experiments.earth_rate.choice_of_turns import EDGE
-from imubench_pipeline.experiments.earth_rate.found import SURE, FoundDwell, Turn, Turning
-from imubench_pipeline.experiments.earth_rate.position import stays
 from imubench_pipeline.experiments.earth_rate.sight import (
-    ALTERNATES,
-    Plan,
+    TurnSchedule,
     by_sight,
     disturbances,
     without,
 )
 from imubench_pipeline.experiments.earth_rate.transients import (
     CLEAR,
-    Blocks,
     Event,
+    LevelBlocks,
     blocks_of,
     outliers,
     steps,
     transients,
 )
+from imubench_pipeline.experiments.earth_rate.turns import SURE, FoundDwell, Turn, Turning
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
+
+_NEAR = 0.1
+"""Part of the distance of the two positions within which a sensor is in one of them."""
+
+
+@dataclass(frozen=True)
+class Stays:
+    """Where the sensor stood.
+
+    Attributes
+    ----------
+    start, stop : ndarray, shape (n,)
+        s; what lies between two of them is turning.
+    high : ndarray of bool, shape (n,)
+        Whether it is the position of the larger number; alternates.
+    senses : bool
+        Whether the column has +1 and -1: then it says the sense itself.
+    away : bool
+        Whether more than a twentieth of the column is in neither position for longer than a turn
+        takes: perhaps there are more than two.
+    """
+
+    start: Array
+    stop: Array
+    high: NDArray[np.bool_]
+    senses: bool
+    away: bool
+
+
+def stays(position: Array, rate: float, shortest: float) -> Stays:
+    """Find the stays in two positions.
+
+    The positions are the medians of the column's lower and upper half, by range. A sample within
+    a tenth of their distance of one is in it; other samples are turning, or overrun. Stays of the
+    same position that follow each other are one.
+
+    Parameters
+    ----------
+    position : ndarray, shape (n,)
+        Two positions as numbers in any unit, such as angles, 0 and 1, or -1 and +1; NaN where it
+        is not known. An angle must not wrap at one of them.
+    rate : float
+        Hz.
+    shortest : float
+        Shorter stays are overruns, s.
+
+    Raises
+    ------
+    ValueError
+        If the column has one position only, or none.
+    """
+    known = np.flatnonzero(np.isfinite(position))
+    if len(known) == 0:
+        raise ValueError("the column with the position has no numbers")
+    value = position[known]
+    middle = 0.5 * (float(value.min()) + float(value.max()))
+    if value.min() == value.max():
+        raise ValueError(f"the position is {middle:g} throughout: the log never turns")
+    low, high = float(np.median(value[value <= middle])), float(np.median(value[value > middle]))
+    near = _NEAR * (high - low)
+    state = np.where(np.abs(value - high) <= near, 1, np.where(np.abs(value - low) <= near, 0, -1))
+    change = np.flatnonzero(np.diff(state)) + 1
+    first = np.concatenate(([0], change))
+    last = np.concatenate((change, [len(state)])) - 1
+    merged: list[list[float]] = []
+    away = 0.0
+    for a, b in zip(first, last, strict=True):
+        start, stop = known[a] / rate, (known[b] + 1) / rate
+        if state[a] < 0 or stop - start < shortest:
+            away += (stop - start) if stop - start > shortest else 0.0
+            continue
+        if merged and merged[-1][2] == state[a]:
+            merged[-1][1] = stop
+        else:
+            merged.append([start, stop, state[a]])
+    if len(merged) < 2:
+        raise ValueError("the column with the position shows no two stays: the log never turns")
+    table = np.array(merged)
+    return Stays(
+        table[:, 0],
+        table[:, 1],
+        table[:, 2] == 1,
+        bool(np.allclose([low, high], [-1.0, 1.0], atol=0.05)),
+        away > 0.05 * len(position) / rate,
+    )
 
 
 def find_turning(
@@ -46,10 +130,8 @@ def find_turning(
     turning: float = 2.0,
     start: float = 0.0,
     first_sense: int | None = None,
-    sense_by_rate: bool = False,
     position: Array | None = None,
     model: NoiseModel | None = None,
-    tolerance: float | None = None,
     margin: float = 0.5,
     trust_schedule: bool = False,
 ) -> Turning:
@@ -70,9 +152,7 @@ def find_turning(
     where the level then alternates the other way clearly, a doubt says so. Which is first is what
     ``first_sense`` says, or the column if it has +1 and -1. Otherwise +1 is assumed and the result
     is ``ambiguous``: all senses may be the other way round, and so may be the sign of a rate
-    estimated from them. The known rate of the Earth chooses only where ``sense_by_rate`` asks for
-    it; then the estimate is positive by construction, and its sign says nothing. Neither its sign
-    nor its size is used otherwise.
+    estimated from them. The known rate of the Earth chooses nothing.
 
     Without a transient, the log must alternate by 3 standard errors with the schedule: runs in
     which chance hides the alternation are then refused, which favours large estimates.
@@ -93,23 +173,14 @@ def find_turning(
         are not seen.
     first_sense : {1, -1}, optional
         Sense of the first dwell.
-    sense_by_rate : bool
-        Let the sign of the Earth's rate, positive, choose the sense of the first dwell.
     position : ndarray, shape (n,), optional
-        How the sensor stands (`experiments.earth_rate.position.stays`), sampled as the log.
+        How the sensor stands (`stays`), sampled as the log.
     model : NoiseModel, optional
         Noise of the sensor at rest, SI; without it, it is found in the log.
-    tolerance : float, optional
-        How far a turn may be from the schedule, s (a standard deviation); a tenth of a dwell, and
-        at least 2 s. So much is left out on both sides of a turn that is not seen.
     margin : float
         Left out on both sides of a turn that is seen, s.
     trust_schedule : bool
         Take the schedule's word where the log shows no turns at all.
-
-    Returns
-    -------
-    Turning
 
     Raises
     ------
@@ -118,7 +189,7 @@ def find_turning(
         shows that it was turned.
     """
     log = np.asarray(log, dtype=np.float64)
-    plan = _checked(log, rate, dwell, turning, start, first_sense, tolerance, margin)
+    schedule = _checked(log, rate, dwell, turning, start, first_sense, margin)
     blocks = blocks_of(log, rate, dwell, model)
     events = _seen(blocks, log, rate, dwell, model)
     doubts = []
@@ -126,17 +197,17 @@ def find_turning(
         doubts.append("the noise of the log is not that of the model: the log's is used")
     column_sense = None
     if position is not None:
-        turns, knocks, column_sense, more = _by_column(position, log, rate, events, plan)
+        turns, knocks, column_sense, more = _by_column(position, log, rate, events, schedule)
     else:
-        turns, knocks, more = by_sight(blocks, events, plan, trust_schedule)
+        turns, knocks, more = by_sight(blocks, events, schedule, trust_schedule)
     doubts += more
-    stretches, more = _stretches(turns, knocks, plan)
+    stretches, more = _stretches(turns, knocks, schedule)
     doubts += more
     knocks = sorted([*knocks, *_lone(outliers(blocks, log, rate), turns, knocks)])
-    knocks = [(max(start, 0.0), min(stop, plan.duration)) for start, stop in knocks]
+    knocks = [(max(start, 0.0), min(stop, schedule.duration)) for start, stop in knocks]
     signs = without(blocks, knocks)
     size = alternation(signs, stretches)
-    first, more = _first_sense(first_sense, column_sense, sense_by_rate, size.z)
+    first, more = _first_sense(first_sense, column_sense)
     doubts += more
     place = contradiction(signs, stretches)
     if place is not None:
@@ -144,9 +215,9 @@ def find_turning(
             f"from {stretches[place][0]:.0f} s on the log alternates the other way: "
             "a turn too many or too few near there?"
         )
-    ambiguous = first_sense is None and column_sense is None and not sense_by_rate
+    ambiguous = first_sense is None and column_sense is None
     return Turning(
-        tuple(_dwells(stretches, turns, first, plan)),
+        tuple(_dwells(stretches, turns, first, schedule)),
         tuple(turns),
         tuple(knocks),
         ambiguous,
@@ -162,9 +233,8 @@ def _checked(
     turning: float,
     start: float,
     first_sense: int | None,
-    tolerance: float | None,
     margin: float,
-) -> Plan:
+) -> TurnSchedule:
     if not (math.isfinite(rate) and rate > 0.0):
         raise ValueError(f"rate is {rate}, expected Hz above 0")
     if not (math.isfinite(dwell) and dwell > 0.0):
@@ -173,10 +243,6 @@ def _checked(
         raise ValueError(f"turning is {turning}, expected s from 0 to half the dwell of {dwell} s")
     if first_sense not in (None, 1, -1):
         raise ValueError(f"first_sense is {first_sense}, expected 1, -1 or None")
-    if tolerance is None:
-        tolerance = max(0.1 * dwell, min(2.0, 0.2 * dwell))
-    if not 0.0 < tolerance < 0.5 * dwell:
-        raise ValueError(f"tolerance is {tolerance}, expected s below half the dwell")
     if not margin >= 0.0:
         raise ValueError(f"margin is {margin}, expected s from 0")
     if log.ndim != 1:
@@ -184,33 +250,34 @@ def _checked(
     duration = len(log) / rate
     if duration < 2.0 * dwell - 1.0 / rate:
         raise ValueError(f"the log lasts {duration:g} s, less than two dwells of {dwell:g} s")
-    return Plan(dwell, start, turning, tolerance, margin, duration)
+    tolerance = max(0.1 * dwell, min(2.0, 0.2 * dwell))
+    return TurnSchedule(dwell, start, turning, tolerance, margin, duration)
 
 
 def _seen(
-    blocks: Blocks, log: Array, rate: float, dwell: float, model: NoiseModel | None
+    blocks: LevelBlocks, log: Array, rate: float, dwell: float, model: NoiseModel | None
 ) -> list[Event]:
     """Return transients and steps in order of time, the greater where both are near."""
-    found = transients(blocks, log, rate)
+    events = transients(blocks, log, rate)
     near = max(3.0, 0.1 * dwell)
     for step in steps(blocks, dwell, model, rate):
-        beside = [e for e in found if e.start - near < step.time < e.stop + near]
+        beside = [e for e in events if e.start - near < step.time < e.stop + near]
         # The level follows a step at once, but for the blocks in which it comes about.
         greater = [e for e in beside if e.kind == "transient" and e.peak > 1.5 * step.peak]
         if all(event.haste for event in greater):
-            found = [e for e in found if e not in beside or e in greater]
-            found.append(step)
-    return sorted(found, key=lambda event: event.time)
+            events = [e for e in events if e not in beside or e in greater]
+            events.append(step)
+    return sorted(events, key=lambda event: event.time)
 
 
 def _by_column(
-    position: Array, log: Array, rate: float, events: list[Event], plan: Plan
+    position: Array, log: Array, rate: float, events: list[Event], schedule: TurnSchedule
 ) -> tuple[list[Turn], list[tuple[float, float]], int | None, list[str]]:
     if np.shape(position) != np.shape(log):
         raise ValueError(
             f"the position has the shape {np.shape(position)}, the log {np.shape(log)}"
         )
-    found = stays(np.asarray(position, dtype=np.float64), rate, 0.1 * plan.dwell)
+    found = stays(np.asarray(position, dtype=np.float64), rate, 0.1 * schedule.dwell)
     turns, used = [], set()
     for stop, start in zip(found.stop[:-1], found.start[1:], strict=True):
         first, last, peak = float(stop), float(start), None
@@ -221,7 +288,7 @@ def _by_column(
                 peak = max(peak or 0.0, event.peak)
                 used.add(k)
         time = 0.5 * float(stop + start)
-        turns.append(Turn(first - plan.margin, last + plan.margin, time, "column", peak))
+        turns.append(Turn(first - schedule.margin, last + schedule.margin, time, "column", peak))
     doubts = ["the column is in neither position for long: more than two?"] if found.away else []
     rest = [e for k, e in enumerate(events) if k not in used and e.kind == "transient"]
     sense = (1 if found.high[0] else -1) if found.senses else None
@@ -244,49 +311,45 @@ def _lone(
 
 
 def _stretches(
-    turns: Sequence[Turn], knocks: Sequence[tuple[float, float]], plan: Plan
+    turns: Sequence[Turn], knocks: Sequence[tuple[float, float]], schedule: TurnSchedule
 ) -> tuple[list[tuple[float, float]], list[str]]:
     """Return start and stop of the dwells between turns; handling at the ends is cut off."""
-    edge = EDGE * plan.dwell
+    edge = EDGE * schedule.dwell
     first = max((stop for _, stop in knocks if stop < min(edge, turns[0].start)), default=0.0)
-    late = max(plan.duration - edge, turns[-1].stop)
-    last = min((start for start, _ in knocks if start > late), default=plan.duration)
+    late = max(schedule.duration - edge, turns[-1].stop)
+    last = min((start for start, _ in knocks if start > late), default=schedule.duration)
     starts = [first, *(turn.stop for turn in turns)]
     stops = [*(turn.start for turn in turns), last]
     stretches = [(start, max(start, stop)) for start, stop in zip(starts, stops, strict=True)]
-    short = sum(stop - start < 0.1 * plan.dwell for start, stop in stretches)
-    doubts = [f"{short} dwells are shorter than a tenth of {plan.dwell:g} s"] if short else []
+    short = sum(stop - start < 0.1 * schedule.dwell for start, stop in stretches)
+    doubts = [f"{short} dwells are shorter than a tenth of {schedule.dwell:g} s"] if short else []
     return stretches, doubts
 
 
-def _first_sense(
-    given: int | None, column: int | None, by_rate: bool, z: float
-) -> tuple[int, list[str]]:
+def _first_sense(stated: int | None, column: int | None) -> tuple[int, list[str]]:
     """Return the sense of the first dwell, and what to doubt about it."""
     if column is not None:
-        if given not in (None, column):
-            return column, [f"the first sense is {column:+d} by the column, {given:+d} was given"]
+        if stated not in (None, column):
+            return column, [f"the first sense is {column:+d} by the column, {stated:+d} was given"]
         return column, []
-    if given is not None:
-        return given, []
-    if by_rate:
-        doubts = ["the sign of the Earth's rate chose the senses: that of an estimate says nothing"]
-        if abs(z) < ALTERNATES:
-            doubts.append(f"it chose on {abs(z):.1f} standard errors")
-        return (1 if z >= 0.0 else -1), doubts
+    if stated is not None:
+        return stated, []
     return 1, ["the sense of the first dwell is assumed: all may be the other way round"]
 
 
 def _dwells(
-    stretches: Sequence[tuple[float, float]], turns: Sequence[Turn], first: int, plan: Plan
+    stretches: Sequence[tuple[float, float]],
+    turns: Sequence[Turn],
+    first: int,
+    schedule: TurnSchedule,
 ) -> list[FoundDwell]:
     """Return the dwells with their senses; the sense goes on through one with no samples."""
     dwells = []
     for k, (start, stop) in enumerate(stretches):
         beside = turns[max(0, k - 1) : k + 1]
         doubts = [word for turn in beside for word in turn.doubts]
-        if stop - start > 1.5 * plan.dwell:
-            doubts.append(f"it lasts {(stop - start) / plan.dwell:.1f} dwells: a missed turn?")
+        if stop - start > 1.5 * schedule.dwell:
+            doubts.append(f"it lasts {(stop - start) / schedule.dwell:.1f} dwells: a missed turn?")
         if stop <= start:
             continue
         by = max((turn.found_by for turn in beside), key=SURE.index)

@@ -76,10 +76,6 @@ class WindowCovariance:
     def of(self, model: NoiseModel) -> Array:
         """Return the covariance of the errors by lag in blocks, without what is deterministic.
 
-        Parameters
-        ----------
-        model : NoiseModel
-
         Returns
         -------
         ndarray, shape (lags,)
@@ -104,10 +100,6 @@ class WindowCovariance:
         model : NoiseModel
         errors : Errors
             Of the log: which windows there are.
-
-        Returns
-        -------
-        Spread
         """
         covariance, share = self.of(model), _twofold(errors.pairs) / errors.count**2
         mean, variance = float(covariance[0]), 2.0 * float(share @ covariance**2)

@@ -7,9 +7,8 @@ from typing import Any
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.estimators.estimate import Estimate
-from imubench_pipeline.navigation.backtest.block_means import block_means
 from imubench_pipeline.navigation.backtest.comparison import Comparison, DeadReckoning, compare
-from imubench_pipeline.navigation.backtest.windows import window
+from imubench_pipeline.navigation.backtest.windows import block_means, window
 from imubench_pipeline.navigation.error_budget import draw_models, drawn_jointly
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.recordings.recording import ChannelLog

@@ -1,7 +1,7 @@
 """What a noise model means for navigation: errors of dead reckoning, by what they come of."""
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.navigation.error_budget.budget import Levelled, Start, budget
+from imubench_pipeline.navigation.error_budget.budget import Levelled, Start, budget, time_until
 from imubench_pipeline.navigation.error_budget.gyrocompass import Gyrocompass
 from imubench_pipeline.navigation.error_budget.in_use import (
     NO_FIGURES,
@@ -17,7 +17,6 @@ from imubench_pipeline.navigation.error_budget.uncertainty import (
     drawn_jointly,
     interval,
 )
-from imubench_pipeline.navigation.error_budget.until import time_until
 from imubench_pipeline.noise.growth import Calibrated, Uncalibrated
 
 __all__ = [

@@ -190,14 +190,7 @@ def of_squared_rise(order: int, time: float, over: float) -> float:
 
     2 (c''(t) - c''(t - T) - T c'(t - T)) / T^2, with c' and c'' of ``order + 1`` and ``order + 2``.
 
-    Parameters
-    ----------
-    order : int
-        m: integrations but one.
-    time : float
-        t, s.
-    over : float
-        T, s.
+    Its parameters are those of `of_rise`.
     """
     later = of_constant(order + 1, max(time - over, 0.0))
     return 2.0 * (of_pulse(order + 2, time, over) - over * later) / over**2

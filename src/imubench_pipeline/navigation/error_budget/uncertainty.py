@@ -58,10 +58,6 @@ def chance_within(limit: float, budgets: Sequence[Budget]) -> float:
     budgets : sequence of Budget
         As `interval` takes them.
 
-    Returns
-    -------
-    float
-
     References
     ----------
     B. W. Silverman, "Density estimation for statistics and data analysis", 1986, eq. 3.31.
@@ -91,12 +87,6 @@ def draw_models(estimate: Estimate, draws: int, rng: np.random.Generator) -> lis
     half-normal from 0 with that as its 95 % point. A ramp, which has a sign, is normal on either
     side. What has no limits stays as it is.
 
-    Parameters
-    ----------
-    estimate : Estimate
-    draws : int
-    rng : numpy.random.Generator
-
     Returns
     -------
     list of NoiseModel
@@ -110,12 +100,7 @@ def draw_models(estimate: Estimate, draws: int, rng: np.random.Generator) -> lis
 
 
 def drawn_jointly(estimate: Estimate) -> bool:
-    """Tell whether `draw_models` draws the parameters of an estimate together.
-
-    Parameters
-    ----------
-    estimate : Estimate
-    """
+    """Tell whether `draw_models` draws the parameters of an estimate together."""
     return estimate.draws is not None
 
 

@@ -149,10 +149,6 @@ class Board:
         correlation : mapping of str to float, optional
             Part of the variance of N, B, K and R that is common to all, 0 to 1; by default none.
 
-        Returns
-        -------
-        Board
-
         Raises
         ------
         ValueError
@@ -191,10 +187,6 @@ class Board:
         ----------
         tau : array_like, shape (m,)
             s; taken to the nearest whole number of fused samples, at least one.
-
-        Returns
-        -------
-        Parts
         """
         t = np.atleast_1d(np.asarray(tau, dtype=np.float64))
         t = np.maximum(np.rint(t * self.rate), 1.0) / self.rate
@@ -209,10 +201,6 @@ class Board:
         ----------
         omega : array_like, shape (m,)
             rad a fused sample, above 0.
-
-        Returns
-        -------
-        Parts
         """
         w = np.atleast_1d(np.asarray(omega, dtype=np.float64))
         found: dict[tuple[int, int], Array] = {}  # specimens of one sensor have one spectrum
@@ -298,14 +286,5 @@ def block_mean_spectrum(model: NoiseModel, omega: Array, rate: float, size: int)
 
 
 def stochastic(model: NoiseModel) -> NoiseModel:
-    """Return a model without its ramp and its lines, which have no spectrum.
-
-    Parameters
-    ----------
-    model : NoiseModel
-
-    Returns
-    -------
-    NoiseModel
-    """
+    """Return a model without its ramp and its lines, which have no spectrum."""
     return replace(model, R=0.0, sinusoids=())

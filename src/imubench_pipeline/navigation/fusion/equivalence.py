@@ -80,7 +80,7 @@ class TemperaturePart:
 
 
 @dataclass(frozen=True)
-class Candidate:
+class FusionChannel:
     """A channel that may answer for its sensor.
 
     Attributes
@@ -159,7 +159,7 @@ class Answer:
 
     Attributes
     ----------
-    candidate : Candidate
+    candidate : FusionChannel
         The channel that answers.
     own, common : float
         Allan variance of one specimen without the common part, and this, SI.
@@ -169,7 +169,7 @@ class Answer:
         The parameters that matter and are not known: there is no plain number.
     """
 
-    candidate: Candidate
+    candidate: FusionChannel
     own: float
     common: float
     drawn_own: Array
@@ -179,7 +179,7 @@ class Answer:
 
 def answer(
     sensor: str,
-    candidates: Sequence[Candidate],
+    candidates: Sequence[FusionChannel],
     tau: float,
     correlation: Mapping[str, float],
     *,
@@ -192,7 +192,7 @@ def answer(
     Parameters
     ----------
     sensor : str
-    candidates : sequence of Candidate
+    candidates : sequence of FusionChannel
         All channels of one quantity of the sensor, at least one; where some are measured,
         simulated ones are left out. Of two the worse one is the median.
     tau : float
@@ -239,7 +239,7 @@ def _parts(
 
 
 def equivalence_rows(
-    candidates: Iterable[Candidate],
+    candidates: Iterable[FusionChannel],
     taus: Sequence[float],
     correlation: Mapping[str, float],
     *,
@@ -251,7 +251,7 @@ def equivalence_rows(
 
     Parameters
     ----------
-    candidates : iterable of Candidate
+    candidates : iterable of FusionChannel
         The channels of all sensors.
     taus : sequence of float
         s.

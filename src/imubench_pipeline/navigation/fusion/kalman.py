@@ -1,4 +1,7 @@
-"""The Kalman filter that fuses the samples of a board's sensors: weights by frequency, causal."""
+"""The Kalman filter that fuses the samples of a board's sensors: weights by frequency, causal.
+
+Its steady state is found by doubling (`steady_covariance`).
+"""
 
 from __future__ import annotations
 
@@ -12,10 +15,14 @@ from scipy.linalg import block_diag, schur
 from scipy.sparse import csr_array
 
 from imubench_pipeline.navigation.fusion.board import Board, stochastic
-from imubench_pipeline.navigation.fusion.riccati import steady_covariance
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, bias_instability
 from imubench_pipeline.noise.block_means import of_block_means
 from imubench_pipeline.typing import Array
+
+_MOST_DOUBLINGS = 80
+_CONVERGED = 1e-13
+"""Relative change of the covariance in a doubling that ends the search."""
+
 
 _LONGEST = 1e5
 """Tau in s up to which the filter follows flicker noise, where nothing else is asked."""
@@ -26,6 +33,60 @@ _WALK = 100.0
 A walk that all sensors have in common cannot be seen in their differences and would have no steady
 state. It does not matter what the filter thinks of it: it goes with the signal.
 """
+
+
+def steady_covariance(transition: Array, process_noise: Array, information: Array) -> Array:
+    """Return the steady covariance of the prediction of a Kalman filter.
+
+    The solution of the discrete algebraic Riccati equation
+
+        P = Phi P (I + G P)^-1 Phi^T + Q,    G = H^T R^-1 H,
+
+    by the structure-preserving doubling algorithm: k doublings are 2^k steps of the filter from
+    a known state. It takes the information G of one sample, not H and R, so that measurements of
+    which a combination says nothing (G singular) need no choice of differences; and it does not
+    suffer from eigenvalues near 1, of which slow Gauss-Markov processes have many.
+
+    Parameters
+    ----------
+    transition, process_noise, information : ndarray, shape (m, m)
+        Phi, Q_d and G. Processes that are not seen must be stable.
+
+    Returns
+    -------
+    ndarray, shape (m, m)
+        P, before the measurement of a sample.
+
+    Raises
+    ------
+    ValueError
+        If it does not converge.
+
+    References
+    ----------
+    B. D. O. Anderson, "Second-order convergent algorithms for the steady-state Riccati
+    equation", International Journal of Control 28(2), 1978; E. K.-W. Chu et al., "A
+    structure-preserving doubling algorithm for periodic discrete-time algebraic Riccati
+    equations", International Journal of Control 77(8), 2004.
+    """
+    scale = np.sqrt(np.max(np.diag(process_noise), initial=0.0)) or 1.0
+    a = transition
+    g = information * scale**2
+    p = process_noise / scale**2
+    one = np.eye(len(transition))
+    for _ in range(_MOST_DOUBLINGS):
+        inner = np.linalg.solve((one + p @ g).T, np.column_stack((a.T, g))).T
+        # a (I + P G)^-1 and g (I + P G)^-1
+        through, seen = inner[: len(a)], inner[len(a) :]
+        grown = p + through @ p @ a.T
+        g = g + a.T @ seen @ a
+        a = through @ a
+        grown, g = (grown + grown.T) / 2.0, (g + g.T) / 2.0
+        change = np.max(np.abs(grown - p), initial=0.0) / np.max(np.abs(grown), initial=1e-300)
+        p = grown
+        if change < _CONVERGED:
+            return np.asarray(p * scale**2)
+    raise ValueError("the filter has no steady state: a process that grows is not seen")
 
 
 class KalmanFusion:
@@ -51,8 +112,6 @@ class KalmanFusion:
     ----------
     board : Board
         Every sensor needs white noise.
-    longest : float
-        Tau up to which flicker noise and random walks are followed, s.
 
     Raises
     ------
@@ -60,9 +119,9 @@ class KalmanFusion:
         If a sensor has no white noise.
     """
 
-    def __init__(self, board: Board, longest: float = _LONGEST) -> None:
+    def __init__(self, board: Board) -> None:
         self.sensors = board.sensors
-        space = _space(board, longest)
+        space = _space(board)
         if not np.all(np.diag(space.white) > 0.0):
             raise ValueError("a filter needs white noise, N, of every sensor")
         inverse = _without_common(space.white)
@@ -160,7 +219,7 @@ class _Space:
     white: Array
 
 
-def _space(board: Board, longest: float) -> _Space:
+def _space(board: Board) -> _Space:
     spaces, outputs = [], []
     white = np.zeros((board.sensors, board.sensors))
     members = [
@@ -168,7 +227,7 @@ def _space(board: Board, longest: float) -> _Space:
         *((one.model, board.rate, 1, np.asarray(one.sensitivity)) for one in board.shared),
     ]
     for model, rate, size, gains in members:
-        space = of_block_means(_steady(model, longest).state_space(rate, longest), size)
+        space = of_block_means(_steady(model).state_space(rate, _LONGEST), size)
         spaces.append(space)
         outputs.append(np.outer(gains, space.output))
         white += space.measurement_noise * np.outer(gains, gains)
@@ -180,12 +239,12 @@ def _space(board: Board, longest: float) -> _Space:
     )
 
 
-def _steady(model: NoiseModel, longest: float) -> NoiseModel:
+def _steady(model: NoiseModel) -> NoiseModel:
     """Return a model without what is deterministic, its walk bound to 0 by a long time."""
     found = stochastic(model)
     if not found.K:
         return found
-    time = _WALK * longest
+    time = _WALK * _LONGEST
     walk = GaussMarkov(bias_instability(found.K**2, time), time)
     return replace(found, K=0.0, further=[*found.further, walk])
 

@@ -89,10 +89,6 @@ def equal(sensors: int) -> Constant:
     sensors : int
         From 1.
 
-    Returns
-    -------
-    Constant
-
     Raises
     ------
     ValueError
@@ -115,10 +111,6 @@ def best_constant(board: Board, tau: float | None = None) -> Constant:
     tau : float, optional
         s, taken to the nearest whole number of fused samples, at least one; without it the
         weights are the best for white noise, N^-2.
-
-    Returns
-    -------
-    Constant
 
     Raises
     ------

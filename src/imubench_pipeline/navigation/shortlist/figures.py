@@ -97,19 +97,19 @@ def figures_of(sensor: Sensor, quantity: str, ranges: MeasuredRanges) -> Figures
         if row.value is not None
     ]
     of = _NAMES[quantity]
-    said: list[str] = [f"{of}: any of {', '.join(options)}"] if options else []
+    assumed: list[str] = [f"{of}: any of {', '.join(options)}"] if options else []
     unknown: list[str] = []
 
     def filled(figure: str, statistic: str) -> Span | None:
         own = [row for row in printed if row.statistic == statistic]
         if own:
-            said.extend(f"{of} {figure}: {words}" for words in _readings(own))
+            assumed.extend(f"{of} {figure}: {words}" for words in _readings(own))
             return _ends(own)
         found = ranges.span(sensor.price_class, quantity, figure)
         if found is None:
             unknown.append(figure)
         else:
-            said.append(f"{of} {figure}: {found.low:.2g} to {found.high:.2g} SI, {found.words}")
+            assumed.append(f"{of} {figure}: {found.low:.2g} to {found.high:.2g} SI, {found.words}")
         return found
 
     if not any(row.statistic == "N" for row in printed):
@@ -118,28 +118,24 @@ def figures_of(sensor: Sensor, quantity: str, ranges: MeasuredRanges) -> Figures
     assert N is not None  # some is printed
     B = filled("B", "adev_minimum")
     if B is not None and not B.words:
-        said.append(f"{of} B: the printed figure at best, the minimum of the curve at worst")
+        assumed.append(f"{of} B: the printed figure at best, the minimum of the curve at worst")
         B = Span(B.low, B.high / FLOOR)
     K = filled("K", "K")
     T_B = filled("T_B", "T_B")
     if unknown:
-        said.append(f"{of} {', '.join(unknown)}: not published, and not measured of any sensor")
+        assumed.append(f"{of} {', '.join(unknown)}: not published, and not measured of any sensor")
         if B is not None and "T_B" in unknown:
-            said.append(f"{of} B: flicker noise, for want of a T_B")
+            assumed.append(f"{of} B: flicker noise, for want of a T_B")
     times: tuple[float | None, ...] = (None,)
     if T_B is not None:
         middle = math.sqrt(T_B.low * T_B.high)
         alone = (T_B.low, middle, T_B.high)
         times = alone if not T_B.words else (None, *alone)
-    return Figures(N, B, K, tuple(dict.fromkeys(times)), tuple(said))
+    return Figures(N, B, K, tuple(dict.fromkeys(times)), tuple(assumed))
 
 
 def printed_ranges(sensors: Mapping[str, Sensor]) -> dict[tuple[str, str], tuple[float, float]]:
     """Return the range of B that each datasheet of a catalogue allows.
-
-    Parameters
-    ----------
-    sensors : mapping of str to Sensor
 
     Returns
     -------
@@ -172,12 +168,12 @@ def _ends(rows: Sequence[Comparable]) -> Span:
 
 def _readings(rows: Sequence[Comparable]) -> list[str]:
     """Return what a printed figure leaves open, in words."""
-    said = []
+    readings = []
     if any("assumed" in (row.reason or "") for row in rows):
-        said.append("the side of the density is not stated: both")
+        readings.append("the side of the density is not stated: both")
     if all(row.figure is not None and row.figure.kind == "max" for row in rows):
-        said.append("a maximum alone is printed, the typical one may be better")
-    return said
+        readings.append("a maximum alone is printed, the typical one may be better")
+    return readings
 
 
 def _of_every_option(datasheet: Datasheet, quantity: str) -> tuple[Datasheet, list[str]]:

@@ -64,12 +64,7 @@ class _Point:
 
 
 def abilities(sensor: Sensor) -> Abilities:
-    """Return what the file of a sensor tells of what it has.
-
-    Parameters
-    ----------
-    sensor : Sensor
-    """
+    """Return what the file of a sensor tells of what it has."""
     quantities: tuple[Measured, ...] = ("gyro", "accel")
     found = {
         name: {
@@ -125,11 +120,6 @@ def _largest(datasheet: Datasheet, quantity: Measured, name: str) -> float | Non
 
 def judge(must: Must, has: Abilities) -> tuple[list[str], list[str]]:
     """Hold what a sensor has against what must be there.
-
-    Parameters
-    ----------
-    must : Must
-    has : Abilities
 
     Returns
     -------

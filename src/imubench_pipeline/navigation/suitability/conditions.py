@@ -104,12 +104,7 @@ class Rests:
         return cls(tuple(lacking), tuple(unknown), figures)
 
     def verdict(self, words: str) -> tuple[str, str | None]:
-        """Return a verdict on the known errors with what it rests on, and the latter in words.
-
-        Parameters
-        ----------
-        words : str
-        """
+        """Return a verdict on the known errors with what it rests on, and the latter in words."""
         if self.lacking:
             return EXCLUDED, "; ".join(self.lacking)
         said = list(self._conditions())
@@ -161,12 +156,7 @@ def _measured(row: Row) -> str:
 
 
 def is_condition(row: Row) -> bool:
-    """Tell whether a limit rests on the figure of a source, a row of the table ``error_budget``.
-
-    Parameters
-    ----------
-    row : mapping
-    """
+    """Tell whether a limit rests on the figure of a source, a row of the table ``error_budget``."""
     return row["largest_unit"] is not None
 
 

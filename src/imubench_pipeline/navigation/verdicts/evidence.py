@@ -3,6 +3,8 @@
 A verdict says how sure a figure is if its log is what it seems. Evidence says how far the logs
 carry: how long they are, of how many specimens and axes, and what is doubted of the parameter that
 makes most of the error (`imubench_pipeline.recordings.fitness` says what is doubted of a log).
+
+What a contribution to an error comes of, quantity and noise parameter, is told by its name.
 """
 
 from __future__ import annotations
@@ -12,12 +14,24 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import Literal, get_args
 
+from imubench_pipeline.estimators.estimate import CURVE
 from imubench_pipeline.navigation.verdicts.basis import Basis
-from imubench_pipeline.navigation.verdicts.sources import parameters_behind, quantity_behind
 from imubench_pipeline.navigation.verdicts.standing import Standing
+from imubench_pipeline.noise import TERMS, Term
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si
+
+
+def _behind(kind: type[Term]) -> frozenset[str]:
+    symbols = frozenset(parameter.symbol for parameter in kind.parameters)
+    return symbols | frozenset(CURVE) if "B" in symbols else symbols
+
+
+_PARAMETERS = {kind.word: _behind(kind) for kind in TERMS}
+"""Parameters behind the first word of a term's name (`Term.source`); the lowest part of the curve
+is what its bias instability makes of it."""
+
 
 Reason = Literal["one_specimen", "short_log", "wide_interval", "few_axes"]
 """What makes evidence weak; beside these, the codes of doubts."""
@@ -29,6 +43,33 @@ LONGEST_PART = 1 / 9
 8 differences of clusters end to end, and is known to about a quarter."""
 
 _AXES = 3
+
+
+def quantity_behind(source: str) -> str | None:
+    """Return gyro or accel where a source is noise of one that the log tells; else None.
+
+    Parameters
+    ----------
+    source : str
+        As in the table ``error_budget``: ``gyro N``, ``initial tilt by accel GM 89.5 s``. A
+        turn-on bias is stated, and not of the log.
+    """
+    words = source.removeprefix("initial tilt by ").split()
+    noise = len(words) > 1 and words[0] in ("gyro", "accel") and words[1] in _PARAMETERS
+    return words[0] if noise else None
+
+
+def parameters_behind(source: str) -> frozenset[str]:
+    """Return the noise parameters that a source comes of; none where it is no noise of the log.
+
+    Parameters
+    ----------
+    source : str
+        As in `quantity_behind`.
+    """
+    if quantity_behind(source) is None:
+        return frozenset()
+    return _PARAMETERS[source.removeprefix("initial tilt by ").split()[1]]
 
 
 def weaknesses(standing: Standing, requirement: Requirement, basis: Basis) -> list[str]:

@@ -136,7 +136,7 @@ def judgements(
                     Abilities.model_validate(sensors[sensor].get("abilities", {})),
                     [row for each in found for row in each.conditions],
                 ),
-                unless(sensor, rows, one, basis),
+                unless(sensor, rows, basis),
             )
 
 

@@ -17,7 +17,7 @@ from scipy.special import ndtr
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.navigation.verdicts.basis import Basis
-from imubench_pipeline.navigation.verdicts.sources import quantity_behind
+from imubench_pipeline.navigation.verdicts.evidence import quantity_behind
 from imubench_pipeline.navigation.verdicts.standing import Standing, deciding, limit_of, standings
 from imubench_pipeline.typing import Row
 
@@ -62,7 +62,7 @@ class Unless:
     doubts: Mapping[tuple[str, str], str]
 
 
-def unless(sensor: str, rows: Sequence[Row], found: Standing, basis: Basis) -> Unless | None:
+def unless(sensor: str, rows: Sequence[Row], basis: Basis) -> Unless | None:
     """Return what the verdict on a sensor would be if what is doubted were mended.
 
     Parameters
@@ -70,8 +70,6 @@ def unless(sensor: str, rows: Sequence[Row], found: Standing, basis: Basis) -> U
     sensor : str
     rows : sequence of mapping
         Of the table ``error_budget``, of one requirement, with the figures of all recordings.
-    found : Standing
-        The limit that decides.
     basis : Basis
 
     Returns
@@ -95,9 +93,9 @@ def unless(sensor: str, rows: Sequence[Row], found: Standing, basis: Basis) -> U
         mended = None
     if not logged.known or (mended is None and not unjudged):
         return None
-    said = {key: basis.doubted(key) for key in (doubted or apart)}
+    doubts = {key: basis.doubted(key) for key in (doubted or apart)}
     together = {name: f for one in factors.values() for name, f in one.items()}
-    return Unless(logged if unjudged else None, mended, together, said)
+    return Unless(logged if unjudged else None, mended, together, doubts)
 
 
 def _mended(rows: Iterable[Row], factors: Mapping[tuple[str, str], Factors]) -> Iterator[Row]:
@@ -150,12 +148,7 @@ def _within(total: Row) -> float | None:
 
 
 def unless_words(found: Unless) -> str:
-    """Return in words what the verdict would be.
-
-    Parameters
-    ----------
-    found : Unless
-    """
+    """Return in words what the verdict would be."""
     parts = []
     if found.logged is not None:
         parts.append(f"as logged it {_outcome(found.logged)}")

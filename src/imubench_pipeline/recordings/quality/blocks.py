@@ -16,7 +16,7 @@ _MANY = 1 << 15
 
 
 @dataclass(frozen=True)
-class Blocks:
+class BlockStatistics:
     """Statistics of consecutive blocks of records.
 
     Attributes
@@ -65,11 +65,11 @@ class Gathering:
             self._number, self._size = _MANY, 2 * self._size
         self._waiting = fresh.copy()
 
-    def blocks(self, last: Array) -> Blocks:
+    def blocks(self, last: Array) -> BlockStatistics:
         """Return all blocks; ``last``, shape (n, 5), are those that were not added yet."""
         fresh = np.concatenate([self._waiting, last])
         rows = np.concatenate([*self._rows, _united(fresh, self._size // FIRST_SIZE)])
-        return Blocks(self._size, *(np.ascontiguousarray(column) for column in rows.T))
+        return BlockStatistics(self._size, *(np.ascontiguousarray(column) for column in rows.T))
 
 
 def _united(rows: Array, together: int) -> Array:

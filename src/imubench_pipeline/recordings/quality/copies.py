@@ -1,9 +1,15 @@
-"""Samples that are there twice: a channel in another one, a stretch of a log further on in it."""
+"""Samples that are there twice: a channel in another one, a stretch of a log further on in it.
+
+So are those of recordings of a sensor that are one log, which lies in its folder twice. Such a copy
+counts as another specimen, with no spread between the two. The likelihood of a channel
+and its mean are those of its samples: to nine digits they are the same of no other log.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +18,7 @@ from imubench_pipeline.recordings.quality.excerpts import Excerpt, together
 from imubench_pipeline.recordings.quality.repeats import WINDOW, Stretch
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
 from imubench_pipeline.tables.findings import Finding
-from imubench_pipeline.typing import Array
+from imubench_pipeline.typing import Array, Row
 
 _FEWEST = 64
 """Increments of a piece that must not be 0."""
@@ -32,6 +38,9 @@ walks and low-passed noise in steps of 0.01 to 8 sigma not one window of 64 (24 
 
 _TWICE = 0.1
 """Part of the samples that occurred before from which the log is no record of a noise."""
+
+
+_DIGITS = ".8e"
 
 
 def copied_channels(columns: Mapping[str, ColumnSummary]) -> Iterator[Finding]:
@@ -156,3 +165,38 @@ def _repeated(channel: str | None, stretches: list[Stretch], present: int, rate:
         return Finding("log_twice", "warning", detail, total, channel, begin, end)
     detail += "; find what wrote them twice (a buffer, a paste), or use a part without them"
     return Finding("repeated_stretch", "warning", detail, total, channel, begin, end)
+
+
+def recorded_twice(models: Iterable[Row], biases: Iterable[Row]) -> Iterator[Row]:
+    """Yield the rows of the table ``findings`` about recordings that another one holds, too.
+
+    Parameters
+    ----------
+    models, biases : iterable of mapping
+        Rows of the tables ``models`` and ``fixed_bias``, in the order of the recordings. The first
+        of several copies is taken for the log.
+    """
+    means = {_place(row): row["value"] for row in biases}
+    first: dict[tuple[Any, ...], str] = {}
+    copies: dict[tuple[str, str], dict[str, list[str]]] = {}
+    for row in models:
+        mean = means.get(_place(row))
+        if not row["chosen"] or row["log_likelihood"] is None or mean is None:
+            continue
+        samples = format(row["log_likelihood"], _DIGITS), format(mean, _DIGITS)
+        sensor, recording, channel = _place(row)
+        of = first.setdefault((sensor, channel, *samples), recording)
+        if of != recording:
+            copies.setdefault((sensor, recording), {}).setdefault(of, []).append(channel)
+    for (sensor, recording), found in copies.items():
+        for of, channels in found.items():
+            detail = (
+                f"{recording} has the samples of {of} ({', '.join(channels)}): one log lies in the "
+                "folder of the sensor twice, and would count as two; remove one of them"
+            )
+            finding = Finding("recording_twice", "warning", detail, float(len(channels)))
+            yield finding.row(sensor, recording)
+
+
+def _place(row: Row) -> tuple[str, str, str]:
+    return row["sensor"], row["recording"], row["channel"]

@@ -44,12 +44,7 @@ class Held:
 
 
 def held(pieces: list[Excerpt]) -> Held | None:
-    """Return at which distance samples repeat the one before; None where by chance alone.
-
-    Parameters
-    ----------
-    pieces : list of Excerpt
-    """
+    """Return at which distance samples repeat the one before; None where by chance alone."""
     whole = [piece.values for piece in pieces if len(piece.values) >= PIECE // 4]
     whole = whole[:: max(1, len(whole) // _PIECES)][:_PIECES]
     found: list[Held] = []
@@ -98,13 +93,7 @@ def _fold(repeats: NDArray[np.int64], counts: NDArray[np.int64]) -> None:
 
 
 def held_samples(channel: str, column: ColumnSummary) -> Iterator[Finding]:
-    """Yield whether every n-th sample of a channel repeats the one before.
-
-    Parameters
-    ----------
-    channel : str
-    column : ColumnSummary
-    """
+    """Yield whether every n-th sample of a channel repeats the one before."""
     if column.repeats < column.present / (2 * _LONGEST):
         return
     found = held(column.excerpts())

@@ -148,10 +148,6 @@ def _registers(
 def register_of(pieces: Sequence[Excerpt]) -> tuple[float, float] | None:
     """Return the step of a register, and what it would be by chance without one; None: untold.
 
-    Parameters
-    ----------
-    pieces : sequence of Excerpt
-
     Returns
     -------
     (step, seen) or None
@@ -185,13 +181,7 @@ def _differ(one: tuple[float, float] | None, other: tuple[float, float] | None) 
 
 
 def interleaved(channel: str, column: ColumnSummary) -> Iterator[Finding]:
-    """Yield whether every other sample is of another sensor.
-
-    Parameters
-    ----------
-    channel : str
-    column : ColumnSummary
-    """
+    """Yield whether every other sample is of another sensor."""
     levels, noises, units, sizes = [], [], [], []
     pieces = [piece for piece in column.excerpts() if len(piece.values) >= PIECE // 4]
     for piece in pieces:

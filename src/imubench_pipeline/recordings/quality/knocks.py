@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.recordings.quality.blocks import Blocks
+from imubench_pipeline.recordings.quality.blocks import BlockStatistics
 from imubench_pipeline.typing import Array
 
 _NEIGHBOURS = 16
@@ -50,13 +50,13 @@ class Knock:
 
 
 def suspects(
-    blocks: Blocks, sigmas: float, step: float | None = None
+    blocks: BlockStatistics, sigmas: float, step: float | None = None
 ) -> tuple[NDArray[np.int64], Array, Array]:
     """Return the blocks that hold an outlier, with the level and the noise around them.
 
     Parameters
     ----------
-    blocks : Blocks
+    blocks : BlockStatistics
     sigmas : float
         Distance from the level that counts, in standard deviations of the samples.
     step : float or None
@@ -94,7 +94,7 @@ def suspects(
 
 def knocks(
     pieces: Iterable[Array],
-    blocks: Blocks,
+    blocks: BlockStatistics,
     sigmas: float,
     longest: int,
     step: float | None = None,
@@ -105,7 +105,7 @@ def knocks(
     ----------
     pieces : iterable of ndarray
         The column in order, SI; NaN where a sample is missing.
-    blocks : Blocks
+    blocks : BlockStatistics
         Of the same column.
     sigmas : float
         As `suspects` takes it.

@@ -155,11 +155,7 @@ def density_of(column: ColumnSummary, rate: float) -> tuple[float, float | None]
     The spread within blocks over √rate is too small behind a low-pass, the Allan deviation of the
     block means times √τ too large where slow noise reaches τ, and both where it is of a register.
 
-    Parameters
-    ----------
-    column : ColumnSummary
-    rate : float
-        Hz.
+    `column` and `rate`: as of `kept_level`.
 
     Returns
     -------

@@ -51,10 +51,6 @@ _ENOUGH = 8
 def hidden_step(pieces: Sequence[Excerpt]) -> float | None:
     """Return the least significant bit of a register whose values were rounded again.
 
-    Parameters
-    ----------
-    pieces : sequence of Excerpt
-
     Returns
     -------
     float or None

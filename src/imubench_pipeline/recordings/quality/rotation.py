@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imubench_pipeline.recordings.quality.blocks import Blocks
+from imubench_pipeline.recordings.quality.blocks import BlockStatistics
 from imubench_pipeline.typing import Array
 
 _QUARTERS = 4
@@ -41,7 +41,7 @@ class GravityTurn:
     swept: float
 
 
-def gravity_turn(axes: Sequence[Blocks], rate: float) -> GravityTurn | None:
+def gravity_turn(axes: Sequence[BlockStatistics], rate: float) -> GravityTurn | None:
     """Return the steady turn that block means of an accelerometer show; None: there is none.
 
     In the frame of a sensor that turns with ω, gravity changes by dg/dt = -ω × g. A block mean is
@@ -51,7 +51,7 @@ def gravity_turn(axes: Sequence[Blocks], rate: float) -> GravityTurn | None:
 
     Parameters
     ----------
-    axes : sequence of Blocks
+    axes : sequence of BlockStatistics
         Of x, y and z, SI, over the same records.
     rate : float
         Of the samples, Hz.

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imubench_pipeline.recordings.quality.blocks import Blocks
+from imubench_pipeline.recordings.quality.blocks import BlockStatistics
 from imubench_pipeline.typing import Array
 
 _PARTS = 20
@@ -66,12 +66,12 @@ class WarmUp:
     usual: float
 
 
-def steps(blocks: Blocks, sigmas: float) -> list[Step]:
+def steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
     """Find sudden changes of the mean.
 
     Parameters
     ----------
-    blocks : Blocks
+    blocks : BlockStatistics
     sigmas : float
         How far a step lies out of the others, in their robust standard deviations.
     """
@@ -100,12 +100,12 @@ def steps(blocks: Blocks, sigmas: float) -> list[Step]:
     return found
 
 
-def warm_up(blocks: Blocks, times: float) -> WarmUp | None:
+def warm_up(blocks: BlockStatistics, times: float) -> WarmUp | None:
     """Find a beginning that drifts more than the rest.
 
     Parameters
     ----------
-    blocks : Blocks
+    blocks : BlockStatistics
     times : float
         How many times the median drift of a part counts.
     """
@@ -129,7 +129,7 @@ def warm_up(blocks: Blocks, times: float) -> WarmUp | None:
     return WarmUp(end * size * blocks.size, drift, usual)
 
 
-def variance_change(blocks: Blocks) -> tuple[float, int, int] | None:
+def variance_change(blocks: BlockStatistics) -> tuple[float, int, int] | None:
     """Return how many times the spread of the noisiest part is that of the calmest, and where.
 
     Returns
@@ -154,12 +154,12 @@ def variance_change(blocks: Blocks) -> tuple[float, int, int] | None:
     )
 
 
-def motions(blocks: Blocks, times: float) -> list[tuple[int, int]]:
+def motions(blocks: BlockStatistics, times: float) -> list[tuple[int, int]]:
     """Return where the spread is many times the usual, and not for a knock.
 
     Parameters
     ----------
-    blocks : Blocks
+    blocks : BlockStatistics
     times : float
         Times the median spread that count as motion.
 
@@ -179,7 +179,7 @@ def motions(blocks: Blocks, times: float) -> list[tuple[int, int]]:
     return [(int(group[0]) * blocks.size, (int(group[-1]) + 1) * blocks.size) for group in groups]
 
 
-def _means(blocks: Blocks, size: int) -> Array:
+def _means(blocks: BlockStatistics, size: int) -> Array:
     """Return medians of the means of ``size`` blocks: one knock does not move them.
 
     The mean of a block of a few samples, such as the last one, is far off without any step.

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numba import njit
 
-from imubench_pipeline.recordings.quality.blocks import FIRST_SIZE, Blocks, Gathering
+from imubench_pipeline.recordings.quality.blocks import FIRST_SIZE, BlockStatistics, Gathering
 from imubench_pipeline.recordings.quality.excerpts import Excerpt, Excerpts
 from imubench_pipeline.recordings.quality.repeats import Repeats
 from imubench_pipeline.typing import Array
@@ -140,7 +140,7 @@ class ColumnSummary:
         """Return pieces of the column, evenly over all of it."""
         return self._excerpts.pieces()
 
-    def blocks(self) -> Blocks:
+    def blocks(self) -> BlockStatistics:
         """Return the statistics of the blocks, the last one as far as it goes."""
         return self._blocks.blocks(_closed(self._state))
 
