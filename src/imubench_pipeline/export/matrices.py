@@ -27,6 +27,7 @@ from scipy.linalg import block_diag
 from imubench_pipeline.export.comments import heading
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.mapping import named
+from imubench_pipeline.export.target import Target
 from imubench_pipeline.noise import (
     GaussMarkov,
     NoiseModel,
@@ -141,39 +142,39 @@ def write_json(imu: Imu) -> str:
         "inflation": imu.inflation,
     }
     for name, axis in imu.axes.items():
-        found = matrices(axis.model, imu.rate, imu.horizon)
+        of_axis = matrices(axis.model, imu.rate, imu.horizon)
         content[name] = {
             "model": axis.model.name,
             "unit": {"gyro": "rad/s", "accel": "m/s^2"}[name],
             "parameters": _parameters(axis.model),
             "density_bounded": list(axis.bounded) if axis.bounded else None,
-            "states": list(found.states),
+            "states": list(of_axis.states),
             "continuous": {
-                "F": found.F.tolist(),
-                "Q": found.Q.tolist(),
-                "H": found.H_continuous.tolist(),
-                "R": found.R,
+                "F": of_axis.F.tolist(),
+                "Q": of_axis.Q.tolist(),
+                "H": of_axis.H_continuous.tolist(),
+                "R": of_axis.R,
             },
             "discrete": {
-                "Phi": found.Phi.tolist(),
-                "Q_d": found.Q_d.tolist(),
-                "H": found.H.tolist(),
-                "R_d": found.R_d,
-                "x0": found.x0.tolist(),
-                "P0": found.P0.tolist(),
+                "Phi": of_axis.Phi.tolist(),
+                "Q_d": of_axis.Q_d.tolist(),
+                "H": of_axis.H.tolist(),
+                "R_d": of_axis.R_d,
+                "x0": of_axis.x0.tolist(),
+                "P0": of_axis.P0.tolist(),
             },
         }
     return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
 
 def _parameters(model: NoiseModel) -> dict[str, object]:
-    found: dict[str, object] = {name: getattr(model, name) for name in ("Q", "N", "B", "K", "R")}
-    found["T_B"] = model.T_B
-    found["further"] = [{"B": part.B, "T_B": part.T_B} for part in model.further]
-    found["sinusoids"] = [
+    figures: dict[str, object] = {name: getattr(model, name) for name in ("Q", "N", "B", "K", "R")}
+    figures["T_B"] = model.T_B
+    figures["further"] = [{"B": part.B, "T_B": part.T_B} for part in model.further]
+    figures["sinusoids"] = [
         {"amplitude": part.amplitude, "frequency": part.frequency} for part in model.sinusoids
     ]
-    return found
+    return figures
 
 
 def write_npz(imu: Imu) -> bytes:
@@ -185,12 +186,17 @@ def write_npz(imu: Imu) -> bytes:
     """
     arrays: dict[str, Array] = {"rate": np.array(imu.rate), "horizon": np.array(imu.horizon)}
     for name, axis in imu.axes.items():
-        found = matrices(axis.model, imu.rate, imu.horizon)
+        of_axis = matrices(axis.model, imu.rate, imu.horizon)
         if axis.bounded:
             arrays[f"{name}_density_bounded"] = np.array(axis.bounded)
         for key in ("F", "Q", "H_continuous", "R", "Phi", "Q_d", "H", "R_d", "x0", "P0"):
-            arrays[f"{name}_{key}"] = np.asarray(getattr(found, key))
+            arrays[f"{name}_{key}"] = np.asarray(getattr(of_axis, key))
     about = np.array(heading(imu, "any Kalman filter", _CONVENTION.format(rate=imu.rate)))
     stream = io.BytesIO()
     np.savez(stream, about=about, **arrays)  # type: ignore[arg-type]  # its stub takes a flag among the arrays
     return stream.getvalue()
+
+
+JSON = Target("json", "any: matrices as JSON", "noise.json", write_json, "N+GM+K")
+
+NPZ = Target("npz", "any: matrices as NumPy arrays", "noise.npz", write_npz, "N+GM+K")

@@ -11,6 +11,7 @@ from imubench_pipeline.export.comments import commented, heading, mapping_words
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.mapping import Mapped, named
 from imubench_pipeline.export.matrices import FOLLOWED
+from imubench_pipeline.export.target import Target
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, RandomWalk, WhiteNoise
 
 _CONVENTION = (
@@ -77,11 +78,11 @@ def write(imu: Imu) -> str:
     left_out: dict[str, Mapped] = {}
     for name, axis in imu.axes.items():
         model = axis.model
-        held = NoiseModel(N=model.N, B=model.B, T_B=model.T_B, K=model.K, further=model.further)
-        others = [term for term in model.terms if term not in held.terms]
+        reduced = NoiseModel(N=model.N, B=model.B, T_B=model.T_B, K=model.K, further=model.further)
+        others = [term for term in model.terms if term not in reduced.terms]
         if others:
-            left_out[name] = Mapped(held, [f"not held: {named(others)}"])
-        terms = held.realised(1.0 / imu.rate, max(FOLLOWED * imu.horizon, 4.0 / imu.rate))
+            left_out[name] = Mapped(reduced, [f"not held: {named(others)}"])
+        terms = reduced.realised(1.0 / imu.rate, max(FOLLOWED * imu.horizon, 4.0 / imu.rate))
         white = float(sum(t.N**2 for t in terms if isinstance(t, WhiteNoise)))
         walk = float(sum(t.K**2 for t in terms if isinstance(t, RandomWalk)))
         processes = [(float(t.density), float(t.T_B)) for t in terms if isinstance(t, GaussMarkov)]
@@ -96,3 +97,6 @@ def write(imu: Imu) -> str:
     return commented(about) + _PROGRAM.format(
         rate=float(imu.rate), horizon=float(imu.horizon), noise=entries
     )
+
+
+TARGET = Target("python", "Python with NumPy", "noise.py", write, "N+GM+K")
