@@ -13,9 +13,12 @@ from typing import Any
 import pytest
 
 from imubench_pipeline.estimators.estimate import Parameter
+from imubench_pipeline.report import made as made_page
 from imubench_pipeline.report import publish as publishing
 from imubench_pipeline.report import site as site_module
-from imubench_pipeline.report.publish import one_file, pages, publish, published
+from imubench_pipeline.report import theory
+from imubench_pipeline.report.pages import pages
+from imubench_pipeline.report.publish import one_file, publish, published
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.tables import build
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
@@ -50,12 +53,12 @@ PLOTTING = "var Plotly = {};"
 def _quick() -> Iterator[None]:
     """What is large and the same in every report is made by the tests of the command alone."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(publishing, "figure_text", lambda figure: THEORY_FIGURE)
-        patch.setattr(publishing, "theory_figure", lambda system: None)
+        patch.setattr(theory, "figure_text", lambda figure: THEORY_FIGURE)
+        patch.setattr(theory, "theory_figure", lambda system: None)
         patch.setattr(publishing, "get_plotlyjs", lambda: PLOTTING)
         patch.setattr(publishing, "source_digest", lambda *modules: "code")
         patch.setattr(publishing, "environment", cache(publishing.environment))
-        for module in (publishing, site_module):
+        for module in (made_page, site_module):
             patch.setattr(module, "version", cache(module.version))
         yield
 
