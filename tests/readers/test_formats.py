@@ -108,11 +108,11 @@ def test_a_format_that_is_declared_by_half_stops_the_import(left_out: str, tmp_p
         (source / "readers/formats/ubx.py").unlink()
     else:
         text = (source / "readers/formats/ubx.py").read_text()
-        (source / "readers/formats/imr.py").write_text(text)
+        (source / "readers/formats/other.py").write_text(text)
     command = [sys.executable, "-c", "import imubench_pipeline.readers"]
     done = subprocess.run(
         command, env={"PYTHONPATH": str(tmp_path)}, capture_output=True, text=True, check=False
     )
     assert done.returncode == 1
-    missing = "ubx" if left_out == "module" else "imr"
+    missing = "ubx" if left_out == "module" else "other"
     assert f"{missing}: a format of log files has a module in readers/formats" in done.stderr
