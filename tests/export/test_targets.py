@@ -30,9 +30,9 @@ def test_every_format_and_every_program_is_listed(capsys: pytest.CaptureFixture[
     assert main(["formats"]) == 0
     read, exported = capsys.readouterr().out.split("\n\n")
     for name, known in FILE_FORMATS.items():
-        (line,) = (one for one in read.splitlines() if one.split()[0] == name)
+        (line,) = (text for text in read.splitlines() if text.split()[0] == name)
         words = (known.title, *known.endings, *known.time_columns, *known.settings)
         assert all(word in line for word in words)
     for target in TARGETS.values():
-        (line,) = (one for one in exported.splitlines() if one.split()[0] == target.name)
+        (line,) = (text for text in exported.splitlines() if text.split()[0] == target.name)
         assert all(word in line for word in (target.program, target.file_name, target.family))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pkgutil
 from dataclasses import replace
 from importlib import import_module
+from pathlib import Path
 
 import pyarrow as pa
 import pytest
@@ -12,6 +13,7 @@ import pytest
 from imubench_pipeline import report
 from imubench_pipeline.report.html import environment
 from imubench_pipeline.report.pages import ENTRIES, pages
+from imubench_pipeline.report.publish import publish
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import BY_RECORDING
 from tests.report.tables import ROBOT, joined, recording_rows, rejected_rows, site
@@ -59,6 +61,14 @@ def test_a_page_reads_no_table_that_it_does_not_declare(entry: Entry, whole: Sit
     undeclared = tables.read - {*entry.tables, *of_recordings}
     assert not undeclared, "the page would not be written again when these change"
     environment(noting.system).get_template(page.template)
+
+
+def test_a_page_disappears_with_what_it_shows(whole: Site, tmp_path: Path) -> None:
+    publish(whole, tmp_path)
+    assert (tmp_path / "boards.html").is_file()
+    publish(replace(whole, settings={**whole.settings, "boards": {}}), tmp_path)
+    assert not (tmp_path / "boards.html").exists()
+    assert (tmp_path / "index.html").is_file()
 
 
 def test_every_page_that_a_module_declares_is_in_the_report(whole: Site) -> None:

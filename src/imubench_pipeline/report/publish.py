@@ -74,7 +74,7 @@ def publish(site: Site, folder: Path, say: Progress = lambda _: None) -> list[st
         if page.path not in kept:
             say(page.path)
             written += _put(folder, page.path, _rendered(site, templates, page))
-    for path in _pages_there(folder) - keys.keys():
+    for path in _pages_there(site, folder) - keys.keys():
         (folder / path).unlink()
     _put(folder, _SETTINGS, _text(site.settings))
     _put(folder, _KEYS, _text(keys))
@@ -96,9 +96,10 @@ def _keys(path: Path) -> dict[str, str]:
     return {page: str(key) for page, key in keys.items()}
 
 
-def _pages_there(folder: Path) -> set[str]:
-    """Return the pages of sensors, devices and recordings that lie in the report."""
-    files = (path for of in _FOLDERS for path in (folder / of).rglob("*.html"))
+def _pages_there(site: Site, folder: Path) -> set[str]:
+    """Return the pages that lie in the report, whether it still has them or not."""
+    files = [path for of in _FOLDERS for path in (folder / of).rglob("*.html")]
+    files += [path for entry in site.entries if (path := folder / entry.file).is_file()]
     return {path.relative_to(folder).as_posix() for path in files}
 
 
