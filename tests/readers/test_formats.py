@@ -88,7 +88,8 @@ def test_a_format_is_declared_in_full(file_format: FileFormat) -> None:
 
 def test_no_signature_hides_another() -> None:
     for known, other in permutations(FILE_FORMATS.values(), 2):
-        hidden = [mark for mark in other.signature.begins if mark.startswith(known.signature.begins)]
+        begins = known.signature.begins
+        hidden = [mark for mark in other.signature.begins if mark.startswith(begins)]
         assert not hidden, f"{other.name} is taken for {known.name}"
         marks, others = set(known.signature.within), set(other.signature.within)
         assert not marks or marks != others, f"{other.name} is taken for {known.name}"
