@@ -5,7 +5,8 @@ from typing import Any
 import pytest
 import yaml
 
-from imubench_pipeline.report.publish import pages, site_of
+from imubench_pipeline.report.pages import pages
+from imubench_pipeline.report.publish import site_of
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables import build

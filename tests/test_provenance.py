@@ -11,14 +11,17 @@ from imubench_pipeline.tables.provenance import source_digest
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A package of which `a` uses `b` and the package `sub`, and `c` nothing.
 
-    `sub.d` has texts, and imports `late` by its name.
+    `sub.d` has texts, and imports `late` and all of `many` by their names.
     """
     (tmp_path / "sub/texts").mkdir(parents=True)
+    (tmp_path / "many/inner").mkdir(parents=True)
+    for file in ("__init__.py", "any.py", "inner/__init__.py", "inner/deep.py"):
+        (tmp_path / "many" / file).write_text("w = 1\n")
     (tmp_path / "a.py").write_text("from pack.b import f\nfrom pack import sub\n")
     (tmp_path / "b.py").write_text("import numpy\n")
     (tmp_path / "c.py").write_text("x = 1\n")
     (tmp_path / "sub/__init__.py").write_text("from pack.sub.d import g\n")
-    (tmp_path / "sub/d.py").write_text("g = 1, 'texts', 'pack.late'\n")
+    (tmp_path / "sub/d.py").write_text("g = 1, 'texts', 'pack.late', 'pack.many.*'\n")
     (tmp_path / "late.py").write_text("y = 1\n")
     (tmp_path / "sub/unused.py").write_text("h = 1\n")
     (tmp_path / "sub/texts/page.html").write_text("<p>")
@@ -41,6 +44,9 @@ def test_a_digest_follows_imports(package: Path) -> None:
 
 
 @pytest.mark.parametrize(("file", "known"), [("sub/texts/page.html", True), ("late.py", True),
+                                             ("many/any.py", True),
+                                             ("many/inner/__init__.py", True),
+                                             ("many/inner/deep.py", False),
                                              ("beside.txt", False)])  # fmt: skip
 def test_a_digest_knows_what_the_texts_of_a_module_name(
     package: Path, file: str, known: bool
@@ -59,6 +65,16 @@ def test_a_digest_is_the_same_wherever_the_package_lies(
     package.rename(moved)
     monkeypatch.setattr(provenance, "_PACKAGE", moved)
     assert source_digest("c", "a") == before
+
+
+def test_logs_are_read_again_when_a_format_of_any_changes(monkeypatch: pytest.MonkeyPatch) -> None:
+    packed = provenance._PACKAGE / "readers"
+    files = [*packed.glob("formats/*.py"), packed / "ubx/frames.py", packed / "arrays/hdf5.py"]
+    before, whole = source_digest("steps.ingest"), Path.read_bytes
+    for path in files:
+        with monkeypatch.context() as patch:
+            patch.setattr(Path, "read_bytes", lambda one, of=path: whole(one) + b" " * (one == of))
+            assert source_digest("steps.ingest") != before, path.name
 
 
 @pytest.mark.parametrize(

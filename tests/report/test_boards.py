@@ -1,12 +1,14 @@
 import json
 from copy import deepcopy
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from imubench_pipeline.report.boards import boards_page, published_lines
-from imubench_pipeline.report.publish import pages, publish
+from imubench_pipeline.report.boards import BOARDS, published_lines
+from imubench_pipeline.report.pages import pages
+from imubench_pipeline.report.publish import publish
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.tables import build
 from tests.report.pages import Read, read_pages, sound_pages
@@ -265,14 +267,14 @@ def test_a_report_of_before_there_were_boards_can_be_published_again(tmp_path: P
     # Its settings, kept beside it, know nothing of boards.
     old = made(recording_rows("imu", "day1"), boards={})
     settings = {name: value for name, value in old.settings.items() if name != "boards"}
-    again = Site(old.tables, settings, old.results)
+    again = replace(old, settings=settings)
     assert "boards.html" not in {page.path for page in pages(again)}
     assert "boards.html" not in {path for path, _ in again.navigation}
 
 
 def test_a_board_of_which_no_sensor_was_analysed_names_them_all(tmp_path: Path) -> None:
     lost = [rejected_rows(sensor, "sim_pair", simulated=True) for sensor in ("cheap", "torn")]
-    (board,) = boards_page(made(*lost)).context()["boards"]
+    (board,) = BOARDS.page(made(*lost)).context()["boards"]
     assert board["sensors"] == []
     assert board["lost"] == ["cheap", "dear", "torn"]
 
@@ -284,7 +286,7 @@ def test_recordings_of_other_sensors_and_measured_ones_are_not_of_the_board() ->
         of_board("cheap", board="pair2"),
         of_board("cheap"),
     ]
-    (board,) = boards_page(made(*others)).context()["boards"]
+    (board,) = BOARDS.page(made(*others)).context()["boards"]
     assert [one["view"].sensor for one in board["sensors"]] == ["cheap"]
     assert board["sensors"][0]["view"].name == "sim_pair"
 
@@ -299,29 +301,29 @@ def test_recordings_of_other_sensors_and_measured_ones_are_not_of_the_board() ->
 )
 def test_what_is_shared_is_said(temperature: bool, motion: list[str], said: str) -> None:
     board = BOARD | {"temperature": temperature, "motion": motion}
-    (found,) = boards_page(made(of_board("cheap"), boards={"pair": board})).context()["boards"]
+    (found,) = BOARDS.page(made(of_board("cheap"), boards={"pair": board})).context()["boards"]
     assert found["shared"] == said
 
 
 def test_two_boards_have_each_their_own_recordings() -> None:
     boards = {"b": BOARD | {"title": "second"}, "a": BOARD | {"title": "first"}}
     found = made(of_board("cheap", board="a"), of_board("cheap", board="b"), boards=boards)
-    shown = boards_page(found).context()["boards"]
+    shown = BOARDS.page(found).context()["boards"]
     assert [one["sensors"][0]["view"].name for one in shown] == [f"sim_{o['name']}" for o in shown]
     assert {one["title"] for one in shown} == {"first", "second"}
 
 
 def test_the_page_is_written_again_only_if_its_recordings_or_words_change() -> None:
-    key = boards_page(made(*some())).key
-    assert boards_page(made(*some())).key == key
+    key = BOARDS.page(made(*some())).key
+    assert BOARDS.page(made(*some())).key == key
     changed = some()
     changed[0]["published"][0]["reason"] = "another"
-    assert boards_page(made(*changed)).key != key
+    assert BOARDS.page(made(*changed)).key != key
     longer = some()
     longer[3]["recordings"][0]["duration"] = 9000.0  # a measured one
-    assert boards_page(made(*longer)).key == key
+    assert BOARDS.page(made(*longer)).key == key
     renamed = {"pair": BOARD | {"title": "another"}}
-    assert boards_page(made(*some(), boards=renamed)).key != key
+    assert BOARDS.page(made(*some(), boards=renamed)).key != key
 
 
 # A line of the table.

@@ -1,5 +1,6 @@
 """The pages of gyros that were turned between north and south."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -128,13 +129,11 @@ def test_every_page_leads_there_only_where_there_are_such_runs(
 def test_a_page_is_written_again_only_where_its_run_changed(made: Site, tmp_path: Path) -> None:
     publish(made, tmp_path)
     tables = dict(made.tables)
-    again = Site(tables, made.settings, made.results, made.code)
+    again = replace(made)
     assert publish(again, tmp_path) == []
     rows = tables["earth_rate"].to_pylist()
     rows[0]["value"] *= 1.01
-    changed = Site(
-        tables | {"earth_rate": build("earth_rate", rows)}, made.settings, made.results, made.code
-    )
+    changed = replace(made, tables=tables | {"earth_rate": build("earth_rate", rows)})
     written = {path for path in publish(changed, tmp_path) if path.endswith(".html")}
     assert "recordings/s/run.html" in written and "earth_rate.html" in written
     assert "recordings/s/unknown.html" not in written

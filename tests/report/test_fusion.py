@@ -1,7 +1,7 @@
 from pathlib import Path
 from typing import Any
 
-from imubench_pipeline.report.fusion import equal_numbers, fusion_page, shared_words
+from imubench_pipeline.report.fusion import FUSION, equal_numbers, shared_words
 from imubench_pipeline.tables import build
 from tests.report.tables import joined, recording_rows, site
 
@@ -64,12 +64,12 @@ def test_sensors_that_are_alike_have_no_line_and_one_where_nothing_is_known(
     tmp_path: Path,
 ) -> None:
     made = site(joined(*(recording_rows(name) for name in ("one", "two"))), tmp_path)
-    (found,) = fusion_page(made).context()["lines"]
+    (found,) = FUSION.page(made).context()["lines"]
     assert (found["tau"], found["number"]) == ("1000 s", "–")
     assert found["reason"].startswith("the logs of one tell tau up to 800 s alone")
 
 
 def test_a_single_sensor_is_not_compared(tmp_path: Path) -> None:
-    found = fusion_page(site(joined(recording_rows("one")), tmp_path)).context()
+    found = FUSION.page(site(joined(recording_rows("one")), tmp_path)).context()
     assert found["lines"] == []
     assert set(found["price_classes"]) == {"one"}

@@ -18,6 +18,7 @@ import json
 from imubench_pipeline.export.comments import heading, mapping_words
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.kalibr import positive, walks
+from imubench_pipeline.export.target import Target
 
 _CONVENTION = (
     "*_noise_std is N (rad/s/sqrt(Hz), m/s^2/sqrt(Hz)) and *_bias_std is K (rad/s^2/sqrt(Hz), "
@@ -51,3 +52,6 @@ def write(imu: Imu) -> str:
         },
     }
     return json.dumps(content, indent=4) + "\n"
+
+
+TARGET = Target("basalt", "Basalt", "calibration_imu.json", write, "N+K")

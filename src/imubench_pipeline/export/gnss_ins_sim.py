@@ -21,6 +21,7 @@ import math
 from imubench_pipeline.export.comments import commented, heading, mapping_words
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.mapping import as_process
+from imubench_pipeline.export.target import Target
 from imubench_pipeline.noise import NoiseModel, driving_density
 
 _CONVENTION = (
@@ -47,10 +48,10 @@ def write(imu: Imu) -> str:
     mapped = {name: as_process(a.model, imu.horizon, imu.rate) for name, a in imu.axes.items()}
     gyro, accel = mapped["gyro"].model, mapped["accel"].model
     about = [*heading(imu, "gnss-ins-sim", _CONVENTION), *mapping_words(mapped)]
-    for name, one in mapped.items():
-        if one.model.T_B is not None and one.model.T_B * imu.rate < _FEW:
+    for name, process in mapped.items():
+        if process.model.T_B is not None and process.model.T_B * imu.rate < _FEW:
             about.append(
-                f"{name}: T_B is {one.model.T_B * imu.rate:.3g} samples; the program's "
+                f"{name}: T_B is {process.model.T_B * imu.rate:.3g} samples; the program's "
                 "discretisation of so short a process is coarse."
             )
     degrees = math.degrees(1.0)
@@ -75,3 +76,6 @@ def _deviation(model: NoiseModel) -> float:
     if model.T_B is None or model.B == 0.0:
         return 0.0
     return math.sqrt(driving_density(model.B, model.T_B) * model.T_B / 2.0)
+
+
+TARGET = Target("gnss-ins-sim", "gnss-ins-sim", "imu_err.py", write, "N+GM")

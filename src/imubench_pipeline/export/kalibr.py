@@ -20,6 +20,7 @@ from imubench_pipeline.export.comments import (
 )
 from imubench_pipeline.export.imu import ExportError, Imu
 from imubench_pipeline.export.mapping import Mapped, as_walk
+from imubench_pipeline.export.target import Target
 
 CONVENTION = (
     "N as *_noise_density and K as *_random_walk: continuous in time, two-sided (sigma^2(tau) = "
@@ -50,9 +51,9 @@ def positive(mapped: dict[str, Mapped], program: str) -> None:
     ExportError
         If one is.
     """
-    for name, one in mapped.items():
+    for name, axis in mapped.items():
         for letter in ("N", "K"):
-            if not getattr(one.model, letter) > 0.0:
+            if not getattr(axis.model, letter) > 0.0:
                 raise ExportError(
                     f"{name}: {letter} is 0, and {program} takes values above 0 only; a longer "
                     "log, or an overbound, gives one"
@@ -97,3 +98,6 @@ def write(imu: Imu, topic: str = "/imu0") -> str:
         + setting("rostopic", topic, "of sensor_msgs/Imu")
         + setting("update_rate", plain(imu.rate), "Hz")
     )
+
+
+TARGET = Target("kalibr", "Kalibr", "imu.yaml", write, "N+K")

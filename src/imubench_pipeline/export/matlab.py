@@ -31,6 +31,7 @@ from dataclasses import dataclass
 from imubench_pipeline.export.comments import commented, heading, mapping_words
 from imubench_pipeline.export.imu import AxisNoise, Imu
 from imubench_pipeline.export.mapping import Mapped, as_process_and_walk
+from imubench_pipeline.export.target import Target
 from imubench_pipeline.export.temperature import AXES, TemperatureEffect
 from imubench_pipeline.noise import NoiseModel, driving_density
 
@@ -74,16 +75,16 @@ def write(imu: Imu) -> str:
     text += f"IMU.SampleRate = {imu.rate:.9g};  % Hz\n"
     units = {"gyro": "rad/s", "accel": "m/s^2"}
     words = {"gyro": ("Gyroscope", "gyroparams"), "accel": ("Accelerometer", "accelparams")}
-    for name, one in parameters.items():
+    for name, figures in parameters.items():
         member, maker = words[name]
         unit = units[name]
         lines = [
             ("'NoiseType'", "'single-sided'", "two-sided density, see above"),
-            ("'NoiseDensity'", _vector(one.noise_density), f"N, {unit}/sqrt(Hz)"),
-            ("'RandomWalk'", _vector(one.random_walk), f"K, {unit} sqrt(Hz)"),
-            ("'BiasInstability'", _vector(one.bias_instability), f"of the drive, {unit}"),
+            ("'NoiseDensity'", _vector(figures.noise_density), f"N, {unit}/sqrt(Hz)"),
+            ("'RandomWalk'", _vector(figures.random_walk), f"K, {unit} sqrt(Hz)"),
+            ("'BiasInstability'", _vector(figures.bias_instability), f"of the drive, {unit}"),
             *biases[name][0],
-            ("'BiasInstabilityCoefficients'", one.coefficients, "of the filter"),
+            ("'BiasInstabilityCoefficients'", figures.coefficients, "of the filter"),
         ]
         text += f"IMU.{member} = {maker}( ...\n"
         for i, (key, value, comment) in enumerate(lines):
@@ -91,7 +92,7 @@ def write(imu: Imu) -> str:
             text += f"    {key}, {value}{end} % {comment}\n"
     told = [imu.temperature[name] for name in biases if biases[name][0]]
     if told:
-        low, high = max(one.low for one in told), min(one.high for one in told)
+        low, high = max(effect.low for effect in told), min(effect.high for effect in told)
         text += (
             f"IMU.Temperature = {told[0].reference:.9g};  % degC; between {low:.9g} and "
             f"{high:.9g} the biases follow it\n"
@@ -128,19 +129,19 @@ def _parameters(axis: AxisNoise, imu: Imu) -> tuple[Mapped, _Parameters]:
             f"within 11 % up to {_REACH * poles / imu.rate:.4g} s"
         ]
         rest = NoiseModel(Q=model.Q, N=model.N, K=model.K, sinusoids=model.sinusoids)
-        found = as_process_and_walk(rest, imu.horizon, imu.rate)
-        held = NoiseModel(N=model.N, B=model.B, K=model.K)
-        mapped = Mapped(held, [*words, *found.words])
+        with_walk = as_process_and_walk(rest, imu.horizon, imu.rate)
+        flicker = NoiseModel(N=model.N, B=model.B, K=model.K)
+        mapped = Mapped(flicker, [*words, *with_walk.words])
         return mapped, _Parameters(model.N, model.K, model.B, f"fractalcoef({poles})")
     mapped = as_process_and_walk(model, imu.horizon, imu.rate)
-    held = mapped.model
-    if held.T_B is None or held.B == 0.0:
-        return mapped, _Parameters(held.N, held.K, 0.0, "fractalcoef(1)")
-    p = math.exp(-1.0 / (imu.rate * held.T_B))
-    stationary = driving_density(held.B, held.T_B) * held.T_B / 2.0
-    drive = math.sqrt(-stationary * math.expm1(-2.0 / (imu.rate * held.T_B)))
+    process = mapped.model
+    if process.T_B is None or process.B == 0.0:
+        return mapped, _Parameters(process.N, process.K, 0.0, "fractalcoef(1)")
+    p = math.exp(-1.0 / (imu.rate * process.T_B))
+    stationary = driving_density(process.B, process.T_B) * process.T_B / 2.0
+    drive = math.sqrt(-stationary * math.expm1(-2.0 / (imu.rate * process.T_B)))
     coefficients = f"struct('Numerator', 1, 'Denominator', [1, {-p:.17g}])"
-    return mapped, _Parameters(held.N, held.K, drive, coefficients)
+    return mapped, _Parameters(process.N, process.K, drive, coefficients)
 
 
 def _vector(value: float) -> str:
@@ -149,3 +150,6 @@ def _vector(value: float) -> str:
 
 def _listed(values: Sequence[float]) -> str:
     return f"[{', '.join(f'{value:.9g}' for value in values)}]"
+
+
+TARGET = Target("matlab", "MATLAB (imuSensor)", "imu_noise.m", write, "N+GM+K")

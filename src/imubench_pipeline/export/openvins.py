@@ -19,6 +19,7 @@ from imubench_pipeline.export.comments import (
 )
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.kalibr import CONVENTION, densities, positive, walks
+from imubench_pipeline.export.target import Target
 
 
 def write(imu: Imu, topic: str = "/imu0") -> str:
@@ -54,13 +55,16 @@ def write(imu: Imu, topic: str = "/imu0") -> str:
         + setting("update_rate", plain(imu.rate), "Hz", indent)
         + setting("model", '"kalibr"', "of the intrinsics", indent)
         + "".join(_matrix(name, 3) for name in ("Tw", "R_IMUtoGYRO", "Ta", "R_IMUtoACC"))
-        + _matrix("Tg", 3, one="0.0")
+        + _matrix("Tg", 3, diagonal="0.0")
     )
 
 
-def _matrix(name: str, size: int, one: str = "1.0") -> str:
+def _matrix(name: str, size: int, diagonal: str = "1.0") -> str:
     rows = [
-        "    - [" + ", ".join(one if i == j else "0.0" for j in range(size)) + "]\n"
+        "    - [" + ", ".join(diagonal if i == j else "0.0" for j in range(size)) + "]\n"
         for i in range(size)
     ]
     return f"  {name}:\n" + "".join(rows)
+
+
+TARGET = Target("openvins", "OpenVINS", "kalibr_imu_chain.yaml", write, "N+K")

@@ -21,6 +21,7 @@ from imubench_pipeline.export.comments import (
 )
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.kalibr import positive, walks
+from imubench_pipeline.export.target import Target
 
 _CONVENTION = (
     "N as IMU.Noise* and K as IMU.*Walk: continuous in time, two-sided, SI; the program itself "
@@ -57,3 +58,6 @@ def write(imu: Imu) -> str:
         + setting("IMU.AccWalk", number(accel.K), "K, m/s^3/sqrt(Hz)")
         + setting("IMU.Frequency", plain(imu.rate), "Hz")
     )
+
+
+TARGET = Target("orb-slam3", "ORB-SLAM3", "orb_slam3_imu.yaml", write, "N+K")

@@ -29,6 +29,7 @@ import math
 from imubench_pipeline.export.comments import commented, heading, mapping_words
 from imubench_pipeline.export.imu import ExportError, Imu
 from imubench_pipeline.export.kalibr import walks
+from imubench_pipeline.export.target import Target
 from imubench_pipeline.export.temperature import AXES
 
 PERIOD = 10_000
@@ -113,10 +114,13 @@ def _corrections(imu: Imu, quantity: str) -> dict[str, float]:
     if not effect.slope:
         return {}
     name = f"TC_{_LETTERS[quantity]}0_"
-    found = {"TREF": effect.reference, "TMIN": effect.low, "TMAX": effect.high}
+    parameters = {"TREF": effect.reference, "TMIN": effect.low, "TMAX": effect.high}
     for number, axis in enumerate(AXES):
         # All four: what an earlier calibration left would stay else.
-        found[f"X0_{number}"] = found[f"X3_{number}"] = 0.0
-        found[f"X1_{number}"] = effect.slope.get(axis, 0.0)
-        found[f"X2_{number}"] = effect.square.get(axis, 0.0)
-    return {name + key: value for key, value in found.items()}
+        parameters[f"X0_{number}"] = parameters[f"X3_{number}"] = 0.0
+        parameters[f"X1_{number}"] = effect.slope.get(axis, 0.0)
+        parameters[f"X2_{number}"] = effect.square.get(axis, 0.0)
+    return {name + key: value for key, value in parameters.items()}
+
+
+TARGET = Target("px4", "PX4 (EKF2)", "ekf2.params", write, "N+K")

@@ -210,8 +210,8 @@ def _deciding(
 def _drawn(folder: Path | None, sensor: str, choice: Choice) -> Sequence[NoiseModel]:
     """Return the noise models that the log of the chosen axis allows; none where none are kept."""
     path = folder / sensor / choice.recording / "draws.parquet" if folder is not None else None
-    found = draws(path).get((choice.channel, choice.method)) if path and path.is_file() else None
-    return () if found is None else [found.model(number) for number in range(len(found))]
+    drawn = draws(path).get((choice.channel, choice.method)) if path and path.is_file() else None
+    return () if drawn is None else [drawn.model(number) for number in range(len(drawn))]
 
 
 def _bounded(
@@ -227,7 +227,7 @@ def _bounded(
         _rows(allan, sensor=request.sensor, recording=choice.recording, channel=choice.channel)
     )
     try:
-        found = overbound(
+        bound = overbound(
             curve,
             choice.axis.model,
             rate,
@@ -241,16 +241,16 @@ def _bounded(
             f"{choice.channel} of {choice.recording}: {error}{_ways_out(family, request)}"
         ) from error
     fitted = f"the fitted model was: {named(choice.axis.model.terms)}"
-    notes = [found.words, found.density_words, fitted, *choice.axis.notes]
-    if found.warning:
-        notes.insert(0, f"WARNING: {found.warning}{_holding(family)}")
-    return replace(choice.axis, model=found.model, notes=notes, bounded=found.band)
+    notes = [bound.words, bound.density_words, fitted, *choice.axis.notes]
+    if bound.warning:
+        notes.insert(0, f"WARNING: {bound.warning}{_holding(family)}")
+    return replace(choice.axis, model=bound.model, notes=notes, bounded=bound.band)
 
 
 def _holding(family: Family) -> str:
     """Name the programs that hold more terms than a family has."""
     kinds = {
-        other: ", ".join(name for name, one in TARGETS.items() if one.family == other)
+        other: ", ".join(name for name, target in TARGETS.items() if target.family == other)
         for other in FAMILIES
         if set(other.split("+")) - set(family.split("+"))
     }

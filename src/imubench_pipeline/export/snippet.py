@@ -11,6 +11,7 @@ from imubench_pipeline.export.comments import commented, heading
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.mapping import named
 from imubench_pipeline.export.matrices import FOLLOWED
+from imubench_pipeline.export.target import Target
 from imubench_pipeline.noise.drives import drives_of
 
 _CONVENTION = (
@@ -95,3 +96,6 @@ def write(imu: Imu) -> str:
     return commented(about) + _PROGRAM.format(
         rate=float(imu.rate), horizon=float(imu.horizon), noise=entries
     )
+
+
+TARGET = Target("python", "Python with NumPy", "noise.py", write, "N+GM+K")

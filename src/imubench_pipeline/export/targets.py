@@ -1,9 +1,8 @@
-"""The programs that a noise model can be written for."""
+"""The programs that a noise model can be written for: each is declared in its module."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 from imubench_pipeline.export import (
     basalt,
@@ -17,40 +16,22 @@ from imubench_pipeline.export import (
     snippet,
     vins_fusion,
 )
-from imubench_pipeline.export.imu import Imu
-from imubench_pipeline.export.smallest_model import Family
-
-
-@dataclass(frozen=True)
-class Target:
-    """A program.
-
-    Attributes
-    ----------
-    file_name : str
-        Its usual one.
-    write : callable
-        Imu -> content of the file: str, or bytes.
-    family : str
-        Terms that it holds: those of an overbound for it.
-    """
-
-    file_name: str
-    write: Callable[[Imu], str | bytes]
-    family: Family
-
+from imubench_pipeline.export.target import Target
 
 TARGETS: Mapping[str, Target] = {
-    "kalibr": Target("imu.yaml", kalibr.write, "N+K"),
-    "openvins": Target("kalibr_imu_chain.yaml", openvins.write, "N+K"),
-    "vins-fusion": Target("vins_imu.yaml", vins_fusion.write, "N+K"),
-    "basalt": Target("calibration_imu.json", basalt.write, "N+K"),
-    "orb-slam3": Target("orb_slam3_imu.yaml", orb_slam3.write, "N+K"),
-    "px4": Target("ekf2.params", px4.write, "N+K"),
-    "gnss-ins-sim": Target("imu_err.py", gnss_ins_sim.write, "N+GM"),
-    "matlab": Target("imu_noise.m", matlab.write, "N+GM+K"),
-    "json": Target("noise.json", matrices.write_json, "N+GM+K"),
-    "npz": Target("noise.npz", matrices.write_npz, "N+GM+K"),
-    "python": Target("noise.py", snippet.write, "N+GM+K"),
+    target.name: target
+    for target in (
+        kalibr.TARGET,
+        openvins.TARGET,
+        vins_fusion.TARGET,
+        basalt.TARGET,
+        orb_slam3.TARGET,
+        px4.TARGET,
+        gnss_ins_sim.TARGET,
+        matlab.TARGET,
+        matrices.JSON,
+        matrices.NPZ,
+        snippet.TARGET,
+    )
 }
 """Every target, by the name that the command takes."""

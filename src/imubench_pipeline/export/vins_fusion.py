@@ -30,6 +30,7 @@ from imubench_pipeline.export.comments import (
 )
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.kalibr import walks
+from imubench_pipeline.export.target import Target
 
 _CONVENTION = (
     "acc_n, gyr_n = N sqrt(2 rate) and acc_w, gyr_w = K sqrt(rate): discrete in time, for samples "
@@ -71,3 +72,6 @@ def write(imu: Imu, topic: str = "/imu0") -> str:
         + setting("gyr_w", number(gyro.K * per_step), f"rad/s^2, K = {gyro.K:.4e}")
         + setting("g_norm", plain(imu.gravity), "gravity, m/s^2")
     )
+
+
+TARGET = Target("vins-fusion", "VINS-Fusion, VINS-Mono", "vins_imu.yaml", write, "N+K")

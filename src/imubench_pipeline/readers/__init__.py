@@ -1,9 +1,8 @@
-"""One module a log format: file -> batches of SI samples, in bounded memory."""
+"""Log files of every format (`formats`) -> batches of SI samples, in bounded memory."""
 
 from __future__ import annotations
 
 import errno
-from importlib import import_module
 from itertools import islice
 from pathlib import Path
 
@@ -15,44 +14,23 @@ from imubench_pipeline.readers.compressed import (
     members,
     visible,
 )
-from imubench_pipeline.readers.content import is_endless, is_ros_2_bag, reader_of
+from imubench_pipeline.readers.content import format_of, format_of_folder, is_endless
 from imubench_pipeline.settings.sensor import (
     POSITION,
     TABLE_RATE,
     TEMPERATURE,
     ColumnSource,
     LogFormat,
-    Reader,
 )
 from imubench_pipeline.tables.findings import RecordingError
 
-_CLASSES: dict[Reader, tuple[str, str]] = {
-    "csv": ("imubench_pipeline.readers.text.csv", "CsvFile"),
-    "vectornav": ("imubench_pipeline.readers.vectornav.file", "VectorNavFile"),
-    "ubx": ("imubench_pipeline.readers.ubx.file", "UbxFile"),
-    "rosbag": ("imubench_pipeline.readers.rosbag.file", "RosbagFile"),
-    "matlab": ("imubench_pipeline.readers.arrays.matlab", "MatlabFile"),
-    "numpy": ("imubench_pipeline.readers.arrays.npy", "NumpyFile"),
-    "arrow": ("imubench_pipeline.readers.arrays.arrow", "ArrowFile"),
-    "hdf5": ("imubench_pipeline.readers.arrays.hdf5", "Hdf5File"),
-}
-"""Module and class of each reader: only those that a run needs are imported."""
-
-_STREAMED: tuple[Reader, ...] = ("csv", "vectornav", "ubx")
-"""The readers of logs that may be compressed, or in a zip archive."""
-
-SEVERAL_CLOCKS: tuple[Reader, ...] = ("rosbag", "ubx")
-"""The readers of files in which each ``variable`` is recorded by itself."""
-
 __all__ = [
     "POSITION",
-    "SEVERAL_CLOCKS",
     "TABLE_RATE",
     "TEMPERATURE",
     "Batch",
     "LogFile",
     "RecordingError",
-    "class_of",
     "log_files",
     "only_log",
     "read",
@@ -122,16 +100,16 @@ def _clock(file: Path, log: LogFormat, source: ColumnSource) -> str:
     """Return what has a clock of its own in a file: a topic, or a kind of message."""
     if source.variable is None or is_member(file):
         return ""
-    return source.variable if (log.reader or reader_of(file)) in SEVERAL_CLOCKS else ""
+    return source.variable if format_of(file, log.reader).clock_of == "variable" else ""
 
 
 def _present(path: Path, log: LogFormat) -> list[Path] | None:
     """Return the files of a folder or an archive; None where it is one log."""
-    if is_ros_2_bag(path):
+    if format_of_folder(path) is not None:
         return None
     if path.is_dir():
         return log_files(path)
-    if is_archive(path) and (log.reader or reader_of(path)) in _STREAMED:
+    if is_archive(path) and format_of(path, log.reader).streamed:
         return members(path)
     return None
 
@@ -170,15 +148,15 @@ def only_log(path: Path, present: list[Path]) -> Path:
     RecordingError
         If there is another number of logs.
     """
-    found = [file for file in present if file.parent == path] or present
-    if len(found) > 1 and not path.is_dir():
-        found = list(islice(filter(holds_text, found), 2))  # two are as bad as a thousand
-    if len(found) != 1:
+    logs = [file for file in present if file.parent == path] or present
+    if len(logs) > 1 and not path.is_dir():
+        logs = list(islice(filter(holds_text, logs), 2))  # two are as bad as a thousand
+    if len(logs) != 1:
         raise RecordingError(
             f"{path.name}: expected one file, the folder has {_names(path, present)}; name the "
             "file of each channel with 'file:' in the sensor file"
         )
-    return found[0]
+    return logs[0]
 
 
 def _names(path: Path, files: list[Path]) -> str:
@@ -189,11 +167,4 @@ def _open(file: Path, log: LogFormat, sources: dict[str, ColumnSource]) -> LogFi
     inside = None if is_member(file) else _present(file, log)
     if inside is not None:
         file = only_log(file, inside)  # a log that is packed alone, among others
-    return class_of(log.reader or reader_of(file))(file, log, sources)
-
-
-def class_of(reader: Reader) -> type[LogFile]:
-    """Return the class that reads the files of a reader; only its module is imported."""
-    module, name = _CLASSES[reader]
-    kind: type[LogFile] = getattr(import_module(module), name)
-    return kind
+    return format_of(file, log.reader).code().log_file(file, log, sources)

@@ -202,8 +202,8 @@ _CORRUPT = (
 def _corrupt(name: str, error: Exception) -> RecordingError:
     if isinstance(error, RecordingError):
         return error
-    said = str(error)[:300]
-    return RecordingError(f"{name}: corrupt compressed data ({said}); copy it again")
+    reason = str(error)[:300]
+    return RecordingError(f"{name}: corrupt compressed data ({reason}); copy it again")
 
 
 def open_bytes(path: Path) -> Bytes:

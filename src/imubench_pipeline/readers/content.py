@@ -1,4 +1,4 @@
-"""Which reader a file needs, told by its content and never by its name."""
+"""Which format a file has, told by its content and never by its name."""
 
 from __future__ import annotations
 
@@ -6,22 +6,12 @@ from contextlib import closing
 from pathlib import Path
 
 from imubench_pipeline.readers.compressed import is_member, members, open_bytes
+from imubench_pipeline.readers.file_format import FileFormat
+from imubench_pipeline.readers.formats import FILE_FORMATS, TEXT
 from imubench_pipeline.settings.sensor import Reader
 from imubench_pipeline.tables.findings import RecordingError
 
 _SEEN = 1 << 16
-_BEGINS: tuple[tuple[bytes, Reader], ...] = (
-    (b"MATLAB 5.0 MAT-file", "matlab"),
-    (b"MATLAB 7.3 MAT-file", "matlab"),
-    (b"\x89HDF\r\n\x1a\n", "hdf5"),
-    (b"\x93NUMPY", "numpy"),
-    (b"PAR1", "arrow"),
-    (b"ARROW1", "arrow"),
-    (b"FEA1", "arrow"),
-    (b"#ROSBAG V", "rosbag"),
-    (b"\x89MCAP", "rosbag"),
-    (b"SQLite format 3", "rosbag"),
-)
 _COMPRESSED = {
     b"\x1f\x8b": "gzip",
     b"\x28\xb5\x2f\xfd": "zstd",
@@ -32,14 +22,19 @@ _COMPRESSED = {
 """What is inside is text."""
 
 _LONGEST_MAGIC = 6
-_UBX = b"\xb5\x62"
-_VECTORNAV = b"$VN"
-_ROS_2_BAG = "metadata.yaml"
+_BY_MARKS = sorted(FILE_FORMATS.values(), key=lambda known: -len(known.signature.within))
+"""The formats: those first that ask for most within a file."""
 
 
-def is_ros_2_bag(path: Path) -> bool:
-    """Tell whether a folder is a ROS 2 bag, which is one log and no folder of logs."""
-    return path.is_dir() and (path / _ROS_2_BAG).is_file()
+def format_of_folder(path: Path) -> FileFormat | None:
+    """Return the format of a folder that is one log, such as a ROS 2 bag; None: it is not."""
+    if not path.is_dir():
+        return None
+    for file_format in FILE_FORMATS.values():
+        mark = file_format.signature.folder_has
+        if mark is not None and (path / mark).is_file():
+            return file_format
+    return None
 
 
 def is_endless(path: Path) -> bool:
@@ -47,18 +42,20 @@ def is_endless(path: Path) -> bool:
     return path.exists() and not path.is_file() and not path.is_dir()
 
 
-def reader_of(path: Path) -> Reader:
-    """Return the reader that a file needs (see `content_of`).
+def format_of(path: Path, stated: Reader | None = None) -> FileFormat:
+    """Return the format of a file: the stated one, or what its content tells (`content_of`).
 
     Parameters
     ----------
     path : Path
+    stated : Reader or None
+        What the sensor file says.
     """
-    return content_of(path)[0]
+    return content_of(path)[0] if stated is None else FILE_FORMATS[stated]
 
 
-def content_of(path: Path) -> tuple[Reader, str]:
-    """Return the reader of what a log is inside, and how it is compressed; empty: it is not.
+def content_of(path: Path) -> tuple[FileFormat, str]:
+    """Return the format of what a log is inside, and how it is compressed; empty: it is not.
 
     Of a zip archive with several files this is the text that each of them may be.
 
@@ -72,11 +69,12 @@ def content_of(path: Path) -> tuple[Reader, str]:
     RecordingError
         If it cannot be opened, is compressed twice, or is of a format that is read only as it is.
     """
-    if is_ros_2_bag(path):
-        return "rosbag", ""
+    if (of_folder := format_of_folder(path)) is not None:
+        return of_folder, ""
     packed = _compression_of(path)
     if packed == "zip" and path.is_file():
-        return ("numpy", "") if _holds_arrays(path) else ("csv", packed)
+        of_archive = _format_of_archive(path)
+        return (TEXT, packed) if of_archive is None else (of_archive, "")
     with closing(open_bytes(path)) as stream:
         begin = b""
         while len(begin) < _SEEN and (block := stream.read(_SEEN - len(begin))):
@@ -86,13 +84,13 @@ def content_of(path: Path) -> tuple[Reader, str]:
             f"{path.name}: is compressed twice, by {packed} and inside by {again}; expected once: "
             "unpack it"
         )
-    reader = _reader_of_bytes(begin)
-    if packed and reader not in ("csv", "ubx", "vectornav"):
+    file_format = _format_of_bytes(begin)
+    if packed and not file_format.streamed:
         raise RecordingError(
-            f"{path.name}: holds a file of the reader {reader!r}, compressed by {packed}; "
-            "expected it as it is: unpack it"
+            f"{path.name}: holds a file of the reader {file_format.name!r}, compressed by "
+            f"{packed}; expected it as it is: unpack it"
         )
-    return reader, packed
+    return file_format, packed
 
 
 def _compression_of(path: Path) -> str:
@@ -112,18 +110,21 @@ def _named(begin: bytes) -> str:
     return next((name for magic, name in _COMPRESSED.items() if begin.startswith(magic)), "")
 
 
-def _reader_of_bytes(begin: bytes) -> Reader:
-    for magic, reader in _BEGINS:
-        if begin.startswith(magic):
-            return reader
-    # The receiver may be in the middle of something else when the log begins.
-    if _UBX in begin and b"\0" in begin:
-        return "ubx"
-    if _VECTORNAV in begin:
-        return "vectornav"
-    return "csv"
+def _format_of_bytes(begin: bytes) -> FileFormat:
+    for file_format in FILE_FORMATS.values():
+        if begin.startswith(file_format.signature.begins):
+            return file_format
+    for file_format in _BY_MARKS:
+        marks = file_format.signature.within
+        if marks and all(mark in begin for mark in marks):
+            return file_format
+    return TEXT
 
 
-def _holds_arrays(path: Path) -> bool:
-    """Tell whether a zip archive, which may be cut short, is one of NumPy's."""
-    return any(member.suffix == ".npy" for member in members(path))
+def _format_of_archive(path: Path) -> FileFormat | None:
+    """Return the format of a zip archive that is one log; the archive may be cut short."""
+    endings = {member.suffix for member in members(path)}
+    for file_format in FILE_FORMATS.values():
+        if file_format.signature.archive_has in endings:
+            return file_format
+    return None

@@ -8,20 +8,12 @@ from typing import Any
 from imubench_pipeline.report import thermal
 from imubench_pipeline.report.payload import Arrays, channel_payload, looks
 from imubench_pipeline.report.practical import limit_digits, number_text
-from imubench_pipeline.report.site import Page, Site
+from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.typing import Row
 
 _UNIT = {"bias": "signal"}
 """Unit of the page of a parameter, where it has another name."""
-
-
-def boards_page(site: Site) -> Page:
-    """Return the page that shows every board."""
-    boards = site.settings["boards"]
-    views = [view for name in boards for view in _views(site, name)]
-    key = site.key_of(boards, site.looks, *(view.key for view in views))
-    return Page("boards.html", "boards.html.jinja", key, lambda: _context(site))
 
 
 def _context(site: Site) -> dict[str, Any]:
@@ -32,9 +24,9 @@ def _context(site: Site) -> dict[str, Any]:
         views = _views(site, name)
         channels = {view.sensor: view.channels() for view in views}
         payloads += (
-            channel_payload(one, view.row["rate"], arrays)
+            channel_payload(channel, view.row["rate"], arrays)
             for view in views
-            for one in channels[view.sensor]
+            for channel in channels[view.sensor]
         )
         boards.append(
             {
@@ -47,8 +39,8 @@ def _context(site: Site) -> dict[str, Any]:
                         "view": view,
                         "name": site.names[view.sensor],
                         "channels": [
-                            _channel(site, one, board["sensors"][view.sensor])
-                            for one in channels[view.sensor]
+                            _channel(site, channel, board["sensors"][view.sensor])
+                            for channel in channels[view.sensor]
                         ],
                     }
                     for view in views
@@ -56,7 +48,7 @@ def _context(site: Site) -> dict[str, Any]:
                 "lost": sorted(set(board["sensors"]) - {view.sensor for view in views}),
             }
         )
-    used = {one["sensor"]: site.looks[one["sensor"]] for one in payloads}
+    used = {channel["sensor"]: site.looks[channel["sensor"]] for channel in payloads}
     page = {"looks": looks(used), "channels": payloads, "arrays": arrays.texts}
     return {"boards": boards, "page": page}
 
@@ -72,6 +64,16 @@ def _views(site: Site, board: str) -> list[RecordingView]:
         and view.sensor in of_board
         and not view.left_out
     ]
+
+
+BOARDS = Entry(
+    file="boards.html",
+    title="Boards",
+    context=_context,
+    views=lambda site: [view for name in site.settings["boards"] for view in _views(site, name)],
+    there=lambda site: bool(site.settings.get("boards")),
+)
+"""The page that shows every board."""
 
 
 def _shared(board: Mapping[str, Any]) -> str:

@@ -9,7 +9,7 @@ from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.report.alignment import alignments
 from imubench_pipeline.report.calibration import of_all
 from imubench_pipeline.report.payload import Arrays
-from imubench_pipeline.report.site import Page, Site
+from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.turned import (
     ESTIMATES,
     answer,
@@ -24,29 +24,13 @@ from imubench_pipeline.report.words import counted
 from imubench_pipeline.typing import Row
 
 
-def earth_rate_page(site: Site) -> Page:
-    """Return the page of all experiments that look for the Earth's rate.
-
-    Parameters
-    ----------
-    site : Site
-    """
-    views = [*site.turned, *site.calibrated, *site.predicted]
-    return Page(
-        "earth_rate.html",
-        "earth_rate.html.jinja",
-        site.key_of([view.key for view in views], [view.page for view in views]),
-        lambda: _context(site),
-    )
-
-
 def _context(site: Site) -> dict[str, Any]:
     arrays = Arrays()
     runs = [_run(site, view) for view in site.turned]
     published = [
-        {**one, "view": view}
+        {**line, "view": view}
         for view in site.turned
-        for one in published_lines(view.rows("earth_rate_published"))
+        for line in published_lines(view.rows("earth_rate_published"))
     ]
     predicted = list(_predicted(site))
     aligned = alignments(site, arrays)
@@ -63,14 +47,28 @@ def _context(site: Site) -> dict[str, Any]:
         "page": {
             "looks": {},
             "channels": [],
-            "published": [_drawn(one) for one in published],
+            "published": [_drawn(line) for line in published],
             "predictions": {
-                one["place"]: prediction_payload(one["rows"], arrays) for one in predicted
+                line["place"]: prediction_payload(line["rows"], arrays) for line in predicted
             },
-            "alignments": {one["view"].sensor: one["drawn"] for one in aligned},
+            "alignments": {line["view"].sensor: line["drawn"] for line in aligned},
             "arrays": arrays.texts,
         },
     }
+
+
+def _views(site: Site) -> list[RecordingView]:
+    return [*site.turned, *site.calibrated, *site.predicted]
+
+
+EARTH_RATE_PAGE = Entry(
+    file="earth_rate.html",
+    title="Earth’s rate",
+    context=_context,
+    views=_views,
+    there=lambda site: bool(_views(site)),
+)
+"""The page of all experiments that look for the Earth's rate."""
 
 
 def _run(site: Site, view: RecordingView) -> dict[str, Any]:
@@ -83,32 +81,32 @@ def _run(site: Site, view: RecordingView) -> dict[str, Any]:
         "parts": [
             {
                 "part": part,
-                "duration": next(one["duration"] for one in shown if one["part"] == part),
-                "lines": {one["method"]: one for one in shown if one["part"] == part},
+                "duration": next(row["duration"] for row in shown if row["part"] == part),
+                "lines": {row["method"]: row for row in shown if row["part"] == part},
             }
-            for part in dict.fromkeys(one["part"] for one in shown)
+            for part in dict.fromkeys(row["part"] for row in shown)
         ],
     }
 
 
 def _predicted(site: Site) -> Iterator[dict[str, Any]]:
     """Yield what each sensor would need, once where several recordings say the same."""
-    said: list[tuple[str, Any]] = []
+    told: list[tuple[str, Any]] = []
     for view in [*site.turned, *site.predicted]:
         rows = view.rows("earth_rate_prediction")
-        found = needs(rows)
-        if found is None or (view.sensor, found) in said:
+        needed = needs(rows)
+        if needed is None or (view.sensor, needed) in told:
             continue
-        said.append((view.sensor, found))
+        told.append((view.sensor, needed))
         place = f"{view.sensor}-{view.name}"
         latitude = latitude_text(rows)
-        yield found | {"view": view, "place": place, "rows": rows, "latitude": latitude}
+        yield needed | {"view": view, "place": place, "rows": rows, "latitude": latitude}
 
 
-def _drawn(one: Row) -> dict[str, Any]:
-    name = one["recording"] + ("" if one["part"] == "whole" else f", {one['part']}")
+def _drawn(line: Row) -> dict[str, Any]:
+    name = line["recording"] + ("" if line["part"] == "whole" else f", {line['part']}")
     numbers = ("published", "truth", "sigma", "simulated")
-    return {"name": name} | {key: one[key] for key in numbers}
+    return {"name": name} | {key: line[key] for key in numbers}
 
 
 def published_words(lines: Sequence[Row]) -> str:
@@ -121,12 +119,12 @@ def published_words(lines: Sequence[Row]) -> str:
     """
     if not lines:
         return ""
-    beyond = [one for one in lines if one["verdict"] == "beyond the noise"]
+    beyond = [line for line in lines if line["verdict"] == "beyond the noise"]
     names = ", ".join(
-        one["recording"]
-        + ("" if one["part"] == "whole" else f" ({one['part']})")
-        + f" by {one['off']}"
-        for one in beyond
+        line["recording"]
+        + ("" if line["part"] == "whole" else f" ({line['part']})")
+        + f" by {line['off']}"
+        for line in beyond
     )
     if not beyond:
         return f"All {len(lines)} published estimates lie within what the noise allows."

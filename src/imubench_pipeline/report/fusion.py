@@ -7,17 +7,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from imubench_pipeline.report.practical import number_text
-from imubench_pipeline.report.site import Page, Site
+from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import QUANTITY_NAMES
 from imubench_pipeline.typing import Row
 
 _PARAMETERS = {"N": "white noise", "B": "bias instability", "K": "random walk", "R": "ramp"}
-
-
-def fusion_page(site: Site) -> Page:
-    """Return the page that says how many of one sensor equal one of another."""
-    key = site.key_of(site.rows("fusion"))
-    return Page("fusion.html", "fusion.html.jinja", key, lambda: _context(site))
 
 
 def _context(site: Site) -> dict[str, Any]:
@@ -37,6 +31,10 @@ def _context(site: Site) -> dict[str, Any]:
         "shared": shared_words(site.settings["settings"]["fusion"]["common"]),
         "price_classes": price_classes,
     }
+
+
+FUSION = Entry(file="fusion.html", title="Fusion", context=_context, tables=("fusion",))
+"""The page that says how many of one sensor equal one of another."""
 
 
 def shared_words(common: Mapping[str, float]) -> str:

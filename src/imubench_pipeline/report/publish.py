@@ -3,32 +3,18 @@
 from __future__ import annotations
 
 import json
-import platform
-from collections.abc import Callable, Iterator, Mapping
-from importlib.metadata import version
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 import jinja2
 import pyarrow as pa
 from plotly.offline import get_plotlyjs
 
-from imubench_pipeline.report.boards import boards_page
-from imubench_pipeline.report.earth_rate import earth_rate_page
-from imubench_pipeline.report.fusion import fusion_page
 from imubench_pipeline.report.glossary import glossary
 from imubench_pipeline.report.html import environment
+from imubench_pipeline.report.pages import ENTRIES, pages
 from imubench_pipeline.report.practical import units_of_pages
-from imubench_pipeline.report.rate_table import table_page
-from imubench_pipeline.report.recording import recording_page
-from imubench_pipeline.report.sensor import device_page, sensor_page
-from imubench_pipeline.report.shortlist import shortlist_page
 from imubench_pipeline.report.site import Page, Site
-from imubench_pipeline.report.start import datasheets_page, recordings_page, start_page
-from imubench_pipeline.report.static_figures.files import figure_text
-from imubench_pipeline.report.static_figures.theory import theory_figure
-from imubench_pipeline.report.turned import turned_page
-from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.tables import read, write_content
 from imubench_pipeline.tables.provenance import source_digest
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
@@ -49,64 +35,8 @@ _SCRIPTS = (
     "decisions",
     "start",
 )
-_LIBRARIES = (
-    "imubench_pipeline",
-    "numpy",
-    "scipy",
-    "numba",
-    "pyarrow",
-    "matplotlib",
-    "plotly",
-    "snakemake",
-)
 
 Progress = Callable[[str], None]
-
-_PAGES: Mapping[str, Callable[[Site, RecordingView], Page]] = {
-    "two_position": turned_page,
-    "rate_table": table_page,
-}
-"""Makes the page of a recording that is not static, by its kind."""
-
-
-def pages(site: Site) -> Iterator[Page]:
-    """Yield the pages of the report, the start page last: it stands for the finished report."""
-    for view in site.views:
-        page = recording_page if view.left_out else _PAGES.get(view.row["kind"], recording_page)
-        yield page(site, view)
-    for sensor in site.sensors:
-        yield sensor_page(site, sensor)
-    for path in dict.fromkeys(view.device_page for view in site.views):
-        if path is not None:
-            yield device_page(site, path)
-    yield recordings_page(site)
-    yield datasheets_page(site)
-    yield shortlist_page(site)
-    yield fusion_page(site)
-    if site.settings.get("boards"):
-        yield boards_page(site)
-    if site.finds_rates:
-        yield earth_rate_page(site)
-    yield Page(
-        "theory.html",
-        "theory.html.jinja",
-        site.common,
-        lambda: {"figure": figure_text(theory_figure(site.system)), "terms": glossary()},
-    )
-    yield Page("made.html", "made.html.jinja", site.common, lambda: _made(site))
-    yield start_page(site)
-
-
-def _made(site: Site) -> dict[str, Any]:
-    return {
-        "results": site.results_name,
-        "versions": {"python": platform.python_version()} | {n: version(n) for n in _LIBRARIES},
-        "settings": {
-            f"{section}.{key}": value
-            for section, values in site.settings["settings"].items()
-            for key, value in values.items()
-        },
-    }
 
 
 def publish(site: Site, folder: Path, say: Progress = lambda _: None) -> list[str]:
@@ -144,7 +74,7 @@ def publish(site: Site, folder: Path, say: Progress = lambda _: None) -> list[st
         if page.path not in kept:
             say(page.path)
             written += _put(folder, page.path, _rendered(site, templates, page))
-    for path in _pages_there(folder) - keys.keys():
+    for path in _pages_there(site, folder) - keys.keys():
         (folder / path).unlink()
     _put(folder, _SETTINGS, _text(site.settings))
     _put(folder, _KEYS, _text(keys))
@@ -158,18 +88,19 @@ def _text(data: object) -> str:
 def _keys(path: Path) -> dict[str, str]:
     """Return what the pages that are there show; nothing where that is not known."""
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        keys = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
-    if not isinstance(found, dict):
+    if not isinstance(keys, dict):
         return {}
-    return {page: str(key) for page, key in found.items()}
+    return {page: str(key) for page, key in keys.items()}
 
 
-def _pages_there(folder: Path) -> set[str]:
-    """Return the pages of sensors, devices and recordings that lie in the report."""
-    found = (path for of in _FOLDERS for path in (folder / of).rglob("*.html"))
-    return {path.relative_to(folder).as_posix() for path in found}
+def _pages_there(site: Site, folder: Path) -> set[str]:
+    """Return the pages that lie in the report, whether it still has them or not."""
+    files = [path for of in _FOLDERS for path in (folder / of).rglob("*.html")]
+    files += [path for entry in site.entries if (path := folder / entry.file).is_file()]
+    return {path.relative_to(folder).as_posix() for path in files}
 
 
 def _put(folder: Path, path: str, content: str | bytes) -> list[str]:
@@ -209,7 +140,7 @@ def _script() -> str:
         for quantity, choices in units_of_pages().items()
     }
     parts = [(_STATIC / f"{name}.js").read_text(encoding="utf-8") for name in _SCRIPTS]
-    terms = {key: one.short for key, one in glossary().items()}
+    terms = {key: entry.short for key, entry in glossary().items()}
     head = "".join(
         f"const {name} = {json.dumps(value, ensure_ascii=False)};\n"
         for name, value in (("UNITS", units), ("TERMS", terms))
@@ -220,7 +151,7 @@ def _script() -> str:
 def one_file(site: Site) -> str:
     """Return the whole report as one page that needs no other file."""
     templates = environment(site.system)
-    given = {"site": site.shown(alone=True), "path": "index.html", "root": ""}
+    common = {"site": site.shown(alone=True), "path": "index.html", "root": ""}
     shown = [
         {"path": page.path, "content": _rendered(site, templates, page, "fragment.html.jinja")}
         for page in pages(site)
@@ -232,7 +163,7 @@ def one_file(site: Site) -> str:
     ]
     page = templates.get_template("one_file.html.jinja")
     return page.render(
-        {"pages": shown, "css": assets["assets/report.css"], "scripts": scripts} | given
+        {"pages": shown, "css": assets["assets/report.css"], "scripts": scripts} | common
     )
 
 
@@ -246,7 +177,7 @@ def site_of(tables: Mapping[str, pa.Table], settings: str, results: Path) -> Sit
         As `imubench_pipeline.run.plan.Plan.report_settings` gives them.
     results : Path
     """
-    return Site(tables, json.loads(settings), results, source_digest("report.publish"))
+    return Site(tables, json.loads(settings), results, ENTRIES, source_digest("report.publish"))
 
 
 def published(results: Path) -> Site:

@@ -6,33 +6,29 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from imubench_pipeline.report.practical import number_text
-from imubench_pipeline.report.site import Page, Site
+from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.typing import Row
 
 
-def shortlist_page(site: Site) -> Page:
-    """Return the page of all sensors of the catalogue, for every requirement.
-
-    Parameters
-    ----------
-    site : Site
-    """
+def _context(site: Site) -> dict[str, Any]:
     rows = site.rows("shortlist")
+    asked = site.settings["requirements"]
+    return {
+        "boards": [
+            {
+                "title": asked[name]["title"],
+                "note": asked[name].get("note"),
+                "rows": [_line(site, row) for row in rows if row["requirement"] == name],
+            }
+            for name in dict.fromkeys(row["requirement"] for row in rows)
+        ]
+    }
 
-    def context() -> dict[str, Any]:
-        asked = site.settings["requirements"]
-        return {
-            "boards": [
-                {
-                    "title": asked[name]["title"],
-                    "note": asked[name].get("note"),
-                    "rows": [_line(site, row) for row in rows if row["requirement"] == name],
-                }
-                for name in dict.fromkeys(row["requirement"] for row in rows)
-            ]
-        }
 
-    return Page("shortlist.html", "shortlist.html.jinja", site.key_of(rows, site.sensors), context)
+SHORTLIST = Entry(
+    file="shortlist.html", title="Before buying", context=_context, tables=("shortlist",)
+)
+"""The page of all sensors of the catalogue, for every requirement."""
 
 
 def _line(site: Site, row: Row) -> dict[str, Any]:
@@ -66,9 +62,9 @@ def cells(row: Row) -> list[str]:
 def notes(rows: Sequence[Row]) -> Iterator[str]:
     """Yield what is assumed of each sensor, or why it is not judged, in a line each."""
     for row in rows:
-        said = [row["reason"], row["assumed"]]
-        if any(said):
-            yield f"{row['sensor']}: {'; '.join(filter(None, said))}"
+        remarks = [row["reason"], row["assumed"]]
+        if any(remarks):
+            yield f"{row['sensor']}: {'; '.join(filter(None, remarks))}"
 
 
 def _margin(value: float | None) -> str:

@@ -7,7 +7,7 @@ import json
 import re
 import shlex
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.metadata import version
@@ -22,17 +22,6 @@ from imubench_pipeline.report.view import RecordingView, recording_views
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from imubench_pipeline.typing import Row
 
-NAVIGATION = (
-    ("index.html", "Comparison"),
-    ("recordings.html", "Recordings"),
-    ("datasheets.html", "Datasheets"),
-    ("shortlist.html", "Before buying"),
-    ("fusion.html", "Fusion"),
-    ("boards.html", "Boards"),
-    ("earth_rate.html", "Earth’s rate"),
-    ("theory.html", "Theory"),
-    ("made.html", "How this was made"),
-)
 _CHANNELS = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 _FIRST_ROWS = 100
 """Rows of a long table that stand in the page; the others are made when they are asked for."""
@@ -65,6 +54,40 @@ class Page:
         return "../" * self.path.count("/")
 
 
+@dataclass(frozen=True, kw_only=True)
+class Entry:
+    """A page that a report has once, as it is declared beside what it shows.
+
+    Attributes
+    ----------
+    file : str
+        Its name; its template is called so, too, with ``.jinja``.
+    title : str
+        What the navigation calls it.
+    context : callable
+        Returns what the template is given.
+    tables : tuple of str
+        The joined tables that it shows: it is written again if one of them changes.
+    views : callable
+        Returns the recordings that it shows: likewise, whatever any table says of them alone.
+    there : callable
+        Tells whether a report has it.
+    """
+
+    file: str
+    title: str
+    context: Callable[[Site], Mapping[str, Any]]
+    tables: tuple[str, ...] = ()
+    views: Callable[[Site], Sequence[RecordingView]] = lambda _: ()
+    there: Callable[[Site], bool] = lambda _: True
+
+    def page(self, site: Site) -> Page:
+        """Return the page of a report."""
+        shown = (site.rows(table) for table in self.tables)
+        key = site.key_of([view.key for view in self.views(site)], *shown)
+        return Page(self.file, f"{self.file}.jinja", key, lambda: self.context(site))
+
+
 @dataclass
 class Site:
     """What the pages are made of.
@@ -77,6 +100,8 @@ class Site:
         As `imubench_pipeline.run.plan.Plan.report_settings` gives them.
     results : Path
         Folder of the results, for what is kept of each recording alone.
+    entries : sequence of Entry
+        The pages that there is one of, in the order of the navigation.
     code : str
         Digest of the code that makes the pages.
     """
@@ -84,8 +109,9 @@ class Site:
     tables: Mapping[str, pa.Table]
     settings: Mapping[str, Any]
     results: Path
+    entries: Sequence[Entry]
     code: str = ""
-    _rows: dict[str, list[Row]] = field(default_factory=dict)
+    _rows: dict[str, list[Row]] = field(default_factory=dict, init=False)
 
     @property
     def title(self) -> str:
@@ -105,11 +131,11 @@ class Site:
 
     def again(self, view: RecordingView, table: str) -> str:
         """Return the command that makes the results of a recording again, up to a table."""
-        given = self.settings.get("given", [])
+        stated = self.settings.get("given", [])
         return shlex.join(
             [
                 *("snakemake", "-c2"),
-                *(["--config", *given] if given else []),
+                *(["--config", *stated] if stated else []),
                 *("--forcerun", "ingest", "--"),
                 f"{self.results_name}/recordings/{view.sensor}/{view.name}/{table}.parquet",
             ]
@@ -146,11 +172,6 @@ class Site:
             if view.row["kind"] == "rate_table" or (view.sensor, view.name) in there
         ]
 
-    @property
-    def finds_rates(self) -> bool:
-        """Whether there is anything for the page of the Earth's rate."""
-        return bool(self.turned or self.calibrated or self.predicted)
-
     @cached_property
     def predicted(self) -> list[RecordingView]:
         """The recordings at rest by whose noise it is predicted what their sensor could find."""
@@ -169,11 +190,7 @@ class Site:
     @property
     def navigation(self) -> list[tuple[str, str]]:
         """The pages that every page leads to, with their names."""
-        there = {
-            "boards.html": bool(self.settings.get("boards")),
-            "earth_rate.html": self.finds_rates,
-        }
-        return [one for one in NAVIGATION if there.get(one[0], True)]
+        return [(entry.file, entry.title) for entry in self.entries if entry.there(self)]
 
     @cached_property
     def sensors(self) -> list[str]:
@@ -214,34 +231,27 @@ class Site:
 
     def changed_devices(self) -> list[dict[str, Any]]:
         """Return the recordings that show a change of their device, with what has changed."""
-        found: dict[tuple[str, str], dict[str, Any]] = {}
+        devices: dict[tuple[str, str], dict[str, Any]] = {}
         for row in self.rows("drift"):
             if row["verdict"] != "changed":
                 continue
-            one = found.setdefault(
+            device = devices.setdefault(
                 (row["sensor"], row["recording"]),
                 {key: row[key] for key in ("sensor", "device", "recording")}
                 | {"page": self.device_page_of(row), "what": []},
             )
             name = "fixed bias" if row["parameter"] == "bias" else row["parameter"]
-            one["what"].append(f"{name} of {row['channel'].replace('_', ' ')}")
+            device["what"].append(f"{name} of {row['channel'].replace('_', ' ')}")
         simulated = {(view.sensor, view.name): view.simulated for view in self.views}
         return [
-            one | {"channels": ", ".join(one["what"]), "simulated": simulated[key]}
-            for key, one in found.items()
+            device | {"channels": ", ".join(device["what"]), "simulated": simulated[key]}
+            for key, device in devices.items()
         ]
 
     @cached_property
     def common(self) -> str:
         """Digest of what every page shows: settings, names, code."""
         return _digest(self.settings, self.names, self.navigation, self.code, self.version)
-
-    @cached_property
-    def key(self) -> str:
-        """Digest of everything, for pages that show all recordings."""
-        shown = ("pooled", "ranking", "next_steps", "drift", "coverage")
-        parts = (self.rows(table) for table in shown)
-        return _digest(self.common, [view.key for view in self.views], *parts)
 
     def key_of(self, *parts: object) -> str:
         """Return the digest of what a page shows."""
@@ -260,7 +270,7 @@ class Site:
         return {
             "title": self.title,
             "navigation": self.navigation,
-            "units": {quantity: list(found) for quantity, found in units_of_pages().items()},
+            "units": {quantity: list(choices) for quantity, choices in units_of_pages().items()},
             "first_units": first_choices(self.system),
             "names": self.names,
             "tables": [] if alone else sorted(set(TABLES) - set(OF_ONE_RECORDING)),

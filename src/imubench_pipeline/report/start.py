@@ -12,7 +12,7 @@ from imubench_pipeline.report.glossary import term
 from imubench_pipeline.report.meaning import rankings
 from imubench_pipeline.report.payload import FOREST, looks
 from imubench_pipeline.report.practical import duration_text
-from imubench_pipeline.report.site import Page, Site
+from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.report.words import (
     counted,
@@ -25,11 +25,6 @@ from imubench_pipeline.typing import Row
 
 _STEPS = 3
 """What is to do next that the start page names; the table has all."""
-
-
-def start_page(site: Site) -> Page:
-    """Return the page that says which sensor to buy, how sure that is, and what is wrong."""
-    return Page("index.html", "index.html.jinja", site.key, lambda: _start(site))
 
 
 def _start(site: Site) -> dict[str, Any]:
@@ -57,7 +52,7 @@ def _start(site: Site) -> dict[str, Any]:
             "grouped": "sensor",
             "looks": looks(site.looks),
             "names": site.names,
-            "rankings": {one["name"]: one["drawn"] for one in ranked},
+            "rankings": {ranking["name"]: ranking["drawn"] for ranking in ranked},
             **together.page,
         },
     }
@@ -66,8 +61,8 @@ def _start(site: Site) -> dict[str, Any]:
 def _failures(site: Site) -> Iterator[dict[str, Any]]:
     """Yield the steps that failed, with the recording that is left out for it."""
     views = {(view.sensor, view.name): view for view in site.views}
-    for row in site.tables["failures"].to_pylist():
-        yield row | {"view": views.get((row["sensor"], row["recording"]))}
+    for row in site.rows("failures"):
+        yield {**row, "view": views.get((row["sensor"], row["recording"]))}
 
 
 def _not_found(site: Site) -> Iterator[dict[str, Any]]:
@@ -117,32 +112,32 @@ def summary(views: Sequence[RecordingView], several: bool = True) -> str:
 
 def _grouped(rows: Sequence[Row]) -> list[tuple[str, str]]:
     """Return each finding once, with its channels."""
-    found: dict[str, dict[str, None]] = {}
+    grouped: dict[str, dict[str, None]] = {}
     for row in rows:
-        channels = found.setdefault(row["finding"], {})
+        channels = grouped.setdefault(row["finding"], {})
         if row["channel"]:
             channels[row["channel"].replace("_", " ")] = None
-    return [(name, ", ".join(channels)) for name, channels in found.items()]
+    return [(name, ", ".join(channels)) for name, channels in grouped.items()]
 
 
 def _rankings(site: Site) -> Iterator[dict[str, Any]]:
     simulated = {(view.sensor, view.name): view.simulated for view in site.views}
-    rows = site.tables["ranking"].to_pylist()
-    for one in rankings(rows, site.settings["requirements"], simulated, site.system):
+    rows = site.rows("ranking")
+    for ranking in rankings(rows, site.settings["requirements"], simulated, site.system):
         decisive = {
             row["sensor"]: row
             for row in rows
-            if row["requirement"] == one["name"] and row["decides"]
+            if row["requirement"] == ranking["name"] and row["decides"]
         }
         basis = {
-            group["sensor"]: _basis(site, decisive[group["sensor"]]) for group in one["groups"]
+            group["sensor"]: _basis(site, decisive[group["sensor"]]) for group in ranking["groups"]
         }
-        yield one | {
-            "asked": requirement_words(one["requirement"]),
-            "verdict": requirement_verdict(one["groups"], site.names, basis),
+        yield ranking | {
+            "asked": requirement_words(ranking["requirement"]),
+            "verdict": requirement_verdict(ranking["groups"], site.names, basis),
             "drawn": [
                 _margin(decisive[group["sensor"]], group)
-                for group in one["groups"]
+                for group in ranking["groups"]
                 if group["rank"] != "–"
             ],
             "tied": {
@@ -150,12 +145,12 @@ def _rankings(site: Site) -> Iterator[dict[str, Any]]:
                     site.names.get(name, name)
                     for name in listed_names(group["tied_with"], site.names)
                 ]
-                for group in one["groups"]
+                for group in ranking["groups"]
                 if group["tied_with"]
             },
             "undrawn": ", ".join(
                 f"{site.names[group['sensor']]} ({in_words(group)})"
-                for group in one["groups"]
+                for group in ranking["groups"]
                 if group["rank"] == "–"
             ),
         }
@@ -163,7 +158,9 @@ def _rankings(site: Site) -> Iterator[dict[str, Any]]:
 
 def _next_steps(site: Site) -> Iterator[dict[str, Any]]:
     """Yield what would turn or strengthen most verdicts."""
-    titles = {name: one["title"] for name, one in site.settings["requirements"].items()}
+    titles = {
+        name: requirement["title"] for name, requirement in site.settings["requirements"].items()
+    }
     for row in site.rows("next_steps")[:_STEPS]:
         about = "; ".join(titles[name] for name in listed_names(row["requirements"], titles))
         own = [
@@ -238,29 +235,46 @@ def _sensor(site: Site, name: str) -> dict[str, Any]:
     }
 
 
-def recordings_page(site: Site) -> Page:
-    """Return the page that lists every recording with its state."""
-
-    def context() -> dict[str, Any]:
-        filters = {
-            "status": list(dict.fromkeys(view.row["status"] for view in site.views)),
-            "sensor": [site.names[sensor] for sensor in site.sensors],
-        }
-        return {"views": site.views, "summary": summary(site.views), "filters": filters}
-
-    return Page("recordings.html", "recordings.html.jinja", site.key, context)
+def _recordings(site: Site) -> dict[str, Any]:
+    filters = {
+        "status": list(dict.fromkeys(view.row["status"] for view in site.views)),
+        "sensor": [site.names[sensor] for sensor in site.sensors],
+    }
+    return {"views": site.views, "summary": summary(site.views), "filters": filters}
 
 
-def datasheets_page(site: Site) -> Page:
-    """Return the page of all comparisons with datasheets, and of who publishes what."""
+def _datasheets(site: Site) -> dict[str, Any]:
+    lines = list(deltas_of_sensors(site.views, site.system))
+    filters = {
+        "figure": list(dict.fromkeys(line["quantity"] for line in lines)),
+        "sensor": list(dict.fromkeys(site.names[line["sensor"]] for line in lines)),
+    }
+    coverage = list(coverage_tables(site.rows("coverage")))
+    return {"lines": lines, "filters": filters, "coverage": coverage}
 
-    def context() -> dict[str, Any]:
-        lines = list(deltas_of_sensors(site.views, site.system))
-        coverage = coverage_tables(site.tables["coverage"].to_pylist())
-        filters = {
-            "figure": list(dict.fromkeys(line["quantity"] for line in lines)),
-            "sensor": list(dict.fromkeys(site.names[line["sensor"]] for line in lines)),
-        }
-        return {"lines": lines, "filters": filters, "coverage": list(coverage)}
 
-    return Page("datasheets.html", "datasheets.html.jinja", site.key, context)
+START = Entry(
+    file="index.html",
+    title="Comparison",
+    context=_start,
+    tables=("failures", "pooled", "ranking", "next_steps", "drift", "coverage"),
+    views=lambda site: site.views,
+)
+"""The page that says which sensor to buy, how sure that is, and what is wrong."""
+
+RECORDINGS = Entry(
+    file="recordings.html",
+    title="Recordings",
+    context=_recordings,
+    views=lambda site: site.views,
+)
+"""The page that lists every recording with its state."""
+
+DATASHEETS = Entry(
+    file="datasheets.html",
+    title="Datasheets",
+    context=_datasheets,
+    tables=("coverage",),
+    views=lambda site: site.views,
+)
+"""The page of all comparisons with datasheets, and of who publishes what."""

@@ -15,6 +15,7 @@ from pydantic import BaseModel
 from imubench_pipeline.report import command as report
 from imubench_pipeline.report import show
 from imubench_pipeline.report.static_figures import command as figures
+from imubench_pipeline.run import formats_command as formats
 from imubench_pipeline.run import shortlist_command as shortlist
 from imubench_pipeline.run import simulate_command as simulation
 from imubench_pipeline.run.nightly import command as nightly
@@ -71,6 +72,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     inspecting.add_argument(
         "--output", type=Path, help="where to write the sensor file; default: the terminal"
     )
+    commands.add_parser("formats", help="list the logs that are read, and the exports")
     _add_export(commands.add_parser("export", help="write what a filter or simulator loads"))
     show.add_arguments(
         commands.add_parser("show", help="show the comparison of the sensors in the terminal")
@@ -264,6 +266,7 @@ _COMMANDS = {
     "schema": _schema,
     "check": _check,
     "inspect": _inspect,
+    "formats": formats.run,
     "export": _export,
     "show": show.run,
     "shortlist": shortlist.run,

@@ -64,8 +64,8 @@ class ColumnSource(Strict):
     )
     variable: str | None = Field(
         None,
-        description="variable or dataset of a MATLAB, NumPy or HDF5 file, topic of a ROS bag, "
-        "message of a UBX log; null: the only one of the file",
+        description="array, topic or kind of message of a file that has several; null: the only "
+        "one of the file",
     )
     scale: float = Field(1.0, description="unit per count or volt")
     offset: float = Field(0.0, description="counts or volts at zero: scale * (raw - offset)")
@@ -154,6 +154,7 @@ def _check_stamp_format(form: str) -> None:
 
 
 Reader = Literal["csv", "vectornav", "ubx", "rosbag", "matlab", "numpy", "arrow", "hdf5"]
+"""The formats of log files; each is declared in a module of this name in ``readers/formats``."""
 
 
 class LogFormat(Strict):

@@ -15,14 +15,15 @@ _NAME = _PACKAGE.name
 # A whole tree of each module's syntax would take as long to read as all logs of a run.
 _IMPORT = re.compile(r"^ *from (\w+)((?:\.\w+)*) import (\([^)]*\)|.*)$", re.MULTILINE)
 _IMPORTED = re.compile(r"(\w+)(?: as \w+)?")
-_TEXT = re.compile(r"""["'](\w[\w.]*)["']""", re.ASCII)
+_TEXT = re.compile(r"""["'](\w[\w.]*\*?)["']""", re.ASCII)
 
 
 def source_digest(*modules: str) -> str:
     """Return a digest of modules of this package and of all that they use of it.
 
     That is what they import, and what their texts name: another module in full, since some are
-    imported by name when they are needed, or a file or folder beside the module, such as templates.
+    imported by name when they are needed; every module of a package, by a name that ends in ``.*``;
+    or a file or folder beside the module, such as templates.
 
     Parameters
     ----------
@@ -74,7 +75,11 @@ def _used(path: Path) -> tuple[Path, ...]:
 
 def _named(text: str, folder: Path) -> Iterator[Path]:
     """Yield the modules, or the files in the folder of a module, that a text is the name of."""
-    if text.startswith(_NAME + "."):
+    if text.startswith(_NAME + ".") and text.endswith(".*"):
+        package = _path(text.removeprefix(_NAME + ".").removesuffix(".*")).parent
+        yield from package.glob("*.py")
+        yield from package.glob("*/__init__.py")
+    elif text.startswith(_NAME + "."):
         with suppress(ValueError):
             yield _path(text.removeprefix(_NAME + "."))
     else:

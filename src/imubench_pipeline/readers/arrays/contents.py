@@ -13,19 +13,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.readers import class_of
 from imubench_pipeline.readers.arrays.file import ArrayFile, check_not_empty, explained, numbers
 from imubench_pipeline.readers.arrays.table import DATES, NUMBERS, Table
-from imubench_pipeline.readers.contents import (
+from imubench_pipeline.readers.file_format import (
     FIRST,
     NOTHING_STATED,
     ROWS,
-    HeldColumn,
-    HeldTable,
+    FileFormat,
     Kind,
+    LogColumn,
+    LogTable,
     shown,
 )
-from imubench_pipeline.settings.sensor import Reader
 from imubench_pipeline.tables.findings import RecordingError
 
 _MOST_TABLES, _MOST_COLUMNS = 1000, 1000
@@ -37,13 +36,13 @@ _RATES = frozenset(
 _HIGHEST_RATE = 1e6
 
 
-def held(path: Path, reader: Reader) -> list[HeldTable]:
+def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
     """Return the tables of a file, as far as the first thousand.
 
     Parameters
     ----------
     path : Path
-    reader : Reader
+    file_format : FileFormat
 
     Raises
     ------
@@ -51,19 +50,19 @@ def held(path: Path, reader: Reader) -> list[HeldTable]:
         If it cannot be read.
     """
     check_not_empty(path)
-    file = class_of(reader)(path, NOTHING_STATED, {})
+    file = file_format.code().log_file(path, NOTHING_STATED, {})
     assert isinstance(file, ArrayFile)  # the readers of these files
     with explained(path), ExitStack() as stack:
         tables = list(islice(file.tables(stack), _MOST_TABLES))
-        found = [_held(path, reader, table) for table in tables]
-    rates = {rate for table in found if (rate := _rate(table)) is not None}
+        described = [_table(path, file_format, table) for table in tables]
+    rates = {rate for table in described if (rate := _rate(table)) is not None}
     if len(rates) == 1:
         (rate,) = rates
-        found = [replace(table, rate=rate) for table in found]
-    return _together(found)
+        described = [replace(table, rate=rate) for table in described]
+    return _together(described)
 
 
-def _rate(table: HeldTable) -> float | None:
+def _rate(table: LogTable) -> float | None:
     """Return the rate that a single value is, by its name."""
     name = re.sub(r"[\W_\d]+", "", table.name.rpartition("/")[2]).lower().removesuffix("hz")
     if table.rows != 1 or len(table.columns) != 1 or name not in _RATES:
@@ -72,10 +71,10 @@ def _rate(table: HeldTable) -> float | None:
     return float(values[0]) if len(values) and 0 < values[0] < _HIGHEST_RATE else None
 
 
-def _together(found: Sequence[HeldTable]) -> list[HeldTable]:
+def _together(described: Sequence[LogTable]) -> list[LogTable]:
     """Put vectors of one length, side by side in the file, into one table."""
-    tables: dict[object, HeldTable] = {}
-    for number, table in enumerate(found):
+    tables: dict[object, LogTable] = {}
+    for number, table in enumerate(described):
         alone = table.fault or table.variable or not table.name or table.rows in (None, 1)
         above = table.name.rpartition("/")[0]
         key = number if alone else (above, table.rows)
@@ -90,9 +89,9 @@ def _together(found: Sequence[HeldTable]) -> list[HeldTable]:
     return list(tables.values())
 
 
-def _held(path: Path, reader: Reader, table: Table) -> HeldTable:
+def _table(path: Path, file_format: FileFormat, table: Table) -> LogTable:
     if table.fault is not None:
-        return HeldTable(reader, table.name, fault=table.fault)
+        return LogTable(file_format, table.name, fault=table.fault)
     described = [table.column(place) for place in range(min(table.width, _MOST_COLUMNS))]
     usable = [n for n, column in enumerate(described) if column.kind in NUMBERS + DATES]
     try:
@@ -100,7 +99,7 @@ def _held(path: Path, reader: Reader, table: Table) -> HeldTable:
             values = _first(table, usable)
             units = [table.unit(place) for place in range(len(described))]
     except RecordingError as error:
-        return HeldTable(reader, table.name, fault=str(error).removeprefix(f"{path.name}: "))
+        return LogTable(file_format, table.name, fault=str(error).removeprefix(f"{path.name}: "))
     kinds: dict[str, Kind] = {DATES: "date", **dict.fromkeys(NUMBERS, "number")}
     columns = []
     for place, column in enumerate(described):
@@ -108,7 +107,7 @@ def _held(path: Path, reader: Reader, table: Table) -> HeldTable:
         raw = values.get(place, np.empty(0))
         dated = column.kind == DATES
         columns.append(
-            HeldColumn(
+            LogColumn(
                 source,
                 column.label or (table.name if table.width == 1 else ""),
                 kinds.get(column.kind, "other"),
@@ -122,7 +121,7 @@ def _held(path: Path, reader: Reader, table: Table) -> HeldTable:
     whole = not table.labels and table.width == 1 and table.name != ""
     variable = None if whole or not table.name else table.name
     about = "" if table.rows is None else f"{table.rows} x {table.width}"
-    return HeldTable(reader, table.name, tuple(columns), variable, rows=table.rows, about=about)
+    return LogTable(file_format, table.name, tuple(columns), variable, rows=table.rows, about=about)
 
 
 def _called(table: Table, place: int) -> tuple[str | int, str | int]:

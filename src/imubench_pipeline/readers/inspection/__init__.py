@@ -63,6 +63,6 @@ def inspect(path: Path, model: str | None = None) -> Inspection:
     """
     # What stands in a damaged file may overflow.
     with np.errstate(all="ignore"):
-        held = contents(path)
-        found = draft(held, model)
-        return Inspection(listing(held), block(found, path.name), found, proof(path, found))
+        log = contents(path)
+        drafted = draft(log, model)
+        return Inspection(listing(log), block(drafted, path.name), drafted, proof(path, drafted))

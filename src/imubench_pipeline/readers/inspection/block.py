@@ -66,7 +66,7 @@ def _entries(entries: Sequence[tuple[str, Entry]], margin: str) -> list[str]:
     """
     written = [f"{margin}{key}: {_flow(entry.value)}" for key, entry in entries]
     comments = [printable(entry.comment) for _, entry in entries]
-    behind = [len(line) for line, said in zip(written, comments, strict=True) if said]
+    behind = [len(line) for line, comment in zip(written, comments, strict=True) if comment]
     width = max(behind, default=0)
     above = width + max(map(len, comments), default=0) > _LONGEST_LINE
     lines, before = [], ""

@@ -6,14 +6,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from imubench_pipeline.readers import SEVERAL_CLOCKS
-from imubench_pipeline.readers.contents import Contents, HeldColumn, HeldTable
+from imubench_pipeline.readers.contents import Contents
+from imubench_pipeline.readers.file_format import LogColumn, LogTable
 from imubench_pipeline.readers.inspection.clock import Clock, clocks
 from imubench_pipeline.readers.inspection.groups import Group, groups
 from imubench_pipeline.readers.inspection.names import DERIVED, PLAIN, WITHOUT_GRAVITY
 
 _CALLED = {"gyro": "gyro", "accel": "accelerometer", "temperature": "temperature"}
-_ARRAYS = ("matlab", "numpy", "arrow", "hdf5")
 
 
 @dataclass(frozen=True)
@@ -26,12 +25,12 @@ class Choice:
     clock : Clock or None
     local : bool
         The time column is one of the table of the channels, in each file.
-    anchor : HeldTable or None
+    anchor : LogTable or None
         The table that the others must go with.
     other_clocks : list of Clock
     left : list of (Group, str)
         What was recognised and not taken, and why.
-    unknown : list of HeldColumn
+    unknown : list of LogColumn
         Numbers of the tables in use that were not recognised.
     """
 
@@ -40,10 +39,10 @@ class Choice:
     temperature: Group | None
     clock: Clock | None
     local: bool
-    anchor: HeldTable | None
+    anchor: LogTable | None
     other_clocks: list[Clock]
     left: list[tuple[Group, str]]
-    unknown: list[HeldColumn]
+    unknown: list[LogColumn]
 
     @property
     def taken(self) -> list[Group]:
@@ -58,17 +57,17 @@ def chosen(contents: Contents) -> Choice:
     ----------
     contents : Contents
     """
-    found = groups(contents)
-    left = [(g, _why_not(g)) for g in found if _why_not(g)]
-    able = [group for group in found if not _why_not(group)]
+    recognised = groups(contents)
+    left = [(g, _why_not(g)) for g in recognised if _why_not(g)]
+    able = [group for group in recognised if not _why_not(group)]
     gyro = _best([g for g in able if g.quantity == "gyro"], None, able)
     accels = [g for g in able if g.quantity == "accel"]
     first = gyro or _best(accels, None, able)
     anchor = first.table if first else None
     if anchor is None:
         anchor = next((table for table in contents.tables if table.columns), None)
-    ours = [] if anchor is None else _clocks(contents, anchor, found)
-    others = {id(g.table): _clocks(contents, g.table, found) for g in able}
+    ours = [] if anchor is None else _clocks(contents, anchor, recognised)
+    others = {id(g.table): _clocks(contents, g.table, recognised) for g in able}
     clock = _common(ours, [others[id(g.table)] for g in able if anchor is not g.table])
 
     def fits(group: Group) -> bool:
@@ -91,7 +90,7 @@ def chosen(contents: Contents) -> Choice:
     temperature = _best([g for g in fitting if g.quantity == "temperature"], gyro or accel, able)
     taken = [group for group in (gyro, accel, temperature) if group is not None]
     left += [(g, f"another {_CALLED[g.quantity]}") for g in fitting if g not in taken]
-    columns = {id(column) for group in found for column in group.columns.values()}
+    columns = {id(column) for group in recognised for column in group.columns.values()}
     spoken = columns | ({id(clock.column)} if clock else set())
     spoken |= {id(other.column) for other in ours}
     return Choice(
@@ -124,7 +123,7 @@ def _why_not(group: Group) -> str:
     return ""
 
 
-def _best(found: Sequence[Group], beside: Group | None, every: Sequence[Group]) -> Group | None:
+def _best(likely: Sequence[Group], beside: Group | None, every: Sequence[Group]) -> Group | None:
     """Return the likeliest group: near another one, or where there are others beside it."""
 
     def order(group: Group) -> tuple[Any, ...]:
@@ -143,18 +142,18 @@ def _best(found: Sequence[Group], beside: Group | None, every: Sequence[Group]) 
             group.unit is None,
         )
 
-    return min(found, key=order, default=None)
+    return min(likely, key=order, default=None)
 
 
 # ------------------------------------------------------------------------------------- time
 
 
-def _clocks(contents: Contents, table: HeldTable, found: Sequence[Group]) -> list[Clock]:
+def _clocks(contents: Contents, table: LogTable, recognised: Sequence[Group]) -> list[Clock]:
     """Return what may be the time of a table."""
-    taken = {id(column) for group in found for column in group.columns.values()}
+    taken = {id(column) for group in recognised for column in group.columns.values()}
     columns = [c for c in table.columns if id(c) not in taken]
     rate = table.rate
-    if table.reader in _ARRAYS:
+    if table.file_format.clock_of == "length":
         for other in contents.tables:
             if other is not table and other.file == table.file and other.rows == table.rows:
                 columns += [c for c in other.columns if id(c) not in taken]
@@ -171,25 +170,25 @@ def _common(ours: Sequence[Clock], others: Iterable[Sequence[Clock]]) -> Clock |
     return max(ours, key=lambda clock: (not clock.counts, shared(clock)), default=None)
 
 
-def _equal(one: Clock, other: Clock) -> bool:
+def _equal(clock: Clock, other: Clock) -> bool:
     """Tell whether a sensor file states both clocks alike."""
-    if one.column.source != other.column.source:
+    if clock.column.source != other.column.source:
         return False
     keys = ("unit", "format", "date", "scale")
-    return all(one.entry.value.get(key) == other.entry.value.get(key) for key in keys)
+    return all(clock.entry.value.get(key) == other.entry.value.get(key) for key in keys)
 
 
-def _readable_together(anchor: HeldTable, table: HeldTable) -> bool:
+def _readable_together(anchor: LogTable, table: LogTable) -> bool:
     if anchor is table or anchor.file != table.file:
         return True
-    if table.reader in SEVERAL_CLOCKS:
-        return True
-    return table.reader in _ARRAYS and anchor.rows == table.rows
+    clock_of = table.file_format.clock_of
+    return clock_of == "variable" or (clock_of == "length" and anchor.rows == table.rows)
 
 
-def _same_clock(anchor: HeldTable, table: HeldTable) -> bool:
+def _same_clock(anchor: LogTable, table: LogTable) -> bool:
     """Tell whether the records of two tables are the same, so that one clock does for both."""
-    return anchor is table or (anchor.file == table.file and table.reader in _ARRAYS)
+    by_length = table.file_format.clock_of == "length"
+    return anchor is table or (anchor.file == table.file and by_length)
 
 
 def _is_local(taken: Sequence[Group], clock: Clock | None) -> bool:
@@ -204,6 +203,6 @@ def _is_local(taken: Sequence[Group], clock: Clock | None) -> bool:
     return len(tables) > 1 or any(clock.column is c for t in tables for c in t.columns)
 
 
-def _tables(taken: Sequence[Group], anchor: HeldTable | None) -> list[HeldTable]:
+def _tables(taken: Sequence[Group], anchor: LogTable | None) -> list[LogTable]:
     tables = [group.table for group in taken] or ([anchor] if anchor else [])
     return list({id(table): table for table in tables}.values())

@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.readers.batch import SECONDS
-from imubench_pipeline.readers.contents import HeldColumn, HeldTable
+from imubench_pipeline.readers.file_format import LogColumn, LogTable
 from imubench_pipeline.readers.inspection.draft import UNKNOWN, Entry
 from imubench_pipeline.readers.inspection.names import words_of
 from imubench_pipeline.readers.spellings import divided, unit_of
 from imubench_pipeline.readers.started import date_of
 from imubench_pipeline.readers.text.stamps import DAY
-from imubench_pipeline.settings.sensor import Reader
 
 _WORDS = frozenset(
     ("t", "time", "timestamp", "timestamps", "stamp", "stamps", "ts", "elapsed", "clock", "tow",
@@ -28,9 +27,6 @@ _COUNTERS = frozenset(
     ("counter", "count", "cnt", "cntr", "sample", "samples", "index", "idx", "frame", "seq",
      "sequence", "n", "no", "nr", "packet", "row", "record", "id", "num", "number")
 )  # fmt: skip
-_NAMED_TIME: tuple[Reader, ...] = ("vectornav", "ubx", "rosbag")
-"""Formats that name the time themselves."""
-
 _TICKS, _PACKETS = "sampletimefine", "packetcounter"
 _LIKELY = (10.0, 5000.0)
 """Hz: the rates that a clock of unknown unit is thought to show."""
@@ -62,7 +58,7 @@ class Clock:
 
     Attributes
     ----------
-    column : HeldColumn
+    column : LogColumn
     entry : Entry
         ``time`` of the sensor file.
     counts : bool
@@ -71,51 +67,50 @@ class Clock:
         The lower, the better.
     """
 
-    column: HeldColumn
+    column: LogColumn
     entry: Entry
     counts: bool
     order: tuple[int, ...]
 
 
-def clocks(table: HeldTable, columns: Sequence[HeldColumn], rate: float | None) -> list[Clock]:
+def clocks(table: LogTable, columns: Sequence[LogColumn], rate: float | None) -> list[Clock]:
     """Return the columns that may be the time, the likeliest first.
 
     Parameters
     ----------
-    table : HeldTable
-    columns : sequence of HeldColumn
+    table : LogTable
+    columns : sequence of LogColumn
         Those of the table that are no channel, and vectors beside it.
     rate : float or None
         That the file states, Hz.
     """
-    found = []
+    likely = []
     for place, column in enumerate(columns):
-        named = not (_WORDS | _COUNTERS).isdisjoint(words_of(column.label))
-        if table.reader in _NAMED_TIME and not named:
+        if (names := table.file_format.time_columns) and column.label not in names:
             continue
         clock = _dated(column, table) if column.kind == "date" else _counted(column, rate)
         if clock is not None:
             counts_alone = clock.counts and rate is None
             order = (*clock.order, int(counts_alone), place)
-            found.append(Clock(clock.column, clock.entry, clock.counts, order))
-    return sorted(found, key=lambda clock: clock.order)
+            likely.append(Clock(clock.column, clock.entry, clock.counts, order))
+    return sorted(likely, key=lambda clock: clock.order)
 
 
-def rate_entry(table: HeldTable | None) -> Entry:
+def rate_entry(table: LogTable | None) -> Entry:
     """Return ``rate`` of a sensor file where no stamps tell it."""
     if table is None or table.rate is None:
         return Entry(UNKNOWN, _RATE_HINT)
     return Entry(f"{table.rate:.10g} Hz", "stated in the file")
 
 
-def _source(column: HeldColumn) -> str | int:
+def _source(column: LogColumn) -> str | int:
     return column.source if column.address is None else column.address
 
 
 # ----------------------------------------------------------------------------------- dates
 
 
-def _dated(column: HeldColumn, table: HeldTable) -> Clock | None:
+def _dated(column: LogColumn, table: LogTable) -> Clock | None:
     form = column.forms[0]
     has_day = form == "iso8601" or "%d" in form
     has_hour = form == "iso8601" or "%H" in form or "%I" in form
@@ -138,7 +133,7 @@ def _has_hour(form: str) -> bool:
     return form == "iso8601" or any(field in form for field in ("%H", "%I"))
 
 
-def _day_comment(column: HeldColumn) -> str:
+def _day_comment(column: LogColumn) -> str:
     """Say where day and month may be the other way round."""
     form = column.forms[0]
     others = [other for other in column.forms[1:] if sorted(other) == sorted(form)]
@@ -148,7 +143,7 @@ def _day_comment(column: HeldColumn) -> str:
 # --------------------------------------------------------------------------------- numbers
 
 
-def _counted(column: HeldColumn, rate: float | None) -> Clock | None:
+def _counted(column: LogColumn, rate: float | None) -> Clock | None:
     """Return the clock that a column of numbers is; None: it is none."""
     if column.kind != "number" or not advances(column.values):
         return None
@@ -179,7 +174,7 @@ def _counted(column: HeldColumn, rate: float | None) -> Clock | None:
     return Clock(column, Entry(value | again, comment), False, order)
 
 
-def _counter(column: HeldColumn, value: dict[str, Any], of_16_bits: bool) -> Clock | None:
+def _counter(column: LogColumn, value: dict[str, Any], of_16_bits: bool) -> Clock | None:
     steps = _steps(column.values)
     step = float(np.median(steps[steps > 0]))
     highest = float(np.nanmax(column.values))
@@ -198,7 +193,7 @@ def _counter(column: HeldColumn, value: dict[str, Any], of_16_bits: bool) -> Clo
     return Clock(column, Entry(value, comment), True, (1, 3))
 
 
-def _tick_clock(column: HeldColumn) -> Clock:
+def _tick_clock(column: LogColumn) -> Clock:
     """Return the clock of Xsens: of 0.1 ms in a motion tracker, of 1 us in a wearable one."""
     step = typical_step(column.values)
     of_microseconds = step is not None and step > 8000
@@ -211,7 +206,7 @@ def _tick_clock(column: HeldColumn) -> Clock:
     return Clock(column, Entry(value, f"ticks of {tick}{rate}"), False, (0, 0))
 
 
-def _stated(column: HeldColumn) -> tuple[str | None, float]:
+def _stated(column: LogColumn) -> tuple[str | None, float]:
     """Return the unit that the file states, s, ms, us or ns, and how many of it are one."""
     unit = unit_of(column.unit or "", "time")
     if unit is None:
@@ -292,7 +287,7 @@ def advances(values: NDArray[np.float64], wrap: float | None = None) -> bool:
     return bool(forward > 10 * back and back <= 0.02 * len(steps) + 1)
 
 
-def _coarse(column: HeldColumn) -> int:
+def _coarse(column: LogColumn) -> int:
     """Return 2 for stamps that most samples share with others, else 0."""
     steps = _steps(column.values)
     return 2 if len(steps) and np.mean(steps == 0) > 0.5 else 0

@@ -49,15 +49,15 @@ class Draft:
 
     def log(self) -> dict[str, Any]:
         """Return what stands under ``log``."""
-        found = {
+        entries = {
             key: entry.value
             for key, entry in (("reader", self.reader), ("rate", self.rate), ("time", self.time))
             if entry is not None
         }
-        found["channels"] = {name: dict(entry.value) for name, entry in self.channels.items()}
+        entries["channels"] = {name: dict(entry.value) for name, entry in self.channels.items()}
         if self.temperature is not None:
-            found["temperature"] = dict(self.temperature.value)
-        return found
+            entries["temperature"] = dict(self.temperature.value)
+        return entries
 
     def sensor(self) -> dict[str, Any]:
         """Return the whole sensor file."""
@@ -70,7 +70,7 @@ class Draft:
 
 def _unfilled(value: object, key: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
     if isinstance(value, dict):
-        for name, held in value.items():
-            yield from _unfilled(held, (*key, name))
+        for name, inner in value.items():
+            yield from _unfilled(inner, (*key, name))
     elif value == UNKNOWN:
         yield key

@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from imubench_pipeline.readers.contents import Contents, HeldColumn, HeldTable
+from imubench_pipeline.readers.contents import Contents
+from imubench_pipeline.readers.file_format import LogColumn, LogTable
 from imubench_pipeline.readers.inspection.choice import Choice, chosen
 from imubench_pipeline.readers.inspection.clock import rate_entry
 from imubench_pipeline.readers.inspection.draft import UNKNOWN, Draft, Entry
 from imubench_pipeline.readers.inspection.groups import Group
 from imubench_pipeline.readers.inspection.names import WITHOUT_GRAVITY
-from imubench_pipeline.settings.sensor import CHANNELS, Reader
+from imubench_pipeline.settings.sensor import CHANNELS
 
-_VENDORS: dict[Reader, str] = {"vectornav": "VectorNav", "ubx": "u-blox"}
 _GYRO_HINT = "the file does not say: deg/s or rad/s? see the logger's manual"
 _SHOWN = 20
 _ENDINGS = re.compile(r"(?:\.[A-Za-z]\w{0,7})+$")
@@ -34,42 +34,42 @@ def draft(contents: Contents, model: str | None = None) -> Draft:
         What the sensor is called; None: as the log.
     """
     choice = chosen(contents)
-    found = Draft(
+    drafted = Draft(
         Entry(_vendor(contents), "who makes the sensor, for the report"),
         Entry(model or _ENDINGS.sub("", contents.path.name) or "sensor", "what it is called"),
     )
-    if contents.reader is not None:
-        found.reader = Entry(contents.reader, "the file does not tell it by its first bytes")
+    if contents.stated is not None:
+        drafted.reader = Entry(contents.stated.name, "the file does not tell it by its first bytes")
     if choice.clock is not None:
         value = dict(choice.clock.entry.value)
         if choice.local:
             value["column"] = choice.clock.column.source
-        found.time = Entry(value, choice.clock.entry.comment)
+        drafted.time = Entry(value, choice.clock.entry.comment)
     if choice.clock is None or choice.clock.counts:
-        found.rate = rate_entry(choice.anchor or _stating(contents.tables))
+        drafted.rate = rate_entry(choice.anchor or _stating(contents.tables))
     files = {group.table.file for group in choice.taken}
     alone = len(files) == 1 and files == {contents.only}
     for group in (choice.gyro, choice.accel):
         if group is not None:
-            _add(found, group, alone)
+            _add(drafted, group, alone)
     if choice.temperature is not None:
-        _add_temperature(found, choice.temperature, alone)
-    if not found.channels:
-        _add_placeholders(found)
-    found.left_over += _left_over(choice, contents)
-    return found
+        _add_temperature(drafted, choice.temperature, alone)
+    if not drafted.channels:
+        _add_placeholders(drafted)
+    drafted.left_over += _left_over(choice, contents)
+    return drafted
 
 
 def _vendor(contents: Contents) -> str:
-    readers = {table.reader for table in contents.tables if table.fault is None}
-    return next((_VENDORS[reader] for reader in readers if reader in _VENDORS), "unknown")
+    usable = (table.file_format for table in contents.tables if table.fault is None)
+    return next((made.vendor for made in usable if made.vendor), "unknown")
 
 
-def _stating(tables: Iterable[HeldTable]) -> HeldTable | None:
+def _stating(tables: Iterable[LogTable]) -> LogTable | None:
     return next((table for table in tables if table.rate is not None), None)
 
 
-def _source(table: HeldTable, column: HeldColumn, unit: str, alone: bool) -> dict[str, Any]:
+def _source(table: LogTable, column: LogColumn, unit: str, alone: bool) -> dict[str, Any]:
     """Return what a sensor file says of a column."""
     source: dict[str, Any] = {}
     if table.file is not None and not alone:
@@ -82,7 +82,7 @@ def _source(table: HeldTable, column: HeldColumn, unit: str, alone: bool) -> dic
 # --------------------------------------------------------------------------------- channels
 
 
-def _add(found: Draft, group: Group, alone: bool) -> None:
+def _add(drafted: Draft, group: Group, alone: bool) -> None:
     """Add the axes of a group."""
     unit, comment = group.unit, ""
     if unit is None and group.quantity == "accel":
@@ -100,7 +100,7 @@ def _add(found: Draft, group: Group, alone: bool) -> None:
     comment = "; ".join(text for text in (group.guessed, comment) if text)
     for axis, column in group.columns.items():
         entry = Entry(_source(group.table, column, unit, alone), comment)
-        found.channels[f"{group.quantity}_{axis}"] = entry
+        drafted.channels[f"{group.quantity}_{axis}"] = entry
 
 
 def _guessed_acceleration(group: Group) -> tuple[str, str]:
@@ -110,15 +110,15 @@ def _guessed_acceleration(group: Group) -> tuple[str, str]:
         return UNKNOWN, "the file does not say: m/s^2, g or mg?"
     if unit is not None:
         return unit, f"guessed: the mean is {length:.4g} long, as gravity in {unit}"
-    counts = [one for one in _COUNTS if abs(length / one - 1) < _NEAR]
+    counts = [count for count in _COUNTS if abs(length / count - 1) < _NEAR]
     hint = (
         f": counts of g/{counts[0]}? then 'unit: g, scale: {1 / counts[0]:.10g}'" if counts else ""
     )
-    said = f"the file says {group.written!r}, and" if group.written else "the file does not say;"
-    return UNKNOWN, f"{said} the mean is {length:.4g} long{hint}"
+    what = f"the file says {group.written!r}, and" if group.written else "the file does not say;"
+    return UNKNOWN, f"{what} the mean is {length:.4g} long{hint}"
 
 
-def _add_temperature(found: Draft, group: Group, alone: bool) -> None:
+def _add_temperature(drafted: Draft, group: Group, alone: bool) -> None:
     """Add the temperature, unless its unit cannot be told."""
     (column,) = list(group.columns.values())[:1]
     unit, comment = group.unit, ""
@@ -128,21 +128,21 @@ def _add_temperature(found: Draft, group: Group, alone: bool) -> None:
         unit = "degC" if -60 <= level <= 130 else "K" if 230 <= level <= 400 else None
         comment = f"guessed: {level:.4g} is one in {unit}"
     if unit is None:
-        found.left_over.append(
+        drafted.left_over.append(
             f"not taken: {_shown(group)}, a temperature in a unit that the file does not say"
         )
         return
-    found.temperature = Entry(_source(group.table, column, unit, alone), comment)
+    drafted.temperature = Entry(_source(group.table, column, unit, alone), comment)
 
 
-def _add_placeholders(found: Draft) -> None:
+def _add_placeholders(drafted: Draft) -> None:
     for name in CHANNELS:
-        found.channels[name] = Entry(
+        drafted.channels[name] = Entry(
             {"column": UNKNOWN, "unit": UNKNOWN}, "no name of a column tells: fill in, or remove"
         )
 
 
-def _is_whole(column: HeldColumn) -> bool:
+def _is_whole(column: LogColumn) -> bool:
     values = column.values[np.isfinite(column.values)]
     return bool(len(values)) and bool((values == np.rint(values)).all()) and bool(values.any())
 
@@ -151,16 +151,16 @@ def _is_whole(column: HeldColumn) -> bool:
 
 
 def _left_over(choice: Choice, contents: Contents) -> list[str]:
-    found = [f"not taken: {_shown(group)} ({why})" for group, why in choice.left]
+    remarks = [f"not taken: {_shown(group)} ({why})" for group, why in choice.left]
     if choice.other_clocks:
         names = _listed(str(clock.entry.value["column"]) for clock in choice.other_clocks)
-        found.append(f"also a time: {names}")
+        remarks.append(f"also a time: {names}")
     if choice.unknown:
         names = _listed(c.label or f"column {c.source}" for c in choice.unknown)
-        found.append(f"not recognised: {names}")
+        remarks.append(f"not recognised: {names}")
     if contents.files > len({table.file for table in contents.tables}):
-        found.append(f"only some of the {contents.files} files were looked into")
-    return found
+        remarks.append(f"only some of the {contents.files} files were looked into")
+    return remarks
 
 
 def _shown(group: Group) -> str:

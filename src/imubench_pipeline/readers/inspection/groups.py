@@ -10,7 +10,8 @@ from pathlib import PurePosixPath
 import numpy as np
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
-from imubench_pipeline.readers.contents import Contents, HeldColumn, HeldTable
+from imubench_pipeline.readers.contents import Contents
+from imubench_pipeline.readers.file_format import LogColumn, LogTable
 from imubench_pipeline.readers.inspection.clock import advances
 from imubench_pipeline.readers.inspection.names import (
     DERIVED,
@@ -23,7 +24,6 @@ from imubench_pipeline.readers.inspection.names import (
     quantity_of_text,
 )
 from imubench_pipeline.readers.spellings import said, unit_of
-from imubench_pipeline.settings.sensor import Reader
 from imubench_pipeline.units import conversion
 
 _AXES = "xyz"
@@ -34,8 +34,6 @@ _NEAR, _STATED_NEAR = 0.1, 0.2
 _NAMELESS = 0.05
 _TELLING = 40
 """Records of all axes that are the same, from which a sensor was not read."""
-_FIXED: tuple[Reader, ...] = ("rosbag",)
-"""Formats in which the names are those of the format: there linear acceleration is measured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +43,8 @@ class Group:
     Attributes
     ----------
     quantity : {"gyro", "accel", "temperature"}
-    table : HeldTable
-    columns : dict of str to HeldColumn
+    table : LogTable
+    columns : dict of str to LogColumn
         By axis; of a temperature by an empty text.
     unit : str or None
         The unit that the file states.
@@ -59,8 +57,8 @@ class Group:
     """
 
     quantity: Quantity
-    table: HeldTable
-    columns: dict[str, HeldColumn]
+    table: LogTable
+    columns: dict[str, LogColumn]
     unit: str | None
     written: str
     rank: int
@@ -96,33 +94,33 @@ class Group:
         if self.unit is not None:
             in_si = length * conversion(self.unit, DIMENSIONS["accel"])[0]
             return self.unit if abs(in_si / STANDARD_GRAVITY - 1) < _STATED_NEAR else None
-        return next((u for u, one in GRAVITIES.items() if abs(length / one - 1) < _NEAR), None)
+        return next((u for u, g in GRAVITIES.items() if abs(length / g - 1) < _NEAR), None)
 
 
 def groups(contents: Contents) -> list[Group]:
     """Return all groups of a recording, in the order of its tables."""
-    found: list[Group] = []
+    recognised: list[Group] = []
     for table in contents.tables:
         if table.fault is None:
-            found += _named(table, contents) or _nameless(table)
-    return found
+            recognised += _named(table, contents) or _nameless(table)
+    return recognised
 
 
-def _named(table: HeldTable, contents: Contents) -> list[Group]:
+def _named(table: LogTable, contents: Contents) -> list[Group]:
     """Return the groups that the names of the columns tell."""
     context = _context(table, contents)
-    together: dict[tuple[Quantity, str, bool], dict[str, tuple[HeldColumn, Meaning]]] = {}
+    together: dict[tuple[Quantity, str, bool], dict[str, tuple[LogColumn, Meaning]]] = {}
     for column in table.columns:
         if column.kind != "number":
             continue
         label = column.label or f"{context}[{column.source}]"
-        found = meaning(label, context)
-        if found is not None:
-            if found.quantity != "temperature":
-                key = found.quantity, found.stem, found.axis.isdecimal()
-                together.setdefault(key, {}).setdefault(found.axis, (column, found))
+        told = meaning(label, context)
+        if told is not None:
+            if told.quantity != "temperature":
+                key = told.quantity, told.stem, told.axis.isdecimal()
+                together.setdefault(key, {}).setdefault(told.axis, (column, told))
             elif column.label or not advances(column.values):
-                together["temperature", label, False] = {"": (column, found)}
+                together["temperature", label, False] = {"": (column, told)}
     result = []
     for (quantity, _, counted), axes in together.items():
         placed = _counted_axes(axes) if counted else axes
@@ -131,7 +129,7 @@ def _named(table: HeldTable, contents: Contents) -> list[Group]:
     return result + list(_roll_pitch_yaw(table, result))
 
 
-def _context(table: HeldTable, contents: Contents) -> str:
+def _context(table: LogTable, contents: Contents) -> str:
     """Return the nearest of the names about a table that says a quantity."""
     file = PurePosixPath(table.file or contents.path.name)
     names = (table.name.rpartition("/")[2], table.name, file.name.partition(".")[0])
@@ -139,17 +137,17 @@ def _context(table: HeldTable, contents: Contents) -> str:
 
 
 def _counted_axes(
-    axes: Mapping[str, tuple[HeldColumn, Meaning]],
-) -> dict[str, tuple[HeldColumn, Meaning]]:
+    axes: Mapping[str, tuple[LogColumn, Meaning]],
+) -> dict[str, tuple[LogColumn, Meaning]]:
     """Return three axes that are counted, without a time before them; none if they are not."""
-    held = [axes[number] for number in sorted(axes, key=int)]
-    if len(held) == 4 and advances(held[0][0].values):
-        held = held[1:]
-    return dict(zip(_AXES, held, strict=True)) if len(held) == 3 else {}
+    columns = [axes[number] for number in sorted(axes, key=int)]
+    if len(columns) == 4 and advances(columns[0][0].values):
+        columns = columns[1:]
+    return dict(zip(_AXES, columns, strict=True)) if len(columns) == 3 else {}
 
 
 def _group(
-    quantity: Quantity, table: HeldTable, axes: Mapping[str, tuple[HeldColumn, Meaning]]
+    quantity: Quantity, table: LogTable, axes: Mapping[str, tuple[LogColumn, Meaning]]
 ) -> Group:
     columns = {axis: axes[axis][0] for axis in sorted(axes)}
     meanings = [meaning for _, meaning in axes.values()]
@@ -161,14 +159,14 @@ def _group(
     }
     written = beside or ", ".join(said(column.label))
     rank = max(meaning.rank for meaning in meanings)
-    if table.reader in _FIXED:
+    if table.file_format.measured_by_name:
         rank = DERIVED if rank == DERIVED else PLAIN
     return Group(quantity, table, columns, unit if same else None, written, rank)
 
 
-def _roll_pitch_yaw(table: HeldTable, found: list[Group]) -> Iterator[Group]:
+def _roll_pitch_yaw(table: LogTable, named: list[Group]) -> Iterator[Group]:
     """Yield the rates that are called p, q and r, where no other gyro is there."""
-    if any(group.quantity == "gyro" for group in found):
+    if any(group.quantity == "gyro" for group in named):
         return
     by_name = {re.split(r"[\s(\[]", c.label)[0].lower(): c for c in table.columns}
     if {"p", "q", "r"} <= set(by_name):
@@ -176,14 +174,14 @@ def _roll_pitch_yaw(table: HeldTable, found: list[Group]) -> Iterator[Group]:
             axis: (by_name[name], meaning(by_name[name].label.lower().replace(name, f"w{axis}", 1)))
             for axis, name in zip(_AXES, "pqr", strict=True)
         }
-        axes = {axis: (column, said) for axis, (column, said) in told.items() if said is not None}
+        axes = {axis: (column, meant) for axis, (column, meant) in told.items() if meant}
         if len(axes) == 3:
             group = _group("gyro", table, axes)
             yield Group("gyro", table, group.columns, group.unit, group.written, WEAK,
                         "guessed from the names p, q and r")  # fmt: skip
 
 
-def _nameless(table: HeldTable) -> list[Group]:
+def _nameless(table: LogTable) -> list[Group]:
     """Return gyro and accelerometer of columns without names, where gravity tells them apart."""
     columns = [c for c in table.columns if c.kind == "number"]
     if any(column.label for column in columns) or len(columns) > 8:
@@ -198,20 +196,20 @@ def _nameless(table: HeldTable) -> list[Group]:
     heavy = [
         n
         for n, length in enumerate(lengths)
-        if length and any(abs(length / one - 1) < _NAMELESS for one in GRAVITIES.values())
+        if length and any(abs(length / gravity - 1) < _NAMELESS for gravity in GRAVITIES.values())
     ]
     if len(threes) not in (1, 2) or len(heavy) != 1:
         return []
-    found = []
+    guessed = []
     for n, group in enumerate(threes):
         is_accel = n == heavy[0]
         why = "no names" if is_accel else "no names: guessed by its place"
-        found.append(
+        guessed.append(
             Group("accel" if is_accel else "gyro", table, group.columns, None, "", WEAK, why)
         )
-    return found
+    return guessed
 
 
-def _mean(column: HeldColumn) -> float | None:
+def _mean(column: LogColumn) -> float | None:
     values = column.values[np.isfinite(column.values)]
     return float(values.mean()) if len(values) else None

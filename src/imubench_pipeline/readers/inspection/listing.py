@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from imubench_pipeline.readers.contents import Contents, HeldColumn, HeldTable
+from imubench_pipeline.readers.contents import Contents
+from imubench_pipeline.readers.file_format import LogColumn, LogTable
 from imubench_pipeline.readers.inspection.block import printable
 from imubench_pipeline.readers.inspection.names import meaning
 from imubench_pipeline.readers.spellings import said
@@ -34,7 +35,7 @@ def listing(contents: Contents) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _table(table: HeldTable, with_rate: bool) -> Iterator[str]:
+def _table(table: LogTable, with_rate: bool) -> Iterator[str]:
     title = " ".join(printable(text) for text in (table.file, table.name) if text)
     about = [table.about] if table.about else []
     if table.rows is not None and " x " not in table.about:
@@ -58,12 +59,11 @@ def _table(table: HeldTable, with_rate: bool) -> Iterator[str]:
         yield f"    ... and {len(table.columns) - _MOST} more"
 
 
-def _row(column: HeldColumn) -> tuple[str, str, str, str]:
+def _row(column: LogColumn) -> tuple[str, str, str, str]:
     """Return name, kind, unit and first values of a column."""
     name = printable(column.label) or f"column {column.source}"
-    found = meaning(column.label)
-    told = None if found is None else found.unit
-    unit = column.unit or told or ", ".join(said(column.label)) or _NOT_STATED
+    meant = meaning(column.label)
+    unit = column.unit or (meant and meant.unit) or ", ".join(said(column.label)) or _NOT_STATED
     values = ", ".join(printable(text) for text in column.first)
     return (
         _cut(name, _WIDEST_NAME),

@@ -94,32 +94,32 @@ def meaning(label: str, context: str = "") -> Meaning | None:
     label = label[:_LONGEST].replace("ω", "omega").replace("Ω", "omega")
     for quantity, dimension in DIMENSIONS.items():
         name, unit = divided(label, dimension)
-        found = _meant(name)
-        if found is None and (axis := _bare_axis(name)):
+        meant = _meant(name)
+        if meant is None and (axis := _bare_axis(name)):
             told = quantity_of_text(context)
             if told is not None:
-                found = Meaning(told[0], axis, "", None, told[1])
-        if found is None and unit is not None:
-            found = _told_by_unit(quantity, name, unit)
-        if found is not None and found.quantity == quantity:
-            return Meaning(quantity, found.axis, found.stem, unit, found.rank)
+                meant = Meaning(told[0], axis, "", None, told[1])
+        if meant is None and unit is not None:
+            meant = _told_by_unit(quantity, name, unit)
+        if meant is not None and meant.quantity == quantity:
+            return Meaning(quantity, meant.axis, meant.stem, unit, meant.rank)
     return None
 
 
 def quantity_of_text(text: str) -> tuple[Quantity, int] | None:
     """Return the one quantity that a text such as the name of a file says, and its rank."""
     joined = "".join(_words(text[:_LONGEST]))
-    found: list[Quantity] = []
+    quantities: list[Quantity] = []
     for quantity, pattern in (
         ("gyro", _GYRO),
         ("accel", _ACCEL),
         ("temperature", _TEMPERATURE),
     ):
         if pattern.search(joined):
-            found.append(quantity)  # type: ignore[arg-type]  # the keys of Quantity
-    if len(found) != 1 or _OTHER.search(joined):
+            quantities.append(quantity)  # type: ignore[arg-type]  # the keys of Quantity
+    if len(quantities) != 1 or _OTHER.search(joined):
         return None
-    return found[0], _rank(_words(text[:_LONGEST]), joined)
+    return quantities[0], _rank(_words(text[:_LONGEST]), joined)
 
 
 def words_of(label: str) -> list[str]:

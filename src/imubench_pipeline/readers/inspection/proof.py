@@ -71,18 +71,18 @@ def proof(path: Path, draft: Draft) -> Proof:
         files = [_first(file) for file in read(path, log)]
     except (RecordingError, ConfigError) as error:
         return Proof(False, printable(f"not read so: {error}"))
-    said = [_shown_count(files), _shown_rate(files, draft), *_shown_vectors(files, unfilled)]
+    remarks = [_shown_count(files), _shown_rate(files, draft), *_shown_vectors(files, unfilled)]
     started = next((file.started for file in files if file.started), None)
     if started is not None:
-        said.append(f"from {started[:19]} on")
+        remarks.append(f"from {started[:19]} on")
     rest = f"; left to fill in: {_list(unfilled)}" if unfilled else ""
-    return Proof(True, "read so: " + ", ".join(said) + rest)
+    return Proof(True, "read so: " + ", ".join(remarks) + rest)
 
 
 def _filled(log: dict[str, Any]) -> dict[str, Any]:
     """Return a log format in which something stands for what is not filled in."""
     filled: dict[str, Any] = {
-        key: _STAND_IN_RATE if held == UNKNOWN else held for key, held in log.items()
+        key: _STAND_IN_RATE if entry == UNKNOWN else entry for key, entry in log.items()
     }
     for holder in (filled, filled["channels"]):
         for key, entry in holder.items():
@@ -147,7 +147,7 @@ def _shown_vectors(files: list[_First], unfilled: list[str]) -> list[str]:
         for file in files
         for name, values in file.columns.items()
     }
-    said = []
+    lengths = []
     for quantity, unit in (("gyro", "deg/s"), ("accel", "m/s^2")):
         axes = [means.get(f"{quantity}_{axis}", np.nan) for axis in "xyz"]
         if any(f".{quantity}_" in f".{key}" for key in unfilled) or not np.isfinite(axes).all():
@@ -157,8 +157,8 @@ def _shown_vectors(files: list[_First], unfilled: list[str]) -> list[str]:
         shown = from_si(length, unit, dimension)
         far = quantity == "accel" and abs(length / STANDARD_GRAVITY - 1) > _NEAR
         wrong = f" (gravity is {STANDARD_GRAVITY:.2f}: is the unit right?)" if far else ""
-        said.append(f"|{quantity}| = {shown:.3g} {unit}{wrong}")
-    return said
+        lengths.append(f"|{quantity}| = {shown:.3g} {unit}{wrong}")
+    return lengths
 
 
 def _list(keys: list[str]) -> str:

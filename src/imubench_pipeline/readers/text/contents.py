@@ -6,25 +6,31 @@ from pathlib import Path
 
 import numpy as np
 
-from imubench_pipeline.readers.contents import FIRST, NOTHING_STATED, ROWS, HeldColumn, HeldTable
+from imubench_pipeline.readers.file_format import (
+    FIRST,
+    NOTHING_STATED,
+    ROWS,
+    FileFormat,
+    LogColumn,
+    LogTable,
+)
 from imubench_pipeline.readers.text.cells import Decimal, is_missing, is_number
 from imubench_pipeline.readers.text.layout import TextLayout, find_layout
 from imubench_pipeline.readers.text.preamble import stated_rate, stated_start
 from imubench_pipeline.readers.text.stamp_forms import stamp_forms, stamps_of
 from imubench_pipeline.readers.text.units import line_of_units
-from imubench_pipeline.settings.sensor import Reader
 
 _NOTES = 12
 
 
-def held(path: Path, reader: Reader) -> list[HeldTable]:
+def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
     """Return the one table of a text log.
 
     Parameters
     ----------
     path : Path
         A file, compressed or not, or a member of a zip archive.
-    reader : Reader
+    file_format : FileFormat
 
     Raises
     ------
@@ -43,8 +49,8 @@ def held(path: Path, reader: Reader) -> list[HeldTable]:
     )
     names = "with names" if named else "without names"
     return [
-        HeldTable(
-            reader,
+        LogTable(
+            file_format,
             columns=columns,
             rate=stated_rate(before),
             started=stated_start(before),
@@ -60,7 +66,7 @@ def held(path: Path, reader: Reader) -> list[HeldTable]:
 
 def _column(
     layout: TextLayout, place: int, cells: list[str], named: bool, unit: str | None
-) -> HeldColumn:
+) -> LogColumn:
     name = layout.names[place] if named else ""
     source: str | int = name
     if not name or layout.names.count(name) > 1 or not name.isprintable():
@@ -70,10 +76,10 @@ def _column(
     present = [cell for cell in cells if not is_missing(cell)]
     if present and all(is_number(cell, layout.decimal) for cell in present):
         values = np.array([_figure(cell, layout.decimal) for cell in cells])
-        return HeldColumn(source, name, "number", first, values, unit)
+        return LogColumn(source, name, "number", first, values, unit)
     if forms := stamp_forms(present):
-        return HeldColumn(source, name, "date", first, stamps_of(forms[0], cells), None, forms)
-    return HeldColumn(source, name, "text", first, unit=unit)
+        return LogColumn(source, name, "date", first, stamps_of(forms[0], cells), None, forms)
+    return LogColumn(source, name, "text", first, unit=unit)
 
 
 def _figure(cell: str, decimal: Decimal) -> float:

@@ -6,23 +6,22 @@ from pathlib import Path
 
 import numpy as np
 
-from imubench_pipeline.readers.contents import ROWS, HeldColumn, HeldTable, shown
+from imubench_pipeline.readers.file_format import ROWS, FileFormat, LogColumn, LogTable, shown
 from imubench_pipeline.readers.ubx.file import COLUMNS, KINDS, RAW, TICK_MS, UNITS, Words
 from imubench_pipeline.readers.ubx.frames import Frames
-from imubench_pipeline.settings.sensor import Reader
 from imubench_pipeline.tables.findings import RecordingError
 
 _LOOKED_AT, _LOOKED_FOR = 1 << 22, 1 << 26
 """Bytes after which a log is known, and those in which a first message is looked for."""
 
 
-def held(path: Path, reader: Reader) -> list[HeldTable]:
+def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
     """Return a table for each message that holds inertial figures.
 
     Parameters
     ----------
     path : Path
-    reader : Reader
+    file_format : FileFormat
 
     Raises
     ------
@@ -37,31 +36,32 @@ def held(path: Path, reader: Reader) -> list[HeldTable]:
             words[key].add(payload)
         if frames.read > (_LOOKED_AT if any(map(len, words.values())) else _LOOKED_FOR):
             break
-    found = [_held(reader, kind, words[kind], frames) for kind in KINDS if len(words[kind])]
+    present = [kind for kind in KINDS if len(words[kind])]
+    described = [_table(file_format, kind, words[kind], frames) for kind in present]
     others = ", ".join(f"{key.hex(' ')} ({count})" for key, count in frames.right.most_common(10))
-    if not any(table.columns for table in found):
+    if not any(table.columns for table in described):
         raise RecordingError(
             f"{path.name}: no inertial figures in ESF-MEAS or ESF-RAW among {frames.right.total()} "
             f"UBX messages (class and id {others or 'none'}); switch ESF-RAW on in the receiver"
         )
-    return sorted(found, key=lambda table: table.name != KINDS[RAW])
+    return sorted(described, key=lambda table: table.name != KINDS[RAW])
 
 
-def _held(reader: Reader, kind: bytes, words: Words, frames: Frames) -> HeldTable:
+def _table(file_format: FileFormat, kind: bytes, words: Words, frames: Frames) -> LogTable:
     """Describe one kind of message."""
-    columns, figures, tags, _ = words.taken()
+    places, figures, tags, _ = words.taken()
     name = KINDS[kind]
-    held = []
+    columns = []
     for place, column in enumerate(COLUMNS):
-        values = figures[columns == place]
+        values = figures[places == place]
         if len(values):
             unit = UNITS[column.split("_")[0]]
-            held.append(HeldColumn(column, column, "number", shown(values), values, unit))
-    if held:
-        first = tags[columns == columns[0]].astype(np.float64)
+            columns.append(LogColumn(column, column, "number", shown(values), values, unit))
+    if columns:
+        first = tags[places == places[0]].astype(np.float64)
         ticks = first * TICK_MS if kind == RAW else first
-        held.append(HeldColumn("time_tag", "time_tag", "number", shown(ticks), ticks, "ms"))
+        columns.append(LogColumn("time_tag", "time_tag", "number", shown(ticks), ticks, "ms"))
         if kind == RAW:
-            held.append(HeldColumn("sTtag", "sTtag", "number", shown(first), first))
+            columns.append(LogColumn("sTtag", "sTtag", "number", shown(first), first))
     about = f"{frames.right[kind]} messages at the beginning"
-    return HeldTable(reader, name, tuple(held), variable=name, about=about)
+    return LogTable(file_format, name, tuple(columns), variable=name, about=about)

@@ -1,0 +1,22 @@
+"""Delimited text: what a log is taken for that no other format claims."""
+
+from imubench_pipeline.readers.file_format import Code, FileFormat, Signature
+
+
+def _code() -> Code:
+    from imubench_pipeline.readers.text import contents, csv
+
+    return Code(csv.CsvFile, contents.tables)
+
+
+FORMAT = FileFormat(
+    name="csv",
+    title="text",
+    endings=(".csv", ".txt", ".tsv", ".dat", ".log", ".asc"),
+    signature=Signature(),
+    streamed=True,
+    clock_of="file",
+    time_columns=(),
+    settings=("delimiter", "header", "skip_lines", "comment", "decimal"),
+    code=_code,
+)

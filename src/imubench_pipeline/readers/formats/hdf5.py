@@ -1,0 +1,22 @@
+"""HDF5 files."""
+
+from imubench_pipeline.readers.file_format import Code, FileFormat, Signature
+
+
+def _code() -> Code:
+    from imubench_pipeline.readers.arrays import contents, hdf5
+
+    return Code(hdf5.Hdf5File, contents.tables)
+
+
+FORMAT = FileFormat(
+    name="hdf5",
+    title="HDF5 file",
+    endings=(".h5", ".hdf5"),
+    signature=Signature(begins=(b"\x89HDF\r\n\x1a\n",)),
+    streamed=False,
+    clock_of="length",
+    time_columns=(),
+    settings=("variable",),
+    code=_code,
+)

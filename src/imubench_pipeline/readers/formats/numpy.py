@@ -1,0 +1,22 @@
+"""Arrays of NumPy, one in a file (NPY) or several in an archive (NPZ)."""
+
+from imubench_pipeline.readers.file_format import Code, FileFormat, Signature
+
+
+def _code() -> Code:
+    from imubench_pipeline.readers.arrays import contents, npy
+
+    return Code(npy.NumpyFile, contents.tables)
+
+
+FORMAT = FileFormat(
+    name="numpy",
+    title="NumPy arrays",
+    endings=(".npy", ".npz"),
+    signature=Signature(begins=(b"\x93NUMPY",), archive_has=".npy"),
+    streamed=False,
+    clock_of="length",
+    time_columns=(),
+    settings=("variable",),
+    code=_code,
+)

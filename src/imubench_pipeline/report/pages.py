@@ -1,0 +1,47 @@
+"""The pages of a report: those that there is one of, and those of each recording and sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+from imubench_pipeline.report import boards, earth_rate, fusion, made, shortlist, start, theory
+from imubench_pipeline.report.rate_table import table_page
+from imubench_pipeline.report.recording import recording_page
+from imubench_pipeline.report.sensor import device_page, sensor_page
+from imubench_pipeline.report.site import Entry, Page, Site
+from imubench_pipeline.report.turned import turned_page
+from imubench_pipeline.report.view import RecordingView
+
+ENTRIES: Sequence[Entry] = (
+    start.START,
+    start.RECORDINGS,
+    start.DATASHEETS,
+    shortlist.SHORTLIST,
+    fusion.FUSION,
+    boards.BOARDS,
+    earth_rate.EARTH_RATE_PAGE,
+    theory.THEORY,
+    made.MADE,
+)
+"""The pages that there is one of, in the order of the navigation; the first is the start page."""
+
+_OF_RECORDING: Mapping[str, Callable[[Site, RecordingView], Page]] = {
+    "two_position": turned_page,
+    "rate_table": table_page,
+}
+"""Makes the page of a recording that is not static, by its kind."""
+
+
+def pages(site: Site) -> Iterator[Page]:
+    """Yield the pages of the report, the start page last: it stands for the finished report."""
+    for view in site.views:
+        kind = "" if view.left_out else view.row["kind"]
+        yield _OF_RECORDING.get(kind, recording_page)(site, view)
+    for sensor in site.sensors:
+        yield sensor_page(site, sensor)
+    for path in dict.fromkeys(view.device_page for view in site.views):
+        if path is not None:
+            yield device_page(site, path)
+    first, *others = (entry for entry in site.entries if entry.there(site))
+    for entry in (*others, first):
+        yield entry.page(site)

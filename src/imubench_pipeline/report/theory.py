@@ -1,0 +1,18 @@
+"""The page of the theory: the noise terms, and every word of the glossary."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from imubench_pipeline.report.glossary import glossary
+from imubench_pipeline.report.site import Entry, Site
+from imubench_pipeline.report.static_figures.files import figure_text
+from imubench_pipeline.report.static_figures.theory import theory_figure
+
+
+def _context(site: Site) -> dict[str, Any]:
+    return {"figure": figure_text(theory_figure(site.system)), "terms": glossary()}
+
+
+THEORY = Entry(file="theory.html", title="Theory", context=_context)
+"""The page that the terms of all others lead to."""

@@ -1,0 +1,50 @@
+"""`imubench formats`: the log files that are read, and the programs that files are written for."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Sequence
+
+Line = Sequence[str]
+
+
+def run(_: argparse.Namespace) -> int:
+    """Print both tables; return the exit status."""
+    print("Logs that are read: `reader` of a sensor file, mostly found in the file itself")
+    print("\n".join(_aligned(list(log_formats()))))
+    print("\nPrograms that files are written for: `imubench export --target`, `exports: targets`")
+    print("\n".join(_aligned(list(export_targets()))))
+    return 0
+
+
+def log_formats() -> Iterator[Line]:
+    """Yield a line a format of log files, the heads first."""
+    # Only this command needs these: the others answer at once.
+    from imubench_pipeline.readers.formats import FILE_FORMATS
+
+    yield "reader", "format", "files", "compressed", "columns of time", "settings of its own"
+    for name, known in FILE_FORMATS.items():
+        yield (
+            name,
+            known.title,
+            " ".join(known.endings),
+            "yes" if known.streamed else "no",
+            ", ".join(known.time_columns) or "any",
+            ", ".join(known.settings) or "none",
+        )
+
+
+def export_targets() -> Iterator[Line]:
+    """Yield a line a program that noise models are exported for, the heads first."""
+    from imubench_pipeline.export.targets import TARGETS
+
+    yield "target", "program", "file", "terms"
+    for target in TARGETS.values():
+        yield target.name, target.program, target.file_name, target.family
+
+
+def _aligned(lines: Sequence[Line]) -> Iterator[str]:
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    for line in lines:
+        cells = (cell.ljust(width) for cell, width in zip(line, widths, strict=True))
+        yield f"  {'  '.join(cells)}".rstrip()

@@ -1,0 +1,119 @@
+"""The registry of the formats of log files: nothing of a format is forgotten."""
+
+from __future__ import annotations
+
+import inspect
+import shutil
+import subprocess
+import sys
+from itertools import permutations
+from pathlib import Path
+from typing import get_args
+
+import pytest
+
+from imubench_pipeline.readers import read
+from imubench_pipeline.readers.batch import LogFile
+from imubench_pipeline.readers.content import content_of
+from imubench_pipeline.readers.contents import contents
+from imubench_pipeline.readers.file_format import FileFormat
+from imubench_pipeline.readers.formats import FILE_FORMATS, TEXT
+from imubench_pipeline.settings.sensor import ColumnSource, LogFormat, Reader
+from tests.conftest import PROJECT
+from tests.corpus import ENTRIES, Kept
+
+PACKAGE = PROJECT / "src/imubench_pipeline"
+
+SAMPLES: dict[Reader, str] = {
+    "csv": "axis in coarse steps",
+    "vectornav": "vectornav with a counter",
+    "ubx": "ubx of ESF-MEAS",
+    "rosbag": "ros 1 bag",
+    "matlab": "matlab 5",
+    "numpy": "npz",
+    "arrow": "parquet",
+    "hdf5": "hdf5",
+}
+"""An entry of the corpus in each format, which is read."""
+
+
+@pytest.fixture(params=get_args(Reader))
+def file_format(request: pytest.FixtureRequest) -> FileFormat:
+    return FILE_FORMATS[request.param]
+
+
+@pytest.fixture
+def log(file_format: FileFormat, tmp_path: Path) -> Path:
+    assert file_format.name in SAMPLES, "SAMPLES lacks a log of the format"
+    entry = ENTRIES[SAMPLES[file_format.name]]
+    assert isinstance(entry.expected, Kept)
+    return entry.write(tmp_path)
+
+
+def test_a_log_is_told_by_its_content(file_format: FileFormat, log: Path) -> None:
+    assert content_of(log) == (file_format, "")
+    renamed = log.rename(log.with_name("log"))
+    assert content_of(renamed) == (file_format, "")
+
+
+def test_a_log_is_read(file_format: FileFormat, log: Path) -> None:
+    stated = LogFormat.model_validate(ENTRIES[SAMPLES[file_format.name]].log)
+    files = read(log, stated.model_copy(update={"reader": file_format.name}))
+    assert files
+    for file in files:
+        assert type(file) is file_format.code().log_file
+        assert sum(len(batch) for batch in file.batches()) > 0
+
+
+def test_what_a_log_holds_is_listed(file_format: FileFormat, log: Path) -> None:
+    listed = contents(log)
+    assert listed.about == file_format.title
+    assert listed.tables
+    assert all(table.file_format is file_format for table in listed.tables)
+    labels = {column.label for table in listed.tables for column in table.columns}
+    assert not file_format.time_columns or labels & set(file_format.time_columns)
+
+
+def test_a_format_is_declared_in_full(file_format: FileFormat) -> None:
+    assert file_format.title.strip()
+    assert file_format.endings
+    assert all(ending.startswith(".") for ending in file_format.endings)
+    known = LogFormat.model_fields.keys() | ColumnSource.model_fields.keys()
+    assert set(file_format.settings) <= known
+    assert ("variable" in file_format.settings) >= (file_format.clock_of == "variable")
+    code = file_format.code()
+    assert issubclass(code.log_file, LogFile)
+    assert not inspect.isabstract(code.log_file)
+
+
+def test_no_signature_hides_another() -> None:
+    for known, other in permutations(FILE_FORMATS.values(), 2):
+        begins = known.signature.begins
+        hidden = [mark for mark in other.signature.begins if mark.startswith(begins)]
+        assert not hidden, f"{other.name} is taken for {known.name}"
+        marks, others = set(known.signature.within), set(other.signature.within)
+        assert not marks or marks != others, f"{other.name} is taken for {known.name}"
+    told_by_nothing = [
+        known.name
+        for known in FILE_FORMATS.values()
+        if not known.signature.begins and not known.signature.within
+    ]
+    assert told_by_nothing == [TEXT.name]
+
+
+@pytest.mark.parametrize("left_out", ["module", "name"])
+def test_a_format_that_is_declared_by_half_stops_the_import(left_out: str, tmp_path: Path) -> None:
+    source = tmp_path / PACKAGE.name
+    shutil.copytree(PACKAGE, source, ignore=shutil.ignore_patterns("__pycache__"))
+    if left_out == "module":
+        (source / "readers/formats/ubx.py").unlink()
+    else:
+        text = (source / "readers/formats/ubx.py").read_text()
+        (source / "readers/formats/other.py").write_text(text)
+    command = [sys.executable, "-c", "import imubench_pipeline.readers"]
+    done = subprocess.run(
+        command, env={"PYTHONPATH": str(tmp_path)}, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    missing = "ubx" if left_out == "module" else "other"
+    assert f"{missing}: a format of log files has a module in readers/formats" in done.stderr

@@ -1,0 +1,85 @@
+"""The registry of the pages that a report has once: nothing of one is forgotten."""
+
+from __future__ import annotations
+
+import pkgutil
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+
+import pyarrow as pa
+import pytest
+
+from imubench_pipeline import report
+from imubench_pipeline.report.html import environment
+from imubench_pipeline.report.pages import ENTRIES, pages
+from imubench_pipeline.report.publish import publish
+from imubench_pipeline.report.site import Entry, Site
+from imubench_pipeline.report.view import BY_RECORDING
+from tests.report.tables import ROBOT, joined, recording_rows, rejected_rows, site
+from tests.report.test_boards import BOARD, some
+
+pytestmark = pytest.mark.usefixtures("small_report")
+
+
+class Tables(dict[str, pa.Table]):
+    """The tables of a site, which note who is read."""
+
+    def __init__(self, tables: dict[str, pa.Table]) -> None:
+        super().__init__(tables)
+        self.read: set[str] = set()
+
+    def __getitem__(self, name: str) -> pa.Table:
+        self.read.add(name)
+        return super().__getitem__(name)
+
+
+@pytest.fixture(scope="module")
+def whole() -> Site:
+    """A site that has every page."""
+    asked = {"robot": ROBOT}
+    rows = [
+        *some(),
+        recording_rows("asked", "day1", requirements=asked),
+        rejected_rows("turned", "day1", kind="two_position"),
+    ]
+    return site(joined(*rows, requirements=asked), requirements=asked, boards={"pair": BOARD})
+
+
+@pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.file)
+def test_a_page_reads_no_table_that_it_does_not_declare(entry: Entry, whole: Site) -> None:
+    tables = Tables(dict(whole.tables))
+    noting = replace(whole, tables=tables)
+    assert entry.there(noting), "the site of this test lacks what the page shows"
+    of_recordings = BY_RECORDING if entry.views(noting) else ()
+    page = entry.page(noting)
+    # What tells which recordings there are, and their names, is in the key of every page.
+    assert noting.views and noting.navigation and noting.names
+    tables.read.clear()
+    noting._rows.clear()
+    assert page.context()
+    undeclared = tables.read - {*entry.tables, *of_recordings}
+    assert not undeclared, "the page would not be written again when these change"
+    environment(noting.system).get_template(page.template)
+
+
+def test_a_page_disappears_with_what_it_shows(whole: Site, tmp_path: Path) -> None:
+    publish(whole, tmp_path)
+    assert (tmp_path / "boards.html").is_file()
+    publish(replace(whole, settings={**whole.settings, "boards": {}}), tmp_path)
+    assert not (tmp_path / "boards.html").exists()
+    assert (tmp_path / "index.html").is_file()
+
+
+def test_every_page_that_a_module_declares_is_in_the_report(whole: Site) -> None:
+    declared = [
+        value
+        for module in pkgutil.iter_modules(report.__path__, f"{report.__name__}.")
+        for value in vars(import_module(module.name)).values()
+        if isinstance(value, Entry)
+    ]
+    assert {entry.file for entry in declared} == {entry.file for entry in ENTRIES}
+    assert len({entry.file for entry in ENTRIES}) == len(ENTRIES)
+    assert len({entry.title for entry in ENTRIES}) == len(ENTRIES)
+    assert [file for file, _ in whole.navigation] == [entry.file for entry in ENTRIES]
+    assert {entry.file for entry in ENTRIES} <= {page.path for page in pages(whole)}
