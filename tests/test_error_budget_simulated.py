@@ -38,7 +38,7 @@ G = 9.80665
 RATE = 20.0
 BEFORE = 20.0
 TIMES = (4.0, 30.0)
-RUNS = 2000
+RUNS = 1000
 TERMS: tuple[Term, ...] = (
     Quantization(0.3),
     WhiteNoise(0.5),
