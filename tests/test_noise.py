@@ -20,6 +20,7 @@ from imubench_pipeline.noise import (
     driving_density,
     sampled_gauss_markov_shape,
 )
+from tests.conftest import few
 
 MTI_7 = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7)
 
@@ -43,7 +44,7 @@ def test_gauss_markov_to_ten_digits_at_every_tau(log_ratio: float, log_time: flo
 @pytest.mark.parametrize(
     "term", [WhiteNoise(0.3), GaussMarkov(0.7, 5.0), RandomWalk(0.2), Flicker(0.4)]
 )
-@pytest.mark.parametrize("tau", [0.5, 3.0, 40.0])
+@pytest.mark.parametrize("tau", few([3.0], [0.5, 40.0]))
 def test_allan_variance_is_the_integral_of_the_spectrum(term, tau: float) -> None:
     # sigma^2 = 4 int S sin^4(pi f tau) / (pi f tau)^2 df, with x = pi f tau
     def integrand(x: float) -> float:

@@ -114,7 +114,7 @@ def test_block_sums_are_distributed_as_the_sums_of_a_log(rng, model: NoiseModel)
 )
 def test_every_term_is_simulated_as_its_allan_variance_says(rng, model: NoiseModel) -> None:
     sizes = np.array([1, 2, 5, 10, 50, 200, 800])
-    found = np.array([reconstructed_variance(model, RATE, 8000, sizes, rng) for _ in range(300)])
+    found = np.array([reconstructed_variance(model, RATE, 8000, sizes, rng) for _ in range(150)])
     error = found.std(axis=0) / np.sqrt(len(found))
     expected = model.allan_variance(sizes / RATE, RATE)
     tolerance = 4.5 * error + 5e-3 * expected
