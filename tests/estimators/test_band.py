@@ -75,9 +75,9 @@ def test_slow_noise_that_hides_the_white_noise_is_no_bend(rng, model: NoiseModel
     # It passes the white noise above a twentieth of the rate, from where the model is carried on.
     bent = sum(
         band_of(spectrum_of(simulate(model, RATE, 100_000, rng))).highest < NYQUIST
-        for _ in range(10)
+        for _ in range(20)
     )
-    assert bent <= 1
+    assert bent <= 2
 
 
 @pytest.mark.parametrize(

@@ -178,7 +178,7 @@ def test_a_correlation_far_longer_than_a_fiftieth_of_the_log_is_estimated_as_wel
 def test_all_samples_tell_what_an_exact_likelihood_of_means_tells_once_n_is_known(rng) -> None:
     truth, rate = truth_of(MTI_7), 100.0
     pairs = []
-    for _ in range(5):
+    for _ in range(12):
         log = simulate(MTI_7, rate, round(HOURS_10 * rate), rng)
         spectrum = spectra([log], len(log), rate)[0]
         assert len(np.unique(spectrum.block)) == 2
