@@ -34,7 +34,7 @@ G = 9.80665
 RATE = 20.0
 BEFORE = 20.0
 TIMES = (4.0, 30.0)
-RUNS = 2000
+RUNS = 1000
 
 
 def fractional_noise(shape: tuple[int, int], rng: np.random.Generator, earlier: int) -> Array:

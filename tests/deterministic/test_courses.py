@@ -5,6 +5,7 @@ import pytest
 from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.deterministic.courses import Courses, find_courses
+from tests.conftest import few
 from tests.deterministic.logs import RATE, SIGMA, K, static_log, times
 
 Array = NDArray[np.float64]
@@ -134,7 +135,7 @@ def with_pauses(log: Array, size: float) -> Array:
     return log
 
 
-@pytest.mark.parametrize("seed", range(30, 34))
+@pytest.mark.parametrize("seed", few([30], [31, 32, 33]))
 @pytest.mark.parametrize("size", [1.0, 3.0, 20.0])
 def test_another_bias_after_each_pause_is_no_random_walk(seed: int, size: float) -> None:
     found = courses_of(with_pauses(static_log(seed, walk=0.0), size * SIGMA))

@@ -218,7 +218,7 @@ def test_a_log_that_never_turns_is_refused(seed: int) -> None:
 
 def test_hardly_a_log_at_rest_alternates_with_the_schedule() -> None:
     noise, taken = NoiseModel(N=PAPER.N), []
-    for seed in range(300):
+    for seed in range(100):
         log = turned([], 600.0, noise=noise, rate=8.0, seed=seed)
         try:
             taken.append(find_turning(log, 8.0, 30.0, first_sense=1))

@@ -56,7 +56,7 @@ def place(text: str) -> tuple[float, float, int, float]:
     ids=["bins of a spectrum", "equal bins", "single ordinates"],
 )
 def test_the_chance_of_the_right_model_is_uniform(rng, nu: np.ndarray) -> None:
-    logs = 3000
+    logs = 2000
     chance = np.array([judged(drawn(rng, nu), nu).chance for _ in range(logs)])
     assert chance.min() > 0
     assert chance.max() == 1

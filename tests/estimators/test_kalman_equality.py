@@ -13,6 +13,7 @@ from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.estimators.whittle import Maximum, Terms, whittle_of
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import block_sums, simulate
+from tests.conftest import few
 from tests.estimators.test_least_squares import C102, MTI_7
 
 H = 10.0
@@ -144,7 +145,9 @@ def estimates(
     return found, exact
 
 
-@pytest.mark.parametrize(("model", "rate"), [(MTI_7, 100.0), (C102, 50.0)], ids=["MTi-7", "C102"])
+@pytest.mark.parametrize(
+    ("model", "rate"), few([(C102, 50.0)], [(MTI_7, 100.0)]), ids=["C102", "MTi-7"]
+)
 def test_estimates_are_those_of_an_exact_likelihood(rng, model: NoiseModel, rate: float) -> None:
     truth = truth_of(model)
     found, exact = estimates(model, rate, 25, rng)

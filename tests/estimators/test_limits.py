@@ -17,7 +17,7 @@ WALK = {"N": 1.0, "K": 1e-2}
 SAMPLES = 100_000
 """At 1 Hz."""
 
-LOGS = 60
+LOGS = 30
 METHODS = ("weighted", "paper")
 
 
@@ -67,7 +67,8 @@ def curves(names: str, **truth: float) -> list[AllanCurve]:
     return [allan_variance(log, 1.0, overlap="octave") for log in logs]
 
 
-def exact_covariance(truth: dict[str, float], samples: int, sizes: np.ndarray) -> np.ndarray:
+@cache
+def exact_covariance(samples: int, sizes: tuple[int, ...], **truth: float) -> np.ndarray:
     """Covariance of Allan variances by the double sum over all second differences.
 
     For Gaussian x and y the covariance of x^2 and y^2 is 2 E(xy)^2.
@@ -109,7 +110,7 @@ def propagated(
     weight = 1 / (2 * np.sqrt(n / (2 * samples)) * power) ** 2
     normal = jacobian.T @ (weight[:, None] * jacobian)
     gain = np.linalg.solve(normal, jacobian.T * weight)
-    covariance = gain @ exact_covariance(truth, samples, sizes) @ gain.T
+    covariance = gain @ exact_covariance(samples, tuple(sizes), **truth) @ gain.T
     return dict(zip(free, np.sqrt(np.diag(covariance)).tolist(), strict=True))
 
 
@@ -150,7 +151,7 @@ def test_errors_are_those_of_the_exact_covariance(
 @pytest.mark.release
 @pytest.mark.parametrize("method", METHODS)
 def test_the_width_of_the_limits_is_the_scatter_of_fits(method: str) -> None:
-    """Sixty logs know a standard deviation to 9 %."""
+    """Thirty logs know a standard deviation to 13 %."""
     for name, truth in SENSOR.items():
         found = [estimate.parameters[name] for estimate in fits("SENSOR", method)]
         assert all(parameter.status == "ok" for parameter in found)
@@ -158,23 +159,23 @@ def test_the_width_of_the_limits_is_the_scatter_of_fits(method: str) -> None:
         limits = [(p.lower or np.nan, p.upper or np.nan) for p in found]
         widths = [np.log(upper / lower) / 3.92 for lower, upper in limits]
         assert values.mean() == pytest.approx(np.log(truth), abs=0.5 * np.median(widths) + 1e-3)
-        assert np.median(widths) == pytest.approx(values.std(ddof=1), rel=0.3), name
+        assert np.median(widths) == pytest.approx(values.std(ddof=1), rel=0.4), name
 
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("names", ["SENSOR", "WALK"])
 def test_limits_hold_the_truth(names: str, method: str) -> None:
-    """Of 60 logs 95 % are 57; fewer than 50 has a probability of 0.06 %."""
+    """Of 30 logs 95 % are 28.5; fewer than 24 has a probability of 0.06 %."""
     for name, truth in {"SENSOR": SENSOR, "WALK": WALK}[names].items():
         found = [estimate.parameters[name] for estimate in fits(names, method)]
         limits = [(p.lower, p.upper) for p in found if p.lower is not None and p.upper is not None]
         assert len(limits) >= LOGS - 4
-        assert sum(lower <= truth <= upper for lower, upper in limits) >= 50, name
+        assert sum(lower <= truth <= upper for lower, upper in limits) >= 24, name
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_bias_instability_that_is_not_there_may_be_zero(method: str) -> None:
-    """In at most 5 % of logs it may seem to be there; more than 8 of 60 has 0.3 %."""
+    """In at most 5 % of logs it may seem to be there; more than 5 of 30 has 0.3 %."""
     phantoms = 0
     for estimate in fits("WALK", method):
         bias = estimate.parameters["B"]
@@ -182,7 +183,7 @@ def test_a_bias_instability_that_is_not_there_may_be_zero(method: str) -> None:
         if bias.status == "not_identified":
             assert bias.value is None and bias.lower == 0.0 and bias.reason
             assert bias.fitted is not None and (bias.upper is None or bias.upper > bias.fitted)
-    assert phantoms <= 8
+    assert phantoms <= 5
 
 
 def test_ten_times_the_log_narrows_the_limits_by_the_root_of_ten() -> None:

@@ -11,6 +11,7 @@ from imubench_pipeline.estimators.missing_slow import slow_noise_missing
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.simulate import simulate
 from imubench_pipeline.tables.findings import Finding
+from tests.conftest import few
 
 RATE = 50.0
 GYRO = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7)
@@ -45,10 +46,11 @@ def test_a_bias_that_is_zeroed_at_rest_is_told(
 
 
 @pytest.mark.parametrize("model", [GYRO, NoiseModel(N=8.4e-5), NoiseModel(N=8.4e-5, Q=1e-6)])
+@pytest.mark.parametrize("logs", few([1], [3]))
 def test_noise_of_a_sensor_has_all_its_slow_part(
-    rng: np.random.Generator, model: NoiseModel
+    rng: np.random.Generator, model: NoiseModel, logs: int
 ) -> None:
-    for _ in range(3):
+    for _ in range(logs):
         log = simulate(model, RATE, SAMPLES, rng)
         assert missing(log) is None
         assert missing(lfilter([0.3], [1.0, -0.7], log)) is None

@@ -104,7 +104,7 @@ def sensor(model: NoiseModel, said: str) -> Imu:
 
 
 @pytest.mark.parametrize("name", TARGETS)
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=5, deadline=None)
 @given(model=models, said=names)
 def test_words_never_reach_the_numbers(name: str, model: NoiseModel, said: str) -> None:
     write, parse = TARGETS[name].write, PARSERS[name]

@@ -223,7 +223,7 @@ def test_registers_pile_nothing_up(rng: np.random.Generator, step: float, digit:
 def test_the_last_level_of_a_coarse_register_is_no_saturation(
     rng: np.random.Generator, step: float
 ) -> None:
-    for _ in range(30):
+    for _ in range(10):
         log = np.round((rng.standard_normal(20_000) + rng.random()) / step) * step
         assert "saturated" not in names(log)
         clipped = names(np.clip(log, None, np.round(2.0 / step) * step))

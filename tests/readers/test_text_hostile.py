@@ -36,9 +36,9 @@ FILES: dict[str, Callable[[], bytes]] = {
     "a number of 500 kB": lambda: HEAD + b"1." + b"1" * 500_000 + b",2\n1,2\n",
     "lines of 10 MB": lambda: b"wx,ax\n" + (b"1," * 5 * MIB + b"2\n") * 2,
     "a million columns": lambda: b",".join([b"wx"] * MIB) + b"\n" + b"1," * MIB + b"2\n",
-    "400000 columns": lambda: (b"," * 400_000 + b"\n") + (b"1," * 400_000 + b"2\n") * 3,
-    "100000 columns": lambda: (
-        b"wx,ax" + b",n" * 100_000 + b"\n" + (b"1,2" + b",3" * 100_000 + b"\n") * 50
+    "100000 columns": lambda: (b"," * 100_000 + b"\n") + (b"1," * 100_000 + b"2\n") * 3,
+    "20000 columns": lambda: (
+        b"wx,ax" + b",n" * 20_000 + b"\n" + (b"1,2" + b",3" * 20_000 + b"\n") * 50
     ),
     "names twice": lambda: b"wx,wx,ax,ax\n1,2,3,4\n",
     "bytes of chance": lambda: np.random.default_rng(1).bytes(8 * MIB),
@@ -48,7 +48,7 @@ FILES: dict[str, Callable[[], bytes]] = {
     "zeros after a cut record": lambda: HEAD + b"1,2" + bytes(8 * MIB),
     "zeros between": lambda: HEAD + bytes(8 * MIB) + HEAD,
     "zero in a cell": lambda: HEAD + b"1\0,2\n" + HEAD,
-    "only comments": lambda: b"# a comment\n" * MIB,
+    "only comments": lambda: b"# a comment\n" * (MIB // 4),
     "comments and a record": lambda: b"# a comment\n" * 100_000 + HEAD,
     "headers": lambda: b"wx,ax\n" * MIB,
     "short records": lambda: HEAD + b"1\n" * 4 * MIB,
@@ -60,7 +60,7 @@ FILES: dict[str, Callable[[], bytes]] = {
     "HTML": lambda: b"<html><body>404 Not Found</body></html>\n" * 1000,
 }
 READ = {
-    *("one row", "100000 columns", "lines of delimiters", "a number of 500 kB"),
+    *("one row", "20000 columns", "lines of delimiters", "a number of 500 kB"),
     *("zeros at the end", "zeros after a cut record", "zeros between", "comments and a record"),
 }
 LIMIT_MB, LIMIT_S = 500, 12
@@ -204,7 +204,7 @@ def test_nothing_but_a_recording_error_comes_of_any_bytes(
 def test_a_sparse_file_is_passed_over_quickly(tmp_path: Path) -> None:
     path = written(tmp_path, HEAD)
     with path.open("r+b") as file:
-        file.truncate(1 << 30)
+        file.truncate(1 << 28)
     begin = time.process_time()
     found, _, _ = columns(path, log_format())
     assert len(found["gyro_x"]) == 1000

@@ -43,7 +43,7 @@ MODELS = {
         lambda f: 0.25 / (2 * np.pi * f),
     ),
 }
-SAMPLES = 1 << 20
+SAMPLES = 1 << 19
 
 
 @pytest.fixture(scope="module", params=MODELS)
