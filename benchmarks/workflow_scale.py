@@ -30,7 +30,7 @@ import yaml
 
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.run.processes import COSTS
-from imubench_pipeline.settings.validation import read_yaml
+from imubench_pipeline.settings.yaml_files import read_yaml
 
 PROJECT = Path(__file__).parents[1]
 SENSORS = 20

@@ -10,7 +10,8 @@ from snakemake.cli import parse_config
 from imubench_pipeline.settings.config import Run, given_beside, read_run
 from imubench_pipeline.settings.sensor import RecordingNotes, Sensor, merged_log, read_sensors
 from imubench_pipeline.settings.simulated_recordings import read_simulated
-from imubench_pipeline.settings.validation import ConfigError, parse, read_yaml
+from imubench_pipeline.settings.validation import ConfigError, parse
+from imubench_pipeline.settings.yaml_files import read_yaml
 from tests.conftest import PROJECT
 
 SENSOR: dict[str, Any] = {

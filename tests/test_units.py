@@ -1,3 +1,4 @@
+import contextlib
 import math
 import re
 from pathlib import Path
@@ -284,3 +285,43 @@ def test_the_printed_pair_of_a_data_sheet() -> None:
     # ADIS16470: 0.008 °/s/√Hz, one-sided, and 0.34 °/√h
     density = to_si(0.008, "°/s/√Hz", "gyro_density")
     assert from_si(density / math.sqrt(2), "°/√h", "gyro_density") == pytest.approx(0.339, abs=5e-4)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "9**9**9**9 rad/s", "(9**9)**(9**9)", "rad/s*9**9**9", "m^(9^9)", "m^(1/0)",
+        "m^" + 70 * "9", "2 rad/s", "rad/s + 1", "rad/s//s", "m**2 3", "m**-", "m**(2", "()",
+        "(m", "m)", "*m", "m*", "-m", "1e9 m", "0x10", "m[0]", "os.system('ls')",
+        "__import__('os')", 90 * "(", 10**6 * "m",
+    ],
+)  # fmt: skip
+def test_an_expression_is_no_unit_and_nothing_computes_it(text: str) -> None:
+    with pytest.raises(UnitError) as caught:
+        to_si(1.0, text, "angular_rate")
+    assert len(str(caught.value)) < 300
+
+
+@given(st.text(max_size=60), st.sampled_from(sorted(SI_UNITS)))
+def test_any_text_is_a_unit_or_an_error_that_says_so(text: str, dimension: str) -> None:
+    with contextlib.suppress(UnitError):
+        factor, offset = conversion(text, dimension)
+        assert math.isfinite(factor) and factor > 0.0 and math.isfinite(offset)
+
+
+@pytest.mark.parametrize(
+    ("written", "factor"),
+    [
+        ("m/s^(3/2)", None),
+        ("m s^-1", 1.0),
+        ("m*s**(-1)", 1.0),
+        ("1/(s/m)", 1.0),
+        ("km/(h)", 1 / 3.6),
+    ],
+)
+def test_products_quotients_and_powers(written: str, factor: float | None) -> None:
+    if factor is None:
+        with pytest.raises(UnitError, match="no unit of velocity"):
+            conversion(written, "velocity")
+    else:
+        assert conversion(written, "velocity")[0] == pytest.approx(factor, rel=1e-15)

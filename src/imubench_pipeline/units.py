@@ -184,16 +184,14 @@ _REWRITTEN = tuple((re.compile(written, re.IGNORECASE), meant) for written, mean
 _LOST_SIGN = re.compile(r"\(.*\blost\b.*\)")
 _LEVEL = re.compile(r"\bdB\b")
 _POWER_OF_TWO = re.compile(r"\*\s*2\s*\^\s*(-?\d+)\s*$")
-_RATIO_POWER = re.compile(r"\^\s*\(\s*(\d+)\s*/\s*(\d+)\s*\)")
 _NO_ROOT = re.compile(r"/\s*(Hz|hr?)\s*$", re.IGNORECASE)
 
 
 def _normalise(text: str) -> str:
-    """Rewrite a vendor's spelling (°/√h, dps/rtHz, m/s²) as an expression for the registry."""
+    """Rewrite a vendor's spelling (°/√h, dps/rtHz, m/s²) as products and powers of units."""
     unit = text.strip()
     for written, meant in _REWRITTEN:
         unit = written.sub(meant, unit)
-    unit = _RATIO_POWER.sub(lambda found: f"**{int(found[1]) / int(found[2])}", unit)
     unit = unit.replace("^", "**").strip()
     # A difference of temperatures is meant wherever degC is not alone.
     return unit if unit == "degC" else re.sub(r"\bdegC\b", "K", unit)
@@ -225,17 +223,123 @@ def _parsed(unit: str) -> tuple[float, pint.Unit]:
         )
     if _LOST_SIGN.search(unit):
         raise UnitError(f"{unit!r} says that a sign was lost; state the unit that was meant")
+    if len(unit) > _LONGEST:
+        raise UnitError(f"{unit[:_LONGEST]!r}... is longer than a unit")
     power = _POWER_OF_TWO.search(unit)
-    text = unit[: power.start()] if power else unit
+    text = _normalise(unit[: power.start()] if power else unit)
+    if power and abs(int(power[1])) > _HIGHEST_POWER_OF_TWO:
+        raise UnitError(f"cannot read {unit!r} as a unit: the power is too high")
     try:
-        if "//" in text:
-            raise pint.UndefinedUnitError(text)
-        found = _registry().parse_units(_normalise(text))
+        factors = list(_factors(text))
+        found = _registry().parse_units("")
+        for name, exponent in factors:
+            found = found * _registry().parse_units(name) ** exponent
     except pint.UndefinedUnitError:
         raise UnitError(f"unknown unit {unit!r}") from None
-    except Exception as error:  # the registry raises many kinds on text that is no unit
-        raise UnitError(f"cannot read {unit!r} as a unit") from error
+    except UnitError as error:
+        raise UnitError(f"cannot read {unit!r} as a unit: {error}") from None
     return 2.0 ** int(power[1]) if power else 1.0, found
+
+
+_LONGEST = 80
+"""Letters of a unit; the longest that a vendor prints has 40."""
+
+_HIGHEST_POWER_OF_TWO = 64
+_HIGHEST_POWER = 12.0
+
+_TOKEN = re.compile(
+    r"\s*(?:(?P<name>[A-Za-zµμ_][A-Za-zµμ_0-9]*)|(?P<number>\d+(?:\.\d+)?)|(?P<sign>\*\*|[-*/()]))"
+)
+
+
+def _factors(text: str) -> Iterator[tuple[str, float]]:
+    """Yield each unit of an expression and its exponent: products, quotients, powers, no sums.
+
+    Nothing is computed but exponents: an expression of numbers is no unit.
+
+    Raises
+    ------
+    UnitError
+        If it is none; the text says what was found.
+    """
+    tokens = list(_tokens(text))
+    if tokens == ["1"]:
+        return
+    exponents, place = _product(tokens, 0)
+    if place < len(tokens):
+        raise UnitError(f"found {tokens[place]!r} too much")
+    yield from exponents
+
+
+def _tokens(text: str) -> Iterator[str]:
+    place = 0
+    while text[place:].strip():
+        found = _TOKEN.match(text, place)
+        if not found:
+            raise UnitError(f"found {text[place:].strip()[0]!r}")
+        yield found[0].strip()
+        place = found.end()
+
+
+def _product(tokens: list[str], place: int) -> tuple[list[tuple[str, float]], int]:
+    """Return the units of a product and their exponents, and where it ends."""
+    exponents: list[tuple[str, float]] = []
+    if tokens[place : place + 2] == ["1", "/"]:
+        place += 1  # one over a unit
+    else:
+        exponents, place = _power(tokens, place)
+    while place < len(tokens) and tokens[place] != ")":
+        sign = 1.0
+        if tokens[place] in ("*", "/"):
+            sign = -1.0 if tokens[place] == "/" else 1.0
+            place += 1
+        more, place = _power(tokens, place)
+        exponents += [(name, sign * exponent) for name, exponent in more]
+    return exponents, place
+
+
+def _power(tokens: list[str], place: int) -> tuple[list[tuple[str, float]], int]:
+    """Return a unit or a bracket, raised to what stands behind it, and where that ends."""
+    if place >= len(tokens):
+        raise UnitError("something is missing at its end")
+    token = tokens[place]
+    if token == "(":
+        exponents, place = _product(tokens, place + 1)
+        if place >= len(tokens):
+            raise UnitError("a bracket is not closed")
+    elif token[0].isalpha() or token[0] == "_":
+        exponents = [(token, 1.0)]
+    else:
+        raise UnitError(f"found {token!r}")
+    place += 1
+    if place < len(tokens) and tokens[place] == "**":
+        raised, place = _exponent(tokens, place + 1)
+        exponents = [(name, exponent * raised) for name, exponent in exponents]
+    if any(abs(exponent) > _HIGHEST_POWER for _, exponent in exponents):
+        raise UnitError("a power is too high")
+    return exponents, place
+
+
+def _exponent(tokens: list[str], place: int) -> tuple[float, int]:
+    """Return a number, or a ratio in brackets, and where it ends."""
+    bracket = tokens[place : place + 1] == ["("]
+    exponent, place = _number(tokens, place + bracket)
+    if bracket and tokens[place : place + 1] == ["/"]:
+        divisor, place = _number(tokens, place + 1)
+        if divisor == 0.0:
+            raise UnitError("a power is divided by 0")
+        exponent /= divisor
+    if bracket and tokens[place : place + 1] != [")"]:
+        raise UnitError("what stands behind ^ is no power")
+    return exponent, place + bracket
+
+
+def _number(tokens: list[str], place: int) -> tuple[float, int]:
+    sign = tokens[place : place + 1] == ["-"]
+    digits = "".join(tokens[place + sign : place + sign + 1])
+    if not digits[:1].isdigit():
+        raise UnitError("what stands behind ^ is no power")
+    return (-1.0 if sign else 1.0) * float(digits), place + sign + 1
 
 
 @lru_cache(maxsize=1)
@@ -358,7 +462,7 @@ def _number_and_unit(text: str, dimension: str) -> tuple[float, str]:
     if not match:
         first = re.split(r", | or ", _EXAMPLES[dimension])[0]
         raise UnitError(
-            f"{text!r} is not a number with its unit; {_expected(dimension)}, "
+            f"{str(text)[:_LONGEST]!r} is not a number with its unit; {_expected(dimension)}, "
             f"written like {_WRITTEN.get(dimension, f'1 {first}')!r}"
         )
     return float(match[1]), match[2]

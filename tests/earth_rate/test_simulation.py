@@ -14,7 +14,7 @@ from imubench_pipeline.experiments.earth_rate.simulation import (
     simulate_runs,
 )
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.settings.validation import read_yaml
+from imubench_pipeline.settings.yaml_files import read_yaml
 from imubench_pipeline.simulate.model import SensorModel
 from imubench_pipeline.units import quantity_to_si
 from tests.conftest import PROJECT

@@ -17,7 +17,8 @@ from imubench_pipeline.recordings.recording import channel_logs, read_metadata
 from imubench_pipeline.run.cli import main
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import RecordingNotes, merged_log, read_sensors
-from imubench_pipeline.settings.validation import parse, read_yaml
+from imubench_pipeline.settings.validation import parse
+from imubench_pipeline.settings.yaml_files import read_yaml
 from imubench_pipeline.tables import write, write_arrow
 from imubench_pipeline.tables.keys import Key
 from tests.conftest import PROJECT

@@ -10,7 +10,8 @@ from pathlib import Path
 
 from pydantic import RootModel
 
-from imubench_pipeline.settings.validation import ConfigError, Strict, parse, read_yaml
+from imubench_pipeline.settings.validation import ConfigError, Strict, parse
+from imubench_pipeline.settings.yaml_files import read_yaml
 
 _FILE = Path(__file__).with_name("glossary.yaml")
 

@@ -22,7 +22,8 @@ from imubench_pipeline.run.nightly import command as nightly
 from imubench_pipeline.settings.config import Run
 from imubench_pipeline.settings.sensor import RecordingNotes, Sensor
 from imubench_pipeline.settings.simulated_recordings import Board, Simulated
-from imubench_pipeline.settings.validation import ConfigError, read_yaml
+from imubench_pipeline.settings.validation import ConfigError
+from imubench_pipeline.settings.yaml_files import read_yaml
 from imubench_pipeline.tables import replacing, write_content, write_json
 from imubench_pipeline.units import UnitError, quantity_to_si
 

@@ -36,7 +36,8 @@ from imubench_pipeline.settings.simulated_recordings import (
     profile_files,
     read_simulated,
 )
-from imubench_pipeline.settings.validation import ConfigError, parse, read_yaml
+from imubench_pipeline.settings.validation import ConfigError, parse
+from imubench_pipeline.settings.yaml_files import read_yaml
 from imubench_pipeline.tables.provenance import source_digest
 from imubench_pipeline.units import quantity_to_si
 

@@ -40,7 +40,8 @@ def run(given: argparse.Namespace) -> int:
     from imubench_pipeline.report.terminal_table import fitting
     from imubench_pipeline.settings.requirements import Requirement, read_requirements
     from imubench_pipeline.settings.sensor import read_sensors
-    from imubench_pipeline.settings.validation import ConfigError, parse, read_yaml
+    from imubench_pipeline.settings.validation import ConfigError, parse
+    from imubench_pipeline.settings.yaml_files import read_yaml
     from imubench_pipeline.steps.shortlist import NEEDED, rows_of_run
 
     try:

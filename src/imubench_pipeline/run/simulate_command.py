@@ -12,7 +12,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from imubench_pipeline.settings.validation import ConfigError, parse, read_yaml
+from imubench_pipeline.settings.validation import ConfigError, parse
+from imubench_pipeline.settings.yaml_files import read_yaml
 from imubench_pipeline.units import UnitError, naming, quantity_to_si
 
 if TYPE_CHECKING:

@@ -21,8 +21,8 @@ from imubench_pipeline.settings.validation import (
     Strict,
     Text,
     parse,
-    read_yaml,
 )
+from imubench_pipeline.settings.yaml_files import read_yaml
 
 _OF_NO_RECORDING = {"held_back", "exports", "limits", "report"}
 

@@ -19,8 +19,8 @@ from imubench_pipeline.settings.validation import (
     checked,
     of_size,
     parse,
-    read_yaml,
 )
+from imubench_pipeline.settings.yaml_files import read_yaml
 from imubench_pipeline.units import difference_to_si, quantity_to_si
 
 Error = Literal["attitude", "heading", "velocity", "position", "north"]

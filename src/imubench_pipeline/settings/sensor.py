@@ -21,8 +21,8 @@ from imubench_pipeline.settings.validation import (
     Text,
     of_size,
     parse,
-    read_yaml,
 )
+from imubench_pipeline.settings.yaml_files import read_yaml
 from imubench_pipeline.units import UnitError, conversion, quantity_to_si
 
 QUANTITIES: dict[str, str] = {"gyro": "angular_rate", "accel": "acceleration"}

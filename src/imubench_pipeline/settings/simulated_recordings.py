@@ -35,8 +35,8 @@ from imubench_pipeline.settings.validation import (
     Strict,
     Text,
     parse,
-    read_yaml,
 )
+from imubench_pipeline.settings.yaml_files import read_yaml
 from imubench_pipeline.units import naming, quantity_to_si
 
 _Around = TypeVar("_Around", bound=Surroundings)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import difflib
 import re
+import reprlib
 from collections.abc import Callable, Mapping
 from datetime import date
 from fractions import Fraction
-from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
-import yaml
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from imubench_pipeline.units import quantity_to_si
@@ -34,6 +33,31 @@ def _fraction(value: object) -> float:
     if not 0 < number <= 0.5:
         raise ValueError("expected a fraction of the log above 0 and at most 1/2")
     return number
+
+
+_SHORT, _LONG = 100, 1000
+"""Letters of what a file holds, and of an error, that are printed at most."""
+
+_MOST_FAULTS = 20
+"""Faults of one file that are printed."""
+
+_BRIEF = reprlib.Repr()
+_BRIEF.maxstring = _BRIEF.maxother = _BRIEF.maxlong = _SHORT
+
+
+def cut(value: object, words: Callable[[object], str] = _BRIEF.repr, most: int = _SHORT) -> str:
+    """Return what a file holds as it may be printed: a line of it at most.
+
+    Parameters
+    ----------
+    value : object
+    words : callable
+        Makes text of it; by default, as Python writes it, the beginning of each list alone.
+    most : int
+        Letters.
+    """
+    text = words(value)
+    return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
 def as_text(value: object) -> object:
@@ -95,9 +119,6 @@ Between = Annotated[tuple[Text, Text], AfterValidator(_between)]
 Duration = Annotated[Text, checked("time", "a time above 0"), Field(examples=["10 h"])]
 
 
-# The same loader, ten times as fast where it is compiled.
-_LOADER: type = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-
 _Model = TypeVar("_Model", bound=BaseModel)
 
 
@@ -110,12 +131,15 @@ def parse(model: type[_Model], data: object, file: str) -> _Model:
         One line for each fault: file, key, value found, what was expected.
     """
     if not isinstance(data, Mapping):
-        raise ConfigError(f"{file}: found {data!r}, expected keys and values")
+        raise ConfigError(f"{file}: found {cut(data)}, expected keys and values")
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        faults = "\n".join(_fault(file, fault, model) for fault in _first_faults(error.errors()))
-        raise ConfigError(faults) from None
+        faults = _first_faults(error.errors())
+        lines = [_fault(file, fault, model) for fault in faults[:_MOST_FAULTS]]
+        if len(faults) > _MOST_FAULTS:
+            lines.append(f"{file}: and {len(faults) - _MOST_FAULTS} more")
+        raise ConfigError("\n".join(lines)) from None
 
 
 def _first_faults(faults: list[Any]) -> list[Any]:
@@ -125,19 +149,19 @@ def _first_faults(faults: list[Any]) -> list[Any]:
 
 
 def _fault(file: str, fault: Any, model: type[BaseModel]) -> str:
-    key = ".".join(str(part) for part in fault["loc"]) or "(top level)"
+    key = ".".join(cut(part, str) for part in fault["loc"]) or "(top level)"
     found = fault["input"]
-    message = re.sub(r"^(Value error|Assertion failed), ", "", fault["msg"])
+    message = cut(re.sub(r"^(Value error|Assertion failed), ", "", fault["msg"]), str, _LONG)
     if fault["type"] == "extra_forbidden":
         known = _known_keys(model, fault["loc"][:-1])
-        close = difflib.get_close_matches(str(fault["loc"][-1]), known, n=1)
+        close = difflib.get_close_matches(cut(fault["loc"][-1], str), known, n=1)
         hint = f"did you mean {close[0]!r}? " if close else ""
         return f"{file}: {key}: unknown key; {hint}expected one of {', '.join(known)}"
     if fault["type"] == "missing":
         return f"{file}: {key}: missing; expected a value here"
     if fault["type"] == "value_error" and isinstance(found, Mapping):
         return f"{file}: {key}: {message}"
-    return f"{file}: {key}: found {found!r}; {message[0].lower()}{message[1:]}"
+    return f"{file}: {key}: found {cut(found)}; {message[0].lower()}{message[1:]}"
 
 
 def _known_keys(model: type[BaseModel], path: tuple[Any, ...]) -> list[str]:
@@ -162,22 +186,3 @@ def _resolve(schema: dict[str, Any], node: dict[str, Any]) -> dict[str, Any]:
     while "$ref" in node:
         node = schema["$defs"][node["$ref"].rsplit("/", maxsplit=1)[-1]]
     return node
-
-
-def read_yaml(path: Path) -> object:
-    """Read one YAML file.
-
-    Raises
-    ------
-    ConfigError
-        If it is not there or not YAML; the text names the line.
-    """
-    try:
-        return yaml.load(path.read_text(encoding="utf-8"), Loader=_LOADER)
-    except FileNotFoundError:
-        raise ConfigError(f"{path}: no such file; expected one of YAML: mend its name") from None
-    except yaml.MarkedYAMLError as error:
-        line = f", line {error.problem_mark.line + 1}" if error.problem_mark else ""
-        raise ConfigError(f"{path}{line}: not readable as YAML: {error.problem}") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: not readable as YAML: {error}") from None

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Literal
 
 from imubench_pipeline.settings.simulated_sensor import ModelSettings
-from imubench_pipeline.settings.validation import ConfigError, parse, read_yaml
+from imubench_pipeline.settings.validation import ConfigError, parse
+from imubench_pipeline.settings.yaml_files import read_yaml
 from imubench_pipeline.simulate.imu import ImuModel
 from imubench_pipeline.simulate.models import imu_model
 

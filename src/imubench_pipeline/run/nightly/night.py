@@ -21,7 +21,8 @@ from imubench_pipeline.run.nightly.settling import Found, Skip, look, moved, set
 from imubench_pipeline.run.nightly.state import State, load_tables, read_state, state_of
 from imubench_pipeline.run.nightly.summary import Skipped, Summary, compared, in_words
 from imubench_pipeline.settings.config import Run, read_run
-from imubench_pipeline.settings.validation import ConfigError, read_yaml
+from imubench_pipeline.settings.validation import ConfigError
+from imubench_pipeline.settings.yaml_files import read_yaml
 from imubench_pipeline.tables import write_content, write_json
 
 __all__ = ["Night", "TakenError"]
