@@ -1,8 +1,10 @@
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
 from imubench_pipeline.allan import cluster_sizes
-from imubench_pipeline.noise import TERMS, GaussMarkov, NoiseModel, Sinusoid, Term
+from imubench_pipeline.noise import TERMS, GaussMarkov, NoiseModel, Sinusoid, StateSpace, Term
 from imubench_pipeline.noise.simulate import (
     block_sums,
     channel_rng,
@@ -111,6 +113,36 @@ def test_every_term_is_simulated_as_its_allan_variance_says(rng, kind: type[Term
     expected = model.allan_variance(sizes / RATE, RATE)
     tolerance = 4.5 * error + 5e-3 * expected
     assert (np.abs(found.mean(axis=0) - expected) < tolerance).all()
+
+
+@dataclass(frozen=True)
+class Mixed(GaussMarkov):
+    """A process and one ten times as slow, in states that are a mixture of the two."""
+
+    @property
+    def both(self) -> NoiseModel:
+        return NoiseModel(B=self.B, T_B=self.T_B, further=[GaussMarkov(self.B, 10.0 * self.T_B)])
+
+    def state_space(self, interval: float) -> StateSpace:
+        space = self.both.state_space(1.0 / interval)
+        turn = np.array([[0.8, -0.6], [0.6, 0.8]])
+        return StateSpace(
+            turn @ space.transition @ turn.T,
+            turn @ space.process_noise @ turn.T,
+            turn @ space.output,
+            0.0,
+            np.zeros(2),
+            turn @ space.initial_variance @ turn.T,
+        )
+
+
+def test_states_whose_noise_goes_together_are_simulated(rng) -> None:
+    mixed, sizes = Mixed(1.0, 0.7), np.array([1, 5, 50, 200])
+    model = NoiseModel(further=[mixed])
+    found = np.array([reconstructed_variance(model, RATE, 8000, sizes, rng) for _ in range(100)])
+    error = found.std(axis=0) / np.sqrt(len(found))
+    expected = mixed.both.allan_variance(sizes / RATE, RATE)
+    assert (np.abs(found.mean(axis=0) - expected) < 4.5 * error).all()
 
 
 @pytest.mark.release

@@ -85,7 +85,7 @@ class WindowCovariance:
         for term in model.terms:
             if not isinstance(term, Deterministic):
                 power, unit = term.as_unit()
-                total += power * self._of_term(unit)
+                total += power * (self._of_term(term) if unit is term else self._of_unit(unit))
         return total
 
     def spread(self, model: NoiseModel, errors: Errors) -> Spread:
@@ -122,18 +122,18 @@ class WindowCovariance:
 
     @cached_property
     def _units(self) -> dict[Term, Array]:
-        """The covariances of terms that all models share (`Term.as_unit`)."""
         return {}
 
+    def _of_unit(self, unit: Term) -> Array:
+        """Return the covariance of a term that all models share."""
+        if unit not in self._units:
+            self._units[unit] = self._of_term(unit)
+        return self._units[unit]
+
     def _of_term(self, term: Term) -> Array:
-        if term in self._units:
-            return self._units[term]
         reach = self.window.blocks - 1
         lags = np.abs(np.arange(-reach, self.lags + reach, dtype=np.float64))
-        covariance = correlated(term.block_covariance(lags, self.window.block), self._overlap)
-        if term.as_unit()[1] is not term:
-            self._units[term] = covariance
-        return covariance
+        return correlated(term.block_covariance(lags, self.window.block), self._overlap)
 
     @cached_property
     def _overlap(self) -> Array:
