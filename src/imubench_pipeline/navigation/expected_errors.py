@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from types import MappingProxyType
 from typing import Any
 
@@ -231,21 +232,14 @@ def error_rows(
         channel: AxisErrors(estimate.model, figures.get(channel, NO_FIGURES))
         for channel, estimate in known.items()
     }
-    drawn = {
-        channel: [
-            AxisErrors(model, one)
-            for model, one in zip(
-                draw_models(estimate, draws, channel_rng(seed, *names.values(), channel, "budget")),
-                _drawn(
-                    axes[channel].figures,
-                    draws,
-                    channel_rng(seed, *names.values(), channel, "temperature of the budget"),
-                ),
-                strict=True,
-            )
-        ]
-        for channel, estimate in known.items()
-    }
+
+    def drawn_of(channel: str) -> list[AxisErrors]:
+        stream = partial(channel_rng, seed, *names.values(), channel)
+        models = draw_models(known[channel], draws, stream("budget"))
+        of_use = _drawn(axes[channel].figures, draws, stream("temperature of the budget"))
+        return [AxisErrors(*pair) for pair in zip(models, of_use, strict=True)]
+
+    drawn = {channel: drawn_of(channel) for channel in known}
     for question in questions:
         asked: dict[str, Any] = {
             **names,
@@ -271,38 +265,42 @@ def error_rows(
         pair = [axes[c] if c else _NOTHING for c in chosen.values()]
         many = [drawn[c] if c else [_NOTHING] * draws for c in chosen.values()]
         found = question.answer(*pair)
-        budgets = [question.answer(*one) for one in zip(*many, strict=True)]
-        lower, upper = interval(budgets)
-        # The draws of what is absent lie above it: the value itself is inside.
-        lower, upper = min(lower, found.total), max(upper, found.total)
-        apart = [c for c in chosen.values() if c and not drawn_jointly(estimates[c])]
-        yield (
-            asked
-            | chosen
-            | {
-                "source": "total",
-                "sigma": found.total,
-                "lower": lower,
-                "upper": upper,
-                "drawn": "one by one" if apart else "jointly",
-                "within": question.limit and chance_within(question.limit, budgets),
-                "reached_after": question.reached(*pair),
-                "reason": "; ".join(
-                    [
-                        *found.assumptions,
-                        *_doubts(chosen, estimates),
-                        *_apart(apart, estimates),
-                        *_unknown(question, estimates),
-                    ]
-                )
-                or None,
-            }
-        )
-        largest = Largest.of(found, question.limit, upper)
-        for contribution in sorted(found.contributions, key=lambda one: -one.sigma):
+        budgets = [question.answer(*axes_drawn) for axes_drawn in zip(*many, strict=True)]
+        total = _total(question, found, budgets, chosen, estimates)
+        yield asked | chosen | total | {"reached_after": question.reached(*pair)}
+        largest = Largest.of(found, question.limit, total["upper"])
+        for contribution in sorted(found.contributions, key=lambda part: -part.sigma):
             yield asked | chosen | source_row(contribution) | largest.of_bias(contribution)
-        for one in found.missing if question.limit is not None else ():
-            yield asked | chosen | largest.of_missing(one)
+        for missed in found.missing if question.limit is not None else ():
+            yield asked | chosen | largest.of_missing(missed)
+
+
+def _total(
+    question: Question,
+    found: Budget,
+    budgets: Sequence[Budget],
+    chosen: Mapping[str, str | None],
+    estimates: Mapping[str, Estimate],
+) -> dict[str, Any]:
+    """Return what the row of a total says of it, by its budget and those of drawn models."""
+    lower, upper = interval(budgets)
+    apart = [c for c in chosen.values() if c and not drawn_jointly(estimates[c])]
+    reasons = (
+        *found.assumptions,
+        *_doubts(chosen, estimates),
+        *_apart(apart, estimates),
+        *_unknown(question, estimates),
+    )
+    return {
+        "source": "total",
+        "sigma": found.total,
+        # The draws of what is absent lie above it: the value itself is inside.
+        "lower": min(lower, found.total),
+        "upper": max(upper, found.total),
+        "drawn": "one by one" if apart else "jointly",
+        "within": question.limit and chance_within(question.limit, budgets),
+        "reason": "; ".join(reasons) or None,
+    }
 
 
 def _drawn(figures: Figures, draws: int, rng: np.random.Generator) -> list[Figures]:

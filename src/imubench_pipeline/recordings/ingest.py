@@ -143,39 +143,11 @@ def _ingest(
     parts = [
         read_part(file, notes.use, scratch, number) for number, file in enumerate(read(source, log))
     ]
-    static = provenance.get("kind", "static") == "static"
-    findings = [finding for part in parts for finding in part.source.findings]
-    findings += [finding for part in parts for finding in part.source.contradicted_units()]
     bases = [_base(part, log, settings) for part in parts]
-    for part, base in zip(parts, bases, strict=True):
-        findings += column_findings(part.columns, base.rate, settings, static=static)
-        if static:  # what is sensed of a turn looks like a knock
-            findings += _knock_findings(part, base.rate, settings, scratch)
-    beside = {TEMPERATURE, POSITION, TABLE_RATE}
-    findings += copied_channels(
-        {name: c for part in parts for name, c in part.columns.items() if name not in beside}
-    )
-    unusable = {finding.channel for finding in findings if finding.severity == "fatal"}
     groups = _shared_bases(parts, bases)
-    if len({part.rows for part in parts if not part.stamped}) > 1:
-        lengths = ", ".join(f"{part.source.path.name} {part.rows}" for part in parts)
-        rows = [part.rows for part in parts]
-        findings.append(
-            Finding(
-                "unequal_length",
-                "warning",
-                f"files without stamps differ in length ({lengths} samples): the shorter ones may "
-                "be cut short",
-                max(rows) - min(rows),
-            )
-        )
-    duration = max(base.grid / base.rate for base in bases)
-    if static and duration < settings.short:
-        detail = (
-            f"the recording lasts {duration:.5g} s: it shows white noise, but bias instability and "
-            "random walk take hours"
-        )
-        findings.append(Finding("short_recording", "note", detail, duration))
+    static = provenance.get("kind", "static") == "static"
+    findings = _findings(parts, bases, groups, settings, scratch, static=static)
+    unusable = {finding.channel for finding in findings if finding.severity == "fatal"}
     names = names_of(parts, groups)
     metadata = provenance | {
         "sources": sources.result(),
@@ -184,29 +156,12 @@ def _ingest(
         "started": notes.started
         or next((p.source.started for p in parts if p.source.started), None),
     }
+    left_out = {"unusable": sorted(channel for channel in unusable if channel)}
     written: list[tuple[Path, Path]] = []
     counts: dict[str, dict[str, int]] = {}
     for name, group in zip(names, groups, strict=True):
-        base = bases[group[0]]
-        findings += [f for f in base.findings if f not in findings]
-        chosen = [parts[index] for index in group]
-        holes = {
-            channel: bool(
-                base.missing or column.missing or column.not_finite or part.knocks.get(channel)
-            )
-            for part in chosen
-            for channel, column in part.columns.items()
-        }
-        about = metadata | {
-            "rate": base.rate,
-            "rate_from": base.source,
-            "rows": base.rows,
-            "grid": base.grid,
-            "segments": [list(segment) for segment in base.segments],
-            "uniform": base.uniform,
-            "holes": holes,
-            "unusable": sorted(channel for channel in unusable if channel),
-        }
+        chosen, base = [parts[index] for index in group], bases[group[0]]
+        about = metadata | _of_clock(chosen, base) | left_out
         assembled, repeated = assemble(chosen, base, settings, about, scratch / name)
         counts |= counted(assembled, chosen, repeated)
         written.append((assembled, folder / name))
@@ -231,6 +186,66 @@ def _ingest(
         for f in findings
     ]
     return Ingested(summary, findings, channels, _digest(folder), _gravity(parts, bases))
+
+
+def _findings(
+    parts: list[Part],
+    bases: list[timebase.TimeBase],
+    groups: list[list[int]],
+    settings: QualitySettings,
+    scratch: Path,
+    *,
+    static: bool,
+) -> list[Finding]:
+    """Return what is wrong with the files, their columns and their clocks."""
+    findings = [finding for part in parts for finding in part.source.findings]
+    findings += [finding for part in parts for finding in part.source.contradicted_units()]
+    for part, base in zip(parts, bases, strict=True):
+        findings += column_findings(part.columns, base.rate, settings, static=static)
+        if static:  # what is sensed of a turn looks like a knock
+            findings += _knock_findings(part, base.rate, settings, scratch)
+    beside = {TEMPERATURE, POSITION, TABLE_RATE}
+    findings += copied_channels(
+        {name: c for part in parts for name, c in part.columns.items() if name not in beside}
+    )
+    if len({part.rows for part in parts if not part.stamped}) > 1:
+        lengths = ", ".join(f"{part.source.path.name} {part.rows}" for part in parts)
+        rows = [part.rows for part in parts]
+        detail = (
+            f"files without stamps differ in length ({lengths} samples): the shorter ones may "
+            "be cut short"
+        )
+        findings.append(Finding("unequal_length", "warning", detail, max(rows) - min(rows)))
+    duration = max(base.grid / base.rate for base in bases)
+    if static and duration < settings.short:
+        detail = (
+            f"the recording lasts {duration:.5g} s: it shows white noise, but bias instability and "
+            "random walk take hours"
+        )
+        findings.append(Finding("short_recording", "note", detail, duration))
+    for group in groups:
+        findings += [f for f in bases[group[0]].findings if f not in findings]
+    return findings
+
+
+def _of_clock(parts: list[Part], base: timebase.TimeBase) -> dict[str, Any]:
+    """Return what the metadata of a file of samples say of its time base, and of holes in it."""
+    holes = {
+        channel: bool(
+            base.missing or column.missing or column.not_finite or part.knocks.get(channel)
+        )
+        for part in parts
+        for channel, column in part.columns.items()
+    }
+    return {
+        "rate": base.rate,
+        "rate_from": base.source,
+        "rows": base.rows,
+        "grid": base.grid,
+        "segments": [list(segment) for segment in base.segments],
+        "uniform": base.uniform,
+        "holes": holes,
+    }
 
 
 def _gravity(parts: list[Part], bases: list[timebase.TimeBase]) -> GravityTurn | None:
