@@ -225,24 +225,24 @@ def test_a_script_that_runs_past_its_time_is_ended(steps: Processes, tmp_path: P
     assert not psutil.pid_exists(script)
 
 
-@pytest.mark.parametrize(
-    ("text", "cause", "reason"),
-    [
-        ("raise ValueError('upside\\ndown')", "error", "ValueError: upside down"),
-        ("import os; os.kill(os.getpid(), 9)", "killed", "SIGKILL, perhaps for want of memory"),
-        ("import os; os.kill(os.getpid(), 11)", "killed", "SIGSEGV"),
-        ("import os; os.kill(os.getpid(), 2)", None, "bad.py was killed"),
-        ("raise OSError(28, 'No space left on device')", None, "OSError: [Errno 28]"),
-    ],
+BLAMED = (
+    ("raise ValueError('upside\\ndown')", "error", "ValueError: upside down"),
+    ("import os; os.kill(os.getpid(), 9)", "killed", "SIGKILL, perhaps for want of memory"),
+    ("import os; os.kill(os.getpid(), 11)", "killed", "SIGSEGV"),
+    ("import os; os.kill(os.getpid(), 2)", None, "bad.py was killed"),
+    ("raise OSError(28, 'No space left on device')", None, "OSError: [Errno 28]"),
 )
+
+
 def test_an_error_says_whether_what_it_was_run_for_is_to_blame(
-    text: str, cause: str | None, reason: str, steps: Processes, tmp_path: Path
+    steps: Processes, tmp_path: Path
 ) -> None:
-    put(tmp_path, "bad", f"if __name__ == '__main__':\n    {text}\n")
-    with pytest.raises(StepError) as caught:
-        run(steps, "bad", tmp_path / "out")
-    assert caught.value.cause == cause
-    assert caught.value.reason.startswith(reason)
+    for text, cause, reason in BLAMED:
+        put(tmp_path, "bad", f"if __name__ == '__main__':\n    {text}\n")
+        with pytest.raises(StepError) as caught:
+            run(steps, "bad", tmp_path / "out")
+        assert caught.value.cause == cause, text
+        assert caught.value.reason.startswith(reason), text
 
 
 def test_a_script_that_cannot_be_imported_is_nobodys_fault(

@@ -84,17 +84,17 @@ def test_random_walk_has_the_degrees_of_freedom_of_greenhall_and_riley() -> None
     "model", [NoiseModel(N=1.0), NoiseModel(N=1.0, B=0.5, T_B=30.0), NoiseModel(N=1.0, K=0.05)]
 )
 def test_the_covariance_is_that_of_simulated_logs(model: NoiseModel) -> None:
-    samples, members = 9000, 1000
+    samples, members = 9000, 500
     sizes = np.array([1, 4, 16, 64, 128, 256, 512, 1000])
     rng = channel_rng(20260102, model.name)
     logs = (simulate(model, 1.0, samples, rng) for _ in range(members))
     found = np.array([allan_variance(log, 1.0, cluster_sizes=sizes).variance for log in logs])
     expected = variance_covariance(model, 1.0, samples, sizes)
     spread = np.sqrt(np.diag(expected))
-    # A standard deviation from 1000 logs is itself known to 2 or, where the tail is long, 4 %.
-    np.testing.assert_allclose(found.std(axis=0) / spread, 1.0, atol=0.1)
+    # A standard deviation from 500 logs is itself known to 3 or, where the tail is long, 6 %.
+    np.testing.assert_allclose(found.std(axis=0) / spread, 1.0, atol=0.15)
     np.testing.assert_allclose(
-        np.cov(found.T) / np.outer(spread, spread), expected / np.outer(spread, spread), atol=0.15
+        np.cov(found.T) / np.outer(spread, spread), expected / np.outer(spread, spread), atol=0.2
     )
 
 

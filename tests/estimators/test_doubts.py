@@ -1,5 +1,7 @@
 """What is doubted of a fit."""
 
+from collections.abc import Iterable
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
+from tests.conftest import few
 
 RATE, SAMPLES = 10.0, 40_000
 
@@ -19,17 +22,16 @@ def k_of(model: NoiseModel, seed: int) -> Parameter:
 
 def test_a_walk_that_may_be_a_slow_process_is_doubted() -> None:
     # A process of a twentieth of the log: BIC takes many for a walk, whose K is then no K.
-    statuses = [k_of(NoiseModel(N=1e-4, B=1e-4, T_B=170.0), seed).status for seed in range(5)]
-    assert "doubtful" in statuses
-    assert statuses.count("ok") <= 2
+    statuses = [k_of(NoiseModel(N=1e-4, B=1e-4, T_B=170.0), seed).status for seed in range(2)]
+    assert statuses == ["doubtful"] * 2
 
 
 def test_a_walk_is_hardly_ever_doubted() -> None:
-    statuses = [k_of(NoiseModel(N=1e-4, K=1e-5), seed).status for seed in range(5)]
-    assert statuses.count("ok") >= 4
+    statuses = [k_of(NoiseModel(N=1e-4, K=1e-5), seed).status for seed in range(3)]
+    assert statuses.count("ok") >= 2
 
 
-@pytest.mark.parametrize("seed", [0, 2, 5])
+@pytest.mark.parametrize("seed", few([0], [2, 5]))
 def test_a_ramp_that_passes_for_a_walk_is_doubted(seed: int) -> None:
     # BIC asks more of a ramp than of a walk: one of four sigma of the process is hardly found.
     model = NoiseModel(N=1e-4, B=1e-4, T_B=20.0)
@@ -40,10 +42,11 @@ def test_a_ramp_that_passes_for_a_walk_is_doubted(seed: int) -> None:
     assert found.estimates[0].parameters["K"].status in ("doubtful", "not_identified")
 
 
-def test_a_process_joined_to_a_walk_is_doubted_where_aic_has_others() -> None:
+@pytest.mark.parametrize("seeds", few([(0, 6)], [(range(12),)]))
+def test_a_process_joined_to_a_walk_is_doubted_where_aic_has_others(seeds: Iterable[int]) -> None:
     # Process and walk pass for one slower process, and AIC sees that they are two.
     wrong = []
-    for seed in range(12):
+    for seed in seeds:
         model = NoiseModel(N=7e-4, B=7e-4, T_B=12.8, K=1.8e-4)
         log = simulate(model, 50.0, 128_000, np.random.default_rng(seed))
         found = fit(log, 50.0)
@@ -68,7 +71,7 @@ def test_with_b_the_figures_of_the_curve_are_doubted() -> None:
 def test_bias_instability_that_a_walk_hides_is_no_plain_value() -> None:
     # The walk is the stronger below a tenth of the frequency at which the process begins.
     model = NoiseModel(N=1e-4, B=1e-4, T_B=20.0, K=6e-5)
-    for seed in range(4):
+    for seed in range(2):
         log = simulate(model, RATE, SAMPLES, np.random.default_rng(seed))
         found = fit(log, RATE)
         B = found.estimates[0].parameters["B"]
@@ -77,7 +80,7 @@ def test_bias_instability_that_a_walk_hides_is_no_plain_value() -> None:
             assert found.estimates[0].curve["B_curve"].status == "doubtful"
 
 
-@pytest.mark.parametrize("seed", [1, 7, 8])
+@pytest.mark.parametrize("seed", few([1], [7, 8]))
 def test_a_ramp_beside_a_walk_that_hardly_needs_it_is_doubted(seed: int) -> None:
     log = simulate(NoiseModel(N=1e-4, K=1e-5), RATE, SAMPLES, np.random.default_rng(seed))
     # Three times what the walk does over the log on average.

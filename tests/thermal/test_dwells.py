@@ -5,6 +5,7 @@ import pytest
 
 from imubench_pipeline.estimators.thermal.path import temperature_path
 from imubench_pipeline.estimators.thermal.register import dwells
+from tests.conftest import few
 
 Q = 3e-3
 """K² per block³: such a path crosses a cell of a degree in ten blocks."""
@@ -31,7 +32,7 @@ def test_a_path_that_passes_through_its_cells_dwells_in_none():
     assert not found(np.zeros(100, dtype=bool), np.zeros(100))
 
 
-@pytest.mark.parametrize("part", range(8))
+@pytest.mark.parametrize("part", few([1, 6], [0, 2, 3, 4, 5, 7]))
 def test_a_level_of_a_chamber_may_lie_anywhere_in_its_cell(part):
     n = 40_000
     levels = np.array([12.3, 31.7, 22.4, 38.1, 15.8, 27.2, 33.6, 19.9])

@@ -142,21 +142,14 @@ def test_a_temperature_that_does_nothing_is_left_in():
     assert not fit.effect.any()
 
 
-@pytest.mark.parametrize(
-    "readings, word",
-    [
-        (20.0 + 8.0 * TIME / TIME[-1], "ramp"),
-        (np.full(SAMPLES, 21.0), "changes"),
-    ],
-    ids=["ramp", "constant"],
-)
-def test_temperature_that_cannot_be_told_from_time_is_said(readings, word):
+def test_temperature_that_cannot_be_told_from_time_is_said():
+    readings = 20.0 + 8.0 * TIME / TIME[-1]
     rng = np.random.default_rng(5)
     log = simulate(NOISE, RATE, SAMPLES, rng) + 4e-5 * readings
     fit = fitted(log, readings)
     assert fit.sensitivity.status == "not_identified"
     assert fit.sensitivity.value is None
-    assert word in fit.sensitivity.reason
+    assert "ramp" in fit.sensitivity.reason
     assert not fit.compensated
 
 
@@ -209,6 +202,7 @@ def test_a_square_is_found_where_there_is_one():
     assert fitted(log, DAY, longest_lag=0.0, quadratic=False).quadratic.status == "absent"
 
 
+@pytest.mark.release
 def test_gyro_y_of_the_tag_follows_its_temperature(shared):
     log = pd.read_csv(shared / "logs/cats/day1.csv.gz")
     values = log["gyro_y_mrad_s"].to_numpy() * 1e-3

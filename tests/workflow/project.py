@@ -16,6 +16,7 @@ import yaml
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from tests.conftest import PROJECT
+from tests.workflow.dry_runs import dry_run
 
 CHANNELS = {
     "gyro_x": {"column": "wx", "unit": "deg/s"},
@@ -58,6 +59,8 @@ class Project:
                 f"results={self.results}", "simulated=false", *self.settings]  # fmt: skip
 
     def run(self, *flags: str, cores: int = 2) -> subprocess.CompletedProcess[str]:
+        if flags == ("-n",) and self.environment is None:
+            return dry_run(self.place, [f"-c{cores}", "--config", *self.config()])
         return subprocess.run(
             self.command(*flags, cores=cores),
             cwd=self.place,

@@ -80,12 +80,19 @@ def test_exports_and_pages_say_so(project: Project) -> None:
     assert "Does not decide" not in (report / "recordings/one/a.html").read_text()
 
 
-def test_who_includes_it_has_it_decide(project: Project) -> None:
+def test_to_include_it_makes_the_tables_and_the_report_anew(project: Project) -> None:
     project.settings = ["decide={include: [one/b]}"]
-    assert set(project.jobs()) == {
+    jobs = project.jobs()
+    project.settings = []
+    assert set(jobs) == {
         "sensor_tables", "tables", "ranking", "shortlist", "repeatability", "fusion", "exports",
         "figures", "report",
     }  # fmt: skip
+
+
+@pytest.mark.release
+def test_who_includes_it_has_it_decide(project: Project) -> None:
+    project.settings = ["decide={include: [one/b]}"]
     done = project.run()
     assert done.returncode == 0, done.stdout + done.stderr
     about = {row["recording"]: row for row in project.table("recordings")}

@@ -55,7 +55,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Project:
         put_log(folder / f"logs/one/{name}.csv", seed, samples=5000)
     put_log(folder / "logs/two/a.csv", 9, samples=5000)
     settings = ["logs=logs", "sensors=sensors", "results=results", "requirements=false",
-                'estimate={"methods": ["weighted"]}', 'limits={"recording": "30 s"}']  # fmt: skip
+                'estimate={"methods": ["weighted"]}', 'limits={"recording": "12 s"}']  # fmt: skip
     return Project(folder, folder / "results", folder, settings)
 
 
@@ -88,7 +88,7 @@ def faulty(project: Project, tmp_path_factory: pytest.TempPathFactory) -> dict[s
 
 REASONS = {
     "raises": "the step estimate failed: ValueError: need at least one array",
-    "sleeps": "the step estimate ran for longer than 30.52 s (limits.recording, ",
+    "sleeps": "the step estimate ran for longer than 12.52 s (limits.recording, ",
     "dies": "the step estimate was killed twice: SIGKILL, perhaps for want of memory",
     "unread": "the step ingest failed: IndexError: list index out of range",
 }
@@ -145,6 +145,7 @@ def test_what_failed_is_tried_again_and_nothing_else(project: Project) -> None:
     assert of["outlook"] == {"one", "two"}
 
 
+@pytest.mark.release
 def test_a_nightly_run_tries_again_and_says_in_its_exit_status_what_failed(
     project: Project, faulty: dict[str, str]
 ) -> None:
@@ -164,6 +165,7 @@ def test_a_nightly_run_tries_again_and_says_in_its_exit_status_what_failed(
     assert "Traceback" in log and "ValueError: need at least\none array" in log
 
 
+@pytest.mark.release
 def test_a_run_of_mended_code_makes_it_good(project: Project) -> None:
     project.environment = None
     project.settings.pop()
