@@ -162,7 +162,7 @@ def test_a_second_run_has_nothing_to_do(project: Project) -> None:
 
 def test_one_core_and_two_give_the_same_tables(project: Project, tmp_path: Path) -> None:
     alone = Project(project.folder, tmp_path / "results")
-    rules = ("tables", "ranking", "shortlist", "repeatability", "fusion", "coverage")
+    rules = ("tables", "ranking", "shortlist", "repeatability", "fusion", "catalogue")
     assert alone.run(*rules, cores=1).returncode == 0
     made = sorted((alone.results / "tables").iterdir())
     assert len(made) > 60
