@@ -1,4 +1,6 @@
 import json
+import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -95,6 +97,50 @@ def test_a_link_to_nowhere_rejects_its_log_only(project: dict[str, Any]) -> None
     plan = Plan(project)
     assert "No such file" in json.loads(plan.ingest_settings("s", "lost"))["error"]
     assert "has no files" in json.loads(plan.ingest_settings("s", "empty"))["error"]
+
+
+def pipe(notes: Path) -> None:
+    os.mkfifo(notes)
+
+
+def lost(notes: Path) -> None:
+    notes.symlink_to("nowhere")
+
+
+def deep(notes: Path) -> None:
+    notes.write_text(200_000 * "[")
+
+
+def twice(notes: Path) -> None:
+    notes.write_text("device: a\ndevice: b\n")
+
+
+def growing(notes: Path) -> None:
+    lines = [f"a{k}: &a{k} [{', '.join(9 * [f'*a{k - 1}'])}]" for k in range(1, 12)]
+    notes.write_text("\n".join(["a0: &a0 [x, x]", *lines]))
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (pipe, "no regular file"),
+        (lost, "no such file"),
+        (deep, "line 1: not readable as YAML: more than"),
+        (twice, "line 2: not readable as YAML: the key 'device' stands twice"),
+        (growing, "line 6: not readable as YAML: more than"),
+    ],
+)
+def test_notes_that_cannot_be_used_reject_their_own_recording_alone(
+    make: Callable[[Path], None], said: str, project: dict[str, Any]
+) -> None:
+    put(project, "a.csv")
+    put(project, "b.csv")
+    make(Path(project["logs"]) / "s/b.yaml")
+    plan = Plan(project)
+    assert set(plan.recordings) == {("s", "a"), ("s", "b")}
+    assert said in json.loads(plan.ingest_settings("s", "b"))["error"]
+    assert "error" not in json.loads(plan.ingest_settings("s", "a"))
+    assert plan.static_of("s") == ["a", "b"] and plan.calibrated == []
 
 
 def test_a_drop_zone_that_is_not_there(project: dict[str, Any]) -> None:

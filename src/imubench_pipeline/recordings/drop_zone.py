@@ -80,7 +80,7 @@ def found_logs(logs: Path) -> list[Recording]:
         for path in sorted(folder.iterdir()):
             if path.name.startswith(".") or path.name.endswith("~"):
                 continue
-            if path.is_file() and path.suffix.lower() in _NOT_LOGS:
+            if not path.is_dir() and path.suffix.lower() in _NOT_LOGS:
                 continue
             name = path.name if path.is_dir() else _stem(path)
             notes = folder / f"{name}.yaml"
@@ -89,7 +89,7 @@ def found_logs(logs: Path) -> list[Recording]:
                     folder.name,
                     _usable(name),
                     path,
-                    notes if notes.is_file() else None,
+                    notes if os.path.lexists(notes) else None,
                     simulated=False,
                     error=_fault(path, name),
                 )
