@@ -44,6 +44,18 @@ BAD = {
 """Logs that cannot be used, and what their reasons say."""
 
 
+RADIAN = np.pi / 180.0
+REASON = "c does not decide: suspicious unit (gyro_x)"
+
+
+def put_log_times(path: Path, seed: int, factor: float) -> None:
+    """Write a log with what its gyro reads multiplied."""
+    put_log(path, seed)
+    wx, ax = np.loadtxt(path, delimiter=",", skiprows=1).T
+    rows = "".join(f"{w:.9g},{a:.9g}\n" for w, a in zip(factor * wx, ax, strict=True))
+    path.write_text("wx,ax\n" + rows)
+
+
 def put_bad_logs(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     good = "wx,ax\n" + "0.5,9.81\n0.25,9.82\n" * 1000
@@ -62,7 +74,8 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Project:
     put_sensor(folder / "sensors/two.yaml")
     put_log(folder / "logs/one/a.csv", 1)
     put_log(folder / "logs/one/b.csv.gz", 2)
-    put_log(folder / "logs/two/a.csv", 3)
+    put_log_times(folder / "logs/one/c.csv", 6, RADIAN)  # the sensor file says deg/s
+    put_log_times(folder / "logs/two/a.csv", 3, 1.5)  # the worse sensor
     put_bad_logs(folder / "logs/two")
     (folder / "logs/unknown").mkdir()
     put_log(folder / "logs/unknown/a.csv", 5, samples=10)
@@ -88,13 +101,15 @@ def test_a_run_leaves_tables_and_a_report(project: Project) -> None:
         for row in project.table("parameters")
         if row["method"] == "weighted" and row["parameter"] == "N"
     }
-    assert len(estimates) == 6
-    for (_, _, channel), value in estimates.items():
-        assert value == pytest.approx({"gyro_x": 1e-4, "accel_x": 1e-3}[channel], rel=0.05)
+    assert len(estimates) == 8
+    factors = {("one", "c"): RADIAN, ("two", "a"): 1.5}
+    for (sensor, recording, channel), value in estimates.items():
+        gyro = 1e-4 * factors.get((sensor, recording), 1.0)
+        assert value == pytest.approx({"gyro_x": gyro, "accel_x": 1e-3}[channel], rel=0.05)
     for name in ("scores", "reconstruction", "datasheet", "findings", "simulated_truth", "allan"):
         assert (project.results / f"tables/{name}.csv").is_file()
     page = (project.results / "report/index.html").read_text()
-    assert "9 recordings of 3 sensors" in page and "3 analysed, 6 rejected" in page
+    assert "10 recordings of 3 sensors" in page and "4 analysed, 6 rejected" in page
     assert set(project.pages()) == {
         "index.html",
         "recordings.html",
@@ -109,6 +124,7 @@ def test_a_run_leaves_tables_and_a_report(project: Project) -> None:
         "sensors/unknown.html",
         "recordings/one/a.html",
         "recordings/one/b.html",
+        "recordings/one/c.html",
         "recordings/two/a.html",
         "recordings/unknown/a.html",
         *(f"recordings/two/{name}.html" for name in BAD),
@@ -133,8 +149,8 @@ def test_bad_logs_are_rejected_and_stop_nothing_else(project: Project, said: str
         for row in project.table("scores")
         if row["method"] == "weighted"
     }
-    assert complete == {("one", "a"), ("one", "b"), ("two", "a")}
-    assert "3 recordings analysed, 6 rejected" in said
+    assert complete == {("one", "a"), ("one", "b"), ("one", "c"), ("two", "a")}
+    assert "4 recordings analysed, 6 rejected" in said
     page = (project.results / "report/index.html").read_text()
     assert "6 rejected" in page
     for name, text in BAD.items():
@@ -142,6 +158,57 @@ def test_bad_logs_are_rejected_and_stop_nothing_else(project: Project, said: str
         assert line.startswith("<li>V two, <a ") and text in html.unescape(line)
         assert page.index(line) < page.index('id="comparison"')
         assert f"recordings/two/{name}.html" in project.pages()
+
+
+def test_a_log_in_another_unit_is_analysed_and_does_not_decide(project: Project) -> None:
+    about = {row["recording"]: row for row in project.table("recordings") if row["sensor"] == "one"}
+    assert {name: row["decides"] for name, row in about.items()} == {
+        "a": True,
+        "b": True,
+        "c": False,
+    }
+    assert about["c"]["fitness"] == "unfit"
+    (doubt,) = (row for row in project.table("doubts") if row["code"] == "suspicious_unit")
+    assert doubt["factor"] == pytest.approx(57.3, rel=1e-3)
+
+
+def test_pools_and_rankings_stand_on_the_others(project: Project) -> None:
+    pooled = pooled_of_one(project)
+    assert (pooled["recordings"], pooled["left_out"]) == (2, 1)
+    assert pooled["value"] == pytest.approx(1e-4, rel=0.05)
+    ranked = [row for row in project.table("ranking") if row["sensor"] == "one"]
+    assert ranked
+    for row in ranked:
+        assert row["recording"] in ("a", "b")
+        assert row["left_out"].startswith(REASON)
+
+
+def pooled_of_one(project: Project) -> dict:
+    of = {"sensor": "one", "channel": "gyro_x", "parameter": "N"}
+    (found,) = (row for row in project.table("pooled") if row.items() >= of.items())
+    return found
+
+
+def test_exports_and_pages_say_what_does_not_decide(project: Project) -> None:
+    exported = (project.results / "exports/one/kalibr/imu.yaml").read_text()
+    said = " ".join(exported.replace("#", "").split())
+    assert f"CAUTION: left out: {REASON}" in said
+    assert yaml.safe_load(exported)["gyroscope_noise_density"] == pytest.approx(1e-4, rel=0.05)
+    report = project.results / "report"
+    assert REASON in (report / "index.html").read_text()
+    assert "does not decide (suspicious unit" in (report / "recordings.html").read_text()
+    assert "Does not decide" in (report / "recordings/one/c.html").read_text()
+    assert "Does not decide" not in (report / "recordings/one/a.html").read_text()
+
+
+def test_to_include_it_makes_the_tables_and_the_report_anew(project: Project) -> None:
+    project.settings = ["decide={include: [one/c]}"]
+    jobs = project.jobs()
+    project.settings = []
+    assert set(jobs) == {
+        "sensor_tables", "tables", "ranking", "shortlist", "repeatability", "fusion", "exports",
+        "figures", "report",
+    }  # fmt: skip
 
 
 def test_what_the_samples_look_like_is_kept_with_each_recording(project: Project) -> None:
@@ -174,7 +241,7 @@ def test_one_core_and_two_give_the_same_tables(project: Project, tmp_path: Path)
 def test_an_edit_of_a_datasheet_runs_its_deltas_and_the_global_steps(project: Project) -> None:
     density = {"value": 0.02, "unit": "deg/s/sqrt(Hz)"}
     put_sensor(project.folder / "sensors/one.yaml", datasheet={"gyro": {"noise_density": density}})
-    steps = {"datasheet": 2, "catalogue": 1, "sensor_tables": 3}
+    steps = {"datasheet": 3, "catalogue": 1, "sensor_tables": 3}
     assert project.jobs() == GLOBAL_STEPS | steps
     assert project.run().returncode == 0
     printed = {
@@ -193,7 +260,7 @@ def test_one_more_log_runs_its_own_steps_and_the_global_ones(project: Project) -
     assert project.jobs() == STEPS_OF_A_RECORDING | GLOBAL_STEPS | {"outlook": 1}
     before = project.pages()
     assert project.run().returncode == 0
-    assert analysed(project) == 4
+    assert analysed(project) == 5
     after = project.pages()
     assert set(after) - set(before) == {"recordings/two/b.html"}
     same = {path for path in before if after[path] == before[path]}
@@ -206,7 +273,7 @@ def test_a_removed_log_runs_the_global_steps(project: Project) -> None:
     (project.folder / "logs/two/b.csv").unlink()
     assert project.jobs() == GLOBAL_STEPS | {"outlook": 1}
     assert project.run().returncode == 0
-    assert analysed(project) == 3
+    assert analysed(project) == 4
     assert "recordings/two/b.html" not in project.pages()
 
 
@@ -227,7 +294,7 @@ def test_steps_that_were_killed_after_an_edit_are_run_again(project: Project) ->
     sensor.write_text(yaml.safe_dump(written))
     to_do = project.job_list()
     edited = {job for job in to_do if job[0] == "estimate"}
-    assert edited == {("estimate", "one/a"), ("estimate", "one/b")}
+    assert edited == {("estimate", f"one/{name}") for name in "abc"}
     with subprocess.Popen(project.command(), cwd=project.place) as process:
         killed = set()
         while process.poll() is None:
@@ -235,11 +302,21 @@ def test_steps_that_were_killed_after_an_edit_are_run_again(project: Project) ->
                 step.kill()
                 killed.add(step.pid)
     # Each is run once more, and then leaves its recording out.
-    assert process.returncode == 1 and len(killed) == 4
+    assert process.returncode == 1 and len(killed) == 6
     failed = {row["recording"]: row["cause"] for row in project.table("failures")}
-    assert failed == {"a": "killed", "b": "killed"}
+    assert failed == dict.fromkeys("abc", "killed")
     # Snakemake has noted the new settings for them, but what they left is no result.
     assert project.job_list() == to_do
+
+
+@pytest.mark.release
+def test_who_includes_it_has_it_decide(project: Project) -> None:
+    project.settings = ["decide={include: [one/c]}"]
+    done = project.run()
+    assert done.returncode == 0, done.stdout + done.stderr
+    about = {row["recording"]: row for row in project.table("recordings") if row["sensor"] == "one"}
+    assert (about["c"]["fitness"], about["c"]["decides"]) == ("unfit", True)
+    assert pooled_of_one(project)["recordings"] == 3
 
 
 def steps_of(run: int, name: str) -> list[psutil.Process]:
