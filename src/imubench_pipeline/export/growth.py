@@ -78,7 +78,10 @@ def growth(model: NoiseModel, time: ArrayLike, rate: float) -> Growth:
 
 
 def growth_of(term: Term, time: Array) -> Growth:
-    """Return the variances of the integrals of one term; 0 for those that do not grow so."""
+    """Return the variances of the integrals of one term at times in s, shape (k,).
+
+    They are 0 for terms that do not grow so.
+    """
     if isinstance(term, WhiteNoise):
         return Growth(time, term.N**2 * time, term.N**2 * time**3 / 3.0)
     if isinstance(term, RandomWalk):
