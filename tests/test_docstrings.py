@@ -1,6 +1,7 @@
 """Every public function says what its arguments are."""
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
@@ -84,6 +85,20 @@ def test_arguments_of_documented_functions_are_documented(module: str) -> None:
             assert any(argument.arg in line.split(" : ")[0] for line in listed if " : " in line), (
                 f"{module}.{function.name}: {argument.arg} is not documented"
             )
+
+
+@pytest.mark.parametrize("module", PUBLIC)
+def test_functions_of_arrays_say_their_shapes(module: str) -> None:
+    """Or where they are said; sections that repeat annotations are left out."""
+    for function in ast.parse((SOURCE / f"{module}.py").read_text()).body:
+        if not isinstance(function, ast.FunctionDef) or function.name.startswith("_"):
+            continue
+        arguments = [*function.args.args, *function.args.kwonlyargs]
+        annotations = [ast.unparse(one.annotation) for one in arguments if one.annotation]
+        if any(re.match(r"(Array|NDArray|ArrayLike)\b", one) for one in annotations):
+            text = ast.get_docstring(function) or ""
+            said = re.search(r"shape|: as of `|are those of `|\(see `|ndarray", text)
+            assert said, f"{module}.{function.name}"
 
 
 def test_modules_are_small() -> None:

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from imubench_pipeline.experiments.earth_rate.courses import thinned
-from imubench_pipeline.experiments.earth_rate.published import Schedule, allowed, published_row
+from imubench_pipeline.experiments.earth_rate.published import RunDesign, allowed, published_row
 from imubench_pipeline.experiments.earth_rate.simulation import (
     ASSUMED_LATITUDE,
     ASSUMED_TURNING,
@@ -15,7 +15,7 @@ from imubench_pipeline.experiments.earth_rate.simulation import (
 )
 from imubench_pipeline.run.plan import Plan
 
-PAPER = Schedule(PAPER_PERIOD, ASSUMED_TURNING, PAPER_RATE, ASSUMED_LATITUDE)
+PAPER = RunDesign(PAPER_PERIOD, ASSUMED_TURNING, PAPER_RATE, ASSUMED_LATITUDE)
 
 
 @pytest.mark.parametrize(

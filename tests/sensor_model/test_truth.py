@@ -7,7 +7,7 @@ import pytest
 from imubench_pipeline.estimators.estimate import CURVE
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.settings.simulated_sensor import AxisSettings
-from imubench_pipeline.simulate.models import Figure, axis_model, figures_of
+from imubench_pipeline.simulate.models import TrueFigure, axis_model, figures_of
 from imubench_pipeline.simulate.simulation import simulate
 
 DEGREE = math.pi / 180
@@ -31,11 +31,11 @@ AXIS: dict[str, Any] = {
 }  # fmt: skip
 
 
-def figures(channel: str = "gyro_x", rate: float = 100.0, **settings: Any) -> list[Figure]:
+def figures(channel: str = "gyro_x", rate: float = 100.0, **settings: Any) -> list[TrueFigure]:
     return list(figures_of(AxisSettings.model_validate(settings), channel, rate))
 
 
-def named(found: list[Figure]) -> dict[str, Figure]:
+def named(found: list[TrueFigure]) -> dict[str, TrueFigure]:
     """Figures by name, with the component behind it where there are several."""
     names = [one.name for one in found]
     return {

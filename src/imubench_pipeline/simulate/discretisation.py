@@ -164,7 +164,7 @@ def _integrated(system: Array, impulse: Array, interval: float) -> tuple[Array, 
 
 
 @dataclass(frozen=True)
-class Held:
+class HeldInput:
     """What a filter lacks of an input that is linear between samples, over one interval.
 
     Attributes
@@ -185,7 +185,7 @@ class Held:
     lagged_step: Array
 
 
-def held_input(low_pass: LowPass | None, lag: float, interval: float) -> Held:
+def held_input(low_pass: LowPass | None, lag: float, interval: float) -> HeldInput:
     """Discretise filter and thermal lag for an input with first-order hold, exactly.
 
     Parameters
@@ -202,7 +202,7 @@ def held_input(low_pass: LowPass | None, lag: float, interval: float) -> Held:
     # ε' = -ε/lag - slope, with the slope of the input that is held.
     lag_step = math.expm1(-x) / x if lag > 0 else 0.0
     if low_pass is None:
-        return Held(np.zeros(0), decay, lag_step, np.zeros(0), np.zeros(0))
+        return HeldInput(np.zeros(0), decay, lag_step, np.zeros(0), np.zeros(0))
     steady_state, transition = low_pass.steady_state, low_pass.transition
     # Columns of e^(system interval): e from ε and from a slope of 1 / interval.
     plain = np.zeros((m + 1, m + 1))
@@ -210,14 +210,14 @@ def held_input(low_pass: LowPass | None, lag: float, interval: float) -> Held:
     plain[:m, m] = -steady_state / interval
     step = expm(plain * interval)[:m, m]
     if lag <= 0:
-        return Held(step, decay, lag_step, np.zeros(m), step)
+        return HeldInput(step, decay, lag_step, np.zeros(m), step)
     lagged = np.zeros((m + 2, m + 2))
     lagged[:m, :m] = transition
     lagged[:m, m] = steady_state / lag
     lagged[m, m] = -1.0 / lag
     lagged[m, m + 1] = -1.0 / interval
     whole = expm(lagged * interval)
-    return Held(step, decay, lag_step, whole[:m, m], whole[:m, m + 1])
+    return HeldInput(step, decay, lag_step, whole[:m, m], whole[:m, m + 1])
 
 
 def stationary(

@@ -84,7 +84,7 @@ def imu_model(axes: Mapping[Channel, AxisSettings], settings: ImuSettings) -> Im
 
 
 @dataclass(frozen=True)
-class Figure:
+class TrueFigure:
     """One true figure.
 
     Attributes
@@ -107,7 +107,7 @@ class Figure:
     component: int = 1
 
 
-def figures_of(settings: AxisSettings, channel: str, rate: float) -> Iterator[Figure]:
+def figures_of(settings: AxisSettings, channel: str, rate: float) -> Iterator[TrueFigure]:
     """Yield the true figures of an axis.
 
     N is the density before the low-pass; ``N in the log``, that its low frequencies show, stands
@@ -127,20 +127,20 @@ def figures_of(settings: AxisSettings, channel: str, rate: float) -> Iterator[Fi
         if name == "N":
             shown = in_the_log(model, rate)
             N = model.noise.N if model.low_pass is not None else shown
-            yield Figure(name, N, units[name], name)
+            yield TrueFigure(name, N, units[name], name)
             if model.low_pass is not None:
-                yield Figure("N in the log", shown, units[name], name)
+                yield TrueFigure("N in the log", shown, units[name], name)
         elif name in ("Q", "K", "R"):
-            yield Figure(name, value, units[name], name)
+            yield TrueFigure(name, value, units[name], name)
         elif name == "bias":
-            yield Figure(name, value, plain, name)
+            yield TrueFigure(name, value, plain, name)
     for number, (figures, setting) in enumerate(_processes(settings, channel), start=1):
         for name, value in figures.items():
-            yield Figure(name, value, units[name], setting, number)
+            yield TrueFigure(name, value, units[name], setting, number)
     lines = sorted((line.si(quantity) for line in settings.sinusoids), key=lambda f: f["frequency"])
     for number, line in enumerate(lines, start=1):
         for name, value in line.items():
-            yield Figure(name, value, units[name], "sinusoids", number)
+            yield TrueFigure(name, value, units[name], "sinusoids", number)
     if settings.drift is not None:
         of_drift = {
             "sensitivity": f"{plain}/K",
@@ -149,9 +149,9 @@ def figures_of(settings: AxisSettings, channel: str, rate: float) -> Iterator[Fi
             "lag": "s",
         }
         for name, value in settings.drift.si(quantity).items():
-            yield Figure(name, value, of_drift[name], "drift")
+            yield TrueFigure(name, value, of_drift[name], "drift")
     if model.low_pass is not None:
-        yield Figure("cutoff", model.low_pass.cutoff, "Hz", "low_pass")
+        yield TrueFigure("cutoff", model.low_pass.cutoff, "Hz", "low_pass")
 
 
 def _processes(settings: AxisSettings, channel: str) -> list[tuple[dict[str, float], str]]:

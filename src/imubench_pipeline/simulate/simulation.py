@@ -20,7 +20,7 @@ from numba import njit
 
 from imubench_pipeline.noise.terms import Sinusoid, Term
 from imubench_pipeline.simulate.discretisation import (
-    Held,
+    HeldInput,
     SlowSources,
     filter_transition,
     held_input,
@@ -88,7 +88,7 @@ def run(
     white : float
         Standard deviation of white noise a sample, where there is no filter.
     step : ndarray, shape (m,)
-        What the filter's lack gains of a unit change of the input (`discretisation.Held`).
+        What the filter's lack gains of a unit change of the input (`discretisation.HeldInput`).
     lag : ndarray, shape (2,)
         Decay of the lag of the temperature over a sample, and what it gains of a change of 1 K.
     lag_coupling, lagged_step : ndarray, shape (m,)
@@ -228,7 +228,7 @@ class _Discrete:
     factor: Array
     output: Array
     white: float
-    held: Held
+    held: HeldInput
 
 
 class _Axis:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from imubench_pipeline.experiments.earth_rate.published import Schedule, published_row
+from imubench_pipeline.experiments.earth_rate.published import RunDesign, published_row
 from imubench_pipeline.recordings.recording import channel_logs, read_metadata
 from imubench_pipeline.settings.config import EarthRateSettings
 from imubench_pipeline.settings.sensor import Sensor
@@ -75,7 +75,7 @@ def _published(key: Key, simulated: SimulatedRecording, estimates: Sequence[Row]
     if turns is None:
         return
     rate = quantity_to_si(simulated.rate, "frequency")
-    schedule = Schedule(turns.seconds("dwell"), turns.seconds("turning"), rate, turns.latitude_si)
+    schedule = RunDesign(turns.seconds("dwell"), turns.seconds("turning"), rate, turns.latitude_si)
     (noise,) = (
         axis_model(axis, name).noise
         for name, axis in simulated.channels.items()

@@ -305,7 +305,7 @@ def _cut(read: Readings, part: slice, jumps: Sequence[tuple[int, int]]) -> tuple
 
 
 @dataclass(frozen=True)
-class Dwell:
+class CellStay:
     """A long time in one cell.
 
     Attributes
@@ -321,7 +321,7 @@ class Dwell:
     taper: Array
 
 
-def dwells(inside: NDArray[np.bool_], level: Array, half: float, q: float) -> Iterator[Dwell]:
+def dwells(inside: NDArray[np.bool_], level: Array, half: float, q: float) -> Iterator[CellStay]:
     """Find the long times in one cell.
 
     Parameters
@@ -348,4 +348,4 @@ def dwells(inside: NDArray[np.bool_], level: Array, half: float, q: float) -> It
         before = place if begin > 0 else math.inf
         after = end - begin - place if end < len(inside) else math.inf
         away = np.minimum(np.minimum(before, after), crossing) / crossing
-        yield Dwell(slice(begin, end), np.asarray(away) * np.ones(end - begin))
+        yield CellStay(slice(begin, end), np.asarray(away) * np.ones(end - begin))

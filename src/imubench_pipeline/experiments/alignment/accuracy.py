@@ -29,7 +29,7 @@ from imubench_pipeline.typing import Array
 
 
 @dataclass(frozen=True)
-class Runs:
+class TriadRuns:
     """Simulated runs of one design, and their truth.
 
     Attributes
@@ -71,7 +71,7 @@ def simulate_triad(
     *,
     runs: int,
     rng: np.random.Generator,
-) -> Runs:
+) -> TriadRuns:
     """Draw the block means of many runs.
 
     Parameters
@@ -93,7 +93,7 @@ def simulate_triad(
     ]
     errors = np.stack([one.means for one in drawn], axis=2)
     drift = np.stack([one.drift for one in drawn], axis=2)
-    return Runs(errors + true_means(positions, site, attitude), drift)
+    return TriadRuns(errors + true_means(positions, site, attitude), drift)
 
 
 TURNING = 2.0

@@ -22,7 +22,7 @@ from imubench_pipeline.typing import Array
 
 
 @dataclass(frozen=True)
-class Accuracy:
+class CoarseAccuracy:
     """How well an attitude is known.
 
     Attributes
@@ -84,7 +84,9 @@ def mean_vectors(means: Array, positions: Positions) -> tuple[Array, Array]:
     return force, rate
 
 
-def coarse_accuracy(triad: Triad, positions: Positions, site: Site, attitude: Array) -> Accuracy:
+def coarse_accuracy(
+    triad: Triad, positions: Positions, site: Site, attitude: Array
+) -> CoarseAccuracy:
     """Return how well coarse alignment finds an attitude, to the first order.
 
     Parameters
@@ -115,7 +117,7 @@ def coarse_accuracy(triad: Triad, positions: Positions, site: Site, attitude: Ar
     of_rate[2, 1] = 1.0 / north
     psi = of_rate @ of_sensor[0] @ of_rate.T + of_force @ of_sensor[1] @ of_force.T
     euler = of_euler_angles(attitude)
-    return Accuracy(psi, np.sqrt(np.diag(euler @ psi @ euler.T)))
+    return CoarseAccuracy(psi, np.sqrt(np.diag(euler @ psi @ euler.T)))
 
 
 def _weights(positions: Positions) -> Array:

@@ -1,6 +1,6 @@
 """What a source prints of its runs, beside what the noise that it prints allows.
 
-A run is taken as its source describes it: a turn at each time of the schedule, and the noise of
+A run is taken as its source describes it: a turn at each time of the run, and the noise of
 the printed figures. An estimate from pairs of dwells then scatters about the true rate with the
 standard deviation of `experiments.earth_rate.pairs`; a published one that is many of these
 away has other errors in it: a sensor that is warming up, an axis that is off, turns that are taken
@@ -29,7 +29,7 @@ _WITHIN = 1.96
 
 
 @dataclass(frozen=True)
-class Schedule:
+class RunDesign:
     """A run as its source describes it.
 
     Attributes
@@ -49,7 +49,7 @@ class Schedule:
     rate: float
     latitude: float
 
-    def run(self, duration: float) -> Experiment:
+    def experiment(self, duration: float) -> Experiment:
         """Return the design of a run of so many s."""
         return Experiment.regular(
             dwell=self.dwell - self.turning,
@@ -60,12 +60,12 @@ class Schedule:
         )
 
 
-def allowed(schedule: Schedule, duration: float, model: NoiseModel) -> Row:
+def allowed(run: RunDesign, duration: float, model: NoiseModel) -> Row:
     """Return the standard deviations that noise gives the estimates of a run, rad/s.
 
     Parameters
     ----------
-    schedule : Schedule
+    run : RunDesign
     duration : float
         s.
     model : NoiseModel
@@ -75,7 +75,7 @@ def allowed(schedule: Schedule, duration: float, model: NoiseModel) -> Row:
     dict
         ``white``, by white noise alone; ``sigma``, of the mean over pairs; ``sigma_filter``.
     """
-    design = schedule.run(duration)
+    design = run.experiment(duration)
     blocks = design.blocks(block_length(design, model))
     nothing = np.zeros((1, len(blocks)))
     return {
@@ -85,20 +85,20 @@ def allowed(schedule: Schedule, duration: float, model: NoiseModel) -> Row:
     }
 
 
-def published_row(value: float, schedule: Schedule, duration: float, model: NoiseModel) -> Row:
+def published_row(value: float, run: RunDesign, duration: float, model: NoiseModel) -> Row:
     """Return what noise says of a published estimate: columns of ``earth_rate_published``.
 
     Parameters
     ----------
     value : float
         As published, rad/s.
-    schedule : Schedule
+    run : RunDesign
     duration : float
         Of the run, or of the part of it, s.
     model : NoiseModel
         As published.
     """
-    noise = allowed(schedule, duration, model)
+    noise = allowed(run, duration, model)
     off = (value - EARTH_RATE) / noise["sigma"]
     verdict = "within the noise" if abs(off) <= _WITHIN else "beyond the noise"
     return noise | {
