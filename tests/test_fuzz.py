@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.readers import RecordingError, read
+from imubench_pipeline.readers.formats import FILE_FORMATS
 from imubench_pipeline.settings.sensor import LogFormat
 from tests.fuzz import target
 from tests.fuzz.__main__ import main
@@ -25,6 +26,10 @@ QUICK = ("csv", "ubx")
 """Readers that are fuzzed for a moment in every run of the tests, and the others in `release`."""
 
 _read: Counter[str] = Counter()
+
+
+def test_every_format_is_fuzzed() -> None:
+    assert set(READERS) == set(FILE_FORMATS)
 
 
 def _is_bad(path: Path) -> bool:

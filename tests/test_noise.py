@@ -1,3 +1,5 @@
+import math
+
 import mpmath
 import numpy as np
 import pytest
@@ -147,3 +149,16 @@ def test_the_flicker_table_and_its_continuation_meet() -> None:
     assert (steps < 0).all()
     np.testing.assert_allclose(steps, steps.mean(), rtol=1e-2)
     assert values[-1] == pytest.approx(FLOOR**2, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("further", "said"),
+    [
+        (GaussMarkov(-1e-5, 3.0), "bias instability B is -1e-05, expected a number from 0"),
+        (GaussMarkov(1e-5, -3.0), "correlation time T_B is -3.0, expected a time above 0 s"),
+        (GaussMarkov(math.nan, 3.0), "bias instability B is nan, expected a number from 0"),
+    ],
+)
+def test_a_further_term_has_values_that_a_model_can_have(further: GaussMarkov, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        NoiseModel(N=1e-4, further=[further])

@@ -137,6 +137,10 @@ PROGRAMS = {
 }
 
 
+def test_each_program_that_takes_a_walk_is_run_on_its_file() -> None:
+    assert {name for name, one in TARGETS.items() if one.family == "N+K"} == PROGRAMS.keys()
+
+
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_the_file_means_the_model_in_white_noise_and_at_the_horizon(name: str) -> None:
     for quantity, (maker, sample, step, rate) in PROGRAMS[name](imu()).items():

@@ -17,8 +17,8 @@ import json
 
 from imubench_pipeline.export.comments import heading, mapping_words
 from imubench_pipeline.export.imu import Imu
-from imubench_pipeline.export.kalibr import positive, walks
 from imubench_pipeline.export.target import Target
+from imubench_pipeline.export.walks import positive, walks
 
 _CONVENTION = (
     "*_noise_std is N (rad/s/sqrt(Hz), m/s^2/sqrt(Hz)) and *_bias_std is K (rad/s^2/sqrt(Hz), "

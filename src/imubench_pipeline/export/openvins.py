@@ -18,8 +18,8 @@ from imubench_pipeline.export.comments import (
     setting,
 )
 from imubench_pipeline.export.imu import Imu
-from imubench_pipeline.export.kalibr import CONVENTION, densities, positive, walks
 from imubench_pipeline.export.target import Target
+from imubench_pipeline.export.walks import CONVENTION, densities, positive, walks
 
 
 def write(imu: Imu, topic: str = "/imu0") -> str:

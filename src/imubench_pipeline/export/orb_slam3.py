@@ -20,8 +20,8 @@ from imubench_pipeline.export.comments import (
     setting,
 )
 from imubench_pipeline.export.imu import Imu
-from imubench_pipeline.export.kalibr import positive, walks
 from imubench_pipeline.export.target import Target
+from imubench_pipeline.export.walks import positive, walks
 
 _CONVENTION = (
     "N as IMU.Noise* and K as IMU.*Walk: continuous in time, two-sided, SI; the program itself "

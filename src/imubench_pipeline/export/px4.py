@@ -28,9 +28,9 @@ import math
 
 from imubench_pipeline.export.comments import commented, heading, mapping_words
 from imubench_pipeline.export.imu import ExportError, Imu
-from imubench_pipeline.export.kalibr import walks
 from imubench_pipeline.export.target import Target
 from imubench_pipeline.export.temperature import AXES
+from imubench_pipeline.export.walks import walks
 
 PERIOD = 10_000
 """EKF2_PREDICT_US by default, us."""

@@ -29,8 +29,8 @@ from imubench_pipeline.export.comments import (
     setting,
 )
 from imubench_pipeline.export.imu import Imu
-from imubench_pipeline.export.kalibr import walks
 from imubench_pipeline.export.target import Target
+from imubench_pipeline.export.walks import walks
 
 _CONVENTION = (
     "acc_n, gyr_n = N sqrt(2 rate) and acc_w, gyr_w = K sqrt(rate): discrete in time, for samples "

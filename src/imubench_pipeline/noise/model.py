@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -74,21 +73,16 @@ class NoiseModel:
     sinusoids: Sequence[Sinusoid] = ()
 
     def __post_init__(self) -> None:
-        for name in ("Q", "N", "B", "K"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0):
-                label = PARAMETERS[name].label
-                raise ValueError(f"the {label} {name} is {value}, expected a number from 0")
-        if not math.isfinite(self.R):
-            raise ValueError(f"the {PARAMETERS['R'].label} R is {self.R}, expected a finite number")
-        if self.T_B is not None and not (math.isfinite(self.T_B) and self.T_B > 0):
-            label = PARAMETERS["T_B"].label
-            raise ValueError(
-                f"the {label} T_B is {self.T_B} s, expected a time above 0, or None for flicker"
-            )
+        for name in ("Q", "N", "B", "K", "R"):
+            PARAMETERS[name].check(getattr(self, name))
+        if self.T_B is not None:
+            PARAMETERS["T_B"].check(self.T_B)
         for term in self.further:
             if isinstance(term, _OWN_PLACE):
                 raise ValueError(f"{term} is no further term, expected it in its own parameter")
+        for term in (*self.further, *self.sinusoids):
+            for parameter in term.parameters:
+                parameter.check(getattr(term, parameter.symbol))
 
     @property
     def terms(self) -> Sequence[Term]:

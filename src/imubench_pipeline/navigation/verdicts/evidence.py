@@ -18,6 +18,7 @@ from imubench_pipeline.estimators.estimate import CURVE
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.standing import Standing
 from imubench_pipeline.noise import TERMS, Term
+from imubench_pipeline.noise.terms.traits import Role
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si
@@ -25,7 +26,8 @@ from imubench_pipeline.units import quantity_to_si
 
 def _behind(kind: type[Term]) -> frozenset[str]:
     symbols = frozenset(parameter.symbol for parameter in kind.parameters)
-    return symbols | frozenset(CURVE) if "B" in symbols else symbols
+    raises_the_curve = "B" in symbols or kind.role is Role.GAUSS_MARKOV
+    return symbols | frozenset(CURVE) if raises_the_curve else symbols
 
 
 _PARAMETERS = {kind.word: _behind(kind) for kind in TERMS}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
@@ -63,6 +64,22 @@ class TermParameter:
     seconds: float
     signed: bool = False
     search: SearchRange | None = None
+
+    def check(self, value: float) -> None:
+        """Refuse a value that a model cannot have.
+
+        Raises
+        ------
+        ValueError
+            If it is not finite, negative without a sign of its own, or no time above 0.
+        """
+        time = (self.signal, self.seconds) == (0.0, 1.0)
+        if math.isfinite(value) and (self.signed or value > 0.0 or (value == 0.0 and not time)):
+            return
+        expected = "a finite number" if self.signed else "a number from 0"
+        if time:
+            expected = "a time above 0 s"
+        raise ValueError(f"the {self.label} {self.symbol} is {value}, expected {expected}")
 
 
 @dataclass(frozen=True)

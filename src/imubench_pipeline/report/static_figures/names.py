@@ -16,8 +16,18 @@ TERM_NAMES = {
 }
 """The field's names of the terms, by quantity and symbol of the term."""
 
+_GREEK = ("beta", "omega", "sigma", "tau")
+
+
+def _set(symbol: str) -> str:
+    """Return a symbol as mathematics sets it."""
+    letter, _, index = symbol.partition("_")
+    letter = f"\\{letter}" if letter in _GREEK else letter
+    return letter + (f"_{index}" if len(index) < 2 else f"_{{{index}}}") * bool(index)
+
+
 SYMBOLS = {
-    symbol: f"$|{symbol}|$" if parameter.signed else f"${symbol}$"
+    symbol: f"$|{_set(symbol)}|$" if parameter.signed else f"${_set(symbol)}$"
     for symbol, parameter in PARAMETERS.items()
 }
 SYMBOLS |= {"B_curve": "$B$ of the curve", "sigma_min": r"$\sigma_\mathrm{min}$"}

@@ -1,0 +1,60 @@
+"""White noise and random walk, N and K: all that most filters take of a gyro or accelerometer."""
+
+from __future__ import annotations
+
+from imubench_pipeline.export.comments import number, setting
+from imubench_pipeline.export.imu import ExportError, Imu
+from imubench_pipeline.export.mapping import Mapped, as_walk
+
+CONVENTION = (
+    "N as *_noise_density and K as *_random_walk: continuous in time, two-sided (sigma^2(tau) = "
+    "N^2 / tau and K^2 tau / 3), SI; not multiplied by the root of the rate."
+)
+
+
+def walks(imu: Imu) -> dict[str, Mapped]:
+    """Return gyro and accelerometer as white noise and random walk.
+
+    Raises
+    ------
+    ExportError
+        If one has no estimate.
+    """
+    imu.both()
+    return {
+        name: as_walk(axis.model, imu.horizon, imu.rate, axis.least_walk)
+        for name, axis in imu.axes.items()
+    }
+
+
+def positive(mapped: dict[str, Mapped], program: str) -> None:
+    """Check that no density is 0.
+
+    Raises
+    ------
+    ExportError
+        If one is.
+    """
+    for name, axis in mapped.items():
+        for letter in ("N", "K"):
+            if not getattr(axis.model, letter) > 0.0:
+                raise ExportError(
+                    f"{name}: {letter} is 0, and {program} takes values above 0 only; a longer "
+                    "log, or an overbound, gives one"
+                )
+
+
+def densities(mapped: dict[str, Mapped], indent: str = "") -> str:
+    """Return the four lines with the densities."""
+    units = {"accel": ("accelerometer", "m/s"), "gyro": ("gyroscope", "rad/s")}
+    text = ""
+    for name in ("accel", "gyro"):
+        word, unit = units[name]
+        model = mapped[name].model
+        power = "^2" if name == "accel" else ""
+        slower = f"{unit}^3" if name == "accel" else f"{unit}^2"
+        text += setting(
+            f"{word}_noise_density", number(model.N), f"N, {unit}{power}/sqrt(Hz)", indent
+        )
+        text += setting(f"{word}_random_walk", number(model.K), f"K, {slower}/sqrt(Hz)", indent)
+    return text
