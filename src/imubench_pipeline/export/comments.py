@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Mapping, Sequence
 
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.mapping import Mapped, named
+from imubench_pipeline.tables.texts import printable
 
 _WIDTH = 96
+_WHITE = re.compile(r"[\t\n]")
 
 
 def heading(imu: Imu, program: str, convention: str, *, temperature: bool = False) -> list[str]:
@@ -80,20 +83,13 @@ def commented(statements: Sequence[str], mark: str = "#") -> str:
     lines = []
     for statement in statements:
         wrapped = textwrap.wrap(
-            _printable(statement),
+            printable(" ".join(_WHITE.split(statement))),
             _WIDTH - len(mark) - 1,
             subsequent_indent="  ",
             break_long_words=False,
         )
         lines += [f"{mark} {line}" for line in wrapped]
     return "\n".join(lines) + "\n"
-
-
-def _printable(text: str) -> str:
-    return "".join(
-        one if one.isprintable() or one in " \t\n" else one.encode("unicode_escape").decode("ascii")
-        for one in text
-    )
 
 
 def setting(key: str, value: str, comment: str, indent: str = "") -> str:

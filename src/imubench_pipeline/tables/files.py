@@ -17,6 +17,7 @@ import pyarrow.parquet as pq
 
 from imubench_pipeline.tables.columns import Column
 from imubench_pipeline.tables.schemas import PARTS_OF, TABLES
+from imubench_pipeline.tables.texts import with_safe_cells
 
 _SMALL = 1_000_000  # bytes
 
@@ -119,10 +120,14 @@ def write(table: str, rows: Iterable[Mapping[str, Any]], path: Path) -> None:
 
 
 def write_arrow(table: pa.Table, path: Path) -> None:
-    """Write an Arrow table as Parquet or, where the name ends so, CSV, atomically."""
+    """Write an Arrow table as Parquet or, where the name ends so, CSV, atomically.
+
+    Texts in CSV are such as no spreadsheet takes for formulas (`imubench_pipeline.tables.texts`);
+    Parquet has them as they are.
+    """
     with replacing(path) as temporary:
         if path.suffix == ".csv":
-            pacsv.write_csv(table, temporary)
+            pacsv.write_csv(with_safe_cells(table), temporary)
         else:
             # A small file is read in half the time by snappy, and thousands of them are.
             compression = "zstd" if table.nbytes > _SMALL else "snappy"
