@@ -292,6 +292,7 @@ def test_what_is_lost_or_damaged_is_made_again_or_named(done: Project) -> None:
     data[5000:5008] = bytes(8)
     log.write_bytes(data)
     curve.unlink()
+    (kept / "allan.parquet").unlink()
     ran = done.run()
     assert ran.returncode == 1 and f"{log.relative_to(done.folder)}: is damaged" in ran.stderr
     assert {row["recording"]: row["status"] for row in done.table("recordings")} == {
