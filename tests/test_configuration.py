@@ -5,6 +5,8 @@ from typing import Any
 
 import pytest
 import yaml
+from hypothesis import example, given
+from hypothesis import strategies as st
 from snakemake.cli import parse_config
 
 from imubench_pipeline.settings.config import Run, given_beside, read_run
@@ -177,3 +179,17 @@ def test_simulated_recordings_name_known_sensors_and_channels(tmp_path: Path) ->
         with pytest.raises(ConfigError, match=message):
             read_simulated(written(**change), sensors)
     assert read_simulated(None, sensors).recordings == []
+
+
+@given(st.text(st.characters(codec="utf-8") | st.sampled_from("-'\" \n\x1f\x85\u2028${}[]:#!&*\\")))
+@example("1e3")
+@example("True")
+@example("1_0")
+@example("- a")
+@example("a: b")
+@example("\u0661")
+@example("!!str x")
+def test_a_folder_of_any_name_is_told_as_snakemake_takes_it(name: str) -> None:
+    folder = "r" if name in ("", ".") else name
+    told = given_beside(Run(results=Path(folder)), Path("none.yaml"))
+    assert parse_config(told) == {"results": str(Path(folder))}

@@ -76,17 +76,19 @@ def test_wrong_notes_reject_their_log_only(project: dict[str, Any]) -> None:
     assert notes["device"] == "12345" and notes["started"].startswith("2024-01-01T10:00:00")
 
 
-@pytest.mark.parametrize("name", ["a{b}.csv", "d<e>.csv", "x" * 200 + ".csv", "a\nb.csv"])
+@pytest.mark.parametrize("name", ["a{b}", "d<e>", "x" * 200, "a\nb", "=1", "\u202e", "\udcff"])
+@pytest.mark.parametrize("what", ["file", "folder"])
 def test_a_name_that_cannot_be_used_rejects_its_log_only(
-    project: dict[str, Any], name: str
+    project: dict[str, Any], name: str, what: str
 ) -> None:
     put(project, "good.csv")
-    put(project, name)
+    put(project, f"{name}.csv" if what == "file" else f"../{name}/a.csv")
     plan = Plan(project)
     assert len(plan.recordings) == 2
     (bad,) = [key for key in plan.recordings if key[1] != "good"]
-    assert not set("{}<>\n") & set(bad[1]) and len(bad[1]) <= 120
-    assert "rename the file" in json.loads(plan.ingest_settings(*bad))["error"]
+    for part in bad:
+        assert not set("{}<>\n=") & set(part) and part.isprintable() and len(part) <= 120
+    assert f"rename the {what}" in json.loads(plan.ingest_settings(*bad))["error"]
     assert plan.recordings[bad].files == []
 
 

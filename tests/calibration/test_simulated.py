@@ -38,7 +38,7 @@ def test_the_truth_lies_in_the_limits(
     write_simulated(made, LogFormat.model_validate(given["log"]), folder)
     kept = tmp_path / "kept"
     quality = ingest_as_planned(folder, plan.ingest_settings("s", "sim_run"), "s", "sim_run", kept)
-    (kept / "quality.json").write_text(json.dumps(vars(quality)))
+    quality.write(kept / "quality.json")
     settings = plan.experiment_settings("s", "sim_run")
     found = calibration_tables(kept, [], "s", "sim_run", settings)["calibration"]
     rows = by_parameter([dict(row) for row in found if row["status"] == "ok"])

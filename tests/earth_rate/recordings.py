@@ -1,7 +1,6 @@
 """Recordings as a run keeps them, of a gyro that is turned and of the same at rest."""
 
 import json
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +10,11 @@ import pyarrow as pa
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import parameter_rows
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.recordings.quality_file import Quality
-from imubench_pipeline.recordings.recording import LogWriter
+from imubench_pipeline.recordings.quality_file import Quality, identified
+from imubench_pipeline.recordings.recording import LogWriter, log_paths
 from imubench_pipeline.settings.config import EarthRateSettings
 from imubench_pipeline.steps.earth_rotation import earth_rate_tables
-from imubench_pipeline.tables import write, write_json
+from imubench_pipeline.tables import write
 from imubench_pipeline.tables.keys import Key
 from tests.earth_rate.runs import PAPER, RATE, turned
 
@@ -53,7 +52,8 @@ def put(folder: Path, columns: dict[str, np.ndarray], **about: Any) -> Path:
         )
     for name in ("segments", "begins"):
         row.pop(name, None)
-    write_json(asdict(Quality(row, [], {}, None)), folder / "quality.json")
+    kept = identified(log_paths(folder))
+    Quality(row, [], {}, kept).write(folder / "quality.json")
     return folder
 
 

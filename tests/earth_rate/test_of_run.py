@@ -1,6 +1,7 @@
 """What a run finds in kept recordings of a gyro that was turned."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +9,8 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.recordings.quality_file import Quality, identified
+from imubench_pipeline.recordings.recording import log_paths
 from imubench_pipeline.steps.noise_source import from_static
 from imubench_pipeline.tables import build
 from imubench_pipeline.tables.of_earth_rate import EARTH_RATE_TABLES
@@ -192,6 +195,8 @@ def test_a_position_on_another_clock_is_refused(tmp_path: Path, rest: Path) -> N
     (folder / "log.parquet").rename(folder / "log.gyro.parquet")
     other = put(tmp_path / "b", {"position": np.ones(9)})
     (other / "log.parquet").rename(folder / "log.position.parquet")
+    path = folder / "quality.json"
+    replace(Quality.read(path), kept=identified(log_paths(folder))).write(path)
     assert "a clock of its own" in run(folder, [rest])["earth_rate"][0]["reason"]
 
 
@@ -208,6 +213,7 @@ def test_a_gyro_that_cannot_be_used_is_said_beside_what_can(
 
 def test_a_rejected_recording_leaves_nothing(tmp_path: Path, rest: Path) -> None:
     (tmp_path / "a").mkdir()
+    Quality({"status": "rejected"}, [], {}, {}).write(tmp_path / "a/quality.json")
     assert set(map(len, run(tmp_path / "a", [rest]).values())) == {0}
 
 

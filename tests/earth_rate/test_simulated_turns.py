@@ -64,7 +64,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Path]:
     kept = tmp_path / "kept"
     settings = plan.ingest_settings("s", "sim_run")
     quality = ingest_as_planned(tmp_path / "log", settings, "s", "sim_run", kept)
-    (kept / "quality.json").write_text(json.dumps(quality.__dict__))
+    quality.write(kept / "quality.json")
     assert (quality.recording["status"], quality.recording["kind"]) == ("ok", "two_position")
     assert quality.recording["simulated"] and quality.findings == []
     return plan, kept

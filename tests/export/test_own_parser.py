@@ -24,12 +24,20 @@ Content = str | bytes
 
 def without_words(text: Content) -> Any:
     found = json.loads(text)
+    assert all(isinstance(line, str) and line.isprintable() for line in found["about"])
     return {key: value for key, value in found.items() if key not in ("about", "sensor")}
+
+
+def program(text: Content) -> str:
+    """Return Python as the interpreter takes the bytes of the file, a comment on them included."""
+    assert isinstance(text, str)
+    return ast.dump(ast.parse(text.encode()))
 
 
 def script(text: Content) -> list[str]:
     """Return the statements of MATLAB: three points go on, and a per cent sign ends a line."""
     assert isinstance(text, str)
+    assert not any(line.strip() in ("%{", "%}") for line in text.split("\n"))  # comments of blocks
     code = [line.split("%")[0].rstrip() for line in text.split("\n") if line.strip()]
     joined = "\n".join(line for line in code if line).replace("...\n", "")
     statements = joined.split("\n")
@@ -64,11 +72,11 @@ PARSERS: dict[str, Callable[[Any], Any]] = {
     "basalt": without_words,
     "orb-slam3": opencv,
     "px4": ekf2,
-    "gnss-ins-sim": lambda text: ast.dump(ast.parse(text)),
+    "gnss-ins-sim": program,
     "matlab": script,
     "json": without_words,
     "npz": arrays,
-    "python": lambda text: ast.dump(ast.parse(text)),
+    "python": program,
 }
 
 positive = st.floats(1e-6, 1e-2)
@@ -84,7 +92,31 @@ models = st.builds(
     sinusoids=st.lists(st.builds(Sinusoid, positive, st.floats(0.1, 5.0)), max_size=1),
 )
 HOSTILE = "a\u2028gyro_x: 1\x85b\x00c\x1f: [\"'{}%#\\\r\n\t...\n\ufeff*/ é"
-names = st.text(min_size=1, max_size=20) | st.just(HOSTILE)
+NAMES = (
+    HOSTILE,
+    "coding: utf-7 +AAo-import os+AAo-",  # in the first lines of Python, the encoding of the file
+    "-*- coding: no_such -*-",
+    "*/ int x; /*",
+    "%{\n%}\nIMU = 1; %",
+    "${HOME} $(id) `id`",
+    "---\n...\n%YAML:1.0\nupdate_rate: 1",
+    "'''\"\"\"\\\\'\"\nimport os #",
+    "\n1\t1\tEKF2_GYR_NOISE\t1\t9\n",
+    '"}, "value0": {"imu_update_rate": 1}',
+    "{noise} {0} %s",
+    "x" * 10_000,
+    "\n: [" * 2_500,
+)
+names = st.text(min_size=1, max_size=20) | st.sampled_from(NAMES)
+_LONGEST_LINE = 120
+
+
+def lines_are_short_and_show(content: Content) -> None:
+    """Assert that no comment is cut by an unseen line end, or longer than a reader takes."""
+    if isinstance(content, str) and not content.startswith("{"):
+        for line in content.split("\n"):
+            assert line.replace("\t", "").isprintable()
+            assert len(line) <= _LONGEST_LINE
 
 
 def sensor(model: NoiseModel, said: str) -> Imu:
@@ -108,7 +140,22 @@ def sensor(model: NoiseModel, said: str) -> Imu:
 @given(model=models, said=names)
 def test_words_never_reach_the_numbers(name: str, model: NoiseModel, said: str) -> None:
     write, parse = TARGETS[name].write, PARSERS[name]
-    assert parse(write(sensor(model, said))) == parse(write(sensor(model, "a")))
+    content = write(sensor(model, said))
+    assert parse(content) == parse(write(sensor(model, "a")))
+    lines_are_short_and_show(content)
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_no_name_reaches_the_numbers(name: str) -> None:
+    model = NoiseModel(N=1e-4, B=1e-4, T_B=90.0, K=1e-6)
+    write, parse = TARGETS[name].write, PARSERS[name]
+    plain = parse(write(sensor(model, "a")))
+    for said in NAMES:
+        content = write(sensor(model, said))
+        assert parse(content) == plain, said[:40]
+        lines_are_short_and_show(content)
+        if name == "json":
+            assert json.loads(content)["sensor"] == said
 
 
 @pytest.mark.parametrize("name", TARGETS)

@@ -281,13 +281,14 @@ def settings_of(
     units: str = "practical",
     title: str = "A title",
     given: Sequence[str] = (),
+    named: str = "results",
 ) -> str:
-    """What a plan says of the report."""
+    """What a plan says of the report; ``named``: the folder of the results."""
     sensors = dict.fromkeys(tables["recordings"]["sensor"].to_pylist())
     return json.dumps(
         {
             "report": {"title": title, "units": units},
-            "results": "results",
+            "results": named,
             "given": list(given),
             "settings": {
                 "allan": {"overlap": "octave"},

@@ -42,7 +42,7 @@ def _server() -> subprocess.Popen[str]:
 
 IMPORTED = (
     "snakemake.cli", "snakemake.report.html_reporter",
-    "imubench_pipeline.run.bounded_steps", "imubench_pipeline.run.resources",
+    "imubench_pipeline.run.scripts", "imubench_pipeline.run.resources",
 )  # fmt: skip
 """What each run needs: all but a third of its time."""
 

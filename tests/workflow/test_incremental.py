@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import time
@@ -99,6 +100,17 @@ def project_in(folder: Path) -> Project:
     settings = ["logs=logs", "sensors=sensors", "results=results", "requirements=requirements",
                 'estimate={"methods": ["weighted"]}']  # fmt: skip
     return Project(folder, folder / "results", folder, settings)
+
+
+@contextlib.contextmanager
+def restored(path: Path) -> Iterator[None]:
+    """Leave a file as it was, with its date."""
+    data, date = path.read_bytes(), path.stat().st_mtime_ns
+    try:
+        yield
+    finally:
+        path.write_bytes(data)
+        os.utime(path, ns=(date, date))
 
 
 @pytest.fixture(scope="module")
@@ -244,6 +256,60 @@ def test_an_edit_of_the_overbound_runs_the_exports(project: Project, code: Path)
 def test_an_edit_of_a_template_runs_the_report(project: Project, code: Path) -> None:
     replace(code / "report/templates/index.html.jinja", "<h2", '<h2 class="again"')
     assert project.job_list() == {("report", "")}
+
+
+@pytest.mark.parametrize("damage", ["lost", "cut", "unreadable"])
+def test_samples_that_are_not_as_they_were_left_are_read_again(
+    project: Project, damage: str
+) -> None:
+    kept = project.results / "recordings/one/a"
+    path = kept / ("quality.json" if damage == "unreadable" else "log.parquet")
+    data = path.read_bytes()
+    with restored(path):
+        if damage == "lost":
+            path.unlink()
+        else:
+            path.write_bytes(data[:-1] if damage == "cut" else data.replace(b"1", b"2", 1))
+        assert project.job_list() == steps_of("one/a")
+    assert project.job_list() == set()
+
+
+@pytest.mark.release
+def test_what_is_lost_or_damaged_is_made_again_or_named(done: Project) -> None:
+    kept = done.results / "recordings/one/a"
+    right = {path: path.read_bytes() for path in done.results.glob("tables/*")}
+    every = {path.name for path in kept.iterdir() if path.is_file()}
+    for names in ({"log.parquet"}, {"quality.json"}, every - {"log.parquet", "quality.json"}):
+        for name in names:
+            (kept / name).unlink()
+        ran = done.run()
+        assert ran.returncode == 0, ran.stdout + ran.stderr
+        assert done.job_list() == set(), names
+        assert right == {path: path.read_bytes() for path in right}, names
+    # bits that a step meets: it fails for its recording alone, and the next run is right again
+    log, curve = kept / "log.parquet", kept / "curve.parquet"
+    data = bytearray(log.read_bytes())
+    data[5000:5008] = bytes(8)
+    log.write_bytes(data)
+    curve.unlink()
+    (kept / "allan.parquet").unlink()
+    ran = done.run()
+    assert ran.returncode == 1 and f"{log.relative_to(done.folder)}: is damaged" in ran.stderr
+    assert {row["recording"]: row["status"] for row in done.table("recordings")} == {
+        "a": "failed", "big": "ok", "f": "ok",
+    }  # fmt: skip
+    ran = done.run()
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    assert right == {path: path.read_bytes() for path in right}
+    # a table of which a bit changed: it is named by the step that needs it
+    curve.write_bytes(curve.read_bytes()[:-20])
+    (kept / "allan.parquet").unlink()
+    ran = done.run()
+    assert ran.returncode == 1 and f"{curve.relative_to(done.folder)}: is damaged" in ran.stderr
+    curve.unlink()
+    ran = done.run()
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    assert right == {path: path.read_bytes() for path in right}
 
 
 @pytest.mark.release

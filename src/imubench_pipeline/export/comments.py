@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Mapping, Sequence
 
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.mapping import Mapped, named
+from imubench_pipeline.tables.texts import printable
 
 _WIDTH = 96
+_WHITE = re.compile(r"[\t\n]")
 
 
 def heading(imu: Imu, program: str, convention: str, *, temperature: bool = False) -> list[str]:
@@ -27,7 +30,7 @@ def heading(imu: Imu, program: str, convention: str, *, temperature: bool = Fals
     Returns
     -------
     list of str
-        One statement each.
+        One statement each, printable.
     """
     said = [f"Noise of the {imu.sensor} for {program}, by imubench."]
     if imu.simulated:
@@ -63,7 +66,7 @@ def heading(imu: Imu, program: str, convention: str, *, temperature: bool = Fals
             f"INFLATED: from here on all densities and amplitudes are {imu.inflation:g} times "
             f"those above, because: {imu.because}."
         )
-    return said
+    return [_on_one_line(words) for words in said]
 
 
 def mapping_words(mapped: Mapping[str, Mapped]) -> list[str]:
@@ -75,25 +78,29 @@ def commented(statements: Sequence[str], mark: str = "#") -> str:
     """Return statements as comment lines, each beginning with a mark.
 
     What no comment can hold in every format, such as the name of a recording with a line end of
-    Unicode or a control character in it, is written as its escape.
+    Unicode or a control character in it, is written as its escape, and a longer word than a line is
+    divided.
     """
     lines = []
     for statement in statements:
         wrapped = textwrap.wrap(
-            _printable(statement),
-            _WIDTH - len(mark) - 1,
-            subsequent_indent="  ",
-            break_long_words=False,
+            _on_one_line(statement), _WIDTH - len(mark) - 1, subsequent_indent="  "
         )
         lines += [f"{mark} {line}" for line in wrapped]
     return "\n".join(lines) + "\n"
 
 
-def _printable(text: str) -> str:
-    return "".join(
-        one if one.isprintable() or one in " \t\n" else one.encode("unicode_escape").decode("ascii")
-        for one in text
-    )
+def commented_python(statements: Sequence[str]) -> str:
+    """Return statements as comments at the top of a file of Python.
+
+    Its encoding is stated before them: Python takes it from the words of the first comments, which
+    hold names that others gave (PEP 263).
+    """
+    return "# -*- coding: utf-8 -*-\n" + commented(statements)
+
+
+def _on_one_line(statement: str) -> str:
+    return printable(_WHITE.sub(" ", statement))
 
 
 def setting(key: str, value: str, comment: str, indent: str = "") -> str:

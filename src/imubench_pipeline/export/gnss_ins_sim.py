@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 
-from imubench_pipeline.export.comments import commented, heading, mapping_words
+from imubench_pipeline.export.comments import commented_python, heading, mapping_words
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.mapping import as_process
 from imubench_pipeline.export.target import Target
@@ -69,7 +69,7 @@ def write(imu: Imu) -> str:
         f'    "{key}": np.full(3, {float(f"{value:.9g}")!r}),  # {comment}\n'
         for key, value, comment in entries
     ]
-    return commented(about) + "import numpy as np\n\nimu_err = {\n" + "".join(lines) + "}\n"
+    return commented_python(about) + "import numpy as np\n\nimu_err = {\n" + "".join(lines) + "}\n"
 
 
 def _deviation(model: NoiseModel) -> float:

@@ -7,7 +7,7 @@ horizon. Ramps, lines and quantization noise are not.
 
 from __future__ import annotations
 
-from imubench_pipeline.export.comments import commented, heading
+from imubench_pipeline.export.comments import commented_python, heading
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.mapping import named
 from imubench_pipeline.export.matrices import FOLLOWED
@@ -93,7 +93,7 @@ def write(imu: Imu) -> str:
         entries += "".join(f"            ({S!r}, {T!r}),\n" for S, T in processes)
         entries += f'        ],\n        "integral": "{unit[1]}",\n    }},\n'
     about = [*heading(imu, "Python", _CONVENTION), *left_out]
-    return commented(about) + _PROGRAM.format(
+    return commented_python(about) + _PROGRAM.format(
         rate=float(imu.rate), horizon=float(imu.horizon), noise=entries
     )
 

@@ -16,6 +16,7 @@ from imubench_pipeline.recordings.parts import Part
 from imubench_pipeline.recordings.recording import LogWriter
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import quantity_of
+from imubench_pipeline.tables import checked_parquet
 
 
 def names_of(parts: list[Part], groups: list[list[int]]) -> list[str]:
@@ -94,7 +95,7 @@ def assemble(
 
 def _columns_of(parts: list[Part]) -> Iterator[dict[str, NDArray[Any]]]:
     """Yield the columns of several files side by side, a row group at a time."""
-    files = [pq.ParquetFile(part.data) for part in parts]
+    files = [checked_parquet(part.data) for part in parts]
     try:
         for group in range(files[0].num_row_groups):
             block: dict[str, NDArray[Any]] = {}

@@ -86,7 +86,7 @@ def found_logs(logs: Path) -> list[Recording]:
             notes = folder / f"{name}.yaml"
             found.append(
                 Recording(
-                    folder.name,
+                    sensor_of(folder),
                     _usable(name),
                     path,
                     notes if os.path.lexists(notes) else None,
@@ -102,6 +102,11 @@ def name_of(file: str) -> str:
     return _usable(_stem(Path(file)))
 
 
+def sensor_of(folder: Path) -> str:
+    """Return the name of the sensor whose logs are in a folder of the drop zone."""
+    return _usable(folder.name)
+
+
 def _usable(name: str) -> str:
     return _UNUSABLE_IN_NAMES.sub("_", name)[:_LONGEST_NAME]
 
@@ -109,11 +114,13 @@ def _usable(name: str) -> str:
 def _fault(path: Path, name: str) -> str | None:
     """Return why a file of the drop zone cannot be used, if its name or place says so."""
     shown = ascii(path.name)
-    if _UNUSABLE_IN_NAMES.search(name) or len(name) > _LONGEST_NAME:
-        return (
-            f"the file name {shown} cannot be used; expected at most {_LONGEST_NAME} letters, "
-            "digits, spaces and . _ - + ( ) in it: rename the file"
-        )
+    folder = path.parent.name
+    for what, found, stem in (("file", shown, name), ("folder", ascii(folder), folder)):
+        if _UNUSABLE_IN_NAMES.search(stem) or len(stem) > _LONGEST_NAME:
+            return (
+                f"the {what} name {found} cannot be used; expected at most {_LONGEST_NAME} "
+                f"letters, digits, spaces and . _ - + ( ) in it: rename the {what}"
+            )
     try:
         if not log_files(path):
             return f"the folder {shown} has no files"

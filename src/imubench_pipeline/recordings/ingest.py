@@ -20,7 +20,7 @@ from imubench_pipeline.recordings.quality.copies import copied_channels
 from imubench_pipeline.recordings.quality.levels import kept_level
 from imubench_pipeline.recordings.quality.rotation import GravityTurn, gravity_turn
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
-from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.recordings.quality_file import Quality, identified
 from imubench_pipeline.recordings.recording import channel_logs, log_paths
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import (
@@ -31,7 +31,6 @@ from imubench_pipeline.settings.sensor import (
     RecordingNotes,
     UsedPart,
 )
-from imubench_pipeline.tables import write_json
 from imubench_pipeline.tables.failures import Failure
 from imubench_pipeline.tables.findings import Finding, RecordingError
 
@@ -47,8 +46,8 @@ class Ingested:
     findings : list of Finding
     channels : dict
         Rate in Hz, points of the grid, segments and levels of each channel that goes on.
-    samples : str or None
-        Digest of the samples.
+    kept : dict
+        The files of samples (`imubench_pipeline.recordings.quality_file.identified`).
     gravity : GravityTurn or None
         How gravity turns against the sensor.
     """
@@ -56,7 +55,7 @@ class Ingested:
     summary: dict[str, Any]
     findings: list[Finding]
     channels: dict[str, dict[str, Any]] = field(default_factory=dict)
-    samples: str | None = None
+    kept: dict[str, dict[str, Any]] = field(default_factory=dict)
     gravity: GravityTurn | None = None
 
     def quality(self, names: dict[str, Any]) -> Quality:
@@ -67,7 +66,7 @@ class Ingested:
             names | {"status": status} | self.summary,
             [dict(finding.row(sensor, recording)) for finding in self.findings],
             self.channels,
-            self.samples,
+            self.kept,
             gravity=asdict(self.gravity) if self.gravity else None,
         )
 
@@ -185,7 +184,8 @@ def _ingest(
         f if f.start is None else replace(f, start=f.start + begin, end=(f.end or 0.0) + begin)
         for f in findings
     ]
-    return Ingested(summary, findings, channels, _digest(folder), _gravity(parts, bases))
+    kept = identified(log_paths(folder))
+    return Ingested(summary, findings, channels, kept, _gravity(parts, bases))
 
 
 def _findings(
@@ -326,15 +326,6 @@ def _summary(
     }
 
 
-def _digest(folder: Path) -> str:
-    """Return a digest of the samples that are kept in a folder."""
-    found = hashlib.sha256()
-    for path in log_paths(folder):
-        with path.open("rb") as file:
-            found.update(hashlib.file_digest(file, "sha256").digest())
-    return found.hexdigest()
-
-
 def _identified(source: Path) -> list[dict[str, Any]]:
     """Return name, size and digest of each file of a recording."""
     found = []
@@ -401,7 +392,7 @@ def write_failed(settings: str, failure: Failure, path: Path) -> None:
     }
     finding = dict(failure.finding().row(failure.sensor, str(failure.recording)))
     remove_kept(path.parent)
-    write_json(asdict(Quality(recording, [finding], {}, None, asdict(failure))), path)
+    Quality(recording, [finding], {}, {}, asdict(failure)).write(path)
 
 
 def rejected(error: RecordingError, notes: RecordingNotes) -> Ingested:

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from imubench_pipeline.readers import Batch, LogFile
@@ -18,6 +17,7 @@ from imubench_pipeline.recordings.quality.knocks import Knock, knocks, suspects
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
 from imubench_pipeline.recordings.recording import LogWriter
 from imubench_pipeline.settings.sensor import UsedPart
+from imubench_pipeline.tables import checked_parquet
 from imubench_pipeline.tables.findings import Finding, RecordingError
 
 _STAMP_BLOCK = 1 << 20
@@ -191,7 +191,7 @@ def _write_again(part: Part, found: dict[str, list[Knock]], scratch: Path) -> No
     part.writer = LogWriter(part.data, dict.fromkeys(part.columns, pa.float64()))
     part.knocks = dict.fromkeys(part.columns, 0)
     reached = 0
-    with pq.ParquetFile(old) as file:
+    with checked_parquet(old) as file:
         for number in range(file.num_row_groups):
             table = file.read_row_group(number, use_threads=False)
             columns = {}
@@ -209,7 +209,7 @@ def _write_again(part: Part, found: dict[str, list[Knock]], scratch: Path) -> No
 
 
 def _pieces(path: Path, name: str) -> Iterator[NDArray[np.float64]]:
-    with pq.ParquetFile(path) as file:
+    with checked_parquet(path) as file:
         for number in range(file.num_row_groups):
             table = file.read_row_group(number, columns=[name], use_threads=False)
             yield np.asarray(table.column(name).to_numpy(), dtype=np.float64)

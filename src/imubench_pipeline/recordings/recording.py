@@ -8,6 +8,7 @@ null. Where channels have clocks of their own, each clock has a file: ``log.gyro
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -20,7 +21,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from imubench_pipeline.recordings.quality_file import MEND
 from imubench_pipeline.settings.sensor import POSITION, TABLE_RATE, TEMPERATURE
+from imubench_pipeline.tables import checked_parquet
+from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.typing import Array
 
 ROW_GROUP = 1 << 20
@@ -45,6 +49,7 @@ class LogWriter:
             use_dictionary=False,
             use_byte_stream_split=floats,
             column_encoding={name: "DELTA_BINARY_PACKED" for name in integers} or None,
+            write_page_checksum=True,
         )
         self._waiting: list[pa.RecordBatch] = []
         self._rows = 0
@@ -145,8 +150,14 @@ class ChannelLog:
     table_rate: bool = False
 
     def blocks(self) -> Iterator[NDArray[np.float64]]:
-        """Yield the samples on the uniform grid in SI, in consecutive blocks; NaN where missing."""
-        with pq.ParquetFile(self.path) as file:
+        """Yield the samples on the uniform grid in SI, in consecutive blocks; NaN where missing.
+
+        Raises
+        ------
+        RecordingError
+            If the file is damaged.
+        """
+        with _named_if_damaged(self.path), checked_parquet(self.path) as file:
             placed = "sample" in file.schema_arrow.names
             columns = [self.channel, *(["sample"] if placed else [])]
             reached = 0
@@ -193,6 +204,14 @@ class ChannelLog:
             total += float(there.sum(dtype=np.float64))
             number += len(there)
         return total / number
+
+
+@contextlib.contextmanager
+def _named_if_damaged(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except (OSError, pa.ArrowException) as error:
+        raise RecordingError(f"{path}: is damaged ({error}): {MEND}") from error
 
 
 def read_metadata(path: Path) -> dict[str, Any]:

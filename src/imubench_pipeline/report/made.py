@@ -6,6 +6,7 @@ import platform
 from importlib.metadata import version
 from typing import Any
 
+from imubench_pipeline.report.shell import imubench
 from imubench_pipeline.report.site import Entry, Site
 
 _LIBRARIES = (
@@ -19,10 +20,25 @@ _LIBRARIES = (
     "snakemake",
 )
 
+_COMMANDS: tuple[tuple[str, dict[str, str], str], ...] = (
+    ("show", {}, "prints the comparison in the terminal"),
+    ("figures", {"--sensor": "NAME"}, "draws the figures of channels for print, as SVG and PDF"),
+    (
+        "report",
+        {"--one-file": "report.html"},
+        "puts all of these pages into one file, to send by mail",
+    ),
+    ("export", {"--sensor": "NAME", "--target": "kalibr"}, "writes what a filter loads"),
+)
+"""Commands of `imubench` for the results, their options, and what they do."""
+
 
 def _context(site: Site) -> dict[str, Any]:
     return {
-        "results": site.results_name,
+        "commands": [
+            (imubench(name, site.results_name, options), words)
+            for name, options, words in _COMMANDS
+        ],
         "versions": {"python": platform.python_version()} | {n: version(n) for n in _LIBRARIES},
         "settings": {
             f"{section}.{key}": value

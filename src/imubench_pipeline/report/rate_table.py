@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -54,12 +53,7 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         "findings": view.findings,
         "provenance": list(provenance(view, [], folder)),
         "sources": metadata_of(folder).get("sources", []),
-        "command": shlex.join(
-            [
-                *("snakemake", "-c2", "--forcerun", "ingest", "--"),
-                f"{site.results_name}/recordings/{view.sensor}/{view.name}/calibration.parquet",
-            ]
-        ),
+        "command": site.again(view, "calibration"),
         "page": {"looks": {}, "channels": [], "findings": [], **_payload(points)},
     }
 

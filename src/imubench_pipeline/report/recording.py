@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -22,6 +21,7 @@ from imubench_pipeline.report.practical import (
     page_unit,
     symbol_text,
 )
+from imubench_pipeline.report.shell import imubench
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.report.words import counted, model_text, precision, sentence, started_text
@@ -110,11 +110,8 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         # Of one that is left out there is nothing to draw.
         "figures_command": None
         if view.left_out
-        else shlex.join(
-            [
-                *("imubench", "figures", site.results_name),
-                *("--sensor", view.sensor, "--recording", view.name),
-            ]
+        else imubench(
+            "figures", site.results_name, {"--sensor": view.sensor, "--recording": view.name}
         ),
         "page": {
             "looks": looks({view.sensor: site.looks[view.sensor]}),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-import shlex
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -18,6 +17,7 @@ import pyarrow as pa
 
 from imubench_pipeline.report.palette import Appearance, sensor_appearances
 from imubench_pipeline.report.practical import System, first_choices, units_of_pages
+from imubench_pipeline.report.shell import made_again
 from imubench_pipeline.report.view import RecordingView, recording_views
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from imubench_pipeline.typing import Row
@@ -131,14 +131,9 @@ class Site:
 
     def again(self, view: RecordingView, table: str) -> str:
         """Return the command that makes the results of a recording again, up to a table."""
-        stated = self.settings.get("given", [])
-        return shlex.join(
-            [
-                *("snakemake", "-c2"),
-                *(["--config", *stated] if stated else []),
-                *("--forcerun", "ingest", "--"),
-                f"{self.results_name}/recordings/{view.sensor}/{view.name}/{table}.parquet",
-            ]
+        return made_again(
+            f"{self.results_name}/recordings/{view.sensor}/{view.name}/{table}.parquet",
+            self.settings.get("given", []),
         )
 
     @cached_property

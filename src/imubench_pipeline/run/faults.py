@@ -10,7 +10,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from imubench_pipeline.recordings.quality_file import Quality
 from imubench_pipeline.tables.failures import Failure
+from imubench_pipeline.tables.findings import RecordingError
 
 Of = tuple[str, str, str | None]
 """Step, sensor and recording; None: a step of the whole sensor."""
@@ -25,7 +27,8 @@ class Faults:
     """The records of the steps that failed, in the folder ``faults`` of the results.
 
     What was there when this was made says how often each step was tried; a step that failed at
-    its last attempt has another one now.
+    its last attempt has another one now. So has an ingest of which the samples are no longer as it
+    left them: no rule declares them, as what there will be of them is known by the log alone.
 
     Parameters
     ----------
@@ -33,8 +36,11 @@ class Faults:
     """
 
     def __init__(self, results: Path) -> None:
+        self._results = results
         self._folder = results / _FOLDER
         self._before = dict(self._records())
+        self._failed = {of[1:] for of, record in self._before.items() if record["failed"]}
+        self._lost: dict[Of, bool] = {}
 
     def attempt(self, of: Of, *, again: bool = True) -> int:
         """Return the number of the attempt of this run, 0 where none has ever failed.
@@ -46,7 +52,28 @@ class Faults:
             False: a step that failed is not tried again.
         """
         record = self._before.get(of)
-        return record["attempt"] + (record["failed"] and again) if record else 0
+        tried, failed = (record["attempt"], record["failed"]) if record else (0, False)
+        return tried + (again and (failed or self._lost_samples(of)))
+
+    def _lost_samples(self, of: Of) -> bool:
+        """Return whether what an ingest left was not as it left it when this was first asked.
+
+        All of it is read where a step has failed since, as one does that finds samples damaged.
+        """
+        step, sensor, recording = of
+        if step != "ingest" or recording is None:
+            return False
+        if of not in self._lost:
+            folder = self._results / "recordings" / sensor / recording
+            try:
+                quality = Quality.read(folder / "quality.json")
+                fault = quality.fault(folder, whole=(sensor, recording) in self._failed)
+                self._lost[of] = fault is not None
+            except FileNotFoundError:  # it is made in any case
+                self._lost[of] = False
+            except RecordingError:
+                self._lost[of] = True
+        return self._lost[of]
 
     def failed(self, failure: Failure, attempt: int, log: Path) -> None:
         """Keep that a step failed.
@@ -71,7 +98,7 @@ class Faults:
     def succeeded(self, of: Of, attempt: int) -> None:
         """Keep that a step which had failed did not any more."""
         path = self._path(of)
-        if path.is_file():
+        if attempt or path.is_file():
             from imubench_pipeline.tables import write_json
 
             step, sensor, recording = of

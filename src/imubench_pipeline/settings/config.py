@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -292,4 +293,21 @@ def _differing(here: Mapping[str, Any], there: Mapping[str, Any]) -> dict[str, A
 def _as_given(value: object) -> str:
     if value is None:
         return "false"  # files that are left out: no other entry outside of a group may be null
-    return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
+    if not isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    if _means_itself(value):
+        return value
+    # Quotes at both ends would be taken away before it is read as YAML.
+    return '!!str "' + "".join(map(_escaped, value)) + '" #'
+
+
+def _means_itself(text: str) -> bool:
+    """Return whether ``snakemake --config`` takes a text for itself: no number, no other YAML."""
+    if re.fullmatch(r"[+-]?([\d._]+(e[+-]?\d+)?|inf|infinity|nan)|true|false", text, re.IGNORECASE):
+        return False
+    return re.fullmatch(r"(?!\.\.\.)[\w/.]([\w/.~+ ,()-]*[\w/.~+,()-])?", text) is not None
+
+
+def _escaped(letter: str) -> str:
+    plain = letter.isprintable() and letter not in '"\\'
+    return letter if plain else f"\\U{ord(letter):08x}"

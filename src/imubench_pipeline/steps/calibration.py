@@ -8,7 +8,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from imubench_pipeline.recordings.recording import channel_logs, read_metadata
+from imubench_pipeline.recordings.kept import kept_logs
+from imubench_pipeline.recordings.recording import read_metadata
 from imubench_pipeline.settings.known_rates import AtRest, OnRateTable
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
@@ -41,7 +42,7 @@ def calibration_tables(
         By table; no rows of a rejected recording.
     """
     rows: dict[str, list[Row]] = {name: [] for name in CALIBRATION_TABLES}
-    logs = channel_logs(folder)
+    logs = kept_logs(folder)
     if not logs:
         return rows
     given = json.loads(settings)

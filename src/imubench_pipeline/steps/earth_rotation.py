@@ -8,7 +8,8 @@ from dataclasses import asdict
 from pathlib import Path
 
 from imubench_pipeline.experiments.earth_rate.published import RunDesign, published_row
-from imubench_pipeline.recordings.recording import channel_logs, read_metadata
+from imubench_pipeline.recordings.kept import kept_logs
+from imubench_pipeline.recordings.recording import read_metadata
 from imubench_pipeline.settings.config import EarthRateSettings
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
@@ -47,7 +48,7 @@ def earth_rate_tables(
     simulated = (
         SimulatedRecording.model_validate(given["simulated"]) if "simulated" in given else None
     )
-    logs = channel_logs(folder)
+    logs = kept_logs(folder)
     if not logs:
         return rows
     if simulated is not None and simulated.two_position is not None:

@@ -10,7 +10,7 @@ from imubench_pipeline.estimators.rows import recommended_estimates
 from imubench_pipeline.navigation.backtest.of_recording import backtest_rows
 from imubench_pipeline.navigation.error_budget.printed_errors import in_use
 from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement, standard
-from imubench_pipeline.recordings.recording import static_logs
+from imubench_pipeline.recordings.kept import kept_static_logs
 from imubench_pipeline.settings.config import ErrorBudgetSettings
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.requirements import Requirement
@@ -40,7 +40,7 @@ def error_tables(
     if not estimates:
         return {"error_budget": iter(()), "backtest": iter(())}
     drawn = {"draws": how.draws, "seed": how.seed}
-    logs = static_logs(inputs["quality"].parent)
+    logs = kept_static_logs(inputs["quality"].parent)
     apart = read("deterministic", [inputs["deterministic"]]).to_pylist()
     temperature = read("temperature", [inputs["temperature"]]).to_pylist()
     figures = in_use(Datasheet.model_validate(given["datasheet"]), estimates, temperature)

@@ -27,8 +27,9 @@ from imubench_pipeline.estimators.rows import allan_rows, draw_rows, parameter_r
 from imubench_pipeline.estimators.thermal.path import TemperaturePath, temperature_path
 from imubench_pipeline.estimators.thermal.result import ThermalFit
 from imubench_pipeline.noise.simulate import channel_rng
+from imubench_pipeline.recordings.kept import kept_static_logs
 from imubench_pipeline.recordings.quality_file import Quality
-from imubench_pipeline.recordings.recording import ChannelLog, static_logs
+from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.config import EstimateSettings
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.steps.compensation import (
@@ -300,7 +301,7 @@ def estimation(
     given = json.loads(settings)
     into = Estimation()
     measured = curves(curve, Quality.read(quality))
-    for channel, log in static_logs(quality.parent).items():
+    for channel, log in kept_static_logs(quality.parent).items():
         key = Key(sensor, recording, channel)
         how = EstimateSettings.model_validate(given["estimate"])
         estimate_channel(key, log, measured[channel], how, given["bandwidth"], into)

@@ -11,6 +11,7 @@ from imubench_pipeline.export.request import Request, Tables, load, made, record
 from imubench_pipeline.export.targets import TARGETS
 from imubench_pipeline.settings.config import ExportSettings
 from imubench_pipeline.tables import making, write_content
+from imubench_pipeline.tables.texts import printable
 from imubench_pipeline.units import quantity_to_si
 
 NOT_MADE = "not_made.txt"
@@ -52,7 +53,7 @@ def exports(
             try:
                 content = made(tables, request, recordings)
             except ExportError as error:
-                refused.append(f"{target}: {error}")
+                refused.append(printable(f"{target}: {error}"))
                 continue
             yield Path(sensor, target, TARGETS[target].file_name), content
         if refused:

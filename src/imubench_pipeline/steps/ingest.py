@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 
 from imubench_pipeline.recordings.ingest import ingest_as_planned
 from imubench_pipeline.recordings.overview import overview
-from imubench_pipeline.tables import write, write_json
+from imubench_pipeline.tables import write
 
 
 def write_recording(
@@ -20,4 +19,4 @@ def write_recording(
     seen = overview(folder, sensor, recording)
     write("envelope", seen.envelope, outputs["envelope"])
     write("histogram", seen.histogram, outputs["histogram"])
-    write_json(asdict(quality), outputs["quality"])
+    quality.write(outputs["quality"])

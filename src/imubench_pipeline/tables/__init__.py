@@ -18,10 +18,12 @@ from imubench_pipeline.tables.files import (
     write_content,
     write_json,
 )
+from imubench_pipeline.tables.parquet import checked_parquet
 
 __all__ = [
     "TableError",
     "build",
+    "checked_parquet",
     "columns_of",
     "joined",
     "making",

@@ -7,6 +7,7 @@ and the tables and pages tell it.
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -64,7 +65,9 @@ class Failure:
 
 
 def failure_of(path: Path) -> Failure | None:
-    """Return why an output is empty; None where it is the work of its step.
+    """Return why an output is empty; None where it is the work of its step, or damaged.
+
+    The step that reads a damaged one says so.
 
     Parameters
     ----------
@@ -72,9 +75,13 @@ def failure_of(path: Path) -> Failure | None:
         A table as Parquet, or ``quality.json``.
     """
     if path.name == QUALITY:
-        found = json.loads(path.read_text(encoding="utf-8")).get("failure")
-        return Failure(**found) if found else None
-    return told_by(pq.read_schema(path)) if path.suffix == ".parquet" else None
+        with contextlib.suppress(ValueError, TypeError, AttributeError):
+            found = json.loads(path.read_text(encoding="utf-8")).get("failure")
+            return Failure(**found) if found else None
+    if path.suffix == ".parquet":
+        with contextlib.suppress(pa.ArrowException):
+            return told_by(pq.read_schema(path))
+    return None
 
 
 def told_by(read: pa.Schema) -> Failure | None:

@@ -13,10 +13,11 @@ from typing import Any
 
 import pyarrow as pa
 import pyarrow.csv as pacsv
-import pyarrow.parquet as pq
 
 from imubench_pipeline.tables.columns import Column
+from imubench_pipeline.tables.parquet import SEAL, checked_parquet, seal_broken, write_sealed
 from imubench_pipeline.tables.schemas import PARTS_OF, TABLES
+from imubench_pipeline.tables.texts import with_safe_cells
 
 _SMALL = 1_000_000  # bytes
 
@@ -119,14 +120,18 @@ def write(table: str, rows: Iterable[Mapping[str, Any]], path: Path) -> None:
 
 
 def write_arrow(table: pa.Table, path: Path) -> None:
-    """Write an Arrow table as Parquet or, where the name ends so, CSV, atomically."""
+    """Write an Arrow table as Parquet or, where the name ends so, CSV, atomically.
+
+    Texts in CSV are such as no spreadsheet takes for formulas (`imubench_pipeline.tables.texts`);
+    Parquet has them as they are.
+    """
     with replacing(path) as temporary:
         if path.suffix == ".csv":
-            pacsv.write_csv(table, temporary)
+            pacsv.write_csv(with_safe_cells(table), temporary)
         else:
             # A small file is read in half the time by snappy, and thousands of them are.
             compression = "zstd" if table.nbytes > _SMALL else "snappy"
-            pq.write_table(table, temporary, compression=compression)
+            write_sealed(table, temporary, compression)
 
 
 def read(table: str, paths: Sequence[Path]) -> pa.Table:
@@ -142,12 +147,30 @@ def joined(table: str, parts: Sequence[pa.Table]) -> pa.Table:
 
 
 def read_part(table: str, path: Path) -> pa.Table:
-    """Read one file of a table, with the metadata that it has."""
+    """Read one file of a table, with the metadata that it has.
+
+    Raises
+    ------
+    TableError
+        If it is damaged, or has other columns.
+    """
     expected = schema(table)
-    with pq.ParquetFile(path) as file:
-        part = file.read(use_threads=False)
-    if part.schema.names != expected.names:
-        raise TableError(f"{path}: columns {part.schema.names}, expected {expected.names}")
+    try:
+        if seal_broken(path):
+            raise pa.ArrowInvalid("its metadata are not those that were written")
+        with checked_parquet(path) as file:
+            part = file.read(use_threads=False)
+        names = part.schema.names
+        told = {key: text for key, text in (part.schema.metadata or {}).items() if key != SEAL}
+        part = part.replace_schema_metadata(told)
+    except FileNotFoundError:
+        raise
+    except (OSError, pa.ArrowException, UnicodeDecodeError) as error:
+        raise TableError(
+            f"{path}: is damaged ({error}); remove it, and the next run makes it again"
+        ) from error
+    if names != expected.names:
+        raise TableError(f"{path}: columns {names}, expected {expected.names}")
     if part.schema.equals(expected):
         return part
     return part.cast(expected).replace_schema_metadata(part.schema.metadata)

@@ -17,7 +17,13 @@ from pathlib import Path
 
 import psutil
 
-from imubench_pipeline.recordings.drop_zone import PARTIAL, Recording, found_logs, name_of
+from imubench_pipeline.recordings.drop_zone import (
+    PARTIAL,
+    Recording,
+    found_logs,
+    name_of,
+    sensor_of,
+)
 from imubench_pipeline.report.run_summary import one_line
 
 Signature = tuple[tuple[str, int, int], ...]
@@ -87,7 +93,7 @@ def look(logs: Path) -> dict[str, Found]:
     for path in sorted(logs.glob("*/*")):
         whole = complete_name(path.name)
         if whole is not None and path.is_file():
-            key = f"{path.parent.name}/{name_of(whole)}"
+            key = f"{sensor_of(path.parent)}/{name_of(whole)}"
             there = found.get(key, Found())
             if not there.incomplete:
                 found[key] = Found(there.files, _stamped(path, path.parent))

@@ -1,0 +1,82 @@
+"""Parquet files of which no bit changes unseen: checksums of their pages, a digest of the rest.
+
+Parquet has checksums for pages alone. What says where they lie, which columns there are and how
+many rows, stands at the end of a file without one; a digest of it is kept there among the metadata.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import struct
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+SEAL = b"imubench.digest"
+"""Key of the metadata."""
+
+_END = struct.Struct("<I4s")
+"""How a file ends: the length of its metadata, and the mark of the format."""
+
+_UNSEALED = b"0" * 64
+# A text in compact Thrift: its field (1 after the last one, binary), its length, itself.
+_PLACE = re.compile(re.escape(SEAL) + rb"\x18\x40([0-9a-f]{64})")
+
+
+def checked_parquet(path: Path) -> pq.ParquetFile:
+    """Open a Parquet file so that the checksums of its pages are verified when they are read."""
+    return pq.ParquetFile(path, page_checksum_verification=True)
+
+
+def write_sealed(table: pa.Table, path: Path, compression: str) -> None:
+    """Write a table with checksums of its pages and a digest of its metadata.
+
+    Parameters
+    ----------
+    table : pyarrow.Table
+    path : Path
+    compression : str
+        As `pyarrow.parquet.ParquetWriter` takes it.
+    """
+    with pq.ParquetWriter(
+        path, table.schema, compression=compression, write_page_checksum=True
+    ) as writer:
+        writer.write_table(table)
+        writer.add_key_value_metadata({SEAL: _UNSEALED})
+    found = end_of(path)
+    place = _PLACE.search(found)
+    if place is None:
+        raise RuntimeError(f"{path}: its metadata are not laid out as expected")
+    with path.open("r+b") as file:
+        file.seek(place.start(1) - len(found), 2)
+        file.write(hashlib.sha256(found).hexdigest().encode())
+
+
+def seal_broken(path: Path) -> bool:
+    """Return whether the metadata of a file are not those that `write_sealed` wrote.
+
+    Of a file without a digest that is not known: False.
+    """
+    found = end_of(path)
+    place = _PLACE.search(found)
+    if place is None:
+        return False
+    unsealed = found[: place.start(1)] + _UNSEALED + found[place.end(1) :]
+    return hashlib.sha256(unsealed).hexdigest().encode() != place[1]
+
+
+def end_of(path: Path) -> bytes:
+    """Return the metadata at the end of a Parquet file, as bytes; none where it has another end."""
+    with path.open("rb") as file:
+        size = file.seek(0, 2)
+        file.seek(max(size - _END.size, 0))
+        end = file.read()
+        if len(end) < _END.size:
+            return b""
+        length = _END.unpack(end)[0] + _END.size
+        if length > size:
+            return b""
+        file.seek(size - length)
+        return file.read()

@@ -1,0 +1,69 @@
+"""Texts from logs, notes and names of folders, made safe for what opens them.
+
+A spreadsheet takes a cell of a CSV file that begins with ``=``, ``+``, ``-`` or ``@`` for a
+formula, quoted or not, and a formula can start programs and fetch pages. An apostrophe before it is
+what spreadsheets themselves take for "this is text". One that expects semicolons between cells
+breaks a text at them, whatever the quotes, so what follows a semicolon is treated as what begins a
+cell.
+"""
+
+from __future__ import annotations
+
+import re
+
+import pyarrow as pa
+
+_FORMULA = re.compile(r"((?:^|;)[\s\"]*)('*[=+\-@\uff1d\uff0b\uff0d\uff20])")
+"""The signs, and their full-width forms, with the apostrophes that stand before them already."""
+
+
+def printable(text: str) -> str:
+    r"""Return a text in which each character shows: others are escaped, as ``\x1b`` and ``\u2028``.
+
+    Parameters
+    ----------
+    text : str
+        May hold control characters, line ends, marks of direction and halves of surrogate pairs.
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        one if one.isprintable() else one.encode("unicode_escape").decode("ascii") for one in text
+    )
+
+
+def as_cell(text: str) -> str:
+    """Return a text as a cell of a CSV file that no spreadsheet takes for a formula.
+
+    Each sign that would begin a formula has one apostrophe more before it than in the text:
+    `of_cell` takes it away.
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    str
+        Printable (`printable`).
+    """
+    return _FORMULA.sub(r"\1'\2", printable(text))
+
+
+def of_cell(cell: str) -> str:
+    """Return the printable text that `as_cell` made a cell of."""
+    return _FORMULA.sub(lambda found: found[1] + found[2].removeprefix("'"), cell)
+
+
+def with_safe_cells(table: pa.Table) -> pa.Table:
+    """Return a table with its texts as `as_cell` gives them; numbers are as they were."""
+    for place, field in enumerate(table.schema):
+        if not pa.types.is_string(field.type):
+            continue
+        column = table.column(place).combine_chunks().dictionary_encode()
+        known = column.dictionary.to_pylist()
+        safe = [as_cell(text) for text in known]
+        if safe != known:
+            column = pa.DictionaryArray.from_arrays(column.indices, pa.array(safe, pa.string()))
+            table = table.set_column(place, field, column.cast(pa.string()))
+    return table
