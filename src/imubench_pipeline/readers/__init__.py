@@ -37,6 +37,10 @@ __all__ = [
 ]
 
 
+_LOOKED_INTO = 1000
+"""Members of an archive, at most, among which the one that is text is looked for."""
+
+
 def log_files(path: Path) -> list[Path]:
     """Return the files of a recording: the file itself, or the visible files of its folder.
 
@@ -149,7 +153,7 @@ def only_log(path: Path, present: list[Path]) -> Path:
         If there is another number of logs.
     """
     logs = [file for file in present if file.parent == path] or present
-    if len(logs) > 1 and not path.is_dir():
+    if 1 < len(logs) <= _LOOKED_INTO and not path.is_dir():
         logs = list(islice(filter(holds_text, logs), 2))  # two are as bad as a thousand
     if len(logs) != 1:
         raise RecordingError(
@@ -160,7 +164,8 @@ def only_log(path: Path, present: list[Path]) -> Path:
 
 
 def _names(path: Path, files: list[Path]) -> str:
-    return ", ".join(file.relative_to(path).as_posix() for file in files[:30]) or "no file"
+    names = ", ".join(file.relative_to(path).as_posix() for file in files[:30]) or "no file"
+    return f"{names} and {len(files) - 30} more" if len(files) > 30 else names
 
 
 def _open(file: Path, log: LogFormat, sources: dict[str, ColumnSource]) -> LogFile:

@@ -35,7 +35,10 @@ _BLOCK_ROWS = 1 << 18
 _BLOCK_BYTES = 1 << 26
 _TIME = "time"
 _SHOWN = 20
-_MOST_TABLES = 100_000
+_MOST_TABLES = 10_000
+_LARGEST_HELD = 1 << 28
+"""Bytes of chunks that are unpacked as a whole, of all columns together."""
+
 _OF_MATRIX = re.compile(r"(.+)\[(\d{1,9})\]")
 
 _Place = tuple[Table, int]
@@ -79,8 +82,13 @@ class ArrayFile(LogFile):
             table: sorted({position for held, position in places.values() if held is table})
             for table in tables
         }
-        held = sum(table.row_bytes(wanted[table]) for table in tables)
-        rows = max(1, min(_BLOCK_ROWS, _BLOCK_BYTES // max(held, 1)))
+        held = sum(table.held_bytes(wanted[table]) for table in tables)
+        if held > _LARGEST_HELD:
+            raise UnusableError(
+                f"the columns lie in chunks of {held} bytes together; expected at most "
+                f"{_LARGEST_HELD}: repack the file with smaller chunks"
+            )
+        rows = rows_of_block(sum(table.row_bytes(wanted[table]) for table in tables), _BLOCK_BYTES)
         read = 0
         streams = [table.blocks(wanted[table], rows) for table in tables]
         for parts in zip(*streams, strict=True):
@@ -158,6 +166,29 @@ def _stated_units(places: Mapping[str, _Place]) -> dict[str, StatedUnit]:
         if unit is not None:
             found[name] = unit
     return found
+
+
+def rows_of_block(row_bytes: int, most: int) -> int:
+    """Return how many records are read at a time.
+
+    Parameters
+    ----------
+    row_bytes : int
+        Memory that one takes.
+    most : int
+        That all may take together.
+
+    Raises
+    ------
+    UnusableError
+        If one alone takes more.
+    """
+    if row_bytes > most:
+        raise UnusableError(
+            f"one record takes {row_bytes} bytes; expected at most {most}: store the log's columns "
+            "in an array of their own"
+        )
+    return min(_BLOCK_ROWS, most // max(row_bytes, 1))
 
 
 def check_not_empty(path: Path) -> None:

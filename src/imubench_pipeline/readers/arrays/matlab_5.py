@@ -44,6 +44,10 @@ _COMPLEX = 0x0800
 _TABLE = 17
 _LARGEST_HEADER = 1 << 16
 _DEEPEST = 16
+_LONGEST_NAME = 256
+"""Bytes; MATLAB's own have 63."""
+
+_MOST_SIDES = 32
 _STEP = {"<": 1, ">": -1}
 """Size and type of a small element stand in the order of the bytes."""
 
@@ -195,6 +199,8 @@ def _matrix(
         kind = flags & 0xFF
         shape = () if kind == _TABLE else _shape(elements)
         own = elements.data(1, 16).decode("utf-8", "replace")
+        if len(own) > _LONGEST_NAME:
+            raise _damaged(f"a name of {len(own)} letters", elements.at)
         name = own if above is None else above
         if not name:
             pass  # what MATLAB keeps of functions and objects
@@ -214,8 +220,8 @@ def _matrix(
 def _shape(elements: _Elements) -> tuple[int, ...]:
     data = elements.data(5)
     shape: tuple[int, ...] = struct.unpack(f"{elements.order}{len(data) // 4}i", data)
-    if len(shape) < 2 or min(shape) < 0:
-        raise _damaged(f"sides {shape}", elements.at)
+    if not 2 <= len(shape) <= _MOST_SIDES or min(shape) < 0:
+        raise _damaged(f"sides {shape[:_MOST_SIDES]}", elements.at)
     return shape
 
 
@@ -236,7 +242,7 @@ def _fields(elements: _Elements, name: str, depth: int) -> Iterator[Table]:
         return
     width = int.from_bytes(elements.data(5), "little" if elements.order == "<" else "big")
     names = elements.data(1)
-    if width < 1:
+    if not 1 <= width <= _LONGEST_NAME:
         raise _damaged(f"names of fields of {width} bytes", elements.at)
     for start in range(0, len(names), width):
         field = names[start : start + width].split(b"\0")[0].decode("utf-8", "replace")

@@ -6,6 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,8 @@ _WORDS = {
 }
 _WIDEST_FIELD = 1024
 """Elements of a field of a record that are told apart as columns."""
+
+_MOST_LEAVES = 1 << 14
 
 
 class UnusableError(Exception):
@@ -96,6 +99,10 @@ class Table(ABC):
     @abstractmethod
     def row_bytes(self, positions: Sequence[int]) -> int:
         """Return the memory that a record takes while these columns are read."""
+
+    def held_bytes(self, positions: Sequence[int]) -> int:
+        """Return the memory that is held, beside the records, while these columns are read."""
+        return 0
 
     @abstractmethod
     def blocks(self, positions: Sequence[int], rows: int) -> Iterator[list[NDArray[Any]]]:
@@ -173,7 +180,9 @@ class Array(Table):
         sides = (*shape, 1)[:2]
         self.rows, self.width = sides[self.time_axis], sides[1 - self.time_axis]
         if dtype.names:
-            self._leaves = list(_leaves(dtype))
+            self._leaves = list(islice(_leaves(dtype), _MOST_LEAVES + 1))
+            if len(self._leaves) > _MOST_LEAVES:
+                self.fault = f"has more than {_MOST_LEAVES} columns; expected a log of one sensor"
             if self.width != 1:
                 self.fault = "is a matrix of records; expected a vector of records"
             self.width = len(self._leaves)
