@@ -1,4 +1,4 @@
-"""What decompresses gzip, zstd, xz and bzip2: block by block, whatever the data say of themselves."""
+"""What decompresses gzip, zstd, xz and bzip2, block by block and in bounded memory."""
 
 from __future__ import annotations
 
@@ -84,7 +84,8 @@ def _counted(parts: int, held: int) -> int:
     """
     if parts >= _MOST_PARTS and held < _LEAST_IN_PART * parts:
         raise OSError(
-            f"{parts} compressed parts hold {held} bytes, expected more than {_LEAST_IN_PART} a part"
+            f"{parts} compressed parts hold {held} bytes, expected more than {_LEAST_IN_PART} "
+            "a part"
         )
     return parts + 1
 

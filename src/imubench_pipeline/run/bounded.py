@@ -8,6 +8,7 @@ import resource
 import select
 import signal
 import sys
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -106,10 +107,8 @@ def _answer(pipe: int, memory: int, called: Callable[[], Any]) -> None:
 
 def _received(pipe: int, seconds: float) -> bytes | None:
     """Return what comes through a pipe until its end; None where that takes longer."""
-    import time
-
     end = time.monotonic() + seconds
-    received = []
+    received: list[bytes] = []
     while select.select([pipe], [], [], max(0.0, end - time.monotonic()))[0]:
         block = os.read(pipe, _READ)
         if not block:

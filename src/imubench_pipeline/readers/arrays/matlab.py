@@ -17,7 +17,6 @@ from imubench_pipeline.readers.arrays import hdf5, matlab_5
 from imubench_pipeline.readers.arrays.file import ArrayFile
 from imubench_pipeline.readers.arrays.table import Table, UnusableError
 
-
 _LONGEST_CLASS = 64
 
 

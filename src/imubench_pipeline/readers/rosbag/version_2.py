@@ -7,12 +7,12 @@ import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 import lz4.frame  # type: ignore[import-untyped]  # has no types
 from rosbags.interfaces import Connection
-from rosbags.rosbag2 import Reader
-from rosbags.rosbag2 import storage_mcap
+from rosbags.rosbag2 import Reader, storage_mcap
 from rosbags.rosbag2.reader import DirectoryReader
 from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
@@ -24,10 +24,8 @@ from imubench_pipeline.readers.rosbag.limits import (
     LARGEST_MESSAGE,
     LARGEST_METADATA,
     LARGEST_OVERLAP,
-    LARGEST_RATIO,
     LONGEST_NAME,
     MOST_TOPICS,
-    UNSUSPICIOUS,
 )
 from imubench_pipeline.tables.findings import RecordingError
 
@@ -53,6 +51,9 @@ def _bounded(size: int) -> int:
 storage_mcap.DECOMPRESSORS.update({"lz4": _lz4, "zstd": _zstd})
 
 
+_Reader = Reader | McapReader | Sqlite3Reader
+
+
 class Bag2:
     """A ROS 2 bag.
 
@@ -65,7 +66,7 @@ class Bag2:
     ros_1 = False
     unclosed = False
 
-    def __init__(self, reader: Reader | McapReader | Sqlite3Reader) -> None:
+    def __init__(self, reader: _Reader) -> None:
         self._reader = reader
         reader.open()
         self._connections: list[Connection] = list(reader.connections)
@@ -110,9 +111,7 @@ class Bag2:
         self._reader.close()
 
 
-def _storages(
-    reader: Reader | McapReader | Sqlite3Reader,
-) -> list[McapReader | Sqlite3Reader]:
+def _storages(reader: _Reader) -> list[Any]:
     """Return the readers of the files of a bag."""
     if not isinstance(reader, Reader):
         return [reader]
