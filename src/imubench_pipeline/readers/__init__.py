@@ -7,6 +7,7 @@ from itertools import islice
 from pathlib import Path
 
 from imubench_pipeline.readers.batch import Batch, LogFile, stated_in
+from imubench_pipeline.readers.bounds import MOST_LOOKED_INTO
 from imubench_pipeline.readers.compressed import (
     holds_text,
     is_archive,
@@ -35,10 +36,6 @@ __all__ = [
     "only_log",
     "read",
 ]
-
-
-_LOOKED_INTO = 1000
-"""Members of an archive, at most, among which the one that is text is looked for."""
 
 
 def log_files(path: Path) -> list[Path]:
@@ -153,7 +150,7 @@ def only_log(path: Path, present: list[Path]) -> Path:
         If there is another number of logs.
     """
     logs = [file for file in present if file.parent == path] or present
-    if 1 < len(logs) <= _LOOKED_INTO and not path.is_dir():
+    if 1 < len(logs) <= MOST_LOOKED_INTO and not path.is_dir():
         logs = list(islice(filter(holds_text, logs), 2))  # two are as bad as a thousand
     if len(logs) != 1:
         raise RecordingError(

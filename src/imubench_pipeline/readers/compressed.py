@@ -14,16 +14,16 @@ from functools import lru_cache
 from pathlib import Path
 from typing import IO, Any
 
+from imubench_pipeline.readers.bounds import (
+    LARGEST_DIRECTORY,
+    LARGEST_RATIO,
+    MOST_MEMBERS,
+    UNSUSPICIOUS,
+)
 from imubench_pipeline.readers.decompression import OPENED
 from imubench_pipeline.tables.findings import RecordingError
 
 _READ = 1 << 16
-_UNSUSPICIOUS = 1 << 28
-_LARGEST_RATIO = 800
-"""A log that expands further holds nothing but one character."""
-
-_LARGEST_DIRECTORY = 1 << 22
-_MOST_MEMBERS = 1 << 16
 _SEEN = 1 << 12
 _SCANNED = 1 << 20
 _ZIP_LOCAL = b"PK\x03\x04"
@@ -53,7 +53,7 @@ class Bytes:
         self.ended_early = False
         self._stream = stream
         self._streams = (stream, *under)
-        self._left = max(_UNSUSPICIOUS, _LARGEST_RATIO * size)
+        self._left = max(UNSUSPICIOUS, LARGEST_RATIO * size)
 
     def read(self, size: int) -> bytes:
         """Return the next bytes, at most ``size``; none at the end.
@@ -74,7 +74,7 @@ class Bytes:
         self._left -= len(block)
         if self._left < 0:
             raise RecordingError(
-                f"{self.name}: expands to more than {_LARGEST_RATIO} times its size, which no log "
+                f"{self.name}: expands to more than {LARGEST_RATIO} times its size, which no log "
                 "does; expected compressed text: unpack it and look what it is"
             )
         return block
@@ -295,7 +295,7 @@ class _Archive(io.FileIO):
     def __init__(self, path: Path) -> None:
         super().__init__(path, "rb")
         self._shown = path.name
-        self.most: int | None = _LARGEST_DIRECTORY
+        self.most: int | None = LARGEST_DIRECTORY
 
     def read(self, size: int | None = -1) -> bytes:
         """Return the next bytes."""
@@ -318,10 +318,10 @@ def _scanned(archive: Path) -> list[zipfile.ZipInfo]:
             while at >= 0 and at + _LONGEST_HEADER <= len(held):
                 found += _local_header(held[at : at + _LONGEST_HEADER], start + at)
                 at = held.find(_ZIP_LOCAL, at + 1)
-            if len(found) > _MOST_MEMBERS:
+            if len(found) > MOST_MEMBERS:
                 raise RecordingError(
                     f"{archive.name}: an archive without its directory, with more than "
-                    f"{_MOST_MEMBERS} members; expected the log alone: pack it anew"
+                    f"{MOST_MEMBERS} members; expected the log alone: pack it anew"
                 )
             keep = at if at >= 0 else max(len(held) - 3, 0)
             start, held = start + keep, held[keep:]

@@ -8,16 +8,12 @@ import zlib
 from collections.abc import Callable, Mapping
 from typing import IO, Any
 
+from imubench_pipeline.readers.bounds import LARGEST_WINDOW, LEAST_IN_PART, MOST_PARTS
+
 _FED = 1 << 11
 """Bytes of zstd data decompressed at a time: they may stand for 32768 times as many."""
 
 _READ = 1 << 16
-_LARGEST_WINDOW = 1 << 27
-"""Bytes that decompression itself may take: the window of zstd, the dictionary of xz."""
-
-_MOST_PARTS = 10_000
-_LEAST_IN_PART = 64
-"""Bytes that each of so many parts, such as members of gzip, holds on the average at least."""
 
 
 class _Parts:
@@ -82,10 +78,9 @@ def _counted(parts: int, held: int) -> int:
     OSError
         If they are many that hold next to nothing.
     """
-    if parts >= _MOST_PARTS and held < _LEAST_IN_PART * parts:
+    if parts >= MOST_PARTS and held < LEAST_IN_PART * parts:
         raise OSError(
-            f"{parts} compressed parts hold {held} bytes, expected more than {_LEAST_IN_PART} "
-            "a part"
+            f"{parts} compressed parts hold {held} bytes, expected more than {LEAST_IN_PART} a part"
         )
     return parts + 1
 
@@ -119,7 +114,7 @@ class _Zstd:
         import zstandard  # only a log that is compressed so needs it
 
         self._new: Callable[[], Any] = zstandard.ZstdDecompressor(
-            max_window_size=_LARGEST_WINDOW
+            max_window_size=LARGEST_WINDOW
         ).decompressobj
         self._error = zstandard.ZstdError
         self._file = file
@@ -172,7 +167,7 @@ def unpacked_zstd(data: bytes, most: int) -> bytes:
     import zstandard  # only a log that is compressed so needs it
 
     try:
-        with zstandard.ZstdDecompressor(max_window_size=_LARGEST_WINDOW).stream_reader(data) as one:
+        with zstandard.ZstdDecompressor(max_window_size=LARGEST_WINDOW).stream_reader(data) as one:
             return one.read(most)
     except zstandard.ZstdError as error:
         raise ValueError(str(error)) from None
@@ -180,7 +175,7 @@ def unpacked_zstd(data: bytes, most: int) -> bytes:
 
 def _unxz() -> lzma.LZMADecompressor:
     # The dictionary that a file asks for is taken from memory before the first byte.
-    return lzma.LZMADecompressor(memlimit=_LARGEST_WINDOW)
+    return lzma.LZMADecompressor(memlimit=LARGEST_WINDOW)
 
 
 OPENED: Mapping[bytes, Callable[[IO[bytes]], Any]] = {

@@ -236,7 +236,7 @@ def _check(given: argparse.Namespace) -> int:
     return worst
 
 
-_INSPECTED_S, _INSPECTED_BYTES = 10.0, 1 << 29
+INSPECTED_S, INSPECTED_BYTES = 10.0, 1 << 29
 """Time and memory in which a log is listed, or rejected."""
 
 
@@ -254,7 +254,7 @@ def _inspect(given: argparse.Namespace) -> int:
         return 2
     try:
         model = output.stem if output is not None else None
-        found = bounded(_INSPECTED_S, _INSPECTED_BYTES, inspect, given.log, model)
+        found = bounded(INSPECTED_S, INSPECTED_BYTES, inspect, given.log, model)
         if output is not None:
             with replacing(output) as temporary:
                 temporary.write_text(found.block, encoding="utf-8")

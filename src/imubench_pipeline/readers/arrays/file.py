@@ -28,17 +28,13 @@ from numpy.typing import NDArray
 from imubench_pipeline.readers.arrays.table import DATES, NUMBERS, Column, Table, UnusableError
 from imubench_pipeline.readers.arrays.time import ArrayTime
 from imubench_pipeline.readers.batch import Batch, LogFile, stated_in
+from imubench_pipeline.readers.bounds import LARGEST_CHUNKS, LARGEST_RECORD, MOST_ARRAYS
 from imubench_pipeline.readers.stated_units import StatedUnit, stated
 from imubench_pipeline.tables.findings import RecordingError
 
 _BLOCK_ROWS = 1 << 18
-_BLOCK_BYTES = 1 << 26
 _TIME = "time"
 _SHOWN = 20
-_MOST_TABLES = 10_000
-_LARGEST_HELD = 1 << 28
-"""Bytes of chunks that are unpacked as a whole, of all columns together."""
-
 _OF_MATRIX = re.compile(r"(.+)\[(\d{1,9})\]")
 
 _Place = tuple[Table, int]
@@ -69,9 +65,7 @@ class ArrayFile(LogFile):
     def _guarded(self) -> Iterator[dict[str, NDArray[Any]]]:
         """Yield the blocks as written; whatever a library raises becomes a `RecordingError`."""
         with explained(self.path), ExitStack() as stack:
-            yield from self._blocks(
-                self._places(list(islice(self.tables(stack), _MOST_TABLES + 1)))
-            )
+            yield from self._blocks(self._places(list(islice(self.tables(stack), MOST_ARRAYS + 1))))
 
     # --------------------------------------------------------------------------- blocks
 
@@ -83,12 +77,14 @@ class ArrayFile(LogFile):
             for table in tables
         }
         held = sum(table.held_bytes(wanted[table]) for table in tables)
-        if held > _LARGEST_HELD:
+        if held > LARGEST_CHUNKS:
             raise UnusableError(
                 f"the columns lie in chunks of {held} bytes together; expected at most "
-                f"{_LARGEST_HELD}: repack the file with smaller chunks"
+                f"{LARGEST_CHUNKS}: repack the file with smaller chunks"
             )
-        rows = rows_of_block(sum(table.row_bytes(wanted[table]) for table in tables), _BLOCK_BYTES)
+        rows = rows_of_block(
+            sum(table.row_bytes(wanted[table]) for table in tables), LARGEST_RECORD
+        )
         read = 0
         streams = [table.blocks(wanted[table], rows) for table in tables]
         for parts in zip(*streams, strict=True):
@@ -111,8 +107,8 @@ class ArrayFile(LogFile):
 
     def _places(self, tables: Sequence[Table]) -> dict[str, _Place]:
         by_name: dict[str, Table] = {}
-        if len(tables) > _MOST_TABLES:
-            raise UnusableError(f"more than {_MOST_TABLES} arrays; expected the log of one sensor")
+        if len(tables) > MOST_ARRAYS:
+            raise UnusableError(f"more than {MOST_ARRAYS} arrays; expected the log of one sensor")
         for table in tables:
             if table.name in by_name:
                 raise UnusableError(f"{table.shown} stands twice; expected one array of that name")

@@ -20,10 +20,7 @@ from numpy.typing import NDArray
 from imubench_pipeline.readers.arrays.file import ArrayFile
 from imubench_pipeline.readers.arrays.hdf5_units import stated_unit
 from imubench_pipeline.readers.arrays.table import Array, Table, UnusableError
-
-_LARGEST_CHUNK = 1 << 28
-_MOST_OBJECTS, _DEEPEST = 20_000, 64
-"""Objects of a file, and groups within each other."""
+from imubench_pipeline.readers.bounds import DEEPEST_GROUP, LARGEST_CHUNKS, MOST_OBJECTS
 
 _CACHE_SLOTS, _CACHE_WEIGHT, _LEAST_CACHE = 521, 0.75, 1 << 20
 """As the library has them."""
@@ -96,14 +93,14 @@ def data_sets(file: h5py.File, time_axis: int = 0, passed_over: str = "\0") -> l
 def _names(group: h5py.Group, before: int, depth: int) -> list[str | bytes]:
     """Return the names in a group; ``before``: how many there were in others."""
     # The library's own visit goes down with the process where groups lie deep.
-    if depth > _DEEPEST:
+    if depth > DEEPEST_GROUP:
         raise UnusableError(
-            f"groups lie more than {_DEEPEST} deep; expected the log of one sensor: copy its data "
-            "sets into a file of their own"
+            f"groups lie more than {DEEPEST_GROUP} deep; expected the log of one sensor: copy its "
+            "data sets into a file of their own"
         )
-    if before + len(group) > _MOST_OBJECTS:
+    if before + len(group) > MOST_OBJECTS:
         raise UnusableError(
-            f"more than {_MOST_OBJECTS} objects; expected the log of one sensor: copy its data "
+            f"more than {MOST_OBJECTS} objects; expected the log of one sensor: copy its data "
             "sets into a file of their own"
         )
     return sorted(group, key=lambda name: name.encode() if isinstance(name, str) else name)
@@ -226,9 +223,9 @@ def _check_written(data: h5py.Dataset, name: str, unpacked: int) -> None:
                 f"{name} is compressed with filter {code} ({title.decode('ascii', 'replace')}), "
                 "which is not here; expected gzip: repack it with h5repack -f GZIP=4"
             )
-    if unpacked > _LARGEST_CHUNK:
+    if unpacked > LARGEST_CHUNKS:
         raise UnusableError(
-            f"{name} has chunks of {unpacked} bytes; expected at most {_LARGEST_CHUNK}: "
+            f"{name} has chunks of {unpacked} bytes; expected at most {LARGEST_CHUNKS}: "
             "repack it with h5repack -l"
         )
     chunks = math.prod(

@@ -22,12 +22,11 @@ from numpy.lib import format as npy
 from imubench_pipeline.readers.arrays.file import ArrayFile
 from imubench_pipeline.readers.arrays.stream import LARGEST_RATIO, StreamedArray, exactly
 from imubench_pipeline.readers.arrays.table import Table, UnusableError, sides_of
+from imubench_pipeline.readers.bounds import LONGEST_NPY_HEADER
 from imubench_pipeline.readers.compressed import opened_archive
 
 _ENDING = ".npy"
 _LENGTH = {(1, 0): "<H", (2, 0): "<I", (3, 0): "<I"}
-_LONGEST_HEADER = 10_000
-"""Bytes, which the library takes, too; but it reads what is said to be there before it looks."""
 
 
 class NumpyFile(ArrayFile):
@@ -78,10 +77,10 @@ def _array(name: str, opened: Callable[[], IO[bytes]], size: int, checked: bool)
             )
         length = exactly(stream, struct.calcsize(_LENGTH[version]))
         (said,) = struct.unpack(_LENGTH[version], length)
-        if said > _LONGEST_HEADER:
+        if said > LONGEST_NPY_HEADER:
             raise UnusableError(
-                f"{shown} has a header of {said} bytes; expected at most {_LONGEST_HEADER}: save "
-                "fewer fields, or copy the file again"
+                f"{shown} has a header of {said} bytes; expected at most {LONGEST_NPY_HEADER}: "
+                "save fewer fields, or copy the file again"
             )
         read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
         shape, fortran, dtype = read(io.BytesIO(length + exactly(stream, said)))

@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from imubench_pipeline.readers.bounds import MOST_FIELDS
+
 NUMBERS = "fiu"
 """NumPy's letters of the kinds of data that are figures: float, signed and unsigned integer."""
 
@@ -33,8 +35,6 @@ _WORDS = {
 }
 _WIDEST_FIELD = 1024
 """Elements of a field of a record that are told apart as columns."""
-
-_MOST_LEAVES = 1 << 14
 
 
 class UnusableError(Exception):
@@ -180,9 +180,9 @@ class Array(Table):
         sides = (*shape, 1)[:2]
         self.rows, self.width = sides[self.time_axis], sides[1 - self.time_axis]
         if dtype.names:
-            self._leaves = list(islice(_leaves(dtype), _MOST_LEAVES + 1))
-            if len(self._leaves) > _MOST_LEAVES:
-                self.fault = f"has more than {_MOST_LEAVES} columns; expected a log of one sensor"
+            self._leaves = list(islice(_leaves(dtype), MOST_FIELDS + 1))
+            if len(self._leaves) > MOST_FIELDS:
+                self.fault = f"has more than {MOST_FIELDS} columns; expected a log of one sensor"
             if self.width != 1:
                 self.fault = "is a matrix of records; expected a vector of records"
             self.width = len(self._leaves)

@@ -21,7 +21,7 @@ from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
 from imubench_pipeline.readers.batch import Batch, LogFile
-from imubench_pipeline.readers.rosbag.limits import LARGEST_BATCH
+from imubench_pipeline.readers.bounds import LARGEST_BATCH
 from imubench_pipeline.readers.rosbag.messages import LAYOUTS, Layout, figures_of
 from imubench_pipeline.readers.rosbag.version_1 import Bag
 from imubench_pipeline.readers.rosbag.version_2 import Bag2, check_database, check_folder

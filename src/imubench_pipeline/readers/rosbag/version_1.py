@@ -13,11 +13,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-from imubench_pipeline.readers.rosbag.limits import (
+from imubench_pipeline.readers.bounds import (
     LARGEST_CHUNK,
     LARGEST_MESSAGE,
     LARGEST_RATIO,
-    LONGEST_NAME,
+    LONGEST_TOPIC,
     MOST_TOPICS,
     UNSUSPICIOUS,
 )
@@ -168,8 +168,8 @@ class Bag:
     def _connect(self, header: dict[bytes, bytes], data: bytes) -> None:
         kind = _fields(data)[b"type"].decode("utf-8", "replace")
         topic = header[b"topic"].decode("utf-8", "replace")
-        if max(len(topic), len(kind)) > LONGEST_NAME:
-            raise ValueError(f"a topic or type of more than {LONGEST_NAME} letters")
+        if max(len(topic), len(kind)) > LONGEST_TOPIC:
+            raise ValueError(f"a topic or type of more than {LONGEST_TOPIC} letters")
         if len(self._connections) >= MOST_TOPICS:
             raise ValueError(f"more than {MOST_TOPICS} connections, expected those of a vehicle")
         # The name that ROS 2 has for the same type.

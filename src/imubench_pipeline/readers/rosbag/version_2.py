@@ -17,16 +17,16 @@ from rosbags.rosbag2.reader import DirectoryReader
 from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
-from imubench_pipeline.readers.compressed import open_bytes
-from imubench_pipeline.readers.decompression import unpacked_zstd
-from imubench_pipeline.readers.rosbag.limits import (
+from imubench_pipeline.readers.bounds import (
     LARGEST_CHUNK,
     LARGEST_MESSAGE,
     LARGEST_METADATA,
     LARGEST_OVERLAP,
-    LONGEST_NAME,
+    LONGEST_TOPIC,
     MOST_TOPICS,
 )
+from imubench_pipeline.readers.compressed import open_bytes
+from imubench_pipeline.readers.decompression import unpacked_zstd
 from imubench_pipeline.tables.findings import RecordingError
 
 _TABLES = ("messages", "topics", "message_definitions", "schema", "metadata")
@@ -72,8 +72,8 @@ class Bag2:
         self._connections: list[Connection] = list(reader.connections)
         if len(self._connections) > MOST_TOPICS:
             raise ValueError(f"more than {MOST_TOPICS} topics, expected those of a vehicle")
-        if any(len(str(c.topic) + str(c.msgtype)) > LONGEST_NAME for c in self._connections):
-            raise ValueError(f"a topic or type of more than {LONGEST_NAME} letters")
+        if any(len(str(c.topic) + str(c.msgtype)) > LONGEST_TOPIC for c in self._connections):
+            raise ValueError(f"a topic or type of more than {LONGEST_TOPIC} letters")
         for storage in _storages(reader):
             if isinstance(storage, McapReader):
                 _check_overlap(storage)

@@ -6,11 +6,11 @@ import codecs
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
+from imubench_pipeline.readers.bounds import LONGEST_LINE
 from imubench_pipeline.readers.compressed import open_bytes
 from imubench_pipeline.tables.findings import Finding, RecordingError
 
 _SEEN = 1 << 16
-_LONGEST_LINE = 1 << 20
 _BYTE_ORDER_MARKS: Mapping[bytes, str] = {
     codecs.BOM_UTF8: "",
     # Before UTF-16, whose mark is the beginning of this one.
@@ -171,10 +171,10 @@ class CompleteLines:
             self.rest += b"\0" if block == bytes(len(block)) else block
             if self.rest.endswith(b"\0"):
                 self.rest = self.rest.rstrip(b"\0") + b"\0"
-            if len(self.rest) > _LONGEST_LINE:
+            if len(self.rest) > LONGEST_LINE:
                 shown = self.rest[:40].decode("utf-8", "replace")
                 raise RecordingError(
-                    f"{self._path.name}: no line break in {_LONGEST_LINE} bytes from {shown!r}; "
+                    f"{self._path.name}: no line break in {LONGEST_LINE} bytes from {shown!r}; "
                     "expected shorter lines: this is no text log, or not one record a line"
                 )
             return b""

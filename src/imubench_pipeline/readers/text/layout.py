@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from imubench_pipeline.readers import bounds
 from imubench_pipeline.readers.batch import stated_in
 from imubench_pipeline.readers.text.cells import Decimal, are_figures, is_datum, is_number
 from imubench_pipeline.readers.text.complete_lines import first_lines
@@ -28,11 +29,8 @@ Column = str | int
 
 _COMMENTS = ("#", "//", "%", ";", "!")
 _SPLITS = (*map(Split, ";\t|,"), Split(" ", runs=True), Split(" "))
-_LINES, _BYTES = 500, 1 << 20
-_COMMENT_LINES, _COMMENT_BYTES = 1000, 1 << 23
-_MOST_LINES_BEFORE, _MOST_BYTES_BEFORE = 500_000, 1 << 26
+_LINES, _BYTES, _UNIT_LINES = 500, 1 << 20, 3
 _SCORED_LINES, _SCORED_CELLS = 50, 50
-_UNIT_LINES = 3
 _SHOWN, _LONGEST_SHOWN = 20, 40
 
 
@@ -225,9 +223,9 @@ class _Search:
         number, start, held, told = 0, 0, 0, 0
         # Whether a semicolon begins a comment or is the delimiter is not yet known.
         signs = tuple(sign for sign in self._signs(None) if sign != ";")
-        for raw in first_lines(path, _MOST_BYTES_BEFORE):
+        for raw in first_lines(path, bounds.MOST_BYTES_BEFORE):
             number, here, start = number + 1, start, start + len(raw)
-            if number > _MOST_LINES_BEFORE + self._log.skip_lines:
+            if number > bounds.MOST_LINES_BEFORE + self._log.skip_lines:
                 break
             if number <= self._log.skip_lines or not raw.strip(b"\0 \t\r\n"):
                 continue
@@ -235,14 +233,14 @@ class _Search:
             if line.text.startswith(signs):
                 comments.append(line)
                 told += len(line.raw)
-                while len(comments) > _COMMENT_LINES or told > _COMMENT_BYTES:
+                while len(comments) > bounds.COMMENT_LINES or told > bounds.COMMENT_BYTES:
                     told -= len(comments.popleft().raw)
                 continue
             lines.append(line)
             held += len(raw)
             if len(lines) >= _LINES or (held > _BYTES and len(lines) > _UNIT_LINES):
                 break
-        if not lines and (number > _MOST_LINES_BEFORE or start > _MOST_BYTES_BEFORE):
+        if not lines and (number > bounds.MOST_LINES_BEFORE or start > bounds.MOST_BYTES_BEFORE):
             raise RecordingError(
                 f"{self._file}: no record in the first {number} lines, which are blank or "
                 "comments; expected some: mend 'comment' in the sensor file"
