@@ -261,7 +261,7 @@ def _inspect(given: argparse.Namespace) -> int:
     except BoundError as error:
         print(
             f"{given.log.name}: to list it {error}; expected the log of an inertial sensor: copy "
-            "its data into a file of their own",
+            "what it measured into a file of its own",
             file=sys.stderr,
         )
         return 2

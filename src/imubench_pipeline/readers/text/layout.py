@@ -30,8 +30,7 @@ Column = str | int
 _COMMENTS = ("#", "//", "%", ";", "!")
 _SPLITS = (*map(Split, ";\t|,"), Split(" ", runs=True), Split(" "))
 _LINES, _BYTES, _UNIT_LINES = 500, 1 << 20, 3
-_SCORED_LINES, _SCORED_CELLS = 50, 50
-_SHOWN, _LONGEST_SHOWN = 20, 40
+_SCORED_LINES, _SCORED_CELLS, _SHOWN, _LONGEST_SHOWN = 50, 50, 20, 40
 
 
 @dataclass(frozen=True)
