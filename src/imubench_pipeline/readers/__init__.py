@@ -23,6 +23,7 @@ from imubench_pipeline.settings.sensor import (
     ColumnSource,
     LogFormat,
 )
+from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
 
 __all__ = [
@@ -161,7 +162,9 @@ def only_log(path: Path, present: list[Path]) -> Path:
 
 
 def _names(path: Path, files: list[Path]) -> str:
-    names = ", ".join(file.relative_to(path).as_posix() for file in files[:30]) or "no file"
+    names = (
+        ", ".join(cut(file.relative_to(path).as_posix(), str) for file in files[:30]) or "no file"
+    )
     return f"{names} and {len(files) - 30} more" if len(files) > 30 else names
 
 

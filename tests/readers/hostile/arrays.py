@@ -73,17 +73,17 @@ def long_names() -> bytes:
     return matlab(matrix(STRUCTURE, b"s", fields(60_000, b"n" * 60_000, body)))
 
 
-def lying_batch(folder: Path) -> Path:
-    """Write a buffer of 2 kB that is said to unpack to 8 GiB."""
+def batch(folder: Path, rows: int, said: int | None = None) -> Path:
+    """Write a batch of zeros; ``said``: MiB that its one buffer is said to unpack to."""
     path = folder / "log.arrow"
-    table = pa.record_batch({"wx": np.zeros(1_000_000)})
+    table = pa.record_batch({"wx": np.zeros(rows)})
     options = pa.ipc.IpcWriteOptions(compression="zstd")
     with pa.ipc.new_file(str(path), table.schema, options=options) as out:
         out.write_batch(table)
-    data = path.read_bytes()
-    said = (8_000_000).to_bytes(8, "little")
-    assert data.count(said) == 1
-    path.write_bytes(data.replace(said, (8 << 30).to_bytes(8, "little")))
+    if said is not None:
+        data, true = path.read_bytes(), (8 * rows).to_bytes(8, "little")
+        assert data.count(true) == 1
+        path.write_bytes(data.replace(true, (said * MIB).to_bytes(8, "little")))
     return path
 
 
@@ -112,6 +112,16 @@ ARRAYS = {
         FIRST,
     ),
     "a batch that is said to have 8 GiB": Attack(
-        lying_batch, "malloc of size 8589934592 failed", channels=FIRST
+        lambda folder: batch(folder, 1_000_000, 8192),
+        "a compressed record batch unpacks to 8589934592 bytes",
+        channels=FIRST,
+    ),
+    "a batch of 256 MiB": Attack(
+        lambda folder: batch(folder, 32 * MIB), "^read: 33554432$", "^listed: ", FIRST
+    ),
+    "a batch of more": Attack(
+        lambda folder: batch(folder, 32 * MIB + 1),
+        "a compressed record batch unpacks to 268435464 bytes",
+        channels=FIRST,
     ),
 }

@@ -87,7 +87,16 @@ def external(folder: Path) -> Path:
     return path
 
 
+def long_names(made: h5py.File) -> None:
+    """Write names of 5 kB with line breaks and what clears a terminal."""
+    for number in range(30):
+        made["\n\x1b[2J" * 1000 + str(number)] = np.ones(100)
+
+
 HDF5 = {
+    "names that clear a terminal": Attack(
+        hdf5(long_names), "no variable or column 'wx' .*; the file has .*; mend 'column'", "^listed"
+    ),
     "20000 links": Attack(hdf5(links), "more than 20000 objects"),
     "5000 groups deep": Attack(hdf5(deep_groups), "groups lie more than 64 deep"),
     "a cycle of groups": Attack(hdf5(cycle), "^read: 100$", "^listed: read so: 2 channels"),

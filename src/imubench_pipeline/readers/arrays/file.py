@@ -30,6 +30,7 @@ from imubench_pipeline.readers.arrays.time import ArrayTime
 from imubench_pipeline.readers.batch import Batch, LogFile, stated_in
 from imubench_pipeline.readers.bounds import LARGEST_CHUNKS, LARGEST_RECORD, MOST_ARRAYS
 from imubench_pipeline.readers.stated_units import StatedUnit, stated
+from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
 
 _BLOCK_ROWS = 1 << 18
@@ -379,4 +380,6 @@ def _contents(tables: dict[str, Table], labels: bool = False) -> str:
 
 def _listed(names: Iterable[str]) -> str:
     every = list(names)
-    return ", ".join(every[:_SHOWN]) + (", ..." if len(every) > _SHOWN else "")
+    return ", ".join(cut(name, str) for name in every[:_SHOWN]) + (
+        ", ..." if len(every) > _SHOWN else ""
+    )
