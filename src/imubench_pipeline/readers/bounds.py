@@ -20,7 +20,7 @@ on the average at least."""
 LARGEST_DIRECTORY, MOST_MEMBERS = 1 << 21, 1 << 16
 """Bytes of the directory of a zip archive; members of one that has lost it."""
 
-MOST_LOOKED_INTO = 1000
+MOST_LOOKED_INTO = 1 << 14
 """Members of an archive among which the one that is text is looked for."""
 
 # --------------------------------------------------------------------------------------- text
