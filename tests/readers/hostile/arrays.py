@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import struct
 import zipfile
 import zlib
@@ -43,6 +44,16 @@ def wide_records() -> bytes:
     descr = ",".join(f"('{number}','f8',(1000,))" for number in range(400))
     header = f"{{'descr': [{descr}], 'fortran_order': False, 'shape': (1,)}}"
     return npy(header.encode().ljust(9990)) + bytes(400 * 8000)
+
+
+def long_record(folder: Path) -> Path:
+    """Write a record of 100 MB, of which the file system keeps none."""
+    descr = "[('wx','f8'),('rest','V100000000')]"
+    header = npy(f"{{'descr': {descr}, 'fortran_order': False, 'shape': (1,)}}".encode().ljust(180))
+    path = folder / "log.npy"
+    path.write_bytes(header)
+    os.truncate(path, len(header) + 100_000_008)
+    return path
 
 
 def element(kind: int, data: bytes) -> bytes:
@@ -96,6 +107,9 @@ ARRAYS = {
     "8000 signs": Attack(file("a.npy", lambda: literal("-" * 8000 + "1")), CORRUPT, channels=FIRST),
     "400000 fields": Attack(
         file("a.npy", wide_records), "has more than 16384 columns", channels=FIRST
+    ),
+    "a record of 100 MB": Attack(
+        long_record, "one record takes 100000008 bytes; expected at most", channels=FIRST
     ),
     "names of 60 kB": Attack(
         file("a.mat", long_names), "names of fields of 60000 bytes", channels=FIRST

@@ -77,6 +77,11 @@ def nested_archives(folder: Path) -> Path:
 
 
 PACKED = {
+    "a sentence of 2 MB": Attack(
+        file("log.txt", lambda: b"$VNYMR,1*00\n$VNYMR," + b"1," * MIB),
+        "no line break in 1048576 bytes",
+        channels={"gyro_x": {"column": "gyro_x"}},
+    ),
     "empty gzip members": Attack(file("log.csv.gz", lambda: gzip.compress(b"") * 1_000_000), PARTS),
     "empty zstd frames": Attack(
         file("log.csv.zst", lambda: zstandard.compress(b"") * 1_000_000), PARTS
