@@ -96,6 +96,23 @@ def test_a_script_that_fails_says_where(steps: Processes, tmp_path: Path) -> Non
     assert "No such file" in (tmp_path / "out.log").read_text()
 
 
+def test_a_script_has_so_much_memory(steps: Processes, tmp_path: Path) -> None:
+    text = "import numpy as np\nif __name__ == '__main__': np.ones({} * 10**6 // 8)\n"
+    put(tmp_path, "modest", text.format(100))
+    put(tmp_path, "greedy", text.format(300))
+    limited = {
+        name: replace(job(name, tmp_path / "out"), memory=200 * 10**6)
+        for name in ("modest", "greedy")
+    }
+    steps.run(limited["modest"])
+    with pytest.raises(StepError, match=r"^greedy.py failed$") as caught:
+        steps.run(limited["greedy"])
+    assert caught.value.cause == "error"
+    assert "MemoryError: Unable to allocate 286. MiB" in caught.value.reason
+    assert caught.value.reason.endswith("; limits.memory allows 200 MB")
+    run(steps, "greedy", tmp_path / "out")
+
+
 def test_a_script_that_is_killed_harms_no_other(steps: Processes, tmp_path: Path) -> None:
     put(tmp_path, "dies", "import os\nif __name__ == '__main__': os.kill(os.getpid(), 9)\n")
     put(tmp_path, "say", SAY.replace("here = snakemake", "here = globals().get('snakemake')"))

@@ -234,7 +234,7 @@ def test_encrypted_and_odd_members_are_named(tmp_path: Path, text: bytes) -> Non
 
 @pytest.mark.parametrize("way", ["gz", "zst", "xz", "bz2", "zip"])
 def test_bombs_are_stopped(tmp_path: Path, way: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compressed, "_UNSUSPICIOUS", 1 << 22)
+    monkeypatch.setattr(compressed, "UNSUSPICIOUS", 1 << 22)
     path = written(tmp_path, PACKED[way](b"wx,ax\n1,2\n" + bytes(20 << 20)), "r.csv")
     with pytest.raises(RecordingError, match=r"expands to more than 800 times its size"):
         columns(path, log_format())

@@ -5,7 +5,7 @@ import gc
 import os
 
 from imubench_pipeline.run.plan import Plan
-from imubench_pipeline.run.resources import OfMany, OfRecording, asked, time_limits
+from imubench_pipeline.run.resources import OfMany, OfRecording, asked, limits_of_steps
 from imubench_pipeline.run.scripts import Scripts
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, SAMPLES, TABLES
@@ -22,7 +22,7 @@ except ConfigError as error:
 
 # What a rule does is named by its `script:`, and Snakemake calls the function of this name for it.
 # This one forks a process that has the imports. On a cluster what fails is tried again by Snakemake.
-script = Scripts(plan.faults, None if workflow.remote_exec else time_limits(plan))
+script = Scripts(plan.faults, None if workflow.remote_exec else limits_of_steps(plan))
 cost = asked(plan)
 
 RESULTS = str(plan.run.results)

@@ -7,6 +7,7 @@ from itertools import islice
 from pathlib import Path
 
 from imubench_pipeline.readers.batch import Batch, LogFile, stated_in
+from imubench_pipeline.readers.bounds import MOST_LOOKED_INTO
 from imubench_pipeline.readers.compressed import (
     holds_text,
     is_archive,
@@ -22,6 +23,7 @@ from imubench_pipeline.settings.sensor import (
     ColumnSource,
     LogFormat,
 )
+from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
 
 __all__ = [
@@ -149,7 +151,7 @@ def only_log(path: Path, present: list[Path]) -> Path:
         If there is another number of logs.
     """
     logs = [file for file in present if file.parent == path] or present
-    if len(logs) > 1 and not path.is_dir():
+    if 1 < len(logs) <= MOST_LOOKED_INTO and not path.is_dir():
         logs = list(islice(filter(holds_text, logs), 2))  # two are as bad as a thousand
     if len(logs) != 1:
         raise RecordingError(
@@ -160,7 +162,10 @@ def only_log(path: Path, present: list[Path]) -> Path:
 
 
 def _names(path: Path, files: list[Path]) -> str:
-    return ", ".join(file.relative_to(path).as_posix() for file in files[:30]) or "no file"
+    names = (
+        ", ".join(cut(file.relative_to(path).as_posix(), str) for file in files[:30]) or "no file"
+    )
+    return f"{names} and {len(files) - 30} more" if len(files) > 30 else names
 
 
 def _open(file: Path, log: LogFormat, sources: dict[str, ColumnSource]) -> LogFile:

@@ -2,31 +2,28 @@
 
 from __future__ import annotations
 
-import bz2
-import gzip
 import io
 import lzma
 import stat
 import struct
 import zipfile
 import zlib
-from collections.abc import Callable, Mapping
-from contextlib import closing
+from collections.abc import Iterator, Mapping
+from contextlib import closing, contextmanager
 from functools import lru_cache
 from pathlib import Path
 from typing import IO, Any
 
+from imubench_pipeline.readers.bounds import (
+    LARGEST_DIRECTORY,
+    LARGEST_RATIO,
+    MOST_MEMBERS,
+    UNSUSPICIOUS,
+)
+from imubench_pipeline.readers.decompression import OPENED
 from imubench_pipeline.tables.findings import RecordingError
 
-_FED = 1 << 11
-"""Bytes of zstd data decompressed at a time: they may stand for 32768 times as many."""
-
 _READ = 1 << 16
-_LARGEST_WINDOW = 1 << 27
-_UNSUSPICIOUS = 1 << 28
-_LARGEST_RATIO = 800
-"""A log that expands further holds nothing but one character."""
-
 _SEEN = 1 << 12
 _SCANNED = 1 << 20
 _ZIP_LOCAL = b"PK\x03\x04"
@@ -36,6 +33,7 @@ _ZIP_METHODS = {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}
 _OTHER_METHODS = {9: "deflate64", 12: "bzip2", 14: "LZMA", 93: "zstd", 95: "xz", 98: "PPMd"}
 _ENCRYPTED, _SIZE_FOLLOWS, _UTF_8 = 1, 8, 0x800
 _LONGEST_MEMBER_NAME = 512
+_LONGEST_HEADER = _ZIP_HEADER.size + _LONGEST_MEMBER_NAME
 _UNKNOWN_SIZE = 1 << 62
 
 
@@ -55,7 +53,7 @@ class Bytes:
         self.ended_early = False
         self._stream = stream
         self._streams = (stream, *under)
-        self._left = max(_UNSUSPICIOUS, _LARGEST_RATIO * size)
+        self._left = max(UNSUSPICIOUS, LARGEST_RATIO * size)
 
     def read(self, size: int) -> bytes:
         """Return the next bytes, at most ``size``; none at the end.
@@ -76,7 +74,7 @@ class Bytes:
         self._left -= len(block)
         if self._left < 0:
             raise RecordingError(
-                f"{self.name}: expands to more than {_LARGEST_RATIO} times its size, which no log "
+                f"{self.name}: expands to more than {LARGEST_RATIO} times its size, which no log "
                 "does; expected compressed text: unpack it and look what it is"
             )
         return block
@@ -85,44 +83,6 @@ class Bytes:
         """Close the file."""
         for stream in self._streams:
             stream.close()
-
-
-class _Zstd:
-    """The decompressed bytes of zstd frames; unlike the library's, it tells an early end."""
-
-    def __init__(self, file: IO[bytes]) -> None:
-        import zstandard  # only a log that is compressed so needs it
-
-        self._new: Callable[[], Any] = zstandard.ZstdDecompressor(
-            max_window_size=_LARGEST_WINDOW
-        ).decompressobj
-        self._error = zstandard.ZstdError
-        self._file = file
-        self._frame: Any = None
-        self._fed = b""
-        self._ready = memoryview(b"")
-
-    def read1(self, size: int) -> bytes:
-        while not self._ready:
-            self._fed = self._fed or self._file.read(_FED)
-            if not self._fed:
-                if self._frame is not None:
-                    raise EOFError
-                return b""
-            self._frame = self._frame or self._new()
-            try:
-                self._ready = memoryview(self._frame.decompress(self._fed))
-            except self._error as error:
-                raise OSError(str(error)) from None
-            self._fed = b""
-            if self._frame.eof:
-                self._fed, self._frame = self._frame.unused_data, None
-        # Views, for to copy the rest each time would take the square of its size.
-        block, self._ready = self._ready[:size], self._ready[size:]
-        return bytes(block)
-
-    def close(self) -> None:
-        self._file.close()
 
 
 class _Deflated:
@@ -169,14 +129,6 @@ class _Deflated:
         if self._size < 0:
             raise zipfile.BadZipFile("more data than the directory says")
 
-
-_OPENED: Mapping[bytes, Callable[[IO[bytes]], Any]] = {
-    b"\x1f\x8b": lambda file: gzip.GzipFile(fileobj=file),
-    b"\x28\xb5\x2f\xfd": _Zstd,
-    b"\xfd7zXZ\0": lzma.LZMAFile,
-    b"BZh": bz2.BZ2File,
-}
-"""How a file is opened that begins so."""
 
 _NOT_READ: Mapping[bytes, str] = {
     b"7z\xbc\xaf\x27\x1c": "7z",
@@ -236,7 +188,7 @@ def open_bytes(path: Path) -> Bytes:
                     f"{path.name}: is compressed with {kind}; expected gzip, zstd, xz, bzip2 or "
                     "zip: unpack it"
                 )
-        opened = next((how for magic, how in _OPENED.items() if begin.startswith(magic)), None)
+        opened = next((how for magic, how in OPENED.items() if begin.startswith(magic)), None)
         if opened is None:
             return Bytes(path.name, file, _UNKNOWN_SIZE)
         return Bytes(path.name, opened(file), path.stat().st_size, (file,))
@@ -303,7 +255,7 @@ def _directory_of(archive: Path, _size: int, _written: int) -> Mapping[str, zipf
     """Read the directory of an archive once, and not for each of its files."""
     try:
         try:
-            with zipfile.ZipFile(archive) as file:
+            with opened_archive(archive) as file:
                 found = file.infolist()
         except zipfile.BadZipFile:
             found = _scanned(archive)
@@ -319,6 +271,42 @@ def _directory_of(archive: Path, _size: int, _written: int) -> Mapping[str, zipf
     }
 
 
+@contextmanager
+def opened_archive(path: Path) -> Iterator[zipfile.ZipFile]:
+    """Open a zip archive whose directory is no larger than that of a log.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    RecordingError
+        If its directory is larger.
+    """
+    with _Archive(path) as file, zipfile.ZipFile(file) as archive:
+        file.most = None
+        yield archive
+
+
+class _Archive(io.FileIO):
+    """An archive of which the library cannot read a large directory, which it does at once."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path, "rb")
+        self._shown = path.name
+        self.most: int | None = LARGEST_DIRECTORY
+
+    def read(self, size: int | None = -1) -> bytes:
+        """Return the next bytes."""
+        if self.most is not None and size is not None and size > self.most:
+            raise RecordingError(
+                f"{self._shown}: the directory of the archive has {size} bytes, which are some "
+                f"{size // 60} members; expected at most {self.most} bytes: pack the log alone"
+            )
+        return super().read(-1 if size is None else size)
+
+
 def _scanned(archive: Path) -> list[zipfile.ZipInfo]:
     """Return the members of an archive without a directory, which stands at its end."""
     found: list[zipfile.ZipInfo] = []
@@ -327,14 +315,19 @@ def _scanned(archive: Path) -> list[zipfile.ZipInfo]:
         while block := file.read(_SCANNED):
             held += block
             at = held.find(_ZIP_LOCAL)
-            while at >= 0 and at + _ZIP_HEADER.size + _LONGEST_MEMBER_NAME <= len(held):
-                found += _local_header(held[at:], start + at)
+            while at >= 0 and at + _LONGEST_HEADER <= len(held):
+                found += _local_header(held[at : at + _LONGEST_HEADER], start + at)
                 at = held.find(_ZIP_LOCAL, at + 1)
+            if len(found) > MOST_MEMBERS:
+                raise RecordingError(
+                    f"{archive.name}: an archive without its directory, with more than "
+                    f"{MOST_MEMBERS} members; expected the log alone: pack it anew"
+                )
             keep = at if at >= 0 else max(len(held) - 3, 0)
             start, held = start + keep, held[keep:]
         at = held.find(_ZIP_LOCAL)
         while at >= 0:
-            found += _local_header(held[at:], start + at)
+            found += _local_header(held[at : at + _LONGEST_HEADER], start + at)
             at = held.find(_ZIP_LOCAL, at + 1)
     return found
 

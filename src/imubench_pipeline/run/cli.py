@@ -236,8 +236,13 @@ def _check(given: argparse.Namespace) -> int:
     return worst
 
 
+INSPECTED_S, INSPECTED_BYTES = 10.0, 1 << 29
+"""Time and memory in which a log is listed, or rejected."""
+
+
 def _inspect(given: argparse.Namespace) -> int:
     from imubench_pipeline.readers.inspection import inspect
+    from imubench_pipeline.run.bounded import BoundError, bounded
     from imubench_pipeline.tables.findings import RecordingError
 
     if isinstance(sys.stdout, io.TextIOWrapper):
@@ -248,10 +253,18 @@ def _inspect(given: argparse.Namespace) -> int:
         print(f"{output}: exists already; expected a new name", file=sys.stderr)
         return 2
     try:
-        found = inspect(given.log, output.stem if output is not None else None)
+        model = output.stem if output is not None else None
+        found = bounded(INSPECTED_S, INSPECTED_BYTES, inspect, given.log, model)
         if output is not None:
             with replacing(output) as temporary:
                 temporary.write_text(found.block, encoding="utf-8")
+    except BoundError as error:
+        print(
+            f"{given.log.name}: to list it {error}; expected the log of an inertial sensor: copy "
+            "what it measured into a file of its own",
+            file=sys.stderr,
+        )
+        return 2
     except (RecordingError, OSError) as error:
         print(error, file=sys.stderr)
         return 2

@@ -85,6 +85,8 @@ class Job:
         What the script sees as ``snakemake.input`` and so on. They are pickled.
     log : Path
         What is printed goes to the end of it.
+    memory : int or None
+        Bytes that it may take beside what the process that forks has; None: no limit.
     """
 
     script: Path
@@ -93,6 +95,7 @@ class Job:
     params: Any
     wildcards: Any
     log: Path
+    memory: int | None = None
 
     @property
     def name(self) -> str:

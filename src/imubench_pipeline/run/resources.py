@@ -2,7 +2,7 @@
 
 The costs that the rules state are what steps took of logs of up to 60 million samples
 (docs/cluster.md); here a margin is added. A job has one core whatever its log: no step computes
-with more. A run on one computer is not held to any of it.
+with more. A run on one computer is held to the limits alone, far above what steps take.
 """
 
 from __future__ import annotations
@@ -26,6 +26,8 @@ small steps of the same group."""
 
 _START = 60
 """s; a cold start of Python from a shared file system, and the compilers of a first run."""
+
+_MB = 10**6
 
 _MARGIN = 10
 """A busy node and a slow file system may take that many times the time measured."""
@@ -181,8 +183,8 @@ def asked(plan: Plan) -> Callable[[Cost], dict[str, Asked]]:
     return stated
 
 
-def time_limits(plan: Plan) -> Limits:
-    """Return how long each step of a recording or a sensor may take, as the plan sets it.
+def limits_of_steps(plan: Plan) -> Limits:
+    """Return what each step of a recording or a sensor may take, as the plan sets it.
 
     Parameters
     ----------
@@ -191,16 +193,22 @@ def time_limits(plan: Plan) -> Limits:
     extent = _extents(plan)
     given = plan.run.limits
     seconds = {
-        key: quantity_to_si(value, "time") for key, value in given.model_dump(mode="json").items()
+        key: quantity_to_si(getattr(given, key), "time")
+        for key in ("recording", "million_values", "sensor", "each_recording")
     }
 
     def limit(sensor: str, recording: str | None) -> Limit:
         of = extent(sensor, recording)
         if recording is None:
-            more = seconds["each_recording"] * of.recordings
-            return Limit(seconds["sensor"] + more, "limits.sensor, limits.each_recording")
-        more = seconds["million_values"] * of.million_samples * of.channels
-        return Limit(seconds["recording"] + more, "limits.recording, limits.million_values")
+            time = seconds["sensor"] + seconds["each_recording"] * of.recordings
+            memory = given.memory + given.memory_of_each_recording * of.recordings
+            words = "limits.sensor, limits.each_recording"
+        else:
+            values = of.million_samples * of.channels
+            time = seconds["recording"] + seconds["million_values"] * values
+            memory = given.memory + math.ceil(given.memory_of_million_values * values)
+            words = "limits.recording, limits.million_values"
+        return Limit(time, words, memory * _MB)
 
     return limit
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,17 +17,20 @@ from imubench_pipeline.tables.failures import Failure
 
 @dataclass(frozen=True)
 class Limit:
-    """How long a step may take.
+    """What a step may take.
 
     Attributes
     ----------
     seconds : float
     words : str
-        Where it is set.
+        Where that is set.
+    memory : int
+        Bytes beside what the process that forks has.
     """
 
     seconds: float
     words: str
+    memory: int
 
 
 Limits = Callable[[str, str | None], Limit]
@@ -47,7 +50,7 @@ class Scripts:
     faults : Faults
         Where it is recorded what failed.
     limits : callable, optional
-        How long a step of one recording or sensor may take; without, each failure ends the job.
+        What a step of one recording or sensor may take; without, each failure ends the job.
     """
 
     def __init__(self, faults: Faults, limits: Limits | None) -> None:
@@ -121,6 +124,7 @@ class Scripts:
             self._faults.succeeded(of, attempt)
 
     def _tried(self, job: Job, limit: Limit) -> None:
+        job = replace(job, memory=limit.memory)
         try:
             self._processes.run(job, limit.seconds)
         except StepError as error:

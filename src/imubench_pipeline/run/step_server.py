@@ -24,6 +24,7 @@ from typing import Any
 from numba import njit
 
 from imubench_pipeline.report.run_summary import one_line
+from imubench_pipeline.run.bounded import limit_memory
 from imubench_pipeline.run.processes import BEGUN, DONE, FAILED, KILLED, LENGTH, Job
 
 _LONGEST = 300
@@ -108,7 +109,8 @@ def _nothing() -> None:
 
 def _run(connection: socket.socket, job: Job, *, imported: bool) -> None:
     """Run a script in this fork, say how it ended, and end."""
-    how, told = FAILED, {"imported": imported, "error": "", "trace": "", "errno": None}
+    how = FAILED
+    told: dict[str, Any] = {"imported": imported, "error": "", "trace": "", "errno": None}
     try:
         for other in _running.values():
             other.close()
@@ -120,11 +122,15 @@ def _run(connection: socket.socket, job: Job, *, imported: bool) -> None:
             Path("/proc/self/comm").write_text(job.name)  # for ps and top
         connection.sendall(BEGUN)
         _print_to(job.log)
+        if job.memory is not None:
+            limit_memory(job.memory)
         runpy.run_path(str(job.script), init_globals={"snakemake": job}, run_name="__main__")
         how = DONE
     except BaseException as error:
         told["trace"] = _said(error, str(job.script))
         told["error"] = one_line("".join(traceback.format_exception_only(error)), _LONGEST)
+        if isinstance(error, MemoryError):
+            told["error"] += f"; limits.memory allows {(job.memory or 0) // 10**6} MB"
         told["errno"] = error.errno if isinstance(error, OSError) else None
     finally:
         sys.stdout.flush()

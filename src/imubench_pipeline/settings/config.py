@@ -197,7 +197,7 @@ class EarthRateSettings(Strict):
 
 
 class LimitSettings(Strict):
-    """How long a step may take of one recording or sensor, which is left out beyond."""
+    """What a step may take of one recording or sensor, which is left out beyond."""
 
     recording: Duration = Field("10 min", description="each step of a recording")
     million_values: Duration = Field(
@@ -206,6 +206,15 @@ class LimitSettings(Strict):
     sensor: Duration = Field("10 min", description="each step of a sensor")
     each_recording: Duration = Field(
         "2 s", description="of it more for each of the sensor's recordings"
+    )
+    memory: int = Field(
+        2000, ge=1000, description="MB of each step of a recording or sensor, on Linux"
+    )
+    memory_of_million_values: int = Field(
+        200, ge=0, description="of it more for each million values of the log"
+    )
+    memory_of_each_recording: int = Field(
+        20, ge=0, description="of it more for each of the sensor's recordings"
     )
 
 

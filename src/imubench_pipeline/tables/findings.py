@@ -52,10 +52,12 @@ class RecordingError(ValueError):
     """A recording that cannot be used; the text is the reason, with what to mend.
 
     What a damaged file puts into it, such as a name of a million letters, is left out of the
-    middle.
+    middle; of what is no sign to print, such as a line break in a name, a question mark is left.
     """
 
     def __init__(self, reason: str) -> None:
+        if not reason.isprintable():
+            reason = "".join(sign if sign.isprintable() else "?" for sign in reason)
         if len(reason) > 2 * _HALF_REASON:
             reason = f"{reason[:_HALF_REASON]} [...] {reason[-_HALF_REASON:]}"
         super().__init__(reason)

@@ -2,7 +2,7 @@
 
 A column is a name or a position; ``variable`` is not used. A null is a missing sample. A column of
 timestamps is time with ``format: iso8601``. A corrupt page of Parquet is seen where the file has
-checksums. A record batch of a compressed Feather file is unpacked as a whole.
+checksums. A record batch of a compressed Feather file is unpacked as a whole, and refused if large.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from imubench_pipeline.readers.arrays.arrow_messages import check_batches
 from imubench_pipeline.readers.arrays.file import ArrayFile
 from imubench_pipeline.readers.arrays.table import Column, Table, UnusableError
 
@@ -37,6 +38,7 @@ class ArrowFile(ArrayFile):
             )
             return [_ParquetTable(stack.enter_context(file))]
         if begin.startswith((_FILE, _STREAM)):
+            check_batches(self.path, begin == _FILE)
             source = stack.enter_context(pa.memory_map(str(self.path)))
             opened = pa.ipc.open_file if begin == _FILE else pa.ipc.open_stream
             return [_IpcTable(opened(source))]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from itertools import islice
@@ -13,7 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.readers.arrays.file import ArrayFile, check_not_empty, explained, numbers
+from imubench_pipeline.readers.arrays.file import (
+    ArrayFile,
+    check_not_empty,
+    explained,
+    numbers,
+    rows_of_block,
+)
 from imubench_pipeline.readers.arrays.table import DATES, NUMBERS, Table
 from imubench_pipeline.readers.file_format import (
     FIRST,
@@ -102,8 +109,9 @@ def _table(path: Path, file_format: FileFormat, table: Table) -> LogTable:
         return LogTable(file_format, table.name, fault=str(error).removeprefix(f"{path.name}: "))
     kinds: dict[str, Kind] = {DATES: "date", **dict.fromkeys(NUMBERS, "number")}
     columns = []
+    labels = Counter(table.labels)
     for place, column in enumerate(described):
-        source, address = _called(table, place)
+        source, address = _called(table, place, labels)
         raw = values.get(place, np.empty(0))
         dated = column.kind == DATES
         columns.append(
@@ -124,10 +132,10 @@ def _table(path: Path, file_format: FileFormat, table: Table) -> LogTable:
     return LogTable(file_format, table.name, tuple(columns), variable, rows=table.rows, about=about)
 
 
-def _called(table: Table, place: int) -> tuple[str | int, str | int]:
+def _called(table: Table, place: int, labels: Mapping[str, int]) -> tuple[str | int, str | int]:
     """Return what a column is called, in its table and in the whole file."""
     label = table.labels[place] if table.labels else ""
-    if not label.isprintable() or table.labels.count(label) > 1:
+    if label and (not label.isprintable() or labels[label] > 1):
         label = ""
     if label:
         return label, f"{table.name}/{label}" if table.name else label
@@ -144,7 +152,7 @@ def _first(table: Table, places: Sequence[int]) -> dict[int, NDArray[Any]]:
     """Return the first records of some columns, by position."""
     if not places:
         return {}
-    rows = max(1, min(ROWS, _MOST_BYTES // max(table.row_bytes(places), 1)))
+    rows = min(ROWS, rows_of_block(table.row_bytes(places), _MOST_BYTES))
     for block in table.blocks(places, rows):
         if len(block[0]):
             return {place: values[:rows] for place, values in zip(places, block, strict=True)}

@@ -28,14 +28,14 @@ from numpy.typing import NDArray
 from imubench_pipeline.readers.arrays.table import DATES, NUMBERS, Column, Table, UnusableError
 from imubench_pipeline.readers.arrays.time import ArrayTime
 from imubench_pipeline.readers.batch import Batch, LogFile, stated_in
+from imubench_pipeline.readers.bounds import LARGEST_CHUNKS, LARGEST_RECORD, MOST_ARRAYS
 from imubench_pipeline.readers.stated_units import StatedUnit, stated
+from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
 
 _BLOCK_ROWS = 1 << 18
-_BLOCK_BYTES = 1 << 26
 _TIME = "time"
 _SHOWN = 20
-_MOST_TABLES = 100_000
 _OF_MATRIX = re.compile(r"(.+)\[(\d{1,9})\]")
 
 _Place = tuple[Table, int]
@@ -66,9 +66,7 @@ class ArrayFile(LogFile):
     def _guarded(self) -> Iterator[dict[str, NDArray[Any]]]:
         """Yield the blocks as written; whatever a library raises becomes a `RecordingError`."""
         with explained(self.path), ExitStack() as stack:
-            yield from self._blocks(
-                self._places(list(islice(self.tables(stack), _MOST_TABLES + 1)))
-            )
+            yield from self._blocks(self._places(list(islice(self.tables(stack), MOST_ARRAYS + 1))))
 
     # --------------------------------------------------------------------------- blocks
 
@@ -79,8 +77,15 @@ class ArrayFile(LogFile):
             table: sorted({position for held, position in places.values() if held is table})
             for table in tables
         }
-        held = sum(table.row_bytes(wanted[table]) for table in tables)
-        rows = max(1, min(_BLOCK_ROWS, _BLOCK_BYTES // max(held, 1)))
+        held = sum(table.held_bytes(wanted[table]) for table in tables)
+        if held > LARGEST_CHUNKS:
+            raise UnusableError(
+                f"the columns lie in chunks of {held} bytes together; expected at most "
+                f"{LARGEST_CHUNKS}: repack the file with smaller chunks"
+            )
+        rows = rows_of_block(
+            sum(table.row_bytes(wanted[table]) for table in tables), LARGEST_RECORD
+        )
         read = 0
         streams = [table.blocks(wanted[table], rows) for table in tables]
         for parts in zip(*streams, strict=True):
@@ -103,8 +108,8 @@ class ArrayFile(LogFile):
 
     def _places(self, tables: Sequence[Table]) -> dict[str, _Place]:
         by_name: dict[str, Table] = {}
-        if len(tables) > _MOST_TABLES:
-            raise UnusableError(f"more than {_MOST_TABLES} arrays; expected the log of one sensor")
+        if len(tables) > MOST_ARRAYS:
+            raise UnusableError(f"more than {MOST_ARRAYS} arrays; expected the log of one sensor")
         for table in tables:
             if table.name in by_name:
                 raise UnusableError(f"{table.shown} stands twice; expected one array of that name")
@@ -158,6 +163,29 @@ def _stated_units(places: Mapping[str, _Place]) -> dict[str, StatedUnit]:
         if unit is not None:
             found[name] = unit
     return found
+
+
+def rows_of_block(row_bytes: int, most: int) -> int:
+    """Return how many records are read at a time.
+
+    Parameters
+    ----------
+    row_bytes : int
+        Memory that one takes.
+    most : int
+        That all may take together.
+
+    Raises
+    ------
+    UnusableError
+        If one alone takes more.
+    """
+    if row_bytes > most:
+        raise UnusableError(
+            f"one record takes {row_bytes} bytes; expected at most {most}: store the log's columns "
+            "in an array of their own"
+        )
+    return min(_BLOCK_ROWS, most // max(row_bytes, 1))
 
 
 def check_not_empty(path: Path) -> None:
@@ -352,4 +380,6 @@ def _contents(tables: dict[str, Table], labels: bool = False) -> str:
 
 def _listed(names: Iterable[str]) -> str:
     every = list(names)
-    return ", ".join(every[:_SHOWN]) + (", ..." if len(every) > _SHOWN else "")
+    return ", ".join(cut(name, str) for name in every[:_SHOWN]) + (
+        ", ..." if len(every) > _SHOWN else ""
+    )

@@ -20,8 +20,12 @@ from numpy.typing import NDArray
 from imubench_pipeline.readers.arrays.file import ArrayFile
 from imubench_pipeline.readers.arrays.hdf5_units import stated_unit
 from imubench_pipeline.readers.arrays.table import Array, Table, UnusableError
+from imubench_pipeline.readers.bounds import DEEPEST_GROUP, LARGEST_CHUNKS, MOST_OBJECTS
 
-_LARGEST_CHUNK = 1 << 28
+_CACHE_SLOTS, _CACHE_WEIGHT, _LEAST_CACHE = 521, 0.75, 1 << 20
+"""As the library has them."""
+
+_ELSEWHERE = "is kept in other files; expected one file: repack it with h5repack"
 
 
 class Hdf5File(ArrayFile):
@@ -44,28 +48,68 @@ def opened(path: Path) -> h5py.File:
     ----------
     path : Path
     """
-    # A chunk that lasts for several blocks is then unpacked once.
-    return h5py.File(path, "r", rdcc_nbytes=_LARGEST_CHUNK)
+    return h5py.File(path, "r")
 
 
-def data_sets(file: h5py.File, time_axis: int = 0) -> list[DataSet]:
-    """Return the data sets of a file by name; links to other files are not followed.
+def data_sets(file: h5py.File, time_axis: int = 0, passed_over: str = "\0") -> list[DataSet]:
+    """Return the data sets of a file by name; links, hard ones apart, are not followed.
 
     Parameters
     ----------
     file : h5py.File
     time_axis : int
         The side of a square matrix that is time.
+    passed_over : str
+        Beginning of the names in the root that are no data.
+
+    Raises
+    ------
+    UnusableError
+        If there are more objects than a log has, or groups lie deeper.
     """
-    found: list[DataSet] = []
+    objects = 0
+    seen = {_identity(file)}
 
-    def visit(name: str | bytes, item: object) -> None:
-        if isinstance(item, h5py.Dataset):
-            shown = name if isinstance(name, str) else name.decode("utf-8", "replace")
-            found.append(DataSet(item, shown, time_axis))
+    def below(group: h5py.Group, above: str, depth: int) -> Iterator[DataSet]:
+        nonlocal objects
+        for key in _names(group, objects, depth):
+            objects += 1
+            name = key if isinstance(key, str) else key.decode("utf-8", "replace")
+            hard = isinstance(group.get(key, getlink=True), h5py.HardLink)
+            if not hard or (not above and name.startswith(passed_over)):
+                continue
+            item = group[key]
+            if (identity := _identity(item)) in seen:
+                continue
+            seen.add(identity)
+            if isinstance(item, h5py.Dataset):
+                yield DataSet(item, above + name, time_axis)
+            elif isinstance(item, h5py.Group):
+                yield from below(item, f"{above}{name}/", depth + 1)
 
-    file.visititems(visit)
-    return found
+    return list(below(file, "", 0))
+
+
+def _names(group: h5py.Group, before: int, depth: int) -> list[str | bytes]:
+    """Return the names in a group; ``before``: how many there were in others."""
+    # The library's own visit goes down with the process where groups lie deep.
+    if depth > DEEPEST_GROUP:
+        raise UnusableError(
+            f"groups lie more than {DEEPEST_GROUP} deep; expected the log of one sensor: copy its "
+            "data sets into a file of their own"
+        )
+    if before + len(group) > MOST_OBJECTS:
+        raise UnusableError(
+            f"more than {MOST_OBJECTS} objects; expected the log of one sensor: copy its data "
+            "sets into a file of their own"
+        )
+    return sorted(group, key=lambda name: name.encode() if isinstance(name, str) else name)
+
+
+def _identity(item: h5py.Group | h5py.Dataset) -> tuple[int, int]:
+    """Return what tells an object from all others of a file."""
+    info = h5py.h5o.get_info(item.id)
+    return info.fileno, info.addr
 
 
 class DataSet(Array):
@@ -84,14 +128,35 @@ class DataSet(Array):
             dtype = data.dtype
         except (TypeError, ValueError):
             dtype = np.dtype(object)  # a type that NumPy does not have
-        super().__init__(name, data.shape if data.shape is not None else (0,), dtype, time_axis)
-        self.data = data
-        if self.fault is None and not _is_sound(dtype):
+        properties = data.id.get_create_plist()
+        # To ask a virtual one for its sides opens the files that it is in, perhaps a pipe.
+        virtual = properties.get_layout() == h5py.h5d.VIRTUAL
+        shape = None if virtual else data.shape
+        super().__init__(name, shape if shape is not None else (0,), dtype, time_axis)
+        if virtual:
+            self.fault = _ELSEWHERE
+        elif self.fault is None and not _is_sound(dtype):
             self.fault = "has a damaged or unusual type; expected standard numbers: copy it again"
+        self._chunk = 0
+        if properties.get_layout() == h5py.h5d.CHUNKED:
+            self._chunk = math.prod(properties.get_chunk()) * data.id.get_type().get_size()
+        self._file, self._path = data.file, h5py.h5i.get_name(data.id)
+
+    @property
+    def data(self) -> h5py.Dataset:
+        """The data set, opened anew: what is open holds what was last unpacked of it."""
+        access = h5py.h5p.create(h5py.h5p.DATASET_ACCESS)
+        # A chunk that lasts for several blocks is then unpacked once.
+        access.set_chunk_cache(_CACHE_SLOTS, max(self._chunk, _LEAST_CACHE), _CACHE_WEIGHT)
+        return h5py.Dataset(h5py.h5d.open(self._file.id, self._path, access))
 
     def unit(self, position: int) -> str | None:
         """Return the unit of its columns, where an attribute states it."""
         return stated_unit(self.data)
+
+    def held_bytes(self, positions: Sequence[int]) -> int:
+        """Return the memory that is held, beside the records, while these columns are read."""
+        return self._chunk
 
     def row_bytes(self, positions: Sequence[int]) -> int:
         """Return the memory that a record takes while these columns are read."""
@@ -103,9 +168,10 @@ class DataSet(Array):
     def blocks(self, positions: Sequence[int], rows: int) -> Iterator[list[NDArray[Any]]]:
         """Yield these columns, ``rows`` records at a time or fewer (see `Table.blocks`)."""
         assert self.rows is not None  # from the shape
-        _check_written(self.data, self.name)
+        data_set = self.data
+        _check_written(data_set, self.name, self._chunk)
         names = self.fields(positions)
-        data = self.data.fields(names) if names else self.data
+        data = data_set.fields(names) if names else data_set
         low, high = min(positions), max(positions) + 1
         for start in range(0, self.rows, rows):
             block = self._block(data, slice(start, start + rows), slice(low, high))
@@ -139,16 +205,12 @@ def _is_sound(dtype: np.dtype[Any]) -> bool:
     )
 
 
-def _check_written(data: h5py.Dataset, name: str) -> None:
+def _check_written(data: h5py.Dataset, name: str, unpacked: int) -> None:
     """Raise where values would be made up, are elsewhere, or are not to be unpacked in blocks."""
     properties = data.id.get_create_plist()
     layout = properties.get_layout()
-    if layout == h5py.h5d.VIRTUAL or (
-        layout == h5py.h5d.CONTIGUOUS and properties.get_external_count()
-    ):
-        raise UnusableError(
-            f"{name} is kept in other files; expected one file: repack it with h5repack"
-        )
+    if layout == h5py.h5d.CONTIGUOUS and properties.get_external_count():
+        raise UnusableError(f"{name} {_ELSEWHERE}")
     size = data.id.get_type().get_size()  # as stored, which NumPy may not have
     if layout == h5py.h5d.CONTIGUOUS and data.id.get_storage_size() < data.size * size:
         raise UnusableError(f"{name} was never written; expected {data.size} values: record again")
@@ -161,10 +223,9 @@ def _check_written(data: h5py.Dataset, name: str) -> None:
                 f"{name} is compressed with filter {code} ({title.decode('ascii', 'replace')}), "
                 "which is not here; expected gzip: repack it with h5repack -f GZIP=4"
             )
-    unpacked = math.prod(data.chunks) * size
-    if unpacked > _LARGEST_CHUNK:
+    if unpacked > LARGEST_CHUNKS:
         raise UnusableError(
-            f"{name} has chunks of {unpacked} bytes; expected at most {_LARGEST_CHUNK}: "
+            f"{name} has chunks of {unpacked} bytes; expected at most {LARGEST_CHUNKS}: "
             "repack it with h5repack -l"
         )
     chunks = math.prod(

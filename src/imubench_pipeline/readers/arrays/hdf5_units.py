@@ -15,8 +15,9 @@ from pathlib import Path
 import h5py
 
 _NAMES = ("unit", "units", "Unit", "Units", "UNIT", "UNITS")
-_LONGEST_WAIT = 10.0
+_LONGEST_WAIT = 3.0
 _LONGEST = 40
+_LONGEST_STORED = 1 << 12
 
 
 def stated_unit(data: h5py.Dataset) -> str | None:
@@ -30,7 +31,7 @@ def stated_unit(data: h5py.Dataset) -> str | None:
     if name is None:
         return None
     kind = data.attrs.get_id(name)
-    if kind.shape != ():
+    if kind.shape != () or kind.dtype.itemsize > _LONGEST_STORED:
         return None
     if kind.dtype.kind == "S":
         text = bytes(data.attrs[name]).decode("utf-8", "replace")

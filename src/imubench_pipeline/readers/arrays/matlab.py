@@ -17,6 +17,8 @@ from imubench_pipeline.readers.arrays import hdf5, matlab_5
 from imubench_pipeline.readers.arrays.file import ArrayFile
 from imubench_pipeline.readers.arrays.table import Table, UnusableError
 
+_LONGEST_CLASS = 64
+
 
 class MatlabFile(ArrayFile):
     """A MATLAB file, of version 7.3 or 5."""
@@ -35,9 +37,9 @@ class MatlabFile(ArrayFile):
 def _variables(file: h5py.File) -> list[Table]:
     """Return the variables of version 7.3: matrices lie there with time along the second side."""
     found: list[Table] = []
-    for data_set in hdf5.data_sets(file, time_axis=1):
-        # What cells, objects and sparse matrices are made of has no meaning alone.
-        if data_set.name.startswith("#") or "MATLAB_sparse" in data_set.data.parent.attrs:
+    # What cells, objects and sparse matrices are made of has no meaning alone.
+    for data_set in hdf5.data_sets(file, time_axis=1, passed_over="#"):
+        if "MATLAB_sparse" in data_set.data.parent.attrs:
             continue
         if data_set.fault is None:
             data_set.fault = _fault(data_set)
@@ -55,7 +57,7 @@ def _fault(data_set: hdf5.DataSet) -> str | None:
         return None
     # Only a plain text is read: the library does not survive every damaged one of another kind.
     kind = attributes.get_id("MATLAB_class")
-    if kind.dtype.kind != "S" or kind.shape != ():
+    if kind.dtype.kind != "S" or kind.shape != () or kind.dtype.itemsize > _LONGEST_CLASS:
         return "has a damaged class; copy the file again"
     if np.bytes_(attributes["MATLAB_class"]) == b"char":
         return "holds text; expected numbers"

@@ -21,6 +21,7 @@ import numpy as np
 
 from imubench_pipeline.readers.arrays.stream import LARGEST_RATIO, StreamedArray, exactly, skip
 from imubench_pipeline.readers.arrays.table import Refused, Table, UnusableError, sides_of
+from imubench_pipeline.readers.bounds import DEEPEST_STRUCTURE, LONGEST_MATLAB_NAME, MOST_SIDES
 
 _HEADER = 128
 _ORDERS = {b"IM": "<", b"MI": ">"}
@@ -43,7 +44,6 @@ _CLASSES = {
 _COMPLEX = 0x0800
 _TABLE = 17
 _LARGEST_HEADER = 1 << 16
-_DEEPEST = 16
 _STEP = {"<": 1, ">": -1}
 """Size and type of a small element stand in the order of the bytes."""
 
@@ -195,6 +195,8 @@ def _matrix(
         kind = flags & 0xFF
         shape = () if kind == _TABLE else _shape(elements)
         own = elements.data(1, 16).decode("utf-8", "replace")
+        if len(own) > LONGEST_MATLAB_NAME:
+            raise _damaged(f"a name of {len(own)} letters", elements.at)
         name = own if above is None else above
         if not name:
             pass  # what MATLAB keeps of functions and objects
@@ -214,8 +216,8 @@ def _matrix(
 def _shape(elements: _Elements) -> tuple[int, ...]:
     data = elements.data(5)
     shape: tuple[int, ...] = struct.unpack(f"{elements.order}{len(data) // 4}i", data)
-    if len(shape) < 2 or min(shape) < 0:
-        raise _damaged(f"sides {shape}", elements.at)
+    if not 2 <= len(shape) <= MOST_SIDES or min(shape) < 0:
+        raise _damaged(f"sides {shape[:MOST_SIDES]}", elements.at)
     return shape
 
 
@@ -231,12 +233,12 @@ def _numeric(elements: _Elements, name: str, shape: tuple[int, ...]) -> Streamed
 
 
 def _fields(elements: _Elements, name: str, depth: int) -> Iterator[Table]:
-    if depth == _DEEPEST:
+    if depth == DEEPEST_STRUCTURE:
         yield Refused(name, f"lies {depth} structures deep; expected a vector or a matrix")
         return
     width = int.from_bytes(elements.data(5), "little" if elements.order == "<" else "big")
     names = elements.data(1)
-    if width < 1:
+    if not 1 <= width <= LONGEST_MATLAB_NAME:
         raise _damaged(f"names of fields of {width} bytes", elements.at)
     for start in range(0, len(names), width):
         field = names[start : start + width].split(b"\0")[0].decode("utf-8", "replace")

@@ -8,6 +8,8 @@ pickled, are refused: to read them would run what is in the file.
 
 from __future__ import annotations
 
+import io
+import struct
 import zipfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
@@ -18,10 +20,13 @@ import numpy as np
 from numpy.lib import format as npy
 
 from imubench_pipeline.readers.arrays.file import ArrayFile
-from imubench_pipeline.readers.arrays.stream import LARGEST_RATIO, StreamedArray
+from imubench_pipeline.readers.arrays.stream import LARGEST_RATIO, StreamedArray, exactly
 from imubench_pipeline.readers.arrays.table import Table, UnusableError, sides_of
+from imubench_pipeline.readers.bounds import LONGEST_NPY_HEADER
+from imubench_pipeline.readers.compressed import opened_archive
 
 _ENDING = ".npy"
+_LENGTH = {(1, 0): "<H", (2, 0): "<I", (3, 0): "<I"}
 
 
 class NumpyFile(ArrayFile):
@@ -39,7 +44,7 @@ class NumpyFile(ArrayFile):
                 "not a NumPy file, or its beginning is damaged; expected what numpy.save or "
                 "numpy.savez writes: mend 'reader' in the sensor file, or copy the file again"
             )
-        archive = stack.enter_context(zipfile.ZipFile(self.path))
+        archive = stack.enter_context(opened_archive(self.path))
         return list(_members(archive, self.path.stat().st_size))
 
 
@@ -66,12 +71,19 @@ def _array(name: str, opened: Callable[[], IO[bytes]], size: int, checked: bool)
     shown = name or "the table"
     with opened() as stream:
         version = npy.read_magic(stream)
-        read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-        if version not in ((1, 0), (2, 0), (3, 0)):
+        if version not in _LENGTH:
             raise UnusableError(
                 f"{shown} has format version {version}; expected 1.0 to 3.0: save again"
             )
-        shape, fortran, dtype = read(stream)
+        length = exactly(stream, struct.calcsize(_LENGTH[version]))
+        (said,) = struct.unpack(_LENGTH[version], length)
+        if said > LONGEST_NPY_HEADER:
+            raise UnusableError(
+                f"{shown} has a header of {said} bytes; expected at most {LONGEST_NPY_HEADER}: "
+                "save fewer fields, or copy the file again"
+            )
+        read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+        shape, fortran, dtype = read(io.BytesIO(length + exactly(stream, said)))
         offset = stream.tell()
     if version == (3, 0):
         _decode_names(dtype)

@@ -6,10 +6,13 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from imubench_pipeline.readers.bounds import MOST_FIELDS
 
 NUMBERS = "fiu"
 """NumPy's letters of the kinds of data that are figures: float, signed and unsigned integer."""
@@ -97,6 +100,10 @@ class Table(ABC):
     def row_bytes(self, positions: Sequence[int]) -> int:
         """Return the memory that a record takes while these columns are read."""
 
+    def held_bytes(self, positions: Sequence[int]) -> int:
+        """Return the memory that is held, beside the records, while these columns are read."""
+        return 0
+
     @abstractmethod
     def blocks(self, positions: Sequence[int], rows: int) -> Iterator[list[NDArray[Any]]]:
         """Yield these columns, ``rows`` records at a time or fewer.
@@ -173,7 +180,9 @@ class Array(Table):
         sides = (*shape, 1)[:2]
         self.rows, self.width = sides[self.time_axis], sides[1 - self.time_axis]
         if dtype.names:
-            self._leaves = list(_leaves(dtype))
+            self._leaves = list(islice(_leaves(dtype), MOST_FIELDS + 1))
+            if len(self._leaves) > MOST_FIELDS:
+                self.fault = f"has more than {MOST_FIELDS} columns; expected a log of one sensor"
             if self.width != 1:
                 self.fault = "is a matrix of records; expected a vector of records"
             self.width = len(self._leaves)

@@ -16,14 +16,15 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from rosbags.interfaces import Connection
 from rosbags.rosbag2 import Reader
 from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
 from imubench_pipeline.readers.batch import Batch, LogFile
+from imubench_pipeline.readers.bounds import LARGEST_BATCH
 from imubench_pipeline.readers.rosbag.messages import LAYOUTS, Layout, figures_of
 from imubench_pipeline.readers.rosbag.version_1 import Bag
+from imubench_pipeline.readers.rosbag.version_2 import Bag2, check_database, check_folder
 from imubench_pipeline.readers.started import date_of
 from imubench_pipeline.readers.wrapping import WrapState, unwrapped
 from imubench_pipeline.tables.findings import Finding, RecordingError
@@ -131,11 +132,13 @@ class RosbagFile(LogFile):
         while True:
             times: list[int] = []
             messages: list[bytes] = []
+            held = 0
             with explained(self.path):
                 for time, message in incoming:
                     times.append(time)
                     messages.append(message)
-                    if len(times) == _BATCH:
+                    held += len(message)
+                    if len(times) == _BATCH or held > LARGEST_BATCH:
                         break
                 written = np.array(times, np.int64)
             if not times:
@@ -273,62 +276,17 @@ def opened(path: Path) -> Source:
 def _opened(path: Path) -> Source:
     if path.is_dir():
         for database in sorted(path.glob("*.db3")):
-            _check_whole(database)
-        return _Bag2(Reader(path))
+            check_database(database)
+        check_folder(path)
+        return Bag2(Reader(path))
     with path.open("rb") as file:
         begin = file.read(16)
     if begin.startswith(b"\x89MCAP"):
-        return _Bag2(McapReader(path))
+        return Bag2(McapReader(path))
     if begin.startswith(_SQLITE):
-        _check_whole(path)
-        return _Bag2(Sqlite3Reader(path))
+        check_database(path)
+        return Bag2(Sqlite3Reader(path))
     return Bag(path)
-
-
-def _check_whole(path: Path) -> None:
-    """Raise if a database is shorter than it says: SQLite would take what is missing as zeros."""
-    with path.open("rb") as file:
-        header = file.read(100)
-    size = int.from_bytes(header[16:18], "big")
-    pages = int.from_bytes(header[28:32], "big")
-    # An old library leaves the count of pages as it was; then the two counters differ.
-    known = header[24:28] == header[92:96]
-    expected = (1 << 16 if size == 1 else size) * pages
-    if known and path.stat().st_size < expected:
-        raise RecordingError(
-            f"{path.name}: cut short: {path.stat().st_size} of {expected} bytes; copy it again, or "
-            "mend it with '.recover' of sqlite3"
-        )
-
-
-class _Bag2:
-    """A ROS 2 bag, read by the library."""
-
-    ros_1 = False
-    unclosed = False
-
-    def __init__(self, reader: Reader | McapReader | Sqlite3Reader) -> None:
-        self._reader = reader
-        reader.open()
-        self._connections: list[Connection] = list(reader.connections)
-
-    def topics(self) -> dict[str, str]:
-        return {str(held.topic): str(held.msgtype) for held in self._connections}
-
-    def counts(self) -> dict[str, int]:
-        found: dict[str, int] = {}
-        for held in self._connections:
-            found[str(held.topic)] = found.get(str(held.topic), 0) + held.msgcount
-        return found
-
-    def messages(self, topic: str) -> Iterator[tuple[int, bytes]]:
-        wanted = [connection for connection in self._connections if connection.topic == topic]
-        for _, time, message in self._reader.messages(wanted):
-            # A damaged database may hold anything.
-            yield time, message if isinstance(message, bytes) else b""
-
-    def close(self) -> None:
-        self._reader.close()
 
 
 def _unmerged(path: Path) -> list[Path]:

@@ -13,11 +13,18 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
+from imubench_pipeline.readers.bounds import (
+    LARGEST_CHUNK,
+    LARGEST_MESSAGE,
+    LARGEST_RATIO,
+    LONGEST_TOPIC,
+    MOST_TOPICS,
+    UNSUSPICIOUS,
+)
 from imubench_pipeline.tables.findings import RecordingError
 
 _MAGIC = b"#ROSBAG V2.0\n"
 _MESSAGE, _BAG, _CHUNK, _CONNECTION = b"\x02", b"\x03", b"\x05", b"\x07"
-_LARGEST_CHUNK = 1 << 28
 _U4 = struct.Struct("<I")
 _TIME = struct.Struct("<II")
 
@@ -36,6 +43,7 @@ class Bag:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._connections: dict[bytes, tuple[str, str]] = {}
+        self._left = 0
         self.unclosed = False
 
     def close(self) -> None:
@@ -82,6 +90,7 @@ class Bag:
         """
         with self._path.open("rb") as file:
             at = 0
+            self._left = max(UNSUSPICIOUS, LARGEST_RATIO * os.fstat(file.fileno()).st_size)
             try:
                 self.unclosed = not self._start(file)
                 while True:
@@ -122,8 +131,11 @@ class Bag:
         self, header: dict[bytes, bytes], data: bytes, topic: str
     ) -> Iterator[tuple[int, bytes]]:
         (size,) = _U4.unpack(header[b"size"])
-        if size > _LARGEST_CHUNK:
-            raise ValueError(f"a chunk of {size} bytes")
+        if size > LARGEST_CHUNK:
+            raise ValueError(f"a chunk of {size} bytes, expected at most {LARGEST_CHUNK}")
+        self._left -= size
+        if self._left < 0:
+            raise ValueError(f"its chunks expand to more than {LARGEST_RATIO} times its size")
         compression = header[b"compression"].decode("ascii", "replace")
         if compression == "bz2":
             data = bz2.BZ2Decompressor().decompress(data, size + 1)
@@ -149,13 +161,17 @@ class Bag:
         if header[b"op"] == _MESSAGE:
             if self._connections[header[b"conn"]][0] == topic:
                 seconds, nanoseconds = _TIME.unpack(header[b"time"])
-                yield seconds * 10**9 + nanoseconds, data
+                yield seconds * 10**9 + nanoseconds, data if len(data) <= LARGEST_MESSAGE else b""
         elif header[b"op"] == _CONNECTION:
             self._connect(header, data)
 
     def _connect(self, header: dict[bytes, bytes], data: bytes) -> None:
         kind = _fields(data)[b"type"].decode("utf-8", "replace")
         topic = header[b"topic"].decode("utf-8", "replace")
+        if max(len(topic), len(kind)) > LONGEST_TOPIC:
+            raise ValueError(f"a topic or type of more than {LONGEST_TOPIC} letters")
+        if len(self._connections) >= MOST_TOPICS:
+            raise ValueError(f"more than {MOST_TOPICS} connections, expected those of a vehicle")
         # The name that ROS 2 has for the same type.
         self._connections[header[b"conn"]] = topic, kind.replace("/", "/msg/", 1)
 
@@ -183,6 +199,8 @@ def _exactly(file: BinaryIO, size: bytes) -> bytes:
     # Asked before, since a damaged size may be larger than the memory.
     if count > os.fstat(file.fileno()).st_size - file.tell():
         raise _CutShortError
+    if count > LARGEST_CHUNK:
+        raise ValueError(f"a record of {count} bytes, expected at most {LARGEST_CHUNK}")
     return file.read(count)
 
 

@@ -6,11 +6,11 @@ import codecs
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
+from imubench_pipeline.readers.bounds import LONGEST_LINE
 from imubench_pipeline.readers.compressed import open_bytes
 from imubench_pipeline.tables.findings import Finding, RecordingError
 
 _SEEN = 1 << 16
-_LONGEST_LINE = 1 << 20
 _BYTE_ORDER_MARKS: Mapping[bytes, str] = {
     codecs.BOM_UTF8: "",
     # Before UTF-16, whose mark is the beginning of this one.
@@ -89,6 +89,8 @@ class CompleteLines:
         Bytes of the text to pass over.
     records : callable
         Makes of complete lines what is read.
+    most : int or None
+        Bytes of the text after which no more is read; None: the whole file is.
 
     Attributes
     ----------
@@ -106,12 +108,14 @@ class CompleteLines:
         findings: list[Finding],
         skipped: int = 0,
         records: Callable[[bytes], bytes] = bytes,
+        most: int | None = None,
     ) -> None:
         self._path = path
         self._findings = findings
         self._records = records
         self._ready = b""
         self._ended = False
+        self._left = most
         self.rest = b""
         self.error: RecordingError | None = None
         self._text = _Text(path, skipped)
@@ -151,7 +155,12 @@ class CompleteLines:
 
     def _lines(self, size: int) -> bytes:
         """Return the next complete lines, none where the next line is not yet complete."""
+        if self._left is not None and self._left < 0:
+            self._ended = True
+            return b""
         block = self._text.read(max(size - len(self.rest), _SEEN))
+        if self._left is not None:
+            self._left -= len(block)
         if not block:
             self._end()
             return b""
@@ -162,10 +171,10 @@ class CompleteLines:
             self.rest += b"\0" if block == bytes(len(block)) else block
             if self.rest.endswith(b"\0"):
                 self.rest = self.rest.rstrip(b"\0") + b"\0"
-            if len(self.rest) > _LONGEST_LINE:
+            if len(self.rest) > LONGEST_LINE:
                 shown = self.rest[:40].decode("utf-8", "replace")
                 raise RecordingError(
-                    f"{self._path.name}: no line break in {_LONGEST_LINE} bytes from {shown!r}; "
+                    f"{self._path.name}: no line break in {LONGEST_LINE} bytes from {shown!r}; "
                     "expected shorter lines: this is no text log, or not one record a line"
                 )
             return b""
@@ -197,9 +206,16 @@ class CompleteLines:
             )
 
 
-def first_lines(path: Path) -> Iterator[bytes]:
-    """Yield the lines of a text log from its beginning; the last one may lack its line break."""
-    with CompleteLines(path, []) as lines:
+def first_lines(path: Path, most: int | None = None) -> Iterator[bytes]:
+    """Yield the lines of a text log from its beginning; the last one may lack its line break.
+
+    Parameters
+    ----------
+    path : Path
+    most : int or None
+        Bytes that are read, about; None: the whole file is.
+    """
+    with CompleteLines(path, [], most=most) as lines:
         while block := lines.read(_SEEN):
             yield from (line + b"\n" for line in block[:-1].split(b"\n"))
         if lines.rest.strip(b"\0"):

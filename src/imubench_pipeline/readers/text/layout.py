@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from imubench_pipeline.readers import bounds
 from imubench_pipeline.readers.batch import stated_in
 from imubench_pipeline.readers.text.cells import Decimal, are_figures, is_datum, is_number
 from imubench_pipeline.readers.text.complete_lines import first_lines
@@ -28,12 +29,8 @@ Column = str | int
 
 _COMMENTS = ("#", "//", "%", ";", "!")
 _SPLITS = (*map(Split, ";\t|,"), Split(" ", runs=True), Split(" "))
-_LINES, _BYTES = 500, 1 << 20
-_COMMENT_LINES = 1000
-_MOST_LINES_BEFORE = 500_000
-_SCORED_LINES, _SCORED_CELLS = 50, 50
-_UNIT_LINES = 3
-_SHOWN, _LONGEST_SHOWN = 20, 40
+_LINES, _BYTES, _UNIT_LINES = 500, 1 << 20, 3
+_SCORED_LINES, _SCORED_CELLS, _SHOWN, _LONGEST_SHOWN = 50, 50, 20, 40
 
 
 @dataclass(frozen=True)
@@ -220,30 +217,33 @@ class _Search:
 
     def _head(self, path: Path) -> tuple[list[_Line], list[_Line]]:
         """Return the comments and the other lines of the beginning of a file."""
-        comments: deque[_Line] = deque(maxlen=_COMMENT_LINES)
+        comments: deque[_Line] = deque()
         lines: list[_Line] = []
-        start, held = 0, 0
+        number, start, held, told = 0, 0, 0, 0
         # Whether a semicolon begins a comment or is the delimiter is not yet known.
         signs = tuple(sign for sign in self._signs(None) if sign != ";")
-        for number, raw in enumerate(first_lines(path), start=1):
-            here, start = start, start + len(raw)
-            if number > _MOST_LINES_BEFORE + self._log.skip_lines:
-                if lines:
-                    break
-                raise RecordingError(
-                    f"{self._file}: no record in the first {number} lines, which are blank or "
-                    "comments; expected some: mend 'comment' in the sensor file"
-                )
+        for raw in first_lines(path, bounds.MOST_BYTES_BEFORE):
+            number, here, start = number + 1, start, start + len(raw)
+            if number > bounds.MOST_LINES_BEFORE + self._log.skip_lines:
+                break
             if number <= self._log.skip_lines or not raw.strip(b"\0 \t\r\n"):
                 continue
             line = _Line(number, here, raw.rstrip(b"\r\n"), _decoded(raw.rstrip(b"\r\n")))
             if line.text.startswith(signs):
                 comments.append(line)
+                told += len(line.raw)
+                while len(comments) > bounds.COMMENT_LINES or told > bounds.COMMENT_BYTES:
+                    told -= len(comments.popleft().raw)
                 continue
             lines.append(line)
             held += len(raw)
             if len(lines) >= _LINES or (held > _BYTES and len(lines) > _UNIT_LINES):
                 break
+        if not lines and (number > bounds.MOST_LINES_BEFORE or start > bounds.MOST_BYTES_BEFORE):
+            raise RecordingError(
+                f"{self._file}: no record in the first {number} lines, which are blank or "
+                "comments; expected some: mend 'comment' in the sensor file"
+            )
         return list(comments), lines
 
     def _parted(self, split: Split) -> tuple[list[_Line], list[_Line]]:

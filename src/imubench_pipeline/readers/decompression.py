@@ -1,0 +1,187 @@
+"""What decompresses gzip, zstd, xz and bzip2, block by block and in bounded memory."""
+
+from __future__ import annotations
+
+import bz2
+import lzma
+import zlib
+from collections.abc import Callable, Mapping
+from typing import IO, Any
+
+from imubench_pipeline.readers.bounds import LARGEST_WINDOW, LEAST_IN_PART, MOST_PARTS
+
+_FED = 1 << 11
+"""Bytes of zstd data decompressed at a time: they may stand for 32768 times as many."""
+
+_READ = 1 << 16
+
+
+class _Parts:
+    """The decompressed bytes of what may be several compressed parts, one behind another.
+
+    Parts that hold next to nothing cost time and no bytes of the file to speak of: the libraries
+    pass over them by the million before they return.
+
+    Parameters
+    ----------
+    file : file
+        At the first byte of the first part.
+    new : callable
+        Makes what decompresses one part.
+    padded : bool
+        Zeros may follow a part, and nothing else; otherwise what is no part ends the data.
+    """
+
+    def __init__(self, file: IO[bytes], new: Callable[[], Any], padded: bool) -> None:
+        self._file = file
+        self._new = new
+        self._padded = padded
+        self._part = new()
+        self._parts = 1
+        self._held = 0
+
+    def read1(self, size: int) -> bytes:
+        while True:
+            begins = self._part.eof
+            packed = self._part.unused_data if begins else b""
+            if not packed and (begins or self._part.needs_input):
+                packed = self._file.read(_READ)
+            if begins:
+                if self._padded:
+                    while packed and not (packed := packed.lstrip(b"\0")):
+                        packed = self._file.read(_READ)
+                if not packed:
+                    return b""
+                self._part = self._new()
+                self._parts = _counted(self._parts, self._held)
+            try:
+                block: bytes = self._part.decompress(packed, size)
+            except (OSError, lzma.LZMAError, EOFError):
+                if begins and not self._padded:
+                    return b""
+                raise
+            if block:
+                self._held += len(block)
+                return block
+            if not packed and not self._part.eof:
+                raise EOFError
+
+    def close(self) -> None:
+        self._file.close()
+
+
+def _counted(parts: int, held: int) -> int:
+    """Return one part more than there were, which held so many bytes.
+
+    Raises
+    ------
+    OSError
+        If they are many that hold next to nothing.
+    """
+    if parts >= MOST_PARTS and held < LEAST_IN_PART * parts:
+        raise OSError(
+            f"{parts} compressed parts hold {held} bytes, expected more than {LEAST_IN_PART} a part"
+        )
+    return parts + 1
+
+
+class _Gunzip:
+    """One member of gzip, as bz2 and lzma have it of their streams."""
+
+    def __init__(self) -> None:
+        self._inflate = zlib.decompressobj(zlib.MAX_WBITS | 16)
+
+    @property
+    def eof(self) -> bool:
+        return self._inflate.eof
+
+    @property
+    def unused_data(self) -> bytes:
+        return self._inflate.unused_data
+
+    @property
+    def needs_input(self) -> bool:
+        return not self._inflate.unconsumed_tail
+
+    def decompress(self, packed: bytes, most: int) -> bytes:
+        return self._inflate.decompress(self._inflate.unconsumed_tail + packed, most)
+
+
+class _Zstd:
+    """The decompressed bytes of zstd frames; unlike the library's, it tells an early end."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        import zstandard  # only a log that is compressed so needs it
+
+        self._new: Callable[[], Any] = zstandard.ZstdDecompressor(
+            max_window_size=LARGEST_WINDOW
+        ).decompressobj
+        self._error = zstandard.ZstdError
+        self._file = file
+        self._frame: Any = None
+        self._fed = b""
+        self._ready = memoryview(b"")
+        self._frames = 0
+        self._held = 0
+
+    def read1(self, size: int) -> bytes:
+        while not self._ready:
+            self._fed = self._fed or self._file.read(_FED)
+            if not self._fed:
+                if self._frame is not None:
+                    raise EOFError
+                return b""
+            if self._frame is None:
+                self._frame = self._new()
+                self._frames = _counted(self._frames, self._held)
+            try:
+                self._ready = memoryview(self._frame.decompress(self._fed))
+            except self._error as error:
+                raise OSError(str(error)) from None
+            self._held += len(self._ready)
+            self._fed = b""
+            if self._frame.eof:
+                self._fed, self._frame = self._frame.unused_data, None
+        # Views, for to copy the rest each time would take the square of its size.
+        block, self._ready = self._ready[:size], self._ready[size:]
+        return bytes(block)
+
+    def close(self) -> None:
+        self._file.close()
+
+
+def unpacked_zstd(data: bytes, most: int) -> bytes:
+    """Return the first bytes of what is compressed in a frame of zstd.
+
+    Parameters
+    ----------
+    data : bytes
+    most : int
+        That are unpacked at most.
+
+    Raises
+    ------
+    ValueError
+        If the data are corrupt.
+    """
+    import zstandard  # only a log that is compressed so needs it
+
+    try:
+        with zstandard.ZstdDecompressor(max_window_size=LARGEST_WINDOW).stream_reader(data) as one:
+            return one.read(most)
+    except zstandard.ZstdError as error:
+        raise ValueError(str(error)) from None
+
+
+def _unxz() -> lzma.LZMADecompressor:
+    # The dictionary that a file asks for is taken from memory before the first byte.
+    return lzma.LZMADecompressor(memlimit=LARGEST_WINDOW)
+
+
+OPENED: Mapping[bytes, Callable[[IO[bytes]], Any]] = {
+    b"\x1f\x8b": lambda file: _Parts(file, _Gunzip, padded=True),
+    b"\x28\xb5\x2f\xfd": _Zstd,
+    b"\xfd7zXZ\0": lambda file: _Parts(file, _unxz, padded=False),
+    b"BZh": lambda file: _Parts(file, bz2.BZ2Decompressor, padded=False),
+}
+"""How a file is opened that begins so."""

@@ -1,0 +1,195 @@
+"""ROS 2 bags, read by the library, which is kept from unpacking whatever a bag asks for."""
+
+from __future__ import annotations
+
+import heapq
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import lz4.frame  # type: ignore[import-untyped]  # has no types
+from rosbags.interfaces import Connection
+from rosbags.rosbag2 import Reader, storage_mcap
+from rosbags.rosbag2.reader import DirectoryReader
+from rosbags.rosbag2.storage_mcap import McapReader
+from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
+
+from imubench_pipeline.readers.bounds import (
+    LARGEST_CHUNK,
+    LARGEST_MESSAGE,
+    LARGEST_METADATA,
+    LARGEST_OVERLAP,
+    LONGEST_TOPIC,
+    MOST_TOPICS,
+)
+from imubench_pipeline.readers.compressed import open_bytes
+from imubench_pipeline.readers.decompression import unpacked_zstd
+from imubench_pipeline.tables.findings import RecordingError
+
+_TABLES = ("messages", "topics", "message_definitions", "schema", "metadata")
+_READ = 1 << 20
+
+
+def _lz4(data: bytes, size: int) -> bytes:
+    return bytes(lz4.frame.LZ4FrameDecompressor().decompress(data, _bounded(size) + 1))
+
+
+def _zstd(data: bytes, size: int) -> bytes:
+    return unpacked_zstd(data, _bounded(size) + 1)
+
+
+def _bounded(size: int) -> int:
+    if size > LARGEST_CHUNK:
+        raise ValueError(f"a chunk of {size} bytes, expected at most {LARGEST_CHUNK}")
+    return size
+
+
+# Its own unpack a chunk before they compare what came of it with what was said.
+storage_mcap.DECOMPRESSORS.update({"lz4": _lz4, "zstd": _zstd})
+
+
+_Reader = Reader | McapReader | Sqlite3Reader
+
+
+class Bag2:
+    """A ROS 2 bag.
+
+    Parameters
+    ----------
+    reader : Reader, McapReader or Sqlite3Reader
+        Of the library, not yet opened.
+    """
+
+    ros_1 = False
+    unclosed = False
+
+    def __init__(self, reader: _Reader) -> None:
+        self._reader = reader
+        reader.open()
+        self._connections: list[Connection] = list(reader.connections)
+        if len(self._connections) > MOST_TOPICS:
+            raise ValueError(f"more than {MOST_TOPICS} topics, expected those of a vehicle")
+        if any(len(str(c.topic) + str(c.msgtype)) > LONGEST_TOPIC for c in self._connections):
+            raise ValueError(f"a topic or type of more than {LONGEST_TOPIC} letters")
+        for storage in _storages(reader):
+            if isinstance(storage, McapReader):
+                _check_overlap(storage)
+
+    def topics(self) -> dict[str, str]:
+        """Return the topics, and the type of message of each."""
+        return {str(held.topic): str(held.msgtype) for held in self._connections}
+
+    def counts(self) -> dict[str, int]:
+        """Return how many messages a topic has."""
+        found: dict[str, int] = {}
+        for held in self._connections:
+            found[str(held.topic)] = found.get(str(held.topic), 0) + held.msgcount
+        return found
+
+    def messages(self, topic: str) -> Iterator[tuple[int, bytes]]:
+        """Yield time of recording (ns) and bytes of the messages of a topic."""
+        packed = isinstance(self._reader, Reader) and self._reader.compression_mode == "message"
+        for time, message in self._stored(topic, packed):
+            # A damaged database may hold anything.
+            data = message if isinstance(message, bytes) else b""
+            if packed:
+                data = unpacked_zstd(data, LARGEST_MESSAGE + 1)
+            yield time, data if len(data) <= LARGEST_MESSAGE else b""
+
+    def _stored(self, topic: str, packed: bool) -> Iterator[tuple[int, object]]:
+        """Yield the messages as they are stored; the library unpacks packed ones as a whole."""
+        for reader in _storages(self._reader) if packed else [self._reader]:
+            wanted = [held for held in reader.connections if held.topic == topic]
+            for _, time, message in reader.messages(wanted) if wanted else ():
+                yield time, message
+
+    def close(self) -> None:
+        """Close the bag."""
+        self._reader.close()
+
+
+def _storages(reader: _Reader) -> list[Any]:
+    """Return the readers of the files of a bag."""
+    if not isinstance(reader, Reader):
+        return [reader]
+    storage = reader.storage
+    return list(storage.storages) if isinstance(storage, DirectoryReader) else [storage]
+
+
+def _check_overlap(storage: McapReader) -> None:
+    """Raise if chunks of one time are larger than may be in memory together."""
+    open_until: list[tuple[int, int]] = []
+    held = 0
+    for chunk in sorted(storage.chunks, key=lambda chunk: chunk.message_start_time):
+        while open_until and open_until[0][0] < chunk.message_start_time:
+            held -= heapq.heappop(open_until)[1]
+        heapq.heappush(open_until, (chunk.message_end_time, chunk.uncompressed_size))
+        held += chunk.uncompressed_size
+        if held > LARGEST_OVERLAP:
+            raise ValueError(
+                f"chunks of one time have {held} bytes, expected at most {LARGEST_OVERLAP}"
+            )
+
+
+def check_folder(path: Path) -> None:
+    """Raise if what describes a bag is too long to be that, or a packed file expands too far.
+
+    Parameters
+    ----------
+    path : Path
+        The folder of a ROS 2 bag.
+    """
+    size = (path / "metadata.yaml").stat().st_size
+    if size > LARGEST_METADATA:
+        raise RecordingError(
+            f"{path.name}: metadata.yaml has {size} bytes; expected at most {LARGEST_METADATA}: "
+            "copy the bag again"
+        )
+    for packed in sorted(path.glob("*.zstd")):
+        # The library unpacks it onto the disk as a whole.
+        with closing(open_bytes(packed)) as stream:
+            while stream.read(_READ):
+                pass
+
+
+def check_database(path: Path) -> None:
+    """Raise if a database is cut short, or its tables are computed where they are read.
+
+    Parameters
+    ----------
+    path : Path
+    """
+    _check_whole(path)
+    location = f"file:{quote(str(path.resolve()))}?mode=ro&immutable=1"
+    with closing(sqlite3.connect(location, uri=True)) as database:
+        for name in _TABLES:
+            kinds = database.execute(
+                "SELECT type, rootpage FROM sqlite_master WHERE lower(name) = ?", (name,)
+            ).fetchall()
+            columns = database.execute(f"PRAGMA table_xinfo({name})").fetchall()
+            if any(kind != "table" or not page for kind, page in kinds) or any(
+                column[-1] for column in columns
+            ):
+                raise RecordingError(
+                    f"{path.name}: {name} is computed, not recorded; expected a table of a ROS 2 "
+                    "bag: record it again"
+                )
+
+
+def _check_whole(path: Path) -> None:
+    """Raise if a database is shorter than it says: SQLite would take what is missing as zeros."""
+    with path.open("rb") as file:
+        header = file.read(100)
+    size = int.from_bytes(header[16:18], "big")
+    pages = int.from_bytes(header[28:32], "big")
+    # An old library leaves the count of pages as it was; then the two counters differ.
+    known = header[24:28] == header[92:96]
+    expected = (1 << 16 if size == 1 else size) * pages
+    if known and path.stat().st_size < expected:
+        raise RecordingError(
+            f"{path.name}: cut short: {path.stat().st_size} of {expected} bytes; copy it again, or "
+            "mend it with '.recover' of sqlite3"
+        )

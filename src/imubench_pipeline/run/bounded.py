@@ -1,0 +1,117 @@
+"""Bounds of memory and time that hold whatever a library does with what a file says of itself."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import resource
+import select
+import signal
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+_READ = 1 << 20
+
+
+class BoundError(Exception):
+    """What was called took more memory or time than it may."""
+
+
+def limit_memory(more: int) -> None:
+    """Let this process have so many bytes more than it has now, on Linux.
+
+    What it asks for beyond is refused to it, which the libraries report as an error. Addresses
+    that are only reserved do not count, as they do with RLIMIT_AS: Arrow and numba reserve many.
+
+    Parameters
+    ----------
+    more : int
+    """
+    if sys.platform != "linux":
+        return
+    status = Path("/proc/self/status").read_text(encoding="ascii", errors="replace")
+    held = 1024 * int(status.partition("VmData:")[2].split()[0])
+    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    most = held + more if hard == resource.RLIM_INFINITY else min(held + more, hard)
+    resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
+
+
+def bounded(
+    seconds: float, memory: int, function: Callable[P, T], *given: P.args, **named: P.kwargs
+) -> T:
+    """Call a function in a process of its own, which is ended where it takes too long.
+
+    Parameters
+    ----------
+    seconds : float
+    memory : int
+        Bytes that it may take beside what this process has.
+    function : callable
+        What it returns or raises is pickled.
+    *given, **named
+        Its arguments.
+
+    Raises
+    ------
+    BoundError
+        If it takes more, or is ended by the system.
+    """
+    ours, theirs = os.pipe()
+    process = os.fork()
+    if process == 0:
+        os.close(ours)
+        _answer(theirs, memory, lambda: function(*given, **named))
+    os.close(theirs)
+    try:
+        answer = _received(ours, seconds)
+    finally:
+        os.close(ours)
+        with suppress(ProcessLookupError):
+            os.kill(process, signal.SIGKILL)  # it has answered, or it will not
+        _, status = os.waitpid(process, 0)
+    if answer is None:
+        raise BoundError(f"took more than {seconds:g} s")
+    try:
+        returned, value = pickle.loads(answer)
+    except (EOFError, pickle.UnpicklingError):
+        ended = os.waitstatus_to_exitcode(status)
+        raise BoundError(f"ended the process that read it ({ended})") from None
+    if returned:
+        result: T = value
+        return result
+    if isinstance(value, MemoryError):
+        raise BoundError(f"took more than {memory >> 20} MiB of memory")
+    raise value
+
+
+def _answer(pipe: int, memory: int, called: Callable[[], Any]) -> None:
+    """Send what a function returns or raises, and end this process."""
+    try:
+        limit_memory(memory)
+        try:
+            answer = True, called()
+        except Exception as error:
+            answer = False, error
+        with os.fdopen(pipe, "wb") as stream:
+            pickle.dump(answer, stream)
+    finally:
+        os._exit(0)
+
+
+def _received(pipe: int, seconds: float) -> bytes | None:
+    """Return what comes through a pipe until its end; None where that takes longer."""
+    end = time.monotonic() + seconds
+    received: list[bytes] = []
+    while select.select([pipe], [], [], max(0.0, end - time.monotonic()))[0]:
+        block = os.read(pipe, _READ)
+        if not block:
+            return b"".join(received)
+        received.append(block)
+    return None

@@ -1,0 +1,58 @@
+"""A file that asks for much is rejected alone, within the time and memory that are stated."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.readers.hostile import ATTACKS
+
+LIMIT_S, LIMIT_MB = 10.0, 600.0
+LONGEST_REASON = 1500
+
+Probe = Callable[[Path, "dict[str, Any] | None"], tuple[str, float, float]]
+
+
+@pytest.fixture(scope="module")
+def probe() -> Iterator[Probe]:
+    """Return what lists a log, or reads it by a format: what was said, s of CPU, MiB."""
+    with subprocess.Popen(
+        [sys.executable, "-W", "error", "-m", "tests.readers.probe"],
+        cwd=Path(__file__).parents[2],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+
+        def ask(path: Path, given: dict[str, Any] | None) -> tuple[str, float, float]:
+            assert process.stdin is not None and process.stdout is not None
+            process.stdin.write(json.dumps([str(path), given]) + "\n")
+            process.stdin.flush()
+            said, seconds, memory = json.loads(process.stdout.readline())
+            return said, seconds, memory
+
+        yield ask
+
+
+@pytest.mark.parametrize("name", ATTACKS)
+def test_it_costs_little_and_ends_in_its_reason(tmp_path: Path, probe: Probe, name: str) -> None:
+    attack = ATTACKS[name]
+    path = attack.write(tmp_path)
+    channels = {key: {"unit": "rad/s"} | source for key, source in attack.channels.items()}
+    expected = (
+        (None, attack.read if attack.listed is None else attack.listed),
+        ({"rate": "100 Hz", "channels": channels}, attack.read),
+    )
+    for given, pattern in expected:
+        said, seconds, memory = probe(path, given)
+        assert re.search(pattern, said), said
+        assert len(said) < LONGEST_REASON and said.isprintable()
+        assert memory < (LIMIT_MB if given is None else attack.most_mb), said
+        assert seconds < LIMIT_S, said

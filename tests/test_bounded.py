@@ -1,0 +1,59 @@
+"""A call that takes too much memory or time ends, and nothing else does."""
+
+from __future__ import annotations
+
+import os
+import re
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from imubench_pipeline.readers import RecordingError
+from imubench_pipeline.run.bounded import BoundError, bounded
+from imubench_pipeline.run.cli import main
+from tests.readers.hostile import ATTACKS
+
+MEMORY = 100 << 20
+
+
+def refuse() -> None:
+    raise RecordingError("a.csv: no log")
+
+
+def test_what_is_returned_or_raised_comes_back() -> None:
+    assert bounded(10.0, MEMORY, sum, [1, 2]) == 3
+    assert len(bounded(10.0, MEMORY, np.ones, 10**6)) == 10**6
+    with pytest.raises(RecordingError, match=r"^a.csv: no log$"):
+        bounded(10.0, MEMORY, refuse)
+
+
+@pytest.mark.parametrize(
+    ("function", "given", "said"),
+    [
+        (time.sleep, 60.0, "took more than 0.5 s"),
+        (np.ones, 10**8, "took more than 100 MiB of memory"),
+        (bytes, 10**9, "took more than 100 MiB of memory"),
+        (os._exit, 3, r"ended the process that read it \(3\)"),
+    ],
+)
+def test_what_takes_more_is_ended(
+    function: Callable[[float], object], given: float, said: str
+) -> None:
+    begin = time.monotonic()
+    with pytest.raises(BoundError, match=said):
+        bounded(0.5 if function is time.sleep else 30.0, MEMORY, function, given)
+    assert time.monotonic() - begin < 20.0
+    assert len(np.ones(2 * MEMORY // 8)) == 2 * MEMORY // 8  # not limited here
+
+
+def test_the_command_says_what_listing_took(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = ATTACKS["20 GB of zeros"].write(tmp_path)
+    monkeypatch.setattr("imubench_pipeline.run.cli.INSPECTED_S", 0.001)
+    assert main(["inspect", str(path)]) == 2
+    said = capsys.readouterr().err
+    assert re.fullmatch(r"log.csv.gz: to list it took more than 0.001 s; expected .*\n", said)
