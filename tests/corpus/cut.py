@@ -13,7 +13,7 @@ from tests.corpus.entry import Cut, Entry, Written, part
 def cut_short(entries: Iterable[Entry]) -> Iterator[Entry]:
     """Yield each of some entries, of one text file each, in gzip and cut at 70 %."""
     for entry in entries:
-        yield replace(entry, name=f"{entry.name}, cut", write=_cut(entry.write), expected=Cut())
+        yield replace(entry, name=f"{entry.name} (cut)", write=_cut(entry.write), expected=Cut())
 
 
 def _cut(write: Written) -> Written:
