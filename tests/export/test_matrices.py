@@ -87,7 +87,7 @@ def test_the_snippet_makes_the_same_matrices_at_any_rate() -> None:
     noises, maker = namespace["NOISE"], namespace["matrices"]
     for name, model in (("gyro", GYRO), ("accel", ACCEL)):
         for rate in (1.0, 200.0):
-            phi, drive, output, noise, _, start = maker(noises[name], rate)  # type: ignore  # the names are those of the program it runs
+            phi, drive, output, noise, _, start = maker(noises[name], rate)  # type: ignore[operator]  # the names are those of the program it runs
             space = model.state_space(rate)
             np.testing.assert_allclose(phi, space.transition, rtol=1e-14)
             np.testing.assert_allclose(drive, space.process_noise, rtol=1e-14)

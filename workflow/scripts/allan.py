@@ -1,7 +1,5 @@
 """Compute the Allan variance of every channel of a recording."""
 
-# mypy: disable-error-code=name-defined
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Find bias and scale factor of a gyro whose rates are known; nothing of a rejected recording."""
 
-# mypy: disable-error-code=name-defined
-
 from pathlib import Path
 
 from imubench_pipeline.steps.calibration import calibration_tables

@@ -1,7 +1,5 @@
 """Say what vendors publish of the sensors of the catalogue."""
 
-# mypy: disable-error-code=name-defined
-
 from pathlib import Path
 
 from imubench_pipeline.steps.catalogue import write_coverage

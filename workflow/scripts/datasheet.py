@@ -1,7 +1,5 @@
 """Compare the estimates of a recording, and its fixed bias, with its sensor's datasheet."""
 
-# mypy: disable-error-code=name-defined
-
 from pathlib import Path
 
 from imubench_pipeline.steps.datasheet import curve_rows, rows

@@ -1,7 +1,5 @@
 """Find the turns of a gyro in its log, and the Earth's rate; nothing of a rejected recording."""
 
-# mypy: disable-error-code=name-defined
-
 from pathlib import Path
 
 from imubench_pipeline.steps.earth_rotation import earth_rate_tables

@@ -1,7 +1,5 @@
 """Say what the estimated noise of a recording means for dead reckoning, and what its log shows."""
 
-# mypy: disable-error-code=name-defined
-
 from pathlib import Path
 
 from imubench_pipeline.steps.error_budget import error_tables

@@ -1,7 +1,5 @@
 """Estimate the noise parameters of every channel by every method."""
 
-# mypy: disable-error-code=name-defined
-
 from pathlib import Path
 
 from imubench_pipeline.steps.estimate import estimation

@@ -1,7 +1,5 @@
 """Write what filters and simulators load, for every sensor."""
 
-# mypy: disable-error-code=name-defined
-
 from pathlib import Path
 
 from imubench_pipeline.steps.exports import write_exports

@@ -1,7 +1,5 @@
 """Draw the figures of all sensors for print."""
 
-# mypy: disable-error-code=name-defined
-
 from pathlib import Path
 
 from imubench_pipeline.steps.figures import write_figures

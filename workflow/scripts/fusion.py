@@ -1,7 +1,5 @@
 """Say how many of one sensor are as good as one of another."""
 
-# mypy: disable-error-code=name-defined
-
 from pathlib import Path
 
 from imubench_pipeline.steps.fusion import write_fusion

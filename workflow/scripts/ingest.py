@@ -1,7 +1,5 @@
 """Read a recording into Parquet; one that cannot be used is recorded as rejected."""
 
-# mypy: disable-error-code=name-defined
-
 from pathlib import Path
 
 from imubench_pipeline.steps.ingest import write_recording

@@ -1,7 +1,5 @@
 """Predict what a sensor at rest finds of attitude, north and the Earth's rate."""
 
-# mypy: disable-error-code=name-defined
-
 from pathlib import Path
 
 from imubench_pipeline.steps.outlook import outlook_tables

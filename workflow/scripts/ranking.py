@@ -1,7 +1,5 @@
 """Rank the sensors for each requirement, and say what would help the verdicts most."""
 
-# mypy: disable-error-code=name-defined
-
 from pathlib import Path
 
 from imubench_pipeline.steps.ranking import write_ranking

@@ -1,7 +1,5 @@
 """Simulate logs from every estimated model, and score how well they repeat the curve."""
 
-# mypy: disable-error-code=name-defined
-
 import json
 from pathlib import Path
 

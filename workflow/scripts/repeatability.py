@@ -1,7 +1,5 @@
 """Compare the fixed biases of each device from one turn-on to the next with its datasheet."""
 
-# mypy: disable-error-code=name-defined
-
 from pathlib import Path
 
 from imubench_pipeline.steps.repeatability import write_repeatability

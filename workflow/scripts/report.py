@@ -1,7 +1,5 @@
 """Write the pages of the report whose data changed."""
 
-# mypy: disable-error-code=name-defined
-
 from pathlib import Path
 
 from imubench_pipeline.steps.report import write_report

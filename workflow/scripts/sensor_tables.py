@@ -1,7 +1,5 @@
 """Join the results of the recordings of a sensor into one file a table."""
 
-# mypy: disable-error-code=name-defined
-
 from pathlib import Path
 
 from imubench_pipeline.steps.sensor_tables import joined_tables

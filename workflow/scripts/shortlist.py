@@ -1,7 +1,5 @@
 """Judge all sensors of the catalogue for each requirement by their datasheets alone."""
 
-# mypy: disable-error-code=name-defined
-
 from pathlib import Path
 
 from imubench_pipeline.steps.shortlist import NEEDED, write_shortlist

@@ -1,7 +1,5 @@
 """Write a simulated recording, in the layout of its sensor's logs."""
 
-# mypy: disable-error-code=name-defined
-
 from pathlib import Path
 
 from imubench_pipeline.steps.simulate import write_recording

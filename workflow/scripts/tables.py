@@ -1,7 +1,5 @@
 """Join the tables of all sensors, as Parquet and CSV."""
 
-# mypy: disable-error-code=name-defined
-
 from pathlib import Path
 
 from imubench_pipeline.steps.tables import tables_of_all
