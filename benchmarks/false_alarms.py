@@ -1,6 +1,6 @@
 """Findings in clean simulated logs, where there should be none.
 
-python benchmarks/false_alarms.py [--logs 200] [--processes 2]
+python benchmarks/false_alarms.py [--logs 200] [--first 0] [--processes 2]
 
 Each log has six channels, of sensors from quiet to noisy, with and without flicker noise and
 random walk, and lasts from a quarter of an hour to three hours. A third has no register, others one
@@ -85,10 +85,11 @@ def main() -> None:
     """Print how many logs have warnings and fatal findings, and which."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--logs", type=int, default=200)
+    parser.add_argument("--first", type=int, default=0, help="number of the first of them")
     parser.add_argument("--processes", type=int, default=2)
     given = parser.parse_args()
     with ProcessPoolExecutor(given.processes) as pool:
-        logs = list(pool.map(of_log, range(given.logs)))
+        logs = list(pool.map(of_log, range(given.first, given.first + given.logs)))
     for severity in ("fatal", "warning", "note"):
         touched = sum(any(f.severity == severity for f in found) for found in logs)
         names = Counter(f.finding for found in logs for f in found if f.severity == severity)

@@ -256,3 +256,15 @@ def test_a_mean_that_crosses_the_edge_of_a_coarse_register_is_no_step(
     log = level + SIGMA * rng.standard_normal(360_000)
     found = names(np.round(log / register) * register)
     assert ("step" in found) == (levels > 1.5)
+
+
+def test_where_rounding_is_all_there_is_nothing_else_is_told(rng: np.random.Generator) -> None:
+    # Three levels: the level wanders from the edge of one to the middle of another, and stays.
+    samples = 540_000
+    level = np.concatenate([np.full(samples - 800, 0.5), np.full(800, 1.0)])
+    level += 0.05 * np.sin(np.arange(samples) / 40.0)
+    log = np.round(level + rng.standard_normal(samples) / 6.0)
+    column = ColumnSummary()
+    column.add(0.004 * log)
+    found = column_findings({"gyro_z": column}, 50.0, SETTINGS)
+    assert {finding.finding for finding in found if finding.severity == "warning"} == {"coarse"}

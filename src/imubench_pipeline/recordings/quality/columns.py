@@ -210,7 +210,7 @@ def _values(
 ) -> Iterator[Finding]:
     """Yield what the values tell by themselves."""
     rounded = "; the figures were rounded after it" if steps is not None and steps.hidden else ""
-    if steps is not None and round(steps.levels) < settings.fewest_levels:
+    if steps is not None and _few_levels(steps, settings):
         detail = (
             f"{channel} has {steps.levels:.0f} levels of {_figure(channel, steps.step)}, fewer "
             f"than {settings.fewest_levels}: its noise is that of the rounding; record "
@@ -225,7 +225,8 @@ def _values(
         yield Finding("quantised", "note", detail, steps.step, channel)
     length, end = column.longest_run
     stuck = length > max(3.0 * levels.longest_by_chance(column), settings.longest_stuck * rate)
-    if stuck:
+    if stuck and not (_rounding(steps) and _few_levels(steps, settings)):
+        # In those, a level midway between two edges stays at one value for as long as it likes.
         detail = f"{channel} stays at one value for {length / rate:.4g} s ({length} samples)"
         yield Finding(
             "stuck_for_a_while",
@@ -317,6 +318,11 @@ def _rounding(steps: levels.Quantisation | None) -> bool:
     return steps is not None and steps.over_noise > _ROUNDING
 
 
+def _few_levels(steps: levels.Quantisation | None, settings: QualitySettings) -> bool:
+    """Tell whether a channel has so few levels that its noise is that of the rounding."""
+    return steps is not None and round(steps.levels) < settings.fewest_levels
+
+
 def _repeated(
     channel: str,
     column: ColumnSummary,
@@ -326,7 +332,7 @@ def _repeated(
     """Yield whether samples are repeated regularly, or more often than rounding explains."""
     regularly = list(held.held_samples(channel, column))
     yield from regularly
-    if regularly or _rounding(steps):
+    if regularly or _rounding(steps) or _few_levels(steps, settings):
         return
     beyond, chance = repeats_beyond_chance(column)
     if beyond > settings.repeated:
