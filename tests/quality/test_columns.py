@@ -268,3 +268,32 @@ def test_where_rounding_is_all_there_is_nothing_else_is_told(rng: np.random.Gene
     column.add(0.004 * log)
     found = column_findings({"gyro_z": column}, 50.0, SETTINGS)
     assert {finding.finding for finding in found if finding.severity == "warning"} == {"coarse"}
+
+
+@pytest.mark.parametrize("first", [0.0, 0.25])
+def test_a_level_that_comes_to_an_edge_of_a_coarse_register_is_no_motion(
+    rng: np.random.Generator, first: float
+) -> None:
+    level = np.zeros(72_000)  # in steps; the edges are at 0.5
+    level[:20_000] = first
+    level[50_000:52_000] = 0.5
+    column = ColumnSummary()
+    column.add(0.01 * np.round(level + rng.standard_normal(72_000) / 6.0))
+    found = column_findings({"accel_x": column}, 20.0, SETTINGS)
+    assert {finding.finding for finding in found if finding.severity != "note"} == {"coarse"}
+
+
+def test_a_channel_that_seldom_changes_is_coarse() -> None:
+    log = np.full(72_000, 9.81)
+    log[[100, 30_000, 50_000]] += 0.05
+    column = ColumnSummary()
+    column.add(log)
+    assert "coarse" in {f.finding for f in column_findings({"accel_x": column}, 20.0, SETTINGS)}
+
+
+def test_motion_shows_in_a_coarse_register(rng: np.random.Generator) -> None:
+    log = rng.standard_normal(72_000) / 6.0
+    log[30_000:31_000] += 4.0 * np.sin(np.arange(1000) / 3.0)
+    column = ColumnSummary()
+    column.add(0.01 * np.round(log + 0.5))
+    assert "motion" in {f.finding for f in column_findings({"accel_x": column}, 20.0, SETTINGS)}

@@ -140,8 +140,9 @@ def column_findings(
         findings += _values(channel, column, steps[channel], rate, settings)
         if static:
             findings += _changes(channel, column, steps[channel], rate, settings)
-            findings += joined.joined(channel, column, rate)
-            findings += joined.interleaved(channel, column)
+            if not _nothing_else(steps[channel], settings):
+                findings += joined.joined(channel, column, rate)
+                findings += joined.interleaved(channel, column)
         findings += _repeated(channel, column, steps[channel], settings)
     findings += copies.repeated_stretches(usable, steps, rate)
     return findings
@@ -225,8 +226,8 @@ def _values(
         yield Finding("quantised", "note", detail, steps.step, channel)
     length, end = column.longest_run
     stuck = length > max(3.0 * levels.longest_by_chance(column), settings.longest_stuck * rate)
-    if stuck and not (_rounding(steps) and _few_levels(steps, settings)):
-        # In those, a level midway between two edges stays at one value for as long as it likes.
+    # Midway between two edges of a register, a level stays at one value for as long as it likes.
+    if stuck and not _nothing_else(steps, settings):
         detail = f"{channel} stays at one value for {length / rate:.4g} s ({length} samples)"
         yield Finding(
             "stuck_for_a_while",
@@ -267,7 +268,10 @@ def _changes(
     """Yield what is not the same from beginning to end."""
     blocks = column.blocks()
     moves = stationarity.steps(blocks, settings.step)
-    for first, last in stationarity.motions(blocks, settings.motion):
+    # A level on an edge of a step of a coarse register has a spread of half of it, and its mean
+    # moves by up to one.
+    step_size = steps.step if steps is not None and _rounding(steps) else 0.0
+    for first, last in stationarity.motions(blocks, settings.motion, 0.75 * step_size):
         if any(first - step.window <= step.sample <= last + step.window for step in moves):
             continue  # the step itself
         detail = (
@@ -277,10 +281,8 @@ def _changes(
         yield Finding(
             "motion", "warning", detail, (last - first) / rate, channel, first / rate, last / rate
         )
-    # A level near the edge of a step of a coarse register moves the means by up to one of them.
-    least = 1.5 * steps.step if steps is not None and _rounding(steps) else 0.0
     for step in moves:
-        if abs(step.size) < least:
+        if abs(step.size) < 1.5 * step_size:
             continue
         at = step.sample / rate
         detail = (
@@ -290,7 +292,7 @@ def _changes(
         )
         yield Finding("step", "warning", detail, step.size, channel, at, at)
     warm = stationarity.warm_up(blocks, settings.warm_up)
-    if warm is not None:
+    if warm is not None and abs(warm.drift) >= 1.5 * step_size:
         than = "a later part not at all"  # in steps so coarse
         if warm.usual > 0.0:
             than = f"{abs(warm.drift) / warm.usual:.0f} times as much as in a later part"
@@ -321,6 +323,11 @@ def _rounding(steps: levels.Quantisation | None) -> bool:
 def _few_levels(steps: levels.Quantisation | None, settings: QualitySettings) -> bool:
     """Tell whether a channel has so few levels that its noise is that of the rounding."""
     return steps is not None and round(steps.levels) < settings.fewest_levels
+
+
+def _nothing_else(steps: levels.Quantisation | None, settings: QualitySettings) -> bool:
+    """Tell whether a channel has nothing but the rounding: ``coarse`` says all there is to say."""
+    return _rounding(steps) and _few_levels(steps, settings)
 
 
 def _repeated(

@@ -54,7 +54,7 @@ class Quantisation:
     levels : float
         Steps between the lowest and the highest sample, and one.
     over_noise : float
-        Step over the standard deviation of the samples.
+        Step over the standard deviation of the samples; infinite where they seldom change.
     hidden : bool
         The figures were rounded again, so that their differences are no multiples of it.
     """
@@ -68,15 +68,16 @@ class Quantisation:
 def quantisation(column: ColumnSummary) -> Quantisation | None:
     """Return the steps of a column, or None where none show."""
     spread = noise_of(column)
-    if not (0.0 < column.step < np.inf and spread > 0.0):
+    if not (0.0 < column.step < np.inf):
         return None
     hidden = hidden_step(column.excerpts())
     step = column.step if hidden is None else hidden
     # Two neighbours of n continuous samples come as close as spread / n.
     if step < 20.0 * spread / column.present:
         return None
+    over_noise = step / spread if spread > 0.0 else math.inf  # most blocks have one value
     return Quantisation(
-        step, (column.high - column.low) / step + 1.0, step / spread, hidden is not None
+        step, (column.high - column.low) / step + 1.0, over_noise, hidden is not None
     )
 
 

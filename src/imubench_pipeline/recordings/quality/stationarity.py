@@ -154,7 +154,7 @@ def variance_change(blocks: BlockStatistics) -> tuple[float, int, int] | None:
     )
 
 
-def motions(blocks: BlockStatistics, times: float) -> list[tuple[int, int]]:
+def motions(blocks: BlockStatistics, times: float, least: float = 0.0) -> list[tuple[int, int]]:
     """Return where the spread is many times the usual, and not for a knock.
 
     Parameters
@@ -162,6 +162,8 @@ def motions(blocks: BlockStatistics, times: float) -> list[tuple[int, int]]:
     blocks : BlockStatistics
     times : float
         Times the median spread that count as motion.
+    least : float
+        Spread below which nothing does, SI.
 
     Returns
     -------
@@ -172,7 +174,9 @@ def motions(blocks: BlockStatistics, times: float) -> list[tuple[int, int]]:
     if not usual > 0.0:
         return []
     reach = np.maximum(blocks.high - blocks.mean, blocks.mean - blocks.low)
-    shaken = np.flatnonzero((blocks.spread > times * usual) & (reach < _SPIKY * blocks.spread))
+    shaken = np.flatnonzero(
+        (blocks.spread > max(times * usual, least)) & (reach < _SPIKY * blocks.spread)
+    )
     if len(shaken) == 0:
         return []
     groups = np.split(shaken, np.flatnonzero(np.diff(shaken) > 2) + 1)
