@@ -1,6 +1,6 @@
 """A process that forks for each log that it is told, and says what became of it and what it took.
 
-It lists a log as the command does, and reads it within the memory of a step of the workflow.
+It lists a log as the command does, and opens and reads it within the bounds of the workflow.
 """
 
 from __future__ import annotations
@@ -13,11 +13,13 @@ from pathlib import Path
 from typing import Any
 
 from imubench_pipeline.readers import RecordingError, read
+from imubench_pipeline.readers.bounded import BoundError, bounded, limit_memory
 from imubench_pipeline.readers.formats import FILE_FORMATS
 from imubench_pipeline.readers.inspection import inspect
-from imubench_pipeline.run.bounded import BoundError, bounded, limit_memory
+from imubench_pipeline.recordings.opening import check_opening
 from imubench_pipeline.run.cli import INSPECTED_BYTES, INSPECTED_S
 from imubench_pipeline.settings.config import LimitSettings
+from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import LogFormat
 
 LONGEST_S = 60
@@ -29,8 +31,10 @@ def outcome(path: Path, given: dict[str, Any] | None) -> str:
         if given is None:
             found = bounded(INSPECTED_S, INSPECTED_BYTES, inspect, path)
             return f"listed: {found.proof.said}"
+        log = LogFormat.model_validate(given)
+        check_opening(path, log, QualitySettings().opening)
         limit_memory(LimitSettings().memory * 10**6)
-        files = read(path, LogFormat.model_validate(given))
+        files = read(path, log)
         rows = sum(len(batch) for file in files for batch in file.batches())
     except (RecordingError, BoundError) as error:
         return f"rejected: {error}"

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.readers import RecordingError
-from imubench_pipeline.run.bounded import BoundError, bounded
+from imubench_pipeline.readers.bounded import BoundError, bounded
 from imubench_pipeline.run.cli import main
 from tests.readers.hostile import ATTACKS
 

@@ -14,6 +14,7 @@ from typing import Any
 from imubench_pipeline.readers import log_files, read
 from imubench_pipeline.recordings import timebase
 from imubench_pipeline.recordings.assembly import assemble, counted, names_of
+from imubench_pipeline.recordings.opening import check_opening
 from imubench_pipeline.recordings.parts import Part, leave_out_knocks, read_part
 from imubench_pipeline.recordings.quality.columns import column_findings
 from imubench_pipeline.recordings.quality.copies import copied_channels
@@ -360,6 +361,7 @@ def ingest_as_planned(
             raise RecordingError(given["error"])
         log = LogFormat.model_validate(given["log"])
         limits = QualitySettings.model_validate(given["quality"])
+        check_opening(source, log, limits.opening)
         kept = ingest(source, log, notes, limits, folder, names)
     except RecordingError as error:
         remove_kept(folder)

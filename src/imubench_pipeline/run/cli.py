@@ -241,8 +241,8 @@ INSPECTED_S, INSPECTED_BYTES = 10.0, 1 << 29
 
 
 def _inspect(given: argparse.Namespace) -> int:
+    from imubench_pipeline.readers.bounded import BoundError, bounded
     from imubench_pipeline.readers.inspection import inspect
-    from imubench_pipeline.run.bounded import BoundError, bounded
     from imubench_pipeline.tables.findings import RecordingError
 
     if isinstance(sys.stdout, io.TextIOWrapper):

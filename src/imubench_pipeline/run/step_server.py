@@ -23,8 +23,8 @@ from typing import Any
 
 from numba import njit
 
+from imubench_pipeline.readers.bounded import limit_memory
 from imubench_pipeline.report.run_summary import one_line
-from imubench_pipeline.run.bounded import limit_memory
 from imubench_pipeline.run.processes import BEGUN, DONE, FAILED, KILLED, LENGTH, Job
 
 _LONGEST = 300

@@ -10,6 +10,12 @@ from imubench_pipeline.settings.validation import Strict
 class QualitySettings(Strict):
     """Thresholds of the findings about a recording."""
 
+    opening: float = Field(
+        10.0,
+        gt=0,
+        description="s, and 1 s for each 5 MB, until the first records of a log are read; one "
+        "that takes longer is rejected",
+    )
     shortest: int = Field(100, ge=10, description="samples; a shorter recording is rejected")
     short: float = Field(
         900.0,

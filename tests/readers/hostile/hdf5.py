@@ -111,7 +111,6 @@ HDF5 = {
         hdf5(lambda made: chunk(made, "wx", 1, 4096)),
         "corrupt data, or cut short",
         channels=FIRST,
-        most_mb=2100.0,
     ),
     "a virtual data set of a pipe": Attack(virtual, "wx .*is kept in other files", "^listed: "),
     "an external link to a pipe": Attack(external, "no variable or column 'wx'", "^listed: "),

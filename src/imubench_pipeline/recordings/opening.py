@@ -1,0 +1,56 @@
+"""Whether a log can be opened: tried in a process of its own, ended where it takes too long."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+
+from imubench_pipeline.readers import log_files, read
+from imubench_pipeline.readers.bounded import BoundError, bounded
+from imubench_pipeline.settings.sensor import LogFormat
+from imubench_pipeline.tables.findings import RecordingError
+
+_MEMORY = 1 << 29
+"""Bytes; the bounds of the readers take up to half of them."""
+
+_SLOWEST = 5e6
+"""Bytes/s. A bag without an index is searched to its end for a topic that it does not have: one of
+511 MB, most of it in messages of 300 bytes, took 21 s on a busy core."""
+
+
+def check_opening(source: Path, log: LogFormat, seconds: float) -> None:
+    """Read the first records of each file of a recording, and no more.
+
+    Parameters
+    ----------
+    source : Path
+        The log file, or the folder of a recording.
+    log : LogFormat
+    seconds : float
+        How long it may take, and a second more for each 5 MB of the log.
+
+    Raises
+    ------
+    RecordingError
+        If they cannot be read, or that takes longer or more than 512 MiB, or crashes.
+    """
+    with suppress(OSError):  # a log that has vanished
+        size = sum(path.stat().st_size for path in log_files(source))
+        try:
+            bounded(seconds + size / _SLOWEST, _MEMORY, _read_first_records, source, log)
+        except BoundError as error:
+            raise RecordingError(
+                f"{source.name}: to read its first records {error}; expected the log of an "
+                "inertial sensor: copy what it measured into a file of its own, or allow more in "
+                "quality.opening"
+            ) from None
+
+
+def _read_first_records(source: Path, log: LogFormat) -> None:
+    try:
+        for file in read(source, log):
+            next(iter(file.batches()), None)
+    except (RecordingError, MemoryError):
+        raise
+    except Exception:
+        return  # who reads it meets the same, and says where
