@@ -223,6 +223,12 @@ def _half_in_radians(samples: Array) -> Array:
     return samples * scale
 
 
+def _summed(log: Columns) -> Made:
+    """Write what came of all gyros into the column of x."""
+    others = [log[name] - log[name].mean() for name in ("gyro_y", "gyro_z")]
+    return _of({**log, "gyro_x": log["gyro_x"] + others[0] + others[1]})
+
+
 def _smoothed(samples: Array) -> Array:
     kernel = np.ones(20) / 20.0
     return np.convolve(samples, kernel, "same")
@@ -276,6 +282,7 @@ MISTAKES: Mapping[str, Callable[[Columns], Made]] = {
     "vibration": _each(_shaken, *_CHANNELS[:3]),
     "clipped": _each(_clipped, *_CHANNELS[:3]),
     "smoothed": _each(_smoothed),
+    "a gyro that is the sum of all": _summed,
 }  # fmt: skip
 """What people do to logs."""
 

@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterator, Mapping
 
 from imubench_pipeline.recordings.quality import copies, held, joined, levels, stationarity
+from imubench_pipeline.recordings.quality.shared_noise import shared_noise
 from imubench_pipeline.recordings.quality.summary import LARGEST, ColumnSummary
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import (
@@ -145,6 +146,8 @@ def column_findings(
                 findings += joined.interleaved(channel, column)
         findings += _repeated(channel, column, steps[channel], settings)
     findings += copies.repeated_stretches(usable, steps, rate)
+    if static:
+        findings += shared_noise(usable)
     return findings
 
 
