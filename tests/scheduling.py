@@ -18,7 +18,7 @@ so that what its tests share is made once; so is a folder that stands here."""
 
 
 def unit(test: str) -> str:
-    """What one worker runs of which this test is a part: its file, or a folder that stands above."""
+    """What one worker runs whole, of the test with this id: its file, or a folder of `FIRST`."""
     path = test.partition("::")[0]
     return next((one for one in FIRST if path == one or path.startswith(f"{one}/")), path)
 

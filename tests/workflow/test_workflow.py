@@ -227,6 +227,16 @@ def test_a_second_run_has_nothing_to_do(project: Project) -> None:
     assert project.jobs() == {}
 
 
+def test_one_core_and_two_give_the_same_of_each_recording(project: Project, tmp_path: Path) -> None:
+    alone = Project(project.folder, tmp_path / "results", linked(tmp_path))
+    own, others = (made.results / "recordings/one/a" for made in (alone, project))
+    last = (own / f"{name}.parquet" for name in ("scores", "datasheet", "error_budget"))
+    assert alone.run(*map(str, last), cores=1).returncode == 0
+    made = {path.name: path.read_bytes() for path in own.iterdir()}
+    assert made == {path.name: path.read_bytes() for path in others.iterdir()}
+
+
+@pytest.mark.release
 def test_one_core_and_two_give_the_same_tables(project: Project, tmp_path: Path) -> None:
     alone = Project(project.folder, tmp_path / "results", linked(tmp_path))
     rules = ("tables", "ranking", "shortlist", "repeatability", "fusion", "catalogue")
