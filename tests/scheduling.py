@@ -12,6 +12,9 @@ FIRST = (
     "tests/workflow/test_nightly.py",  # so are these
     "tests/workflow/test_failures.py",  # waits for a step that takes too long
     "tests/workflow/test_earth_rate.py",  # a run, and lists of jobs
+    "tests/test_corpus.py",  # logs of every format, together and one by one
+    "tests/test_fuzz.py",  # waits for readers that hang
+    "tests/thermal/test_fit.py",  # the longest of those that only compute, and else among the last
 )
 """What takes longest begins first, and what is short fills the rest. A file is run by one worker,
 so that what its tests share is made once; so is a folder that stands here."""

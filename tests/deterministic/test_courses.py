@@ -77,7 +77,7 @@ def test_periodic_drift_is_found_with_its_period() -> None:
 
 
 def test_telegraph_noise_is_named_and_left() -> None:
-    log = static_log(9, hours=1.0)
+    log = static_log(9)
     flips = np.cumsum(np.random.default_rng(1).random(len(log)) < 1.0 / 300.0 / RATE) % 2
     found = courses_of(log + 8.0 * SIGMA * flips)
     assert found.telegraph
