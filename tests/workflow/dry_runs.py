@@ -41,7 +41,7 @@ def _server() -> subprocess.Popen[str]:
 
 
 IMPORTED = (
-    "snakemake.cli", "snakemake.report.html_reporter",
+    "snakemake.cli", "snakemake.report.html_reporter", "smart_open",
     "imubench_pipeline.run.scripts", "imubench_pipeline.run.resources",
 )  # fmt: skip
 """What each run needs: all but a third of its time."""
