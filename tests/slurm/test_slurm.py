@@ -129,7 +129,7 @@ def test_the_tables_are_those_of_a_local_run(project: Project, tmp_path: Path) -
     rules = ("tables", "ranking", "shortlist", "repeatability", "fusion", "catalogue")
     with ThreadPoolExecutor(1) as beside:  # Slurm is waited for
         of_slurm = beside.submit(project.run, *flags(1), cores=1)
-        of_local = local.run(*rules, cores=1)
+        of_local = local.run(*rules)
     for done in (of_slurm.result(), of_local):
         assert done.returncode == 0, done.stdout + done.stderr
     states = [state for state, *_ in submitted(project.environment)[before:]]

@@ -1,4 +1,4 @@
-"""Dry runs of Snakemake, each in a fork of one process that has what all of them need: most of it."""
+"""Dry runs of Snakemake, each in a fork of one process that has what all of them need."""
 
 from __future__ import annotations
 
