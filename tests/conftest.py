@@ -8,15 +8,27 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import settings
+from xdist.scheduler import LoadScopeScheduling
+
+from tests.scheduling import ByUnit, place
 
 # The first example may have to wait for a compiler; how fast the code is, benchmarks/ tells.
-# A fourth of the examples: they are others in each run. All of them: HYPOTHESIS_PROFILE=all.
 settings.register_profile("all", deadline=None, database=None)
-settings.register_profile("quick", settings.get_profile("all"), max_examples=25)
+# Every day a fourth of the examples, and the same in each run: what passes today passes tomorrow.
+# All of them, and others in each run, before a release: HYPOTHESIS_PROFILE=all.
+settings.register_profile("quick", settings.get_profile("all"), max_examples=25, derandomize=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))
 
 PROJECT = Path(__file__).parents[1]
 SHARED = PROJECT.parent / "shared"
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    items.sort(key=lambda item: place(item.nodeid))
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling:
+    return ByUnit(config, log)
 
 
 def few(chosen: Iterable[Any], others: Iterable[Any]) -> list[Any]:

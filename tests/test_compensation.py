@@ -19,8 +19,6 @@ from imubench_pipeline.tables import build, write
 from imubench_pipeline.tables.keys import Key
 from tests.kept import curve_of, kept
 
-pytestmark = pytest.mark.xdist_group("test_compensation")  # its logs are made once
-
 RATE = 5.0
 SAMPLES = 60_000
 BIAS, SENSITIVITY = 0.02, 1e-3

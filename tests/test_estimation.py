@@ -20,8 +20,6 @@ from imubench_pipeline.tables import build, write
 from imubench_pipeline.tables.keys import Key
 from tests.kept import curve_of, kept
 
-pytestmark = pytest.mark.xdist_group("test_estimation")  # its logs are made once
-
 RATE = 10.0
 SAMPLES = 60_000
 GYRO = NoiseModel(N=1e-3, B=2e-3, T_B=20.0)

@@ -12,7 +12,7 @@ import pytest
 
 from tests.conftest import few
 
-pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("workflow")]
+pytestmark = pytest.mark.workflow
 
 WORKFLOW = """
 rule all:

@@ -147,7 +147,6 @@ def snakemake(folder: Path, command: str, *flags: str) -> list[str]:
 
 
 @pytest.mark.workflow
-@pytest.mark.xdist_group("workflow")
 def test_a_failed_run_says_what_failed_and_how_to_go_on(tmp_path: Path) -> None:
     lines = snakemake(tmp_path, "exit 3")
     assert lines[0] == "2 steps failed; why stands above"
@@ -158,7 +157,6 @@ def test_a_failed_run_says_what_failed_and_how_to_go_on(tmp_path: Path) -> None:
 
 
 @pytest.mark.workflow
-@pytest.mark.xdist_group("workflow")
 def test_an_interrupted_run_says_how_to_go_on(tmp_path: Path) -> None:
     # Snakemake loses a signal that comes while it is busy: it is sent until the log has it.
     heard = "grep -qs 'on user request' .snakemake/log/*"

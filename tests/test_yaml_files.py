@@ -90,18 +90,18 @@ VALUES = st.recursive(
 
 
 @example("\x85")
+@example({" ": None, "\x85": None})
 @given(VALUES)
 def test_what_is_written_is_read(value: object) -> None:
     # Escaped, and as people type it. PyYAML itself writes U+0085 without an escape where it is
-    # allowed to, and folds it into a space when it reads: what it loses is not judged here.
-    texts = [yaml.safe_dump(value), yaml.safe_dump(value, allow_unicode=True)]
+    # allowed to, and folds it into a space when it reads, which may make two keys the same: what it
+    # loses is not judged here.
+    escaped, typed = yaml.safe_dump(value), yaml.safe_dump(value, allow_unicode=True)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "a.yaml")
-        for text in texts:
+        for text in (escaped, typed) if yaml.safe_load(typed) == value else (escaped,):
             path.write_text(text, encoding="utf-8")
-            assert read_yaml(path) == yaml.safe_load(text)
-        path.write_text(texts[0], encoding="utf-8")
-        assert read_yaml(path) == value
+            assert read_yaml(path) == value
 
 
 def test_a_next_line_sign_is_read_where_it_is_escaped(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from imubench_pipeline.experiments.calibration.least_squares import NotObservableError
 from imubench_pipeline.experiments.calibration.rate_table import RateTable, calibrate
@@ -11,6 +12,7 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.settings.pointing import Pointing
 from imubench_pipeline.simulate.model import SensorModel
 from imubench_pipeline.simulate.simulation import simulate
+from tests.conftest import few
 
 RATES = (0.0, 0.5, -0.5, 1.0, -1.0, 0.0, 0.25)
 STEPS = [(30.0 * i + 5.0, 30.0 * i + 30.0, rate) for i, rate in enumerate(RATES)]
@@ -124,7 +126,8 @@ def test_white_noise_gives_the_straight_line_of_ordinary_least_squares():
     assert found.linearity.sigma == pytest.approx(sigma, rel=1e-6)
 
 
-def test_logs_of_the_simulator_give_their_scale_factor():
+@pytest.mark.parametrize("logs", few([10], [40]))
+def test_logs_of_the_simulator_give_their_scale_factor(logs):
     noise = MODELS["N+GM+K"]
     model = SensorModel(noise=noise, bias=0.02, scale_error=0.003)
     table = np.interp(
@@ -134,7 +137,7 @@ def test_logs_of_the_simulator_give_their_scale_factor():
     )
     true = table + UP.rate
     errors = []
-    for seed in range(40):
+    for seed in range(logs):
         log = simulate(model, 8.0, 1680, np.random.default_rng(seed), true=lambda a, b: true[a:b])
         log[100:103] = np.nan
         found, measured = calibrate(log, SCHEDULE, noise, UP)
@@ -142,7 +145,8 @@ def test_logs_of_the_simulator_give_their_scale_factor():
         # SensorModel has the bias behind the scale factor.
         errors.append((found.bias[0] - 0.02) / found.bias_sigma)
     assert measured.missing == 3
-    assert 48.0 < np.sum(np.square(errors)) < 122.0  # 99.5 % of chi-squared of 80
+    low, high = chi2(2 * logs).ppf([0.0025, 0.9975])
+    assert low < np.sum(np.square(errors)) < high
     by_column = Schedule.from_column(table, 8.0, tolerance=1e-9, shortest=20.0)
     again, _ = calibrate(log, by_column, noise, UP)
     assert again.scale_factor[0] == pytest.approx(found.scale_factor[0], abs=1e-4)

@@ -9,7 +9,7 @@ import pytest
 from tests.release.kills import Killer
 from tests.release.small import NIGHTLY, SNAKEMAKE, Undisturbed
 
-pytestmark = [pytest.mark.release, pytest.mark.workflow, pytest.mark.xdist_group("workflow")]
+pytestmark = [pytest.mark.release, pytest.mark.workflow]
 
 KILLS = (
     ("all", SNAKEMAKE),

@@ -13,8 +13,6 @@ from imubench_pipeline.simulate.profiles import Constant, DayCycle, Profile, War
 from imubench_pipeline.simulate.simulation import CHUNK, simulate, simulate_blocks
 from tests.sensor_model import theory
 
-pytestmark = pytest.mark.xdist_group("test_simulation")  # its logs are made once
-
 RATE = 100.0
 MODELS = {
     "white noise behind a cut-off above Nyquist": (

@@ -7,6 +7,7 @@ import subprocess
 import tempfile
 import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from tests.workflow.project import Project, linked, put_log, put_sensor
 from tests.workflow.rules import costs
 from tests.workflow.test_workflow import STEPS_OF_A_RECORDING
 
-pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("workflow")]
+pytestmark = pytest.mark.workflow
 
 SCRIPTS = Path(__file__).parent
 PROGRAMS = ("slurmctld", "slurmd", "munged", "sbatch", "srun", "squeue")
@@ -124,18 +125,20 @@ def test_a_job_that_is_killed_is_named_and_the_rest_is_done(project: Project) ->
 def test_the_tables_are_those_of_a_local_run(project: Project, tmp_path: Path) -> None:
     (project.folder / "logs/one/doomed.csv").unlink()
     before = len(submitted(project.environment))
-    done = project.run(*flags(1), cores=1)
-    assert done.returncode == 0, done.stdout + done.stderr
+    local = Project(project.folder, tmp_path / "results", linked(tmp_path), project.settings)
+    rules = ("tables", "ranking", "shortlist", "repeatability", "fusion", "catalogue")
+    with ThreadPoolExecutor(1) as beside:  # Slurm is waited for
+        of_slurm = beside.submit(project.run, *flags(1), cores=1)
+        of_local = local.run(*rules)
+    for done in (of_slurm.result(), of_local):
+        assert done.returncode == 0, done.stdout + done.stderr
     states = [state for state, *_ in submitted(project.environment)[before:]]
     # A recording is one job, unless it is analysed already, and the tables and the report another.
     assert states[-1] == "COMPLETED" and states.count("COMPLETED") <= 2
     assert (project.results / "report/index.html").is_file()
-    local = Project(project.folder, tmp_path / "results", settings=project.settings)
-    rules = ("tables", "ranking", "shortlist", "repeatability", "fusion", "catalogue")
-    assert local.run(*rules).returncode == 0
     made = sorted(path.name for path in (local.results / "tables").iterdir())
     assert made == sorted(path.name for path in (project.results / "tables").iterdir())
     for name in made:
-        of_slurm = (project.results / "tables" / name).read_bytes()
-        assert (local.results / "tables" / name).read_bytes() == of_slurm, name
+        expected = (local.results / "tables" / name).read_bytes()
+        assert (project.results / "tables" / name).read_bytes() == expected, name
     assert {row["recording"] for row in project.table("scores")} == {"hungry (1)"}

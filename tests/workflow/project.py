@@ -35,13 +35,13 @@ _WILDCARDS = re.compile(r"wildcards: sensor=(.+?)(?:, recording=(.+))?$", re.MUL
 class Project:
     """Logs and sensor files in a folder, and the results of their runs.
 
-    ``place`` is the folder to run in, that of the Snakefile unless `linked` made another one;
+    ``place`` is the folder to run in, made by `linked`: two projects never share notes and locks;
     ``settings`` go to the command line, as ``key=value``; ``environment`` is that of the run.
     """
 
     folder: Path
     results: Path
-    place: Path = PROJECT
+    place: Path
     settings: list[str] = field(default_factory=list)
     environment: dict[str, str] | None = None
 

@@ -15,7 +15,7 @@ from tests.calibration.recordings import BIAS, SCALE, STEPS, UP, on_table
 from tests.earth_rate.runs import turned
 from tests.workflow.project import Job, Project, linked
 
-pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("workflow")]
+pytestmark = pytest.mark.workflow
 
 RATE = 32.0
 NOISE = NoiseModel(N=2e-4)

@@ -14,7 +14,7 @@ import pytest
 import imubench_pipeline
 from tests.workflow.project import Project, linked, put_log, put_sensor
 
-pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("workflow")]
+pytestmark = pytest.mark.workflow
 
 FAULTS = """
     import os, time

@@ -15,7 +15,7 @@ import yaml
 import imubench_pipeline
 from tests.workflow.project import CHANNELS, Job, Project, linked, put_log, put_sensor
 
-pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("workflow")]
+pytestmark = pytest.mark.workflow
 
 STEPS = ("ingest", "allan", "estimate", "reconstruct", "datasheet", "error_budget")
 TOGETHER = {

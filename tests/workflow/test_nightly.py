@@ -20,7 +20,7 @@ import pytest
 from tests.conftest import PROJECT
 from tests.workflow.test_workflow import put_log, put_sensor
 
-pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("workflow")]
+pytestmark = pytest.mark.workflow
 
 ENTRY = """
 import argparse, sys

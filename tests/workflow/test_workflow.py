@@ -11,9 +11,9 @@ import pyarrow.parquet as pq
 import pytest
 import yaml
 
-from tests.workflow.project import CHANNELS, Project, put_log, put_sensor
+from tests.workflow.project import CHANNELS, Project, linked, put_log, put_sensor
 
-pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("workflow")]
+pytestmark = pytest.mark.workflow
 
 STEPS_OF_A_RECORDING = dict.fromkeys(
     ("ingest", "allan", "estimate", "reconstruct", "datasheet", "error_budget"), 1
@@ -79,7 +79,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Project:
     put_bad_logs(folder / "logs/two")
     (folder / "logs/unknown").mkdir()
     put_log(folder / "logs/unknown/a.csv", 5, samples=10)
-    return Project(folder, folder / "results")
+    return Project(folder, folder / "results", linked(folder / "place"))
 
 
 @pytest.fixture(scope="module")
@@ -227,8 +227,18 @@ def test_a_second_run_has_nothing_to_do(project: Project) -> None:
     assert project.jobs() == {}
 
 
+def test_one_core_and_two_give_the_same_of_each_recording(project: Project, tmp_path: Path) -> None:
+    alone = Project(project.folder, tmp_path / "results", linked(tmp_path))
+    own, others = (made.results / "recordings/one/a" for made in (alone, project))
+    last = (own / f"{name}.parquet" for name in ("scores", "datasheet", "error_budget"))
+    assert alone.run(*map(str, last), cores=1).returncode == 0
+    made = {path.name: path.read_bytes() for path in own.iterdir()}
+    assert made == {path.name: path.read_bytes() for path in others.iterdir()}
+
+
+@pytest.mark.release
 def test_one_core_and_two_give_the_same_tables(project: Project, tmp_path: Path) -> None:
-    alone = Project(project.folder, tmp_path / "results")
+    alone = Project(project.folder, tmp_path / "results", linked(tmp_path))
     rules = ("tables", "ranking", "shortlist", "repeatability", "fusion", "catalogue")
     assert alone.run(*rules, cores=1).returncode == 0
     made = sorted((alone.results / "tables").iterdir())

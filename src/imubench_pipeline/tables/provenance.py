@@ -6,7 +6,7 @@ import hashlib
 import re
 from collections.abc import Iterator
 from contextlib import suppress
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 
 _PACKAGE = Path(__file__).parents[1]
@@ -55,7 +55,7 @@ def _path(module: str) -> Path:
     raise ValueError(f"no module {module!r} in {_NAME}")
 
 
-@lru_cache(maxsize=256)
+@cache
 def _used(path: Path) -> tuple[Path, ...]:
     """Return the files of the package that a module uses by itself."""
     text = path.read_text("utf-8")

@@ -11,15 +11,6 @@ from tests.report.browser import made
 from tests.report.browser.made import Report
 from tests.report.browser.reader import Open, Reader, Scheme
 
-HERE = Path(__file__).parent
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    # One worker opens the browser, and makes the reports, for all of these tests.
-    for item in items:
-        if HERE in item.path.parents:
-            item.add_marker(pytest.mark.xdist_group("browser"))
-
 
 @pytest.fixture(scope="package")
 def browser() -> Iterator[Browser]:
