@@ -360,7 +360,7 @@ def time_until(
         raise ValueError(f"limit is {limit}, expected a number above 0")
 
     def excess(time: float) -> float:
-        found = budget(
+        error_budget = budget(
             quantity,
             time,
             gyro=gyro,
@@ -370,7 +370,7 @@ def time_until(
             gyro_figures=gyro_figures,
             accel_figures=accel_figures,
         )
-        return found.total - limit
+        return error_budget.total - limit
 
     if excess(_SHORTEST) >= 0:
         return 0.0

@@ -252,9 +252,9 @@ def needed(measured: Measured, cause: Cause, figures: Figures) -> bool:
         Of the axis.
     """
 
-    def known(one: Cause) -> bool:
-        return one in figures and figures[one].sigma is not None
+    def has_figure(candidate: Cause) -> bool:
+        return candidate in figures and figures[candidate].sigma is not None
 
     asked = cause in _NEEDED or (measured, cause) == ("accel", "vibration_rectification")
     otherwise = _OTHERWISE.get((measured, cause))
-    return asked and not known(cause) and not (otherwise and known(otherwise))
+    return asked and not has_figure(cause) and not (otherwise and has_figure(otherwise))

@@ -105,12 +105,12 @@ def figures_of(sensor: Sensor, quantity: str, ranges: MeasuredRanges) -> Figures
         if own:
             assumed.extend(f"{of} {figure}: {words}" for words in _readings(own))
             return _ends(own)
-        found = ranges.span(sensor.price_class, quantity, figure)
-        if found is None:
+        span = ranges.span(sensor.price_class, quantity, figure)
+        if span is None:
             unknown.append(figure)
         else:
-            assumed.append(f"{of} {figure}: {found.low:.2g} to {found.high:.2g} SI, {found.words}")
-        return found
+            assumed.append(f"{of} {figure}: {span.low:.2g} to {span.high:.2g} SI, {span.words}")
+        return span
 
     if not any(row.statistic == "N" for row in printed):
         return f"no noise density of the {of} is published"
@@ -142,7 +142,7 @@ def printed_ranges(sensors: Mapping[str, Sensor]) -> dict[tuple[str, str], tuple
     dict
         (sensor, quantity) -> (low, high), SI; without those that print none.
     """
-    found = {}
+    ranges = {}
     for name, sensor in sensors.items():
         for quantity in _NAMES:
             if getattr(sensor.datasheet, quantity) is None:
@@ -156,8 +156,8 @@ def printed_ranges(sensors: Mapping[str, Sensor]) -> dict[tuple[str, str], tuple
             ]
             if own:
                 ends = _ends(own)
-                found[name, quantity] = (ends.low, ends.high / FLOOR)
-    return found
+                ranges[name, quantity] = (ends.low, ends.high / FLOOR)
+    return ranges
 
 
 def _ends(rows: Sequence[Comparable]) -> Span:

@@ -60,13 +60,13 @@ class _Point:
     name: str
     fulfilled: bool | None
     asked: str
-    found: str = ""
+    shown: str = ""
 
 
 def abilities(sensor: Sensor) -> Abilities:
     """Return what the file of a sensor tells of what it has."""
     quantities: tuple[Measured, ...] = ("gyro", "accel")
-    found = {
+    printed = {
         name: {
             quantity: largest
             for quantity in quantities
@@ -76,8 +76,8 @@ def abilities(sensor: Sensor) -> Abilities:
     }
     ends = sensor.temperature_range
     return Abilities(
-        full_scale=found["full_scale"],
-        bandwidth=found["bandwidth"],
+        full_scale=printed["full_scale"],
+        bandwidth=printed["bandwidth"],
         logged_rate=sensor.log.rate_hz,
         rate=_si(sensor.rate, "frequency"),
         temperature=(
@@ -86,7 +86,9 @@ def abilities(sensor: Sensor) -> Abilities:
             else None
         ),
         channels=tuple(sensor.log.channels),
-        without=tuple(one for one in quantities if getattr(sensor.datasheet, one) is None),
+        without=tuple(
+            quantity for quantity in quantities if getattr(sensor.datasheet, quantity) is None
+        ),
         mass=_si(sensor.mass, "mass"),
         power=_si(sensor.power, "power"),
     )
@@ -108,10 +110,10 @@ def _largest(datasheet: Datasheet, quantity: Measured, name: str) -> float | Non
     for axis in "xyz":
         printed = [(figure, figure.on_axis(axis)) for figure in figures]
         values = [
-            to_si(one, figure.unit or "", FIGURE_DIMENSIONS[quantity][name][0])
+            to_si(size, figure.unit or "", FIGURE_DIMENSIONS[quantity][name][0])
             for figure, value in printed
             if value is not None
-            for one in (value if isinstance(value, tuple) else (value,))
+            for size in (value if isinstance(value, tuple) else (value,))
         ]
         if values:
             by_axis.append(max(values))
@@ -134,8 +136,8 @@ def judge(must: Must, has: Abilities) -> tuple[list[str], list[str]]:
             unknown.append(point.name)
         elif not point.fulfilled:
             lacking.append(
-                f"{point.name} {point.found}, {point.asked} asked"
-                if point.found
+                f"{point.name} {point.shown}, {point.asked} asked"
+                if point.shown
                 else f"no {point.name}"
             )
     return list(dict.fromkeys(lacking)), list(dict.fromkeys(unknown))
@@ -204,9 +206,9 @@ def _temperature(ends: tuple[str, str], has: Abilities) -> _Point:
     if has.temperature is None:
         return _Point(name, None, text)
     low, high = (quantity_to_si(end, "temperature") for end in ends)
-    found = has.temperature
-    within = found[0] <= low and high <= found[1]
-    return _Point(name, within, text, f"{found[0]:.4g} to {found[1]:.4g} degC")
+    covered = has.temperature
+    within = covered[0] <= low and high <= covered[1]
+    return _Point(name, within, text, f"{covered[0]:.4g} to {covered[1]:.4g} degC")
 
 
 def _axes(must: Must, has: Abilities) -> Iterator[_Point]:
@@ -217,8 +219,8 @@ def _axes(must: Must, has: Abilities) -> Iterator[_Point]:
             continue
         for axis in axes:
             # The logs may leave out an axis that the sensor has.
-            there = f"{quantity}_{axis}" in has.channels or None
-            yield _Point(f"axis {quantity}_{axis}", there, text)
+            logged = f"{quantity}_{axis}" in has.channels or None
+            yield _Point(f"axis {quantity}_{axis}", logged, text)
 
 
 def _shown(value: float | None, unit: str, dimension: str) -> str:

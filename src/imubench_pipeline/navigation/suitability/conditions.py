@@ -107,10 +107,10 @@ class Rests:
         """Return a verdict on the known errors with what it rests on, and the latter in words."""
         if self.lacking:
             return EXCLUDED, "; ".join(self.lacking)
-        said = list(self._conditions())
-        if words not in CONDITIONAL or not said:
+        conditions = list(self._conditions())
+        if words not in CONDITIONAL or not conditions:
             return words, None
-        return CONDITIONAL[words], "; ".join(said)
+        return CONDITIONAL[words], "; ".join(conditions)
 
     def unknown_figures(self) -> list[str]:
         """Return the names of the figures that its file does not say, but for turn-on biases."""

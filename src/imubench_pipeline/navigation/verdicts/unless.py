@@ -94,7 +94,7 @@ def unless(sensor: str, rows: Sequence[Row], basis: Basis) -> Unless | None:
     if not logged.known or (mended is None and not unjudged):
         return None
     doubts = {key: basis.doubted(key) for key in (doubted or apart)}
-    together = {name: f for one in factors.values() for name, f in one.items()}
+    together = {name: f for of_recording in factors.values() for name, f in of_recording.items()}
     return Unless(logged if unjudged else None, mended, together, doubts)
 
 
@@ -147,16 +147,19 @@ def _within(total: Row) -> float | None:
     return float(ndtr(_NORMAL * away / half))
 
 
-def unless_words(found: Unless) -> str:
+def unless_words(alternative: Unless) -> str:
     """Return in words what the verdict would be."""
     parts = []
-    if found.logged is not None:
-        parts.append(f"as logged it {_outcome(found.logged)}")
-    if found.mended is not None:
-        outcome = _outcome(found.mended)
-        if found.logged is not None and found.logged.verdict == found.mended.verdict:
-            outcome = outcome.replace(found.mended.verdict, "does so too")
-        parts.append(f"if {_units(found.factors)}, it {outcome}")
+    if alternative.logged is not None:
+        parts.append(f"as logged it {_outcome(alternative.logged)}")
+    if alternative.mended is not None:
+        outcome = _outcome(alternative.mended)
+        if (
+            alternative.logged is not None
+            and alternative.logged.verdict == alternative.mended.verdict
+        ):
+            outcome = outcome.replace(alternative.mended.verdict, "does so too")
+        parts.append(f"if {_units(alternative.factors)}, it {outcome}")
     return "; ".join(parts)
 
 
