@@ -14,13 +14,13 @@ from imubench_pipeline.typing import Row
 
 def shown_symbols(channel: ChannelView) -> list[str]:
     """Return the parameters of the papers' model, and those others that a channel has."""
-    there = {
+    estimated = {
         row["parameter"]
         for rows in channel.parameters.values()
         for row in rows
         if row["status"] != "absent"
     }
-    return [symbol for symbol in SHOWN if symbol in PARAMETERS or symbol in there]
+    return [symbol for symbol in SHOWN if symbol in PARAMETERS or symbol in estimated]
 
 
 def methods_table(

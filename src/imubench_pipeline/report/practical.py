@@ -219,7 +219,7 @@ def _unit(quantity: str, symbol: str, choice: str) -> PageUnit:
     }.get(symbol, QUANTITIES[quantity])
     signs = _CHOICES[quantity][choice]
     # A parameter without a unit of its own has that of the first of its dimension.
-    alike = next((one for one in signs if dimensions.get(one) == dimension), symbol)
+    alike = next((other for other in signs if dimensions.get(other) == dimension), symbol)
     return _page_unit(signs.get(symbol) or signs[alike], dimension)
 
 

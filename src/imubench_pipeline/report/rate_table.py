@@ -72,7 +72,7 @@ def _summary(view: RecordingView, points: Sequence[Row]) -> str:
     row = view.row
     parts = [f"{duration_text(row['duration'])} at {number_text(row['rate'])} Hz"]
     if points:
-        most = math.degrees(max(abs(one["table_rate"]) for one in points))
+        most = math.degrees(max(abs(point["table_rate"]) for point in points))
         parts.append(f"{counted(len(points), 'steady rate')} up to {number_text(most)} °/s")
     kind = "Simulated from known parameters, not measured: " if view.simulated else ""
     return kind + ", ".join(parts) + "."

@@ -147,17 +147,19 @@ def warnings(findings: Iterable[Row]) -> Iterator[str]:
     findings : iterable of mapping
         The table ``findings``; notes, and that a recording is left out, are not.
     """
-    found: dict[str, Counter[str]] = {}
+    by_recording: dict[str, Counter[str]] = {}
     left_out: Counter[str] = Counter()
     for row in serious(findings):
         name = f"{row['sensor']}/{row['recording']}"
-        found.setdefault(name, Counter())[row["finding"].replace("_", " ")] += 1
+        by_recording.setdefault(name, Counter())[row["finding"].replace("_", " ")] += 1
         left_out[name] += row["severity"] == "fatal"
-    for name in sorted(found, key=lambda name: (-left_out[name], -found[name].total())):
+    for name in sorted(
+        by_recording, key=lambda name: (-left_out[name], -by_recording[name].total())
+    ):
         kinds = ", ".join(
-            kind + f" ({count})" * (count > 1) for kind, count in found[name].most_common()
+            kind + f" ({count})" * (count > 1) for kind, count in by_recording[name].most_common()
         )
-        yield one_line(f"{name}: {_counted(found[name].total(), 'warning')}: {kinds}")
+        yield one_line(f"{name}: {_counted(by_recording[name].total(), 'warning')}: {kinds}")
 
 
 def serious(findings: Iterable[Row]) -> Iterator[Row]:

@@ -100,8 +100,8 @@ def _standings(site: Site, sensor: str) -> Iterator[dict[str, str]]:
             text = in_words(row)
             if row["rank"]:
                 judged = sum(
-                    one["rank"] is not None and one["requirement"] == row["requirement"]
-                    for one in deciding
+                    other["rank"] is not None and other["requirement"] == row["requirement"]
+                    for other in deciding
                 )
                 text = f"{verdict_words(row)}; rank {row['rank']} of {judged} that could be judged"
             if row["unless"]:
@@ -157,10 +157,10 @@ def _device(site: Site, own: Sequence[RecordingView], rows: Sequence[Row]) -> di
         quantity, axis = channel.split("_")
         title = f"{QUANTITY_NAMES[quantity]} {axis}"
         name = "fixed bias" if parameter == "bias" else symbol_text(parameter)
-        said = " (simulated)" if own[0].simulated else ""
-        changes = [row["recording"] + said for row in series if row["verdict"] == "changed"]
+        mark = " (simulated)" if own[0].simulated else ""
+        changes = [row["recording"] + mark for row in series if row["verdict"] == "changed"]
         outside = [
-            row["recording"] + said
+            row["recording"] + mark
             for row in series
             if row["verdict"] == "as before" and row["p_value"] < LEVEL
         ]

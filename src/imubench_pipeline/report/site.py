@@ -70,7 +70,7 @@ class Entry:
         The joined tables that it shows: it is written again if one of them changes.
     views : callable
         Returns the recordings that it shows: likewise, whatever any table says of them alone.
-    there : callable
+    exists : callable
         Tells whether a report has it.
     """
 
@@ -79,7 +79,7 @@ class Entry:
     context: Callable[[Site], Mapping[str, Any]]
     tables: tuple[str, ...] = ()
     views: Callable[[Site], Sequence[RecordingView]] = lambda _: ()
-    there: Callable[[Site], bool] = lambda _: True
+    exists: Callable[[Site], bool] = lambda _: True
 
     def page(self, site: Site) -> Page:
         """Return the page of a report."""
@@ -160,19 +160,21 @@ class Site:
     def calibrated(self) -> list[RecordingView]:
         """The recordings on a rate table, or at rest with a direction that is stated."""
         rows = self.rows("calibration")
-        there = {(row["sensor"], row["recording"]) for row in rows}
+        with_rows = {(row["sensor"], row["recording"]) for row in rows}
         return [
             view
             for view in self.views
-            if view.row["kind"] == "rate_table" or (view.sensor, view.name) in there
+            if view.row["kind"] == "rate_table" or (view.sensor, view.name) in with_rows
         ]
 
     @cached_property
     def predicted(self) -> list[RecordingView]:
         """The recordings at rest by whose noise it is predicted what their sensor could find."""
         rows = self.rows("earth_rate_prediction")
-        there = {(row["sensor"], row["recording"]) for row in rows}
-        return [view for view in self.views if view.static and (view.sensor, view.name) in there]
+        with_rows = {(row["sensor"], row["recording"]) for row in rows}
+        return [
+            view for view in self.views if view.static and (view.sensor, view.name) in with_rows
+        ]
 
     def device_page_of(self, row: Row) -> str | None:
         """Return the page of the device of a row that names a recording."""
@@ -185,7 +187,7 @@ class Site:
     @property
     def navigation(self) -> list[tuple[str, str]]:
         """The pages that every page leads to, with their names."""
-        return [(entry.file, entry.title) for entry in self.entries if entry.there(self)]
+        return [(entry.file, entry.title) for entry in self.entries if entry.exists(self)]
 
     @cached_property
     def sensors(self) -> list[str]:
@@ -205,8 +207,8 @@ class Site:
     @cached_property
     def channel_names(self) -> list[str]:
         """The channels that some recording has."""
-        there = set(self.tables["allan"]["channel"].unique().to_pylist())
-        return [name for name in _CHANNELS if name in there]
+        present = set(self.tables["allan"]["channel"].unique().to_pylist())
+        return [name for name in _CHANNELS if name in present]
 
     def sensor_page(self, sensor: str) -> str:
         """Return the page of a sensor."""

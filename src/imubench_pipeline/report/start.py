@@ -208,13 +208,13 @@ _SPREAD_OF = {
 
 
 def _margin(row: Row, group: dict[str, Any]) -> dict[str, Any]:
-    known = row["margin"] is not None
-    bounded = known and bool(row["lower"]) and bool(row["upper"])
+    has_margin = row["margin"] is not None
+    bounded = has_margin and bool(row["lower"]) and bool(row["upper"])
     return {
         "sensor": row["sensor"],
         "verdict": group["verdict"],
         "weak": group["weak"],
-        "margin": row["margin"] if known else None,
+        "margin": row["margin"] if has_margin else None,
         "low": row["limit"] / row["upper"] if bounded else None,
         "high": row["limit"] / row["lower"] if bounded else None,
     }

@@ -209,8 +209,8 @@ def recording_views(tables: Mapping[str, pa.Table]) -> list[RecordingView]:
     for row in tables["recordings"].to_pylist():
         name = (row["sensor"], row["recording"])
         parts = {
-            table: found[name] if name in found else tables[table].slice(0, 0)
-            for table, found in divided.items()
+            table: by_recording[name] if name in by_recording else tables[table].slice(0, 0)
+            for table, by_recording in divided.items()
         }
         views.append(RecordingView(row, parts, keys))
     return views
@@ -230,19 +230,19 @@ def _channels(view: RecordingView) -> list[ChannelView]:
         )
         for (name,), part in _by(view.parts["allan"], "channel").items()
     }
-    for one in view.rows("parameters"):
-        channel = channels[one["channel"]]
-        channel.parameters.setdefault(one["method"], []).append(one)
-        if one["recommended"]:
-            channel.recommended = one["method"]
+    for row in view.rows("parameters"):
+        channel = channels[row["channel"]]
+        channel.parameters.setdefault(row["method"], []).append(row)
+        if row["recommended"]:
+            channel.recommended = row["method"]
     for (name, method), part in _by(view.parts["reconstruction"], "channel", "method").items():
         channels[name].reconstruction[method] = {
             column: _floats(part, column)
             for column in ("tau", "adev", "lower", "upper", "reconstructed")
         }
     for table in ("models", "lines", "deterministic", "datasheet", "datasheet_curve"):
-        for one in view.rows(table):
-            getattr(channels[one["channel"]], table).append(one)
+        for row in view.rows(table):
+            getattr(channels[row["channel"]], table).append(row)
     for (name,), part in _by(view.parts["spectrum"], "channel").items():
         channels[name].spectrum = {
             column: _floats(part, column)
@@ -252,23 +252,25 @@ def _channels(view: RecordingView) -> list[ChannelView]:
         channels[name].compensated = {
             column: _floats(part, column) for column in ("tau", "adev", "lower", "upper")
         }
-    for one in view.rows("scores"):
-        channels[one["channel"]].scores[one["method"]] = one
-    for one in view.rows("fixed_bias"):
-        channels[one["channel"]].fixed_bias = one["value"]
-    for one in view.rows("temperature"):
-        channels[one["channel"]].temperature[one["parameter"]] = one
-    for one in view.rows("low_pass"):
-        channels[one["channel"]].low_pass[one["parameter"]] = one
-    for one in view.rows("simulated_truth"):
-        if one["channel"] in channels:
-            true = channels[one["channel"]].true_components.setdefault(one["parameter"], [])
-            true.append(one)
-    for one in view.rows("published"):
-        if one["channel"] in channels:
-            channels[one["channel"]].published.append(one)
+    for row in view.rows("scores"):
+        channels[row["channel"]].scores[row["method"]] = row
+    for row in view.rows("fixed_bias"):
+        channels[row["channel"]].fixed_bias = row["value"]
+    for row in view.rows("temperature"):
+        channels[row["channel"]].temperature[row["parameter"]] = row
+    for row in view.rows("low_pass"):
+        channels[row["channel"]].low_pass[row["parameter"]] = row
+    for row in view.rows("simulated_truth"):
+        if row["channel"] in channels:
+            true = channels[row["channel"]].true_components.setdefault(row["parameter"], [])
+            true.append(row)
+    for row in view.rows("published"):
+        if row["channel"] in channels:
+            channels[row["channel"]].published.append(row)
     for name, channel in channels.items():
-        channel.findings = [one for one in view.findings if one["channel"] in (None, name)]
+        channel.findings = [
+            finding for finding in view.findings if finding["channel"] in (None, name)
+        ]
     return list(channels.values())
 
 
