@@ -159,12 +159,12 @@ def _nearest_process(slow: Sequence[Term], N: float, horizon: float) -> GaussMar
     tau = np.geomspace(_SHORTEST * horizon, horizon, 60)
     white = N**2 / tau
     wanted = np.log(white + sum(term.allan_variance(tau) for term in slow))
-    kept = _variance(slow, horizon)
+    variance = _variance(slow, horizon)
 
     def process(T_B: float) -> GaussMarkov:
         unit = GaussMarkov(bias_instability(1.0, T_B), T_B)
         return GaussMarkov(
-            bias_instability(kept / _variance([unit], horizon), T_B),
+            bias_instability(variance / _variance([unit], horizon), T_B),
             T_B,
         )
 
