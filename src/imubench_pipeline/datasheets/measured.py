@@ -86,8 +86,8 @@ def _within(value: float, estimate: Estimate, tau: NDArray[np.float64]) -> Param
 def _ends(estimate: Estimate) -> Iterator[Estimate]:
     """Yield the estimate at the ends of its intervals; nothing if one has no interval."""
     groups = [estimate.parameters, *estimate.further]
-    known = [p for group in groups for p in group.values() if p.in_model]
-    if any(p.lower is None or p.upper is None for p in known):
+    in_model = [p for group in groups for p in group.values() if p.in_model]
+    if any(p.lower is None or p.upper is None for p in in_model):
         return
 
     def at(group: Mapping[str, Parameter], amplitudes: str, times: str) -> dict[str, Parameter]:
@@ -166,14 +166,14 @@ def sensitivity(
         Where temperature is not taken out of the log, the upper limit alone; where it cannot be
         told from time, nothing.
     """
-    found = {row["parameter"]: row for row in rows}
-    row = found.get("sensitivity")
+    by_parameter = {row["parameter"]: row for row in rows}
+    row = by_parameter.get("sensitivity")
     if row is None:
         return NO_READINGS
-    at = f"slope at {found['T_0']['value']:.3g} °C"
+    at = f"slope at {by_parameter['T_0']['value']:.3g} °C"
     if lowest is not None and highest is not None:
         at += f", of readings from {lowest:.3g} to {highest:.3g} °C; the vendor has another range"
-    if found["quadratic"]["value"] is not None:
+    if by_parameter["quadratic"]["value"] is not None:
         at += "; the bias bends with temperature, the slope is another elsewhere"
     lower, upper = row["lower"], row["upper"]
     if row["value"] is None or lower is None or upper is None:
