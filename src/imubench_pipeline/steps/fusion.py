@@ -92,13 +92,13 @@ def _temperature_parts(
         curves.setdefault(_channel(row), []).append((row["tau"], row["temperature"]))
     temperature = tables["temperature"]
     chosen = pc.and_(temperature["compensated"], pc.equal(temperature["parameter"], "sensitivity"))
-    found = {}
+    parts = {}
     for row in temperature.filter(chosen).to_pylist():
         if _channel(row) in curves:
             tau, deviation = np.array(curves[_channel(row)]).T
             error = (row["upper"] - row["lower"]) / (2.0 * _OF_LIMIT * abs(row["value"]))
-            found[_channel(row)] = TemperaturePart(tau, deviation, error)
-    return found
+            parts[_channel(row)] = TemperaturePart(tau, deviation, error)
+    return parts
 
 
 def _channel(row: Row) -> tuple[str, str, str]:

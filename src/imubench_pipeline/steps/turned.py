@@ -215,7 +215,7 @@ def _turning_rows(key: Key, turning: Turning, samples: Array, rate: float) -> It
     used = _used(samples, turning, rate)
     for number, (dwell, part) in enumerate(_dwells(turning, rate), 1):
         values = used[part.start : part.stop]
-        there = np.isfinite(values)
+        finite = np.isfinite(values)
         yield names | {
             "what": "dwell",
             "number": number,
@@ -223,7 +223,7 @@ def _turning_rows(key: Key, turning: Turning, samples: Array, rate: float) -> It
             "stop": dwell.stop,
             "sense": dwell.sense,
             "found_by": dwell.found_by,
-            "mean": float(values[there].mean()) if there.any() else None,
+            "mean": float(values[finite].mean()) if finite.any() else None,
             "doubts": "; ".join(dwell.doubts) or None,
         }
     for number, turn in enumerate(turning.turns, 1):
