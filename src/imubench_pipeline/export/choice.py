@@ -74,10 +74,6 @@ def choose(
     method : str, optional
         Estimation method; the recommended one by default.
 
-    Returns
-    -------
-    Choice
-
     Raises
     ------
     ExportError

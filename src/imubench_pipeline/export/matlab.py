@@ -57,12 +57,7 @@ class _Parameters:
 
 
 def write(imu: Imu) -> str:
-    """Return the script; it leaves ``IMU``, an imuSensor.
-
-    Parameters
-    ----------
-    imu : Imu
-    """
+    """Return the script; it leaves ``IMU``, an imuSensor."""
     mapped: dict[str, Mapped] = {}
     parameters: dict[str, _Parameters] = {}
     for name, axis in imu.axes.items():

@@ -213,10 +213,6 @@ def overbound(
     most_excess : float
         Largest Allan deviation of the model over the limit that it must lie above.
 
-    Returns
-    -------
-    Overbound
-
     Raises
     ------
     ValueError

@@ -65,10 +65,6 @@ def temperature_effect(
     horizon : float
         How long the program goes without a measurement, s: a sensor that may follow the
         temperature later than that is left out.
-
-    Returns
-    -------
-    TemperatureEffect
     """
     low, high = recording["temperature_min"], recording["temperature_max"]
     by_axis: dict[str, dict[str, Row]] = {}

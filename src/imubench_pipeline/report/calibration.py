@@ -6,12 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from imubench_pipeline.report.practical import (
-    System,
-    limit_digits,
-    number_text,
-    page_unit,
-)
+from imubench_pipeline.report.practical import System, limit_digits, number_text, page_unit
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.report.words import noise_words, sentence
@@ -210,13 +205,7 @@ def _degrees(angle: float) -> str:
 
 
 def at_rest(view: RecordingView, system: System) -> dict[str, Any] | None:
-    """Return what the page of a static recording says of its bias; None without a direction.
-
-    Parameters
-    ----------
-    view : RecordingView
-    system : str
-    """
+    """Return what the page of a static recording says of its bias; None without a direction."""
     rows = [row for row in view.rows("calibration") if row["run"] == "at_rest"]
     if not rows:
         return None
@@ -231,12 +220,7 @@ def at_rest(view: RecordingView, system: System) -> dict[str, Any] | None:
 
 
 def of_all(site: Site) -> dict[str, list[dict[str, Any]]]:
-    """Return the lines of the page that has all calibrated recordings, by kind of run.
-
-    Parameters
-    ----------
-    site : Site
-    """
+    """Return the lines of the page that has all calibrated recordings, by kind of run."""
     by_run: dict[str, list[dict[str, Any]]] = {"rate_table": [], "at_rest": []}
     for view in site.calibrated:
         rows = view.rows("calibration")

@@ -7,12 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from imubench_pipeline.report.practical import (
-    System,
-    limit_digits,
-    number_text,
-    page_unit,
-)
+from imubench_pipeline.report.practical import System, limit_digits, number_text, page_unit
 from imubench_pipeline.report.view import ChannelView
 from imubench_pipeline.report.words import sentence
 from imubench_pipeline.typing import Row
@@ -35,12 +30,7 @@ _SEEN = 1.05
 
 
 def figures(channel: ChannelView) -> Iterator[dict[str, Any]]:
-    """Yield the lines of the table: temperature's, where its effect was sought; the low-pass's.
-
-    Parameters
-    ----------
-    channel : ChannelView
-    """
+    """Yield the lines of the table: temperature's, where its effect was sought; the low-pass's."""
     entries = (
         *((channel.temperature, *names) for names in _TEMPERATURE),
         *((channel.low_pass, *names) for names in _LOW_PASS),
@@ -70,13 +60,7 @@ def _without_filter(name: str, rows: Mapping[str, Row]) -> bool:
 
 
 def answer(channel: ChannelView, system: System) -> list[str]:
-    """Return in sentences what was found of temperature and low-pass.
-
-    Parameters
-    ----------
-    channel : ChannelView
-    system : str
-    """
+    """Return in sentences what was found of temperature and low-pass."""
     lines = []
     temperature, low_pass = channel.temperature, channel.low_pass
     if temperature:
