@@ -28,6 +28,7 @@ from imubench_pipeline.navigation.error_budget import (
     interval,
     time_until,
 )
+from imubench_pipeline.navigation.error_budget.in_use import SENSORS
 from imubench_pipeline.navigation.error_budget.parts import Largest, source_row
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
@@ -54,7 +55,6 @@ class AxisErrors:
 
 
 _NOTHING = AxisErrors()
-_NAMES = {"gyro": "gyro", "accel": "accelerometer"}
 
 
 @dataclass(frozen=True)
@@ -333,7 +333,7 @@ def _missing(quantity: str, estimates: Mapping[str, Estimate]) -> str:
     """Return why there is no noise of a quantity to answer with."""
     silent = [channel for channel in estimates if quantity_of(channel) == quantity]
     if not silent:
-        return f"no {_NAMES[quantity]} in the recording"
+        return f"no {SENSORS[quantity]} in the recording"
     return f"nothing is known of the noise of {', '.join(silent)}: {_why(estimates[silent[0]])}"
 
 

@@ -51,7 +51,10 @@ _NUMBERS = ("value", "lower", "upper", "unit", "spread", "spread_lower", "spread
 COLUMNS = (*_KEYS, *_NUMBERS, "p_value", "verdict", "reason")
 """The columns of the table ``pooled``."""
 
-_NORMAL, _NARROWEST_HALF = 1.959963984540054, 0.25  # 97.5 % of the standard normal
+NORMAL = 1.959963984540054
+"""97.5 % of the standard normal."""
+
+_NARROWEST_HALF = 0.25
 
 _Point = tuple[float, float, float]  # y, and its variance where the truth lies below and above
 _Present = tuple[str, Row]  # a device, and the row of one of its recordings
@@ -150,7 +153,7 @@ def pool(
     mean, q, _, weight = _minimum(points, spread_squared)
     centre = middle + mean
     error = 1.0 / math.sqrt(weight)
-    half = max(t * math.sqrt(q / freedom), _NORMAL) * error
+    half = max(t * math.sqrt(q / freedom), NORMAL) * error
     predicted = t * math.hypot(math.sqrt(spread_squared), error)
     outside = _outside(others, bounded_exp(centre - predicted), bounded_exp(centre + predicted))
     p_value = float(chdtrc(freedom, _minimum(points, 0.0)[1]))
@@ -203,7 +206,7 @@ def points_about_median(used: Iterable[tuple[float, float, float]]) -> tuple[flo
     for y, low, high in logs:
         narrowest = _NARROWEST_HALF * (high - low) / 2.0
         below, above = max(y - low, narrowest), max(high - y, narrowest)
-        points.append((y - middle, (below / _NORMAL) ** 2, (above / _NORMAL) ** 2))
+        points.append((y - middle, (below / NORMAL) ** 2, (above / NORMAL) ** 2))
     return middle, points
 
 

@@ -36,6 +36,7 @@ from imubench_pipeline.navigation.error_budget.in_use import (
     NAMES,
     NO_FIGURES,
     NO_USE,
+    SENSORS,
     STATED,
     Cause,
     Figures,
@@ -56,8 +57,6 @@ from imubench_pipeline.noise.growth import Calibrated, SensorStart, Uncalibrated
 _GYRO_ORDER: dict[Quantity, int] = {"attitude": 0, "heading": 0, "velocity": 1, "position": 2}
 _ACCEL_ORDER: dict[Quantity, int] = {"velocity": 0, "position": 1}
 """Integrations but one, m of `growth`."""
-
-_WORDS: dict[Measured, str] = {"gyro": "gyro", "accel": "accelerometer"}
 
 
 _SHORTEST = 1e-6
@@ -234,7 +233,7 @@ def budget(
         elif part is not None:
             missing.append(part)
             if cause == "turn_on_bias":
-                assumptions.append(f"turn-on bias of the {_WORDS[measured]}: not known, left out")
+                assumptions.append(f"turn-on bias of the {SENSORS[measured]}: not known, left out")
     return Budget(time, quantity, contributions, assumptions, missing)
 
 
@@ -359,18 +358,11 @@ def time_until(
     if not (math.isfinite(limit) and limit > 0):
         raise ValueError(f"limit is {limit}, expected a number above 0")
 
+    figures = {"gyro_figures": gyro_figures, "accel_figures": accel_figures}
+
     def excess(time: float) -> float:
-        error_budget = budget(
-            quantity,
-            time,
-            gyro=gyro,
-            accel=accel,
-            start=start,
-            use=use,
-            gyro_figures=gyro_figures,
-            accel_figures=accel_figures,
-        )
-        return error_budget.total - limit
+        after = budget(quantity, time, gyro=gyro, accel=accel, start=start, use=use, **figures)
+        return after.total - limit
 
     if excess(_SHORTEST) >= 0:
         return 0.0

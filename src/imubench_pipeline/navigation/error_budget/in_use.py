@@ -34,6 +34,9 @@ from imubench_pipeline.noise.growth import Calibrated, SensorStart, Uncalibrated
 Measured = Literal["gyro", "accel"]
 """What a sensor measures."""
 
+SENSORS: Mapping[str, str] = {"gyro": "gyro", "accel": "accelerometer"}
+"""What measures it."""
+
 Cause = Literal[
     "turn_on_bias",
     "repeatability",

@@ -10,10 +10,8 @@ from scipy.special import ndtr
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.navigation.error_budget.parts import Budget
+from imubench_pipeline.navigation.error_budget.printed_errors import SIGMAS
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
-
-_SIGMAS = 1.96
-"""Half the width of a 95 % interval."""
 
 
 def interval(budgets: Sequence[Budget], level: float = 0.95) -> tuple[float, float]:
@@ -143,11 +141,11 @@ def _value(name: str, parameter: Parameter, normal: float) -> float:
     value = parameter.in_model
     lower, upper = parameter.lower, parameter.upper
     if value is None or value == 0.0:
-        return 0.0 if name in ("R", "T_B") or upper is None else abs(normal) * upper / _SIGMAS
+        return 0.0 if name in ("R", "T_B") or upper is None else abs(normal) * upper / SIGMAS
     limit = lower if normal < 0 else upper
     if limit is None:
         return value
-    share = abs(normal) / _SIGMAS
+    share = abs(normal) / SIGMAS
     if name == "R":
         return value + (limit - value) * share
     if limit <= 0.0:

@@ -179,7 +179,7 @@ def fused_allan(board: Board, weights: Weights, tau: ArrayLike) -> FusedCurve:
 
     With constant weights it is the sum of w_i^2 AV_i and, of each shared process, of
     (w^T g)^2 AV. With weights that change with the frequency it is the integral of the
-    fused spectrum (`quadrature.nodes`; relative error below 1e-7). A ramp passes with the weights
+    fused spectrum (`nodes`; relative error below 1e-7). A ramp passes with the weights
     at frequency 0, a line with those at its own; ramps of several sensors are taken as
     independent, of either sign.
 

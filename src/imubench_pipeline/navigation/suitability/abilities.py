@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import get_args
 
 from pydantic import Field
 
+from imubench_pipeline.navigation.error_budget.in_use import SENSORS, Measured
 from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, Datasheet, PrintedFigure
 from imubench_pipeline.settings.requirements import Must
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor
 from imubench_pipeline.settings.validation import Strict
 from imubench_pipeline.units import from_si, quantity_to_si, to_si
 
-Measured = Literal["gyro", "accel"]
-
-_NAMES: dict[Measured, str] = {"gyro": "gyro", "accel": "accelerometer"}
 _UNITS: dict[Measured, str] = {"gyro": "deg/s", "accel": "g"}
 
 _ROUNDED = 1.0 + 1e-9
@@ -168,11 +166,11 @@ def _full_scales(must: Must, has: Abilities) -> Iterator[_Point]:
     for measured, text in asked.items():
         if text is None:
             continue
-        name = f"full scale of the {_NAMES[measured]}"
+        name = f"full scale of the {SENSORS[measured]}"
         dimension, largest = QUANTITIES[measured], has.full_scale.get(measured)
         shown = _shown(largest, _UNITS[measured], dimension)
         if measured in has.without:
-            yield _Point(_NAMES[measured], False, text)
+            yield _Point(SENSORS[measured], False, text)
         elif largest is None:
             yield _Point(name, None, text)
         else:
@@ -183,13 +181,13 @@ def _bandwidths(must: Must, has: Abilities) -> Iterator[_Point]:
     """Yield the bandwidth of the quantities whose axes must be there, or else of all."""
     if must.bandwidth is None:
         return
-    asked = {text.split("_")[0] for text in must.axes} or set(_NAMES)
-    for measured, name in _NAMES.items():
+    asked = {text.split("_")[0] for text in must.axes} or set(SENSORS)
+    for measured in get_args(Measured):
         if measured in asked and measured not in has.without:
             width = has.bandwidth.get(measured)
             wide = None if width is None else width >= quantity_to_si(must.bandwidth, "frequency")
             shown = _shown(width, "Hz", "frequency")
-            yield _Point(f"bandwidth of the {name}", wide, must.bandwidth, shown)
+            yield _Point(f"bandwidth of the {SENSORS[measured]}", wide, must.bandwidth, shown)
 
 
 def _rate(text: str, has: Abilities) -> _Point:
@@ -215,7 +213,7 @@ def _axes(must: Must, has: Abilities) -> Iterator[_Point]:
     for text in must.axes:
         quantity, axes = text.split("_")
         if quantity in has.without:
-            yield _Point(_NAMES["gyro" if quantity == "gyro" else "accel"], False, text)
+            yield _Point(SENSORS[quantity], False, text)
             continue
         for axis in axes:
             # The logs may leave out an axis that the sensor has.

@@ -9,6 +9,7 @@ from typing import Any, Literal, get_args
 
 from scipy.special import stdtrit
 
+from imubench_pipeline.navigation.error_budget.in_use import SENSORS
 from imubench_pipeline.navigation.verdicts.basis import Basis, Key
 from imubench_pipeline.navigation.verdicts.evidence import LONGEST_PART, REASONS, longest_asked
 from imubench_pipeline.navigation.verdicts.judgement import Judgement
@@ -111,9 +112,6 @@ def _to_know(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
         )
 
 
-_NAMES = {"gyro": "gyro", "accel": "accelerometer"}
-
-
 def _to_settle(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
     decides = judgement.decides
     away = abs(math.log(decides.margin))
@@ -195,7 +193,7 @@ def _to_strengthen(judgement: Judgement, reason: str, basis: Basis) -> Iterator[
 
 
 def _quantities(names: Iterable[str]) -> str:
-    return " and ".join(f"the {_NAMES[name]}" for name in names)
+    return " and ".join(f"the {SENSORS[name]}" for name in names)
 
 
 def _longest(sensor: str, standing: Standing, basis: Basis) -> tuple[Key, float | None]:

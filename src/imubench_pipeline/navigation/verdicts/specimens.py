@@ -30,7 +30,7 @@ from statistics import variance
 
 from scipy.special import stdtr, stdtrit
 
-from imubench_pipeline.navigation.pooled import Pool, bounded_exp, pool
+from imubench_pipeline.navigation.pooled import NORMAL, Pool, bounded_exp, pool
 from imubench_pipeline.typing import Row
 
 Limits = tuple[float, float, float]  # value, lower, upper
@@ -41,7 +41,6 @@ _LEAST_TAKEN = 0.5
 _FEWEST = 3
 """Degrees of freedom that a spread of other sensors needs; t = 3.2, of two it is 4.3."""
 
-_NORMAL = 1.959963984540054  # 97.5 % of the standard normal
 _FURTHEST = 1e-4  # of a value: a lower limit of 0 is no logarithm
 _NARROWEST = 1e-9  # likewise, for a value that is its own limit
 
@@ -118,7 +117,7 @@ def expected(
     limit = with_figure[0]["limit"]
     if len(groups) == 1 and usual is not None:
         value, lower, upper = _of_device(*groups.values())
-        error = math.log(upper / lower) / (2.0 * _NORMAL)
+        error = math.log(upper / lower) / (2.0 * NORMAL)
         # Of the specimen that is known, and of the next one.
         scale = math.sqrt(2.0 * usual.variance + error**2)
         prediction = _predicted(math.log(value), scale, usual.freedom, limit)

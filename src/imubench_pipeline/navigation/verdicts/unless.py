@@ -16,6 +16,7 @@ from typing import Any
 from scipy.special import ndtr
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.navigation.pooled import NORMAL
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.evidence import quantity_behind
 from imubench_pipeline.navigation.verdicts.standing import Standing, deciding, limit_of, standings
@@ -36,8 +37,6 @@ _MEANT = {
     ),
 }
 """What is meant where a factor mends figures."""
-
-_NORMAL = 1.959963984540054  # 97.5 % of the standard normal
 
 
 @dataclass(frozen=True)
@@ -144,7 +143,7 @@ def _within(total: Row) -> float | None:
     half = math.log(side)
     if half <= 0.0:
         return 1.0 if away >= 0.0 else 0.0
-    return float(ndtr(_NORMAL * away / half))
+    return float(ndtr(NORMAL * away / half))
 
 
 def unless_words(alternative: Unless) -> str:
