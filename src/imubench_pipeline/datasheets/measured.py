@@ -12,13 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.datasheets.comparable import Comparable
-from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.earth import EARTH_RATE, STANDARD_GRAVITY
 from imubench_pipeline.estimators.curve_bias import of_model
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.noise import FLOOR
-
-_EARTH_RATE = 7.292115e-5
-"""rad/s; its part in the mean of a gyro depends on how the axis stands."""
 
 _LOCAL_GRAVITY = 0.027
 """m/s²; gravity on the ground differs by less from its standard value."""
@@ -122,7 +119,7 @@ def fixed_bias(channel: str, means: Mapping[str, float]) -> Parameter:
     """
     if channel.startswith("gyro"):
         reason = "mean of the recording; the Earth's rotation is in it, 15 °/h either way at most"
-        return _size(means[channel], _EARTH_RATE, reason)
+        return _size(means[channel], EARTH_RATE, reason)
     axes = [means.get(f"accel_{axis}") for axis in "xyz"]
     if any(value is None for value in axes):
         return Parameter(None, "not_shown", "gravity cannot be taken off: three axes are needed")

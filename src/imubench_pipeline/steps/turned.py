@@ -47,6 +47,12 @@ _GIVEN = (
 )
 
 
+_POSITION_ELSEWHERE = (
+    "the position has a clock of its own; give it as a column of the file that the gyro is in, or "
+    "leave 'position' out"
+)
+
+
 @dataclass
 class EarthRate:
     """Rows of the tables that an experiment leaves."""
@@ -92,14 +98,8 @@ def earth_rate_of(
         "model_from": source.words if source else None,
     }
     names = asdict(key) | about
-    if len(log.segments) > 1:
-        tables.earth_rate += _without(names, WHOLE, "not_shown", segments_reason(log))
-        return tables
-    if log.position_elsewhere:
-        reason = (
-            "the position has a clock of its own; give it as a column of the file that the gyro is "
-            "in, or leave 'position' out"
-        )
+    if len(log.segments) > 1 or log.position_elsewhere:
+        reason = segments_reason(log) if len(log.segments) > 1 else _POSITION_ELSEWHERE
         tables.earth_rate += _without(names, WHOLE, "not_shown", reason)
         return tables
     if source is not None:
