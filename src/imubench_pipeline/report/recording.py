@@ -89,9 +89,7 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         budget_tables(view.budget, {(view.sensor, view.name): view.simulated}, site.system)
     )
     return {
-        "view": view,
-        "name": site.names[view.sensor],
-        "sensor_page": site.sensor_page(view.sensor),
+        **about_of(site, view, channels, folder),
         "summary": _summary(view, len(channels)),
         "findings": numbered,
         "serious": [row for row in numbered if row["severity"] != "note"],
@@ -104,8 +102,6 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
             view.rows("backtest"), site.settings["requirements"], site.system
         ),
         "budget_words": budget_words(site.settings["settings"]["error_budget"]),
-        "provenance": list(provenance(view, channels, folder)),
-        "sources": metadata_of(folder).get("sources", []),
         "command": site.again(view, "scores"),
         # Of one that is left out there is nothing to draw.
         "figures_command": None
@@ -129,11 +125,10 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
 
 
 def _summary(view: RecordingView, channels: int) -> str:
-    row = view.row
     if view.left_out:
         why = "could not be used" if view.rejected else "could not be analysed: a step failed"
         return f"This recording {why}; nothing of it is in the comparison."
-    parts = [f"{duration_text(row['duration'])} at {number_text(row['rate'])} Hz"]
+    row, parts = view.row, []
     if row["started"]:
         parts.append(f"from {started_text(row['started'])}")
     if row["temperature_min"] is not None:
@@ -142,8 +137,15 @@ def _summary(view: RecordingView, channels: int) -> str:
     parts.append(counted(channels, "channel"))
     warnings = len(view.warnings)
     parts.append(counted(warnings, "warning") if warnings else "no warnings")
+    return summary_words(view, parts)
+
+
+def summary_words(view: RecordingView, parts: Sequence[str]) -> str:
+    """Return length and rate of a recording, and parts that say more, as a sentence."""
+    row = view.row
+    length = f"{duration_text(row['duration'])} at {number_text(row['rate'])} Hz"
     kind = "Simulated from known parameters, not measured: " if view.simulated else ""
-    return kind + ", ".join(parts) + "."
+    return kind + ", ".join([length, *parts]) + "."
 
 
 def _channel(
@@ -248,13 +250,26 @@ def _model_words(channel: ChannelView) -> str:
     return " ".join(filter(None, [text, *(sentence(n) for n in notes), sentence(band)]))
 
 
+def about_of(
+    site: Site, view: RecordingView, channels: Sequence[ChannelView], folder: Path
+) -> dict[str, Any]:
+    """Return what the page of a recording of any kind says; ``folder`` is the recording's."""
+    return {
+        "view": view,
+        "name": site.names[view.sensor],
+        "sensor_page": site.sensor_page(view.sensor),
+        "provenance": list(_provenance(view, channels, folder)),
+        "sources": metadata_of(folder).get("sources", []),
+    }
+
+
 def metadata_of(folder: Path) -> Mapping[str, Any]:
     """Return the metadata of the log in a folder of a recording; nothing where there is none."""
     paths = log_paths(folder)
     return read_metadata(paths[0]) if paths else {}
 
 
-def provenance(
+def _provenance(
     view: RecordingView, channels: Sequence[ChannelView], folder: Path
 ) -> Iterator[tuple[str, str]]:
     """Yield where a recording comes from, as names and texts; ``folder`` is the recording's."""

@@ -145,8 +145,34 @@ def _device(site: Site, own: Sequence[RecordingView], rows: Sequence[Row]) -> di
     # As `navigation.drift.order_of` has it: stamps that are all the same tell no order.
     stamps = {row["started"] for row in rows}
     dated = None not in stamps and len(stamps) > 1
+    trends, payload = _trends(rows, dated=dated, simulated=own[0].simulated)
+    return {
+        "sensor_page": site.sensor_page(sensor),
+        "name": site.names[sensor],
+        "device": device,
+        "views": own,
+        "summary": summary(own, several=False),
+        "changes": [
+            change_words(row, simulated=own[0].simulated)
+            for row in rows
+            if row["verdict"] == "changed"
+        ],
+        "order": "The recordings stand at the time when they were started."
+        if dated
+        else "The logs do not all say when they were started: the recordings stand in the order "
+        "of their names.",
+        "trends": list(trends.items()),
+        "page": {"trends": payload, "arrays": []},
+    }
+
+
+def _trends(
+    rows: Sequence[Row], *, dated: bool, simulated: bool
+) -> tuple[dict[str, list[dict[str, Any]]], list[dict[str, Any]]]:
+    """Return the trends of a device by channel, and what their figures are drawn from."""
     trends: dict[str, list[dict[str, Any]]] = {}
     payload: list[dict[str, Any]] = []
+    mark = " (simulated)" * simulated
     for channel, parameter in dict.fromkeys((row["channel"], row["parameter"]) for row in rows):
         series = sorted(
             (row for row in rows if (row["channel"], row["parameter"]) == (channel, parameter)),
@@ -157,7 +183,6 @@ def _device(site: Site, own: Sequence[RecordingView], rows: Sequence[Row]) -> di
         quantity, axis = channel.split("_")
         title = f"{QUANTITY_NAMES[quantity]} {axis}"
         name = "fixed bias" if parameter == "bias" else symbol_text(parameter)
-        mark = " (simulated)" if own[0].simulated else ""
         changes = [row["recording"] + mark for row in series if row["verdict"] == "changed"]
         outside = [
             row["recording"] + mark
@@ -183,24 +208,7 @@ def _device(site: Site, own: Sequence[RecordingView], rows: Sequence[Row]) -> di
                 **{name: [row[name] for row in series] for name in columns},
             }
         )
-    return {
-        "sensor_page": site.sensor_page(sensor),
-        "name": site.names[sensor],
-        "device": device,
-        "views": own,
-        "summary": summary(own, several=False),
-        "changes": [
-            change_words(row, simulated=own[0].simulated)
-            for row in rows
-            if row["verdict"] == "changed"
-        ],
-        "order": "The recordings stand at the time when they were started."
-        if dated
-        else "The logs do not all say when they were started: the recordings stand in the order "
-        "of their names.",
-        "trends": list(trends.items()),
-        "page": {"trends": payload, "arrays": []},
-    }
+    return trends, payload
 
 
 def _trend_words(changes: Sequence[str], outside: Sequence[str]) -> str:

@@ -39,8 +39,8 @@ def _start(site: Site) -> dict[str, Any]:
         "warned": [{"view": view, "found": _grouped(view.warnings)} for view in warned],
         "warning_count": f"{counted(sum(len(v.warnings) for v in warned), 'warning')} in "
         f"{counted(len(warned), 'recording')}",
-        "not_found": list(_not_found(site)),
-        "not_calibrated": list(_not_calibrated(site)),
+        "not_found": list(_without_result(site.turned, "earth_rate")),
+        "not_calibrated": list(_without_result(site.calibrated, "calibration")),
         "changed": site.changed_devices(),
         "rankings": ranked,
         "next_steps": list(_next_steps(site)),
@@ -65,18 +65,10 @@ def _failures(site: Site) -> Iterator[dict[str, Any]]:
         yield {**row, "view": views.get((row["sensor"], row["recording"]))}
 
 
-def _not_found(site: Site) -> Iterator[dict[str, Any]]:
-    """Yield the recordings of turned gyros of which nothing could be estimated, and why."""
-    for view in site.turned:
-        rows = view.rows("earth_rate")
-        if rows and all(row["value"] is None for row in rows):
-            yield {"view": view, "reason": sentence(rows[0]["reason"])}
-
-
-def _not_calibrated(site: Site) -> Iterator[dict[str, Any]]:
-    """Yield the recordings on a rate table or with a stated direction without a result, and why."""
-    for view in site.calibrated:
-        rows = view.rows("calibration")
+def _without_result(views: Sequence[RecordingView], table: str) -> Iterator[dict[str, Any]]:
+    """Yield the recordings of an experiment of which nothing could be estimated, and why."""
+    for view in views:
+        rows = view.rows(table)
         if rows and all(row["value"] is None for row in rows):
             yield {"view": view, "reason": sentence(rows[0]["reason"])}
 

@@ -9,9 +9,9 @@ from typing import Any
 from rich.console import RenderableType
 from rich.text import Text
 
-from imubench_pipeline.estimators.estimate import PARAMETERS, SHOWN
 from imubench_pipeline.navigation.suitability.conditions import in_words
 from imubench_pipeline.report.meaning import rankings
+from imubench_pipeline.report.parameters import shown_symbols
 from imubench_pipeline.report.practical import (
     PageUnit,
     System,
@@ -183,8 +183,7 @@ def _parameter_lines(
     quantity: str, rows: Sequence[Row], about: About, system: System
 ) -> tuple[list[str], list[list[str | Text]]]:
     """Return the heads and a line a channel, with a column a parameter that some channel has."""
-    estimated = {row["parameter"] for row in rows if row["status"] != "absent"}
-    symbols = [symbol for symbol in SHOWN if symbol in PARAMETERS or symbol in estimated]
+    symbols = shown_symbols(rows)
     units = {symbol: page_unit(quantity, symbol, system) for symbol in symbols}
     by_channel: dict[tuple[str, str, str], list[Row]] = {}
     for row in rows:

@@ -18,7 +18,7 @@ from imubench_pipeline.report.practical import (
     number_text,
     page_unit,
 )
-from imubench_pipeline.report.recording import metadata_of, page_of, provenance
+from imubench_pipeline.report.recording import about_of, page_of, summary_words
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.report.words import counted, noise_words, sentence
@@ -68,9 +68,7 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
     envelope = read("envelope", [path]).to_pylist() if path.is_file() else []
     prediction = view.rows("earth_rate_prediction")
     return {
-        "view": view,
-        "name": site.names[view.sensor],
-        "sensor_page": site.sensor_page(view.sensor),
+        **about_of(site, view, [], folder),
         "channel": channel,
         "summary": _summary(view, turning, rows),
         "answer": answer(whole, site.system),
@@ -87,8 +85,6 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         "needs": needs(prediction),
         "has_prediction": bool(prediction),
         "stretches": list(_stretches(turning)),
-        "provenance": list(provenance(view, [], folder)),
-        "sources": metadata_of(folder).get("sources", []),
         "command": site.again(view, "earth_rate"),
         "page": {
             "looks": {},
@@ -103,14 +99,11 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
 
 
 def _summary(view: RecordingView, turning: Sequence[Row], rows: Sequence[Row]) -> str:
-    row = view.row
-    parts = [f"{duration_text(row['duration'])} at {number_text(row['rate'])} Hz"]
     turns = sum(event["what"] == "turn" for event in turning)
-    parts.append(f"{counted(turns, 'turn')} between north and south")
+    parts = [f"{counted(turns, 'turn')} between north and south"]
     if rows:
         parts.append(f"at latitude {latitude_text(rows)}")
-    kind = "Simulated from known parameters, not measured: " if view.simulated else ""
-    return kind + ", ".join(parts) + "."
+    return summary_words(view, parts)
 
 
 def latitude_text(rows: Sequence[Row]) -> str:

@@ -216,50 +216,39 @@ def recording_views(tables: Mapping[str, pa.Table]) -> list[RecordingView]:
     return views
 
 
+_CURVE = ("tau", "adev", "lower", "upper")
+
+
 def _channels(view: RecordingView) -> list[ChannelView]:
-    channels = {
-        name: ChannelView(
-            view.sensor,
-            view.name,
-            name,
-            view.simulated,
-            tau=_floats(part, "tau"),
-            adev=_floats(part, "adev"),
-            lower=_floats(part, "lower"),
-            upper=_floats(part, "upper"),
-        )
-        for (name,), part in _by(view.parts["allan"], "channel").items()
-    }
+    channels = {}
+    for (name,), part in _by(view.parts["allan"], "channel").items():
+        named = (view.sensor, view.name, name, view.simulated)
+        tau, adev, lower, upper = _floats(part, *_CURVE).values()
+        channels[name] = ChannelView(*named, tau, adev, lower, upper)
     for row in view.rows("parameters"):
         channel = channels[row["channel"]]
         channel.parameters.setdefault(row["method"], []).append(row)
         if row["recommended"]:
             channel.recommended = row["method"]
     for (name, method), part in _by(view.parts["reconstruction"], "channel", "method").items():
-        channels[name].reconstruction[method] = {
-            column: _floats(part, column)
-            for column in ("tau", "adev", "lower", "upper", "reconstructed")
-        }
+        channels[name].reconstruction[method] = _floats(part, *_CURVE, "reconstructed")
     for table in ("models", "lines", "deterministic", "datasheet", "datasheet_curve"):
         for row in view.rows(table):
             getattr(channels[row["channel"]], table).append(row)
     for (name,), part in _by(view.parts["spectrum"], "channel").items():
-        channels[name].spectrum = {
-            column: _floats(part, column)
-            for column in ("frequency", "ordinates", "density", "fitted", "used")
-        }
+        columns = ("frequency", "ordinates", "density", "fitted", "used")
+        channels[name].spectrum = _floats(part, *columns)
     for (name,), part in _by(view.parts["allan_compensated"], "channel").items():
-        channels[name].compensated = {
-            column: _floats(part, column) for column in ("tau", "adev", "lower", "upper")
-        }
-    for row in view.rows("scores"):
-        channels[row["channel"]].scores[row["method"]] = row
+        channels[name].compensated = _floats(part, *_CURVE)
+    for table, key in (
+        ("scores", "method"),
+        ("temperature", "parameter"),
+        ("low_pass", "parameter"),
+    ):
+        for row in view.rows(table):
+            getattr(channels[row["channel"]], table)[row[key]] = row
     for row in view.rows("fixed_bias"):
         channels[row["channel"]].fixed_bias = row["value"]
-    for row in view.rows("temperature"):
-        channels[row["channel"]].temperature[row["parameter"]] = row
-    for row in view.rows("low_pass"):
-        channels[row["channel"]].low_pass[row["parameter"]] = row
     for row in view.rows("simulated_truth"):
         if row["channel"] in channels:
             true = channels[row["channel"]].true_components.setdefault(row["parameter"], [])
@@ -292,8 +281,8 @@ def _keys(tables: Mapping[str, pa.Table]) -> dict[Name, str]:
     return {name: digest.hexdigest() for name, digest in digests.items()}
 
 
-def _floats(part: pa.Table, column: str) -> NDArray[np.float64]:
-    return np.asarray(part[column].to_numpy(), dtype=np.float64)
+def _floats(part: pa.Table, *columns: str) -> dict[str, NDArray[np.float64]]:
+    return {name: np.asarray(part[name].to_numpy(), dtype=np.float64) for name in columns}
 
 
 def _by(table: pa.Table, *names: str) -> dict[tuple[str, ...], pa.Table]:
