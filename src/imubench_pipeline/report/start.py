@@ -36,7 +36,7 @@ def _start(site: Site) -> dict[str, Any]:
         "summary": summary(views),
         "failures": list(_failures(site)),
         "rejected": [view for view in views if view.rejected],
-        "warned": [{"view": view, "found": _grouped(view.warnings)} for view in warned],
+        "warned": [{"view": view, "findings": _grouped(view.warnings)} for view in warned],
         "warning_count": f"{counted(sum(len(v.warnings) for v in warned), 'warning')} in "
         f"{counted(len(warned), 'recording')}",
         "not_found": list(_without_result(site.turned, "earth_rate")),
