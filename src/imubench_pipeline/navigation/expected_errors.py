@@ -15,6 +15,7 @@ from imubench_pipeline.navigation.error_budget import (
     NO_FIGURES,
     NO_USE,
     Budget,
+    Figure,
     Figures,
     Gyrocompass,
     Quantity,
@@ -315,16 +316,12 @@ def _drawn(figures: Figures, draws: int, rng: np.random.Generator) -> list[Figur
     if not spread:
         return [figures] * draws
     normal = rng.standard_normal((draws, len(spread)))
+
+    def moved(figure: Figure, number: float) -> Figure:
+        return replace(figure, sigma=abs((figure.sigma or 0.0) + figure.spread * float(number)))
+
     return [
-        {
-            **figures,
-            **{
-                cause: replace(
-                    figure, sigma=abs((figure.sigma or 0.0) + figure.spread * float(number))
-                )
-                for (cause, figure), number in zip(spread.items(), numbers, strict=True)
-            },
-        }
+        {**figures, **dict(zip(spread, map(moved, spread.values(), numbers), strict=True))}
         for numbers in normal
     ]
 

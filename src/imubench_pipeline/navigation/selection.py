@@ -32,14 +32,13 @@ def ranked(judged: Sequence[Judgement], basis: Basis) -> Iterator[Row]:
         own = [judgement for judgement in judged if judgement.name == name]
         compared = {judgement.sensor: judgement for judgement in own if judgement.compared}
         for judgement in own:
-            rank, tied = (
-                _rank(judgement.sensor, compared) if judgement.sensor in compared else (None, [])
-            )
+            sensor = judgement.sensor
+            rank, tied = _rank(sensor, compared) if sensor in compared else (None, [])
             place = {"rank": rank, "tied_with": ", ".join(tied) or None}
-            apart = [reason for (of, _), reason in basis.apart.items() if of == judgement.sensor]
+            apart = [reason for (of, _), reason in basis.apart.items() if of == sensor]
             of_sensor = {
                 "requirement": name,
-                "sensor": judgement.sensor,
+                "sensor": sensor,
                 **place,
                 "verdict": judgement.verdict,
                 "conditions": judgement.conditions,
@@ -53,9 +52,9 @@ def ranked(judged: Sequence[Judgement], basis: Basis) -> Iterator[Row]:
                     "at_most": standing.total["limit"] * judgement.requirement.sigmas,
                     "decides": standing is judgement.decides,
                     **_limit_row(standing),
-                    **_evidence_row(judgement.sensor, standing, weak, basis),
+                    **_evidence_row(sensor, standing, weak, basis),
                     **_backtest_row(name, standing, basis),
-                    "doubts": _doubts(judgement.sensor, standing, basis),
+                    "doubts": _doubts(sensor, standing, basis),
                 }
 
 

@@ -116,11 +116,7 @@ def _drawn(rows: Sequence[Row], arrays: Arrays) -> list[dict[str, Any]]:
                 "level": [max(r["roll"], r["pitch"]) for r in own],
             }
             for angle, sigma in values.items():
-                points = [
-                    (row["time"], deviation)
-                    for row, deviation in zip(own, sigma, strict=True)
-                    if deviation
-                ]
+                points = [(r["time"], s) for r, s in zip(own, sigma, strict=True) if s]
                 if points:
                     courses.append(
                         {
@@ -128,9 +124,7 @@ def _drawn(rows: Sequence[Row], arrays: Arrays) -> list[dict[str, Any]]:
                             "method": method,
                             "angle": angle,
                             "time": arrays.exact([time for time, _ in points]),
-                            "sigma": arrays.exact(
-                                np.degrees([deviation for _, deviation in points]).tolist()
-                            ),
+                            "sigma": arrays.exact(np.degrees([s for _, s in points]).tolist()),
                         }
                     )
     return courses

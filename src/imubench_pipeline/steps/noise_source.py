@@ -131,12 +131,8 @@ def static_recordings(
         return *far(row), -(row["duration"] or 0.0), row["recording"]
 
     every = [(Quality.read(folder / "quality.json").recording, folder) for folder in folders]
-    usable = [
-        recording
-        for recording in every
-        if recording[0]["status"] == "ok" and recording[0]["kind"] == "static"
-    ]
-    return sorted(usable, key=order)
+    static = [(row, folder) for row, folder in every if row["kind"] == "static"]
+    return sorted((each for each in static if each[0]["status"] == "ok"), key=order)
 
 
 def noise_source(

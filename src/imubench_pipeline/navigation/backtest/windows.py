@@ -228,15 +228,10 @@ def block_means(
     }
     if not edges:
         return {}
-    sums = _sums(
-        parts,
-        np.unique(
-            np.concatenate([segment for by_segment in edges.values() for segment in by_segment])
-        ),
-    )
+    every = np.concatenate([of_segment for each in edges.values() for of_segment in each])
+    sums = _sums(parts, np.unique(every))
     return {
-        length: [sums.means(segment) for segment in by_segment]
-        for length, by_segment in edges.items()
+        length: [sums.means(of_segment) for of_segment in each] for length, each in edges.items()
     }
 
 

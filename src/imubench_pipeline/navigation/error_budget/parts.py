@@ -199,17 +199,11 @@ class Largest:
         contribution : Contribution
             A source of the budget.
         """
-        if (
-            not self.room
-            or contribution not in self.biases
-            or contribution.figure is None
-            or not contribution.figure.sigma
-        ):
+        figure = contribution.figure
+        if not self.room or contribution not in self.biases or figure is None or not figure.sigma:
             return {}
         quantity = "accel" if "accel" in contribution.source.split() else "gyro"
-        return self._figure(
-            quantity, contribution.cause, contribution.sigma / contribution.figure.sigma
-        )
+        return self._figure(quantity, contribution.cause, contribution.sigma / figure.sigma)
 
     def of_missing(self, missing: Missing) -> dict[str, Any]:
         """Return the row of a source whose figure is not known."""

@@ -92,12 +92,8 @@ def draw_models(estimate: Estimate, draws: int, rng: np.random.Generator) -> lis
     """
     if estimate.draws is None:
         return [_drawn(estimate, rng) for _ in range(draws)]
-    available = len(estimate.draws)
-    rows = (
-        (np.arange(draws) % available)
-        if draws > available
-        else (np.arange(draws) * available) // draws
-    )
+    available, places = len(estimate.draws), np.arange(draws)
+    rows = places % available if draws > available else places * available // draws
     return [estimate.draws.model(int(row), _lines(estimate, rng)) for row in rng.permutation(rows)]
 
 

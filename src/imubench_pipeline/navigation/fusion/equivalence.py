@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import permutations
 from typing import Any
 
 import numpy as np
@@ -214,20 +215,15 @@ def answer(
     Answer or str
         The reason, where there is no answer.
     """
-    measured = [candidate for candidate in candidates if not candidate.simulated] or list(
-        candidates
-    )
-    long = [candidate for candidate in measured if tau <= longest * candidate.duration]
+    measured = [channel for channel in candidates if not channel.simulated] or list(candidates)
+    long = [channel for channel in measured if tau <= longest * channel.duration]
     if not long:
-        most = longest * max(candidate.duration for candidate in measured)
+        most = longest * max(channel.duration for channel in measured)
         return f"the logs of {sensor} tell tau up to {most:.3g} s alone"
-    noisy = sorted(
-        (candidate for candidate in long if candidate.model.terms),
-        key=lambda candidate: candidate.variance(tau),
-    )
+    noisy = [channel for channel in long if channel.model.terms]
     if not noisy:
         return f"no noise model of {sensor}"
-    chosen = noisy[len(noisy) // 2]
+    chosen = sorted(noisy, key=lambda channel: channel.variance(tau))[len(noisy) // 2]
     stream = channel_rng(seed, chosen.sensor, chosen.recording, chosen.channel, "fusion")
     own, common = _parts([chosen.model], correlation, tau)
     drawn_own, drawn_common = _parts(chosen.drawn(draws, stream), correlation, tau)
@@ -276,31 +272,22 @@ def equivalence_rows(
     mapping
         By column of the table.
     """
-    listed = list(candidates)
-    sensors = sorted({candidate.sensor for candidate in listed})
+    listed = sorted(candidates, key=lambda channel: channel.sensor)
     for quantity in ("gyro", "accel"):
-        own = [candidate for candidate in listed if candidate.channel.startswith(quantity)]
-        measuring = [
-            sensor for sensor in sensors if any(candidate.sensor == sensor for candidate in own)
-        ]
+        by_sensor: dict[str, list[FusionChannel]] = {}
+        for channel in listed:
+            if channel.channel.startswith(quantity):
+                by_sensor.setdefault(channel.sensor, []).append(channel)
         for tau in taus:
             answers = {
                 sensor: answer(
-                    sensor,
-                    [candidate for candidate in own if candidate.sensor == sensor],
-                    tau,
-                    correlation,
-                    longest=longest,
-                    draws=draws,
-                    seed=seed,
+                    sensor, own, tau, correlation, longest=longest, draws=draws, seed=seed
                 )
-                for sensor in measuring
+                for sensor, own in by_sensor.items()
             }
-            for a in measuring:
-                for b in measuring:
-                    if a != b:
-                        names = {"quantity": quantity, "tau": tau, "sensor": a, "other": b}
-                        yield names | _pair(answers[a], answers[b], tau)
+            for a, b in permutations(answers, 2):
+                names = {"quantity": quantity, "tau": tau, "sensor": a, "other": b}
+                yield names | _pair(answers[a], answers[b], tau)
 
 
 def _pair(a: Answer | str, b: Answer | str, tau: float) -> dict[str, Any]:

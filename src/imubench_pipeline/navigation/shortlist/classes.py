@@ -73,9 +73,7 @@ class MeasuredRanges:
         }
         source = "measured sensors"
         if not by_sensor and figure == "B":
-            by_sensor = {
-                sensor: ends for (sensor, of), ends in self.printed.items() if of == quantity
-            }
+            by_sensor = {name: ends for (name, of), ends in self.printed.items() if of == quantity}
             source = "datasheets"
         if not by_sensor:
             return None
@@ -142,9 +140,5 @@ def measured_ranges(
         high = max(ends[1] for ends in several)
         if math.isfinite(high):
             ranges[key] = (low, high)
-    classes = {
-        sensor: class_of(price_class)
-        for sensor, price_class in price_classes.items()
-        if price_class
-    }
+    classes = {sensor: class_of(text) for sensor, text in price_classes.items() if text}
     return MeasuredRanges(ranges, classes)

@@ -75,13 +75,14 @@ def next_step_rows(judged: Sequence[Judgement], basis: Basis) -> list[dict[str, 
 
 def _steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
     """Yield what would help one verdict: to turn it, and to make its evidence stronger."""
-    if judgement.unless is not None:
-        action: Action = "check_unit" if judgement.unless.factors else "record_again"
-        either = judgement.unless.logged, judgement.unless.mended
+    unless, name = judgement.unless, judgement.name
+    if unless is not None:
+        action: Action = "check_unit" if unless.factors else "record_again"
+        either = unless.logged, unless.mended
         same = None not in either and len({each.verdict for each in either if each}) == 1
-        for key, doubts in judgement.unless.doubts.items():
+        for key, doubts in unless.doubts.items():
             what = _quantities(basis.factors(key)) or doubts
-            yield _Step(action, key, judgement.name, turns=not same, what=what)
+            yield _Step(action, key, name, turns=not same, what=what)
     if not judgement.decides.known:
         yield from _to_know(judgement, basis)
         return
@@ -89,9 +90,7 @@ def _steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
         yield from _to_settle(judgement, basis)
     if judgement.compared and (unknown := judgement.rests.unknown_figures()):
         what = ", ".join(unknown)
-        yield _Step(
-            "find_figures", (judgement.sensor, None), judgement.name, turns=False, what=what
-        )
+        yield _Step("find_figures", (judgement.sensor, None), name, turns=False, what=what)
     for reason in judgement.reasons:
         yield from _to_strengthen(judgement, reason, basis)
 
@@ -106,23 +105,19 @@ def _to_know(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
     missing = [name for name in needs if basis.lacks(key, name)]
     if missing:
         yield _Step("add_channels", key, judgement.name, turns=True, what=_quantities(missing))
-    elif _duration_needed(judgement) > (basis.duration(key) or math.inf):
-        yield _Step(
-            "log_longer", key, judgement.name, turns=True, duration=_duration_needed(judgement)
-        )
+    elif (needed := _duration_needed(judgement)) > (basis.duration(key) or math.inf):
+        yield _Step("log_longer", key, judgement.name, turns=True, duration=needed)
 
 
 def _to_settle(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
-    decides = judgement.decides
+    decides, sensor, name = judgement.decides, judgement.sensor, judgement.name
     away = abs(math.log(decides.margin))
     if decides.expected.spread is not None:
         more = specimens_needed(decides.expected, away)
         if more:
-            yield _Step(
-                "add_specimens", (judgement.sensor, None), judgement.name, True, specimens=more
-            )
+            yield _Step("add_specimens", (sensor, None), name, True, specimens=more)
         return
-    key, duration = _longest(judgement.sensor, decides, basis)
+    key, duration = _longest(sensor, decides, basis)
     low, high = decides.margins
     if duration is None or not low or math.isinf(high):
         return
@@ -131,14 +126,8 @@ def _to_settle(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
         math.log(decides.margin / low) if decides.margin > 1.0 else math.log(high / decides.margin)
     )
     if 0.0 < half <= away * math.sqrt(_LONGEST):
-        needed = duration * (half / away) ** 2
-        yield _Step(
-            "log_longer",
-            key,
-            judgement.name,
-            True,
-            duration=max(needed, _duration_needed(judgement)),
-        )
+        needed = max(duration * (half / away) ** 2, _duration_needed(judgement))
+        yield _Step("log_longer", key, name, True, duration=needed)
 
 
 def specimens_needed(expected: Expected, away: float) -> int | None:
@@ -170,26 +159,25 @@ def specimens_needed(expected: Expected, away: float) -> int | None:
 
 
 def _to_strengthen(judgement: Judgement, reason: str, basis: Basis) -> Iterator[_Step]:
-    key, duration = _longest(judgement.sensor, judgement.decides, basis)
+    decides, sensor, name = judgement.decides, judgement.sensor, judgement.name
+    key, duration = _longest(sensor, decides, basis)
     if reason == "one_specimen":
-        more = _ENOUGH_SPECIMENS - judgement.decides.expected.specimens
-        yield _Step(
-            "add_specimens", (judgement.sensor, None), judgement.name, False, specimens=more
-        )
+        more = _ENOUGH_SPECIMENS - decides.expected.specimens
+        yield _Step("add_specimens", (sensor, None), name, False, specimens=more)
     elif reason == "short_log" and duration is not None:
-        yield _Step("log_longer", key, judgement.name, False, duration=_duration_needed(judgement))
+        yield _Step("log_longer", key, name, False, duration=_duration_needed(judgement))
     elif reason == "few_axes":
-        yield _Step("add_channels", key, judgement.name, False, what="all three axes")
+        yield _Step("add_channels", key, name, False, what="all three axes")
     elif reason not in REASONS:
-        for total in judgement.decides.totals:
-            own = judgement.sensor, total["recording"]
+        for total in decides.totals:
+            own = sensor, total["recording"]
             doubts = [row for row in basis.doubts.get(own, ()) if row["code"] == reason]
             if any(row["factor"] is not None for row in doubts):
                 what = _quantities(basis.factors(own))
-                yield _Step("check_unit", own, judgement.name, False, what=what)
+                yield _Step("check_unit", own, name, False, what=what)
             elif doubts:
                 what = reason.replace("_", " ")
-                yield _Step("record_again", own, judgement.name, False, what=what)
+                yield _Step("record_again", own, name, False, what=what)
 
 
 def _quantities(names: Iterable[str]) -> str:

@@ -137,8 +137,8 @@ def _bytes(figure: Figure, kind: str) -> bytes:
 
 def _styled_once(match: re.Match[bytes]) -> bytes:
     group, marks, looks = match.groups()
-    style = b' style="' + looks + b'"'
-    return group + style + b">" + marks.replace(style, b"")
+    attribute = b' style="' + looks + b'"'
+    return group + attribute + b">" + marks.replace(attribute, b"")
 
 
 def _shortened(match: re.Match[bytes]) -> bytes:
