@@ -85,9 +85,7 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         for i, row in enumerate(sorted(view.findings, key=lambda r: order[r["severity"]]), start=1)
     ]
     samples = samples_payload(envelope, histogram, arrays)
-    budgets = list(
-        budget_tables(view.budget, {(view.sensor, view.name): view.simulated}, site.system)
-    )
+    budgets = list(budget_tables(view.budget, {view.full_name: view.simulated}, site.system))
     return {
         **about_of(site, view, channels, folder),
         "summary": _summary(view, len(channels)),

@@ -46,7 +46,7 @@ def _sensor(site: Site, sensor: str, own: Sequence[RecordingView]) -> dict[str, 
     together = Comparison(own, site.names, site.system)
     pooled = [_pooled(row) for row in site.rows("pooled") if row["sensor"] == sensor]
     shown = own if len(own) <= _MANY else []
-    simulated = {(view.sensor, view.name): view.simulated for view in own}
+    simulated = {view.full_name: view.simulated for view in own}
     budget = [row for view in shown for row in view.budget]
     return {
         "name": site.names[sensor],
@@ -140,7 +140,7 @@ def device_page(site: Site, page: str) -> Page:
 
 def _device(site: Site, own: Sequence[RecordingView], rows: Sequence[Row]) -> dict[str, Any]:
     sensor, device = own[0].sensor, own[0].row["device"]
-    named = {(view.sensor, view.name) for view in own}
+    named = {view.full_name for view in own}
     rows = [row for row in rows if (row["sensor"], row["recording"]) in named]
     # As `navigation.drift.order_of` has it: stamps that are all the same tell no order.
     stamps = {row["started"] for row in rows}

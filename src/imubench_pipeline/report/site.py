@@ -18,7 +18,7 @@ import pyarrow as pa
 from imubench_pipeline.report.palette import Appearance, sensor_appearances
 from imubench_pipeline.report.practical import System, first_choices, units_of_pages
 from imubench_pipeline.report.shell import made_again
-from imubench_pipeline.report.view import RecordingView, recording_views
+from imubench_pipeline.report.view import Name, RecordingView, recording_views
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from imubench_pipeline.typing import Row
 
@@ -159,22 +159,21 @@ class Site:
     @cached_property
     def calibrated(self) -> list[RecordingView]:
         """The recordings on a rate table, or at rest with a direction that is stated."""
-        rows = self.rows("calibration")
-        with_rows = {(row["sensor"], row["recording"]) for row in rows}
+        named = self._named_in("calibration")
         return [
             view
             for view in self.views
-            if view.row["kind"] == "rate_table" or (view.sensor, view.name) in with_rows
+            if view.row["kind"] == "rate_table" or view.full_name in named
         ]
 
     @cached_property
     def predicted(self) -> list[RecordingView]:
         """The recordings at rest by whose noise it is predicted what their sensor could find."""
-        rows = self.rows("earth_rate_prediction")
-        with_rows = {(row["sensor"], row["recording"]) for row in rows}
-        return [
-            view for view in self.views if view.static and (view.sensor, view.name) in with_rows
-        ]
+        named = self._named_in("earth_rate_prediction")
+        return [view for view in self.views if view.static and view.full_name in named]
+
+    def _named_in(self, table: str) -> set[Name]:
+        return {(row["sensor"], row["recording"]) for row in self.rows(table)}
 
     def device_page_of(self, row: Row) -> str | None:
         """Return the page of the device of a row that names a recording."""
@@ -182,7 +181,7 @@ class Site:
 
     @cached_property
     def _device_pages(self) -> dict[tuple[str, str], str | None]:
-        return {(view.sensor, view.name): view.device_page for view in self.views}
+        return {view.full_name: view.device_page for view in self.views}
 
     @property
     def navigation(self) -> list[tuple[str, str]]:
@@ -239,7 +238,7 @@ class Site:
             )
             name = "fixed bias" if row["parameter"] == "bias" else row["parameter"]
             device["what"].append(f"{name} of {row['channel'].replace('_', ' ')}")
-        simulated = {(view.sensor, view.name): view.simulated for view in self.views}
+        simulated = {view.full_name: view.simulated for view in self.views}
         return [
             device | {"channels": ", ".join(device["what"]), "simulated": simulated[key]}
             for key, device in devices.items()

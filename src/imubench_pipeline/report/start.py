@@ -60,7 +60,7 @@ def _start(site: Site) -> dict[str, Any]:
 
 def _failures(site: Site) -> Iterator[dict[str, Any]]:
     """Yield the steps that failed, with the recording that is left out for it."""
-    views = {(view.sensor, view.name): view for view in site.views}
+    views = {view.full_name: view for view in site.views}
     for row in site.rows("failures"):
         yield {**row, "view": views.get((row["sensor"], row["recording"]))}
 
@@ -113,7 +113,7 @@ def _grouped(rows: Sequence[Row]) -> list[tuple[str, str]]:
 
 
 def _rankings(site: Site) -> Iterator[dict[str, Any]]:
-    simulated = {(view.sensor, view.name): view.simulated for view in site.views}
+    simulated = {view.full_name: view.simulated for view in site.views}
     rows = site.rows("ranking")
     for ranking in rankings(rows, site.settings["requirements"], simulated, site.system):
         decisive = {

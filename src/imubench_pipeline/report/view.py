@@ -146,6 +146,11 @@ class RecordingView:
         return str(self.row["recording"])
 
     @property
+    def full_name(self) -> Name:
+        """Sensor and name."""
+        return self.sensor, self.name
+
+    @property
     def simulated(self) -> bool:
         """Made from known parameters, not measured."""
         return bool(self.row["simulated"])
@@ -168,7 +173,7 @@ class RecordingView:
     @property
     def key(self) -> str:
         """Digest of all that the tables say of it."""
-        return self.keys()[self.sensor, self.name]
+        return self.keys()[self.full_name]
 
     @cached_property
     def findings(self) -> list[Row]:

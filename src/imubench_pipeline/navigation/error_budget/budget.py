@@ -42,6 +42,7 @@ from imubench_pipeline.navigation.error_budget.in_use import (
     Figures,
     Measured,
     Use,
+    check_not_negative,
     levers,
 )
 from imubench_pipeline.navigation.error_budget.parts import (
@@ -92,7 +93,7 @@ class Levelled:
     on_time: float = 0.0
 
     def __post_init__(self) -> None:
-        _check_not_negative(bias=self.bias or 0.0, on_time=self.on_time)
+        check_not_negative(bias=self.bias or 0.0, on_time=self.on_time)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,9 +122,9 @@ class Start:
     heading: float = 0.0
 
     def __post_init__(self) -> None:
-        _check_not_negative(heading=self.heading)
+        check_not_negative(heading=self.heading)
         if not isinstance(self.tilt, Levelled):
-            _check_not_negative(tilt=self.tilt)
+            check_not_negative(tilt=self.tilt)
         elif not isinstance(self.accel, Calibrated):
             raise ValueError("a levelled start needs the window of calibrated accelerometers")
 
@@ -308,12 +309,6 @@ def _of_levelling(accel: NoiseModel, window: float, levelled: Levelled) -> Itera
         sigma = levelled.bias / STANDARD_GRAVITY
         source = "initial tilt by accel turn-on bias"
         yield Contribution(source, sigma, "turn_on_bias", STATED)
-
-
-def _check_not_negative(**values: float) -> None:
-    for name, value in values.items():
-        if not (math.isfinite(value) and value >= 0):
-            raise ValueError(f"{name} is {value}, expected a number from 0")
 
 
 def time_until(

@@ -113,6 +113,19 @@ Figures = Mapping[Cause, Figure]
 NO_FIGURES: Figures = MappingProxyType({})
 
 
+def check_not_negative(**values: float) -> None:
+    """Check that numbers are finite and not negative.
+
+    Raises
+    ------
+    ValueError
+        If one is not; it is named.
+    """
+    for name, value in values.items():
+        if not (math.isfinite(value) and value >= 0):
+            raise ValueError(f"{name} is {value}, expected a number from 0")
+
+
 @dataclass(frozen=True, kw_only=True)
 class Use:
     """What happens to a sensor in dead reckoning; 0: it does not.
@@ -145,9 +158,7 @@ class Use:
 
     def __post_init__(self) -> None:
         for name in ("temperature_change", "turns", "speed_change", "vibration"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0):
-                raise ValueError(f"{name} is {value}, expected a number from 0")
+            check_not_negative(**{name: getattr(self, name)})
         if not (math.isfinite(self.over) and self.over > 0):
             raise ValueError(f"over is {self.over}, expected a time above 0")
 
