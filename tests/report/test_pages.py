@@ -50,7 +50,7 @@ def whole() -> Site:
 def test_a_page_reads_no_table_that_it_does_not_declare(entry: Entry, whole: Site) -> None:
     tables = Tables(dict(whole.tables))
     noting = replace(whole, tables=tables)
-    assert entry.there(noting), "the site of this test lacks what the page shows"
+    assert entry.exists(noting), "the site of this test lacks what the page shows"
     of_recordings = BY_RECORDING if entry.views(noting) else ()
     page = entry.page(noting)
     # What tells which recordings there are, and their names, is in the key of every page.

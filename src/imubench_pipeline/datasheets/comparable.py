@@ -179,9 +179,9 @@ class PrintedAxis:
 
     def unpublished(self, like: Comparable, *names: str) -> Comparable:
         """Return the row of what has no figure."""
-        known = any(self.sheet.looked_up(name) for name in names)
-        said = "the vendor does not publish it" if known else "the sensor file does not say"
-        return replace(like, reason=said, looked_up=known)
+        looked_up = any(self.sheet.looked_up(name) for name in names)
+        reason = "the vendor does not publish it" if looked_up else "the sensor file does not say"
+        return replace(like, reason=reason, looked_up=looked_up)
 
 
 def _with_interval(row: Comparable, rows: Sequence[Comparable]) -> Comparable:

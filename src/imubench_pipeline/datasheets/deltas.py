@@ -191,8 +191,8 @@ def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
     reasons = [entry.reason, parameter.reason]
     if least != largest:
         reasons.append(f"the 95 % interval reaches from {least!r} to {largest!r}")
-    said = "; ".join(reason for reason in reasons if reason)
-    return replace(row, verdict=least if least == largest else "not sure", reason=said or None)
+    words = "; ".join(reason for reason in reasons if reason)
+    return replace(row, verdict=least if least == largest else "not sure", reason=words or None)
 
 
 def _without_a_value(entry: Comparable, parameter: Parameter, tolerance: float) -> tuple[str, str]:
@@ -279,7 +279,7 @@ def curve_rms(
         )
     noises: list[Comparable | None] = [*_lines(printed, "N")]
     floors: list[Comparable | None] = [*_lines(printed, "adev_minimum")]
-    found = []
+    distances = []
     for noise, floor in product(noises or [None], floors[:1] or [None]):
         if noise is None and floor is None:
             continue
@@ -288,12 +288,12 @@ def curve_rms(
         line = np.sqrt(white**2 / tau + bottom**2)
         absolute, relative = adev - line, np.log10(adev / line)
         rms, rms_log10 = (float(np.sqrt(np.mean(each**2))) for each in (absolute, relative))
-        found.append(CurveRms(noise, floor, rms, rms_log10))
-    return found
+        distances.append(CurveRms(noise, floor, rms, rms_log10))
+    return distances
 
 
 def _lines(printed: Sequence[Comparable], statistic: str) -> list[Comparable]:
     """Return the typical figures of a statistic; the others where there are none."""
-    known = [row for row in printed if row.statistic == statistic and row.value is not None]
-    typical = [row for row in known if row.figure and row.figure.kind in _TYPICAL]
-    return typical or known
+    with_value = [row for row in printed if row.statistic == statistic and row.value is not None]
+    typical = [row for row in with_value if row.figure and row.figure.kind in _TYPICAL]
+    return typical or with_value

@@ -12,13 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.datasheets.comparable import Comparable
-from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.earth import EARTH_RATE, STANDARD_GRAVITY
 from imubench_pipeline.estimators.curve_bias import of_model
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.noise import FLOOR
-
-_EARTH_RATE = 7.292115e-5
-"""rad/s; its part in the mean of a gyro depends on how the axis stands."""
 
 _LOCAL_GRAVITY = 0.027
 """m/s²; gravity on the ground differs by less from its standard value."""
@@ -86,8 +83,8 @@ def _within(value: float, estimate: Estimate, tau: NDArray[np.float64]) -> Param
 def _ends(estimate: Estimate) -> Iterator[Estimate]:
     """Yield the estimate at the ends of its intervals; nothing if one has no interval."""
     groups = [estimate.parameters, *estimate.further]
-    known = [p for group in groups for p in group.values() if p.in_model]
-    if any(p.lower is None or p.upper is None for p in known):
+    in_model = [p for group in groups for p in group.values() if p.in_model]
+    if any(p.lower is None or p.upper is None for p in in_model):
         return
 
     def at(group: Mapping[str, Parameter], amplitudes: str, times: str) -> dict[str, Parameter]:
@@ -122,7 +119,7 @@ def fixed_bias(channel: str, means: Mapping[str, float]) -> Parameter:
     """
     if channel.startswith("gyro"):
         reason = "mean of the recording; the Earth's rotation is in it, 15 °/h either way at most"
-        return _size(means[channel], _EARTH_RATE, reason)
+        return _size(means[channel], EARTH_RATE, reason)
     axes = [means.get(f"accel_{axis}") for axis in "xyz"]
     if any(value is None for value in axes):
         return Parameter(None, "not_shown", "gravity cannot be taken off: three axes are needed")
@@ -166,14 +163,14 @@ def sensitivity(
         Where temperature is not taken out of the log, the upper limit alone; where it cannot be
         told from time, nothing.
     """
-    found = {row["parameter"]: row for row in rows}
-    row = found.get("sensitivity")
+    by_parameter = {row["parameter"]: row for row in rows}
+    row = by_parameter.get("sensitivity")
     if row is None:
         return NO_READINGS
-    at = f"slope at {found['T_0']['value']:.3g} °C"
+    at = f"slope at {by_parameter['T_0']['value']:.3g} °C"
     if lowest is not None and highest is not None:
         at += f", of readings from {lowest:.3g} to {highest:.3g} °C; the vendor has another range"
-    if found["quadratic"]["value"] is not None:
+    if by_parameter["quadratic"]["value"] is not None:
         at += "; the bias bends with temperature, the slope is another elsewhere"
     lower, upper = row["lower"], row["upper"]
     if row["value"] is None or lower is None or upper is None:

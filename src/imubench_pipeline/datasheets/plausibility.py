@@ -207,7 +207,7 @@ def implausible_rates(
         fastest = _fastest(bandwidths[name])
         if not _SLOWEST <= rate <= fastest:
             by_rate.setdefault((rate, fastest), []).append(name)
-    found = []
+    findings = []
     for (rate, fastest), names in by_rate.items():
         factor = time_factor(rate, fastest)
         longer = factor if factor > 1.0 else 1.0 / factor
@@ -217,8 +217,10 @@ def implausible_rates(
             f"{rate / factor:.4g} Hz then; mend 'unit' of 'time', or 'rate', in the sensor file"
         )
         channels = [None] if len(names) == len(rates) else names
-        found += [Finding("rate_implausible", "warning", detail, factor, one) for one in channels]
-    return found
+        findings += [
+            Finding("rate_implausible", "warning", detail, factor, channel) for channel in channels
+        ]
+    return findings
 
 
 def time_factor(rate: float, fastest: float = _FASTEST) -> float:
@@ -234,7 +236,7 @@ def time_factor(rate: float, fastest: float = _FASTEST) -> float:
     sign = 1.0 if rate > fastest else -1.0
     return min(
         (factor**sign for factor in _FACTORS),
-        key=lambda one: abs(math.log10(rate / one / _USUAL)) + _FACTORS[round(one**sign)],
+        key=lambda factor: abs(math.log10(rate / factor / _USUAL)) + _FACTORS[round(factor**sign)],
     )
 
 
@@ -267,21 +269,23 @@ def implausible(
     """
     of = {quantity: expected(sensor, quantity) for quantity in QUANTITIES}
     rates = {name: level["rate"] for name, level in channels.items()}
-    found = implausible_rates(rates, {name: of[quantity_of(name)].bandwidth for name in channels})
-    if not found:  # else the density is that of another time
-        found += _noise(channels, of)
-        found += _unlike(channels, of, {f.channel for f in found})
+    findings = implausible_rates(
+        rates, {name: of[quantity_of(name)].bandwidth for name in channels}
+    )
+    if not findings:  # else the density is that of another time
+        findings += _noise(channels, of)
+        findings += _unlike(channels, of, {f.channel for f in findings})
     if gravity is None or gravity.swept < _TILTED:  # its mean is not gravity then
-        found += _gravity(channels)
+        findings += _gravity(channels)
     if static:
-        mending = {f.channel: f.value for f in found if f.finding == "suspicious_unit"}
+        mending = {f.channel: f.value for f in findings if f.finding == "suspicious_unit"}
         means = {
             name: level["mean"] * mending.get(name, 1.0)
             for name, level in channels.items()
             if quantity_of(name) == "gyro"
         }
-        found += [*_turning(means, of["gyro"])] or [*_tilting(means, gravity)]
-    return found
+        findings += [*_turning(means, of["gyro"])] or [*_tilting(means, gravity)]
+    return findings
 
 
 def implausible_of(quality: Quality, sensor: Sensor | None) -> list[dict[str, Any]]:
@@ -296,8 +300,8 @@ def implausible_of(quality: Quality, sensor: Sensor | None) -> list[dict[str, An
     about = quality.recording
     turn = GravityTurn(**quality.gravity) if quality.gravity else None
     static = about.get("kind", "static") == "static"
-    found = implausible(quality.channels, turn, sensor, static=static)
-    return [dict(finding.row(about["sensor"], about["recording"])) for finding in found]
+    findings = implausible(quality.channels, turn, sensor, static=static)
+    return [dict(finding.row(about["sensor"], about["recording"])) for finding in findings]
 
 
 def mistakes(unit: str, quantity: str) -> Iterator[tuple[str, float]]:
@@ -331,9 +335,9 @@ def _gravity(channels: Mapping[str, Level]) -> Iterator[Finding]:
     detail = f"the mean acceleration has a norm of {norm:.4g} m/s², expected {STANDARD_GRAVITY:.4g}"
     for other, factor in mistakes(unit, "accel") if not units else ():
         if abs(norm * factor / STANDARD_GRAVITY - 1.0) <= _TOLERANCE:
-            said = f"{detail}: are the figures in {other}, and not {unit}? {_MEND}"
+            question = f"{detail}: are the figures in {other}, and not {unit}? {_MEND}"
             for name in axes:
-                yield Finding("suspicious_unit", "warning", said, factor, name)
+                yield Finding("suspicious_unit", "warning", question, factor, name)
             return
     advice = "check unit, scale, offset and columns of the accelerometer"
     if norm < 0.05 * STANDARD_GRAVITY:
@@ -372,7 +376,7 @@ def _noise(channels: Mapping[str, Level], of: Mapping[str, Expected]) -> Iterato
 
 
 def _unlike(
-    channels: Mapping[str, Level], of: Mapping[str, Expected], told: Collection[str | None]
+    channels: Mapping[str, Level], of: Mapping[str, Expected], doubted: Collection[str | None]
 ) -> Iterator[Finding]:
     """Yield the channels whose noise is far from what is printed, or from both other axes.
 
@@ -381,7 +385,7 @@ def _unlike(
     """
     untimed = False
     for name, level in channels.items():
-        if name in told:
+        if name in doubted:
             continue
         quantity = quantity_of(name)
         sign, dimension = _SHOWN[quantity]
@@ -408,7 +412,7 @@ def _unlike(
                 )
             continue
         others = [f"{quantity}_{axis}" for axis in "xyz" if f"{quantity}_{axis}" != name]
-        ratio = _ratio(level, [channels[one] for one in others if one in channels])
+        ratio = _ratio(level, [channels[axis] for axis in others if axis in channels])
         if ratio is not None:
             shown = low if ratio > 1.0 else high
             explained = (
@@ -426,17 +430,17 @@ def _unlike(
 
 def _ratio(level: Level, others: Sequence[Level]) -> float | None:
     """Return how many times the noise of two axes alike a third has; None: not far off."""
-    if len(others) < 2 or any(one["density"][1] is None for one in (level, *others)):
+    if len(others) < 2 or any(axis["density"][1] is None for axis in (level, *others)):
         return None
-    least = min(one["density"][0] for one in others)
-    most = max(one["density"][1] for one in others)
+    least = min(axis["density"][0] for axis in others)
+    most = max(axis["density"][1] for axis in others)
     low, high = level["density"]
     if not (least > 0.0 and high > 0.0) or most > _EVEN * least:
         return None
     if low > _UNEVEN * most:
-        return float(low / max(one["density"][0] for one in others))
+        return float(low / max(axis["density"][0] for axis in others))
     if _UNEVEN * high < least:
-        return float(high / min(one["density"][1] for one in others))
+        return float(high / min(axis["density"][1] for axis in others))
     return None
 
 

@@ -81,14 +81,14 @@ def usual_figures(sensors: Mapping[str, Sensor]) -> dict[tuple[str, str], Usual]
     dict
         By quantity and figure (``N``, ``B``), where at least five sensors have it.
     """
-    found: dict[tuple[str, str], list[float]] = {}
+    by_figure: dict[tuple[str, str], list[float]] = {}
     for sensor in sensors.values():
         for quantity in QUANTITIES:
             for figure, value in printed_figures(sensor, quantity).items():
-                found.setdefault((quantity, figure), []).append(value)
+                by_figure.setdefault((quantity, figure), []).append(value)
     return {
         key: Usual(median(values), min(values), max(values), len(values))
-        for key, values in found.items()
+        for key, values in by_figure.items()
         if len(values) >= _FEWEST
     }
 
@@ -107,15 +107,17 @@ def printed_figures(sensor: Sensor, quantity: str) -> dict[str, float]:
     dict
         SI, under ``N`` and ``B``; B is the minimum of the curve, as vendors print it.
     """
-    found: dict[str, float] = {}
+    figures: dict[str, float] = {}
     for axis in "xyz":
         rows = comparables(sensor.datasheet, f"{quantity}_{axis}")
-        known = [(row, row.value) for row in rows if row.value is not None]
+        with_value = [(row, row.value) for row in rows if row.value is not None]
         for figure, statistic in (("N", "N"), ("B", "adev_minimum")):
-            values = [value for row, value in known if row.statistic == statistic and _plain(row)]
+            values = [
+                value for row, value in with_value if row.statistic == statistic and _plain(row)
+            ]
             if values:
-                found.setdefault(figure, values[0])
-    return found
+                figures.setdefault(figure, values[0])
+    return figures
 
 
 def _plain(row: Comparable) -> bool:
@@ -151,29 +153,31 @@ def suspicious(
     list of str
         A sentence a figure.
     """
-    found = []
+    sentences = []
     for figure, value in figures.items():
-        known = usual.get((quantity, figure))
-        if known is None:
+        typical = usual.get((quantity, figure))
+        if typical is None:
             continue
-        least, most = known.least / _NEAR_OTHERS, known.most * _NEAR_OTHERS
+        least, most = typical.least / _NEAR_OTHERS, typical.most * _NEAR_OTHERS
         if own := (printed or {}).get(figure):
             least, most = own / NEAR_PRINTED, own * NEAR_PRINTED
             if least <= value <= most:
                 continue
-        if value > _FAR * known.median:
-            how = f"{value / known.median:.3g} times the median of {known.sensors} sensors, "
-            other = known.median
-        elif 0 < value < known.least / _FAR:
-            how = f"{known.least / value:.3g} times below the least of {known.sensors} sensors, "
-            other = known.least
+        if value > _FAR * typical.median:
+            how = f"{value / typical.median:.3g} times the median of {typical.sensors} sensors, "
+            other = typical.median
+        elif 0 < value < typical.least / _FAR:
+            how = (
+                f"{typical.least / value:.3g} times below the least of {typical.sensors} sensors, "
+            )
+            other = typical.least
         else:
             continue
         doubt = _explained(quantity, figure, value, least, most)
         shown = _text(quantity, figure, value)
         than = _text(quantity, figure, other)
-        found.append(f"{quantity} {figure} = {shown} is {how}{than}: {doubt}")
-    return found
+        sentences.append(f"{quantity} {figure} = {shown} is {how}{than}: {doubt}")
+    return sentences
 
 
 def _explained(quantity: str, figure: str, value: float, least: float, most: float) -> str:

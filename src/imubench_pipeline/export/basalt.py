@@ -29,10 +29,6 @@ _CONVENTION = (
 def write(imu: Imu) -> str:
     """Return JSON with the fields of the sensor in ``value0``.
 
-    Parameters
-    ----------
-    imu : Imu
-
     Raises
     ------
     ExportError

@@ -74,41 +74,39 @@ def choose(
     method : str, optional
         Estimation method; the recommended one by default.
 
-    Returns
-    -------
-    Choice
-
     Raises
     ------
     ExportError
         If there is no estimate of the quantity, or of the device.
     """
-    found: dict[tuple[str, str, str], list[Row]] = {}
+    estimated: dict[tuple[str, str, str], list[Row]] = {}
     for row in rows:
         wanted = row["recommended"] if method is None else row["method"] == method
         if wanted and row["channel"].startswith(f"{quantity}_"):
             key = (row["recording"], row["channel"], row["method"])
-            found.setdefault(key, []).append(row)
+            estimated.setdefault(key, []).append(row)
     named = devices or {}
-    everywhere = list(found)
+    everywhere = list(estimated)
     if axis not in (WORST, MEDIAN):
-        devices_there = sorted({named.get(recording, recording) for recording, _, _ in found})
-        found = {
-            key: part for key, part in found.items() if axis in (key[0], named.get(key[0], key[0]))
+        devices_present = sorted({named.get(recording, recording) for recording, _, _ in estimated})
+        estimated = {
+            key: part
+            for key, part in estimated.items()
+            if axis in (key[0], named.get(key[0], key[0]))
         }
-        if not found and devices_there:
+        if not estimated and devices_present:
             raise ExportError(
-                f"no {quantity} of device {axis!r}; there are: {', '.join(devices_there)}"
+                f"no {quantity} of device {axis!r}; there are: {', '.join(devices_present)}"
             )
     ranked = []
-    for key, part in found.items():
+    for key, part in estimated.items():
         estimate = estimate_of(key[2], part)
         if estimate.model.N > 0.0:
             deviation = float(np.sqrt(estimate.model.allan_variance(np.array([horizon]))[0]))
             ranked.append((deviation, key, estimate))
     if not ranked:
         raise ExportError(f"no estimate of a {quantity} with white noise")
-    ranked.sort(key=lambda one: one[0])
+    ranked.sort(key=lambda entry: entry[0])
     place = len(ranked) // 2 if axis == MEDIAN else len(ranked) - 1
     deviation, (recording, channel, used), estimate = ranked[place]
     which = f"the {MEDIAN if axis == MEDIAN else WORST} of {len(ranked)} axes"
@@ -123,9 +121,9 @@ def choose(
     )
     others: dict[str, list[Key]] = {}
     for key in everywhere:
-        if key not in found:
+        if key not in estimated:
             others.setdefault("of another device", []).append(key[:2])
-        elif key not in (one[1] for one in ranked):
+        elif key not in (entry[1] for entry in ranked):
             others.setdefault("no white noise in the model", []).append(key[:2])
         elif key != (recording, channel, used):
             why = "not the median" if axis == MEDIAN else "less noise"
@@ -138,33 +136,33 @@ def choose(
 def _left_out(others: Mapping[str, Sequence[Key]], chosen: str) -> list[str]:
     """Say which axes do not stand for the quantity of the chosen one, and why."""
     quantity, _ = chosen.split("_")
-    said = []
+    statements = []
     for why, keys in others.items():
         of: dict[str, list[str]] = {}
         for recording, channel in keys:
             of.setdefault(recording, []).append(channel)
-        named = [f"{' and '.join(channels)} of {one}" for one, channels in of.items()]
+        named = [f"{' and '.join(channels)} of {recording}" for recording, channels in of.items()]
         more = len(named) - _NAMED
-        said.append(
+        statements.append(
             f"axes left out, {why}: {'; '.join(named[:_NAMED])}"
             + (f"; and those of {more} more recordings" if more > 0 else "")
         )
-    there = {chosen, *(channel for keys in others.values() for _, channel in keys)}
-    without = [name for axis in AXES if (name := f"{quantity}_{axis}") not in there]
+    channels = {chosen, *(channel for keys in others.values() for _, channel in keys)}
+    without = [name for axis in AXES if (name := f"{quantity}_{axis}") not in channels]
     if without:
-        said.append(f"axes left out, no recording has an estimate: {' and '.join(without)}")
-    return said
+        statements.append(f"axes left out, no recording has an estimate: {' and '.join(without)}")
+    return statements
 
 
 def parameter_notes(estimate: Estimate) -> list[str]:
     """Say what was done with the parameters that have no plain value."""
-    said = []
+    notes = []
     for number, name, parameter in estimate.components():
         label = name if number == 1 else f"{name} of component {number}"
         note = _note(parameter)
         if note:
-            said.append(f"{label} {note}")
-    return said
+            notes.append(f"{label} {note}")
+    return notes
 
 
 def _note(parameter: Parameter) -> str | None:

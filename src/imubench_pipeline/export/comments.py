@@ -32,46 +32,48 @@ def heading(imu: Imu, program: str, convention: str, *, temperature: bool = Fals
     list of str
         One statement each, printable.
     """
-    said = [f"Noise of the {imu.sensor} for {program}, by imubench."]
+    statements = [f"Noise of the {imu.sensor} for {program}, by imubench."]
     if imu.simulated:
-        said.append("The recordings are SIMULATED, not measured.")
-    said += [f"CAUTION: {caution}." for caution in imu.cautions]
-    said.append(convention)
+        statements.append("The recordings are SIMULATED, not measured.")
+    statements += [f"CAUTION: {caution}." for caution in imu.cautions]
+    statements.append(convention)
     units = {"gyro": "rad, s", "accel": "m, s"}
     estimated = {"gyro": imu.gyro, "accel": imu.accel}
-    said += [
+    statements += [
         f"{name} left out: there is no estimate of it."
-        for name, one in estimated.items()
-        if one is None
+        for name, axis in estimated.items()
+        if axis is None
     ]
     for name, axis in imu.axes.items():
-        said.append(f"{name}: {axis.origin}.")
+        statements.append(f"{name}: {axis.origin}.")
         terms = named((estimated[name] or axis).model.terms)
-        said.append(f"{name} model ({units[name]}; N two-sided): {terms}.")
-        said += [f"{name}: {note}." for note in axis.notes]
+        statements.append(f"{name} model ({units[name]}; N two-sided): {terms}.")
+        statements += [f"{name}: {note}." for note in axis.notes]
     if temperature:
-        said += [
+        statements += [
             f"{name} and temperature: {note}."
             for name, effect in imu.temperature.items()
             for note in effect.notes
         ]
-        said.append("Left out: fixed biases, which change from one start to the next.")
+        statements.append("Left out: fixed biases, which change from one start to the next.")
     else:
-        said.append(
+        statements.append(
             "Left out: fixed biases, which change from one start to the next, and how they follow "
             "the temperature: the file holds noise alone."
         )
     if imu.inflation != 1.0:
-        said.append(
+        statements.append(
             f"INFLATED: from here on all densities and amplitudes are {imu.inflation:g} times "
             f"those above, because: {imu.because}."
         )
-    return [_on_one_line(words) for words in said]
+    return [_on_one_line(words) for words in statements]
 
 
 def mapping_words(mapped: Mapping[str, Mapped]) -> list[str]:
     """Return what was replaced in the models, one statement each."""
-    return [f"{name}: {words}." for name, one in mapped.items() for words in one.words]
+    return [
+        f"{name}: {words}." for name, replacement in mapped.items() for words in replacement.words
+    ]
 
 
 def commented(statements: Sequence[str], mark: str = "#") -> str:

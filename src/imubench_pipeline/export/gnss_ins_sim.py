@@ -35,10 +35,6 @@ _FEW = 20.0
 def write(imu: Imu) -> str:
     """Return Python that defines ``imu_err``, for ``imu_model.IMU(accuracy=imu_err)``.
 
-    Parameters
-    ----------
-    imu : Imu
-
     Raises
     ------
     ExportError

@@ -46,8 +46,8 @@ class Mapped:
         What was replaced by what, and by how much it is off.
     half, twice : float
         Relative error of the Allan deviation at half and at twice the horizon; 0: exact.
-    most, most_at : float
-        The largest one at a tau up to the horizon, and that tau, s.
+    most : float
+        The largest one at a tau up to the horizon.
     """
 
     model: NoiseModel
@@ -55,7 +55,6 @@ class Mapped:
     half: float = 0.0
     twice: float = 0.0
     most: float = 0.0
-    most_at: float = 0.0
 
 
 def as_walk(
@@ -96,29 +95,23 @@ def as_process(model: NoiseModel, horizon: float, rate: float) -> Mapped:
     Its T_B is the one with which the logarithm of the Allan variance from a thirtieth of the
     horizon to the horizon is nearest, in the mean square.
     """
-    slow = _slow(model)
-    if not slow:
-        return Mapped(NoiseModel(N=model.N), _left_out(model))
-    processes = _processes(slow)
-    if len(slow) == len(processes) == 1:
-        (process,) = processes
-        return Mapped(NoiseModel(N=model.N, B=process.B, T_B=process.T_B), _left_out(model))
-    process = _nearest_process(slow, model.N, horizon)
-    replacement = NoiseModel(N=model.N, B=process.B, T_B=process.T_B)
-    what = f"a Gauss-Markov process B = {process.B:.3e}, T_B = {process.T_B:.4g} s"
-    return _compared(model, replacement, what, slow, horizon, rate)
+    return _as_process(model, horizon, rate, walk=False)
 
 
 def as_process_and_walk(model: NoiseModel, horizon: float, rate: float) -> Mapped:
     """Return white noise, one Gauss-Markov process and a random walk (see `as_process`)."""
-    slow = _slow(model)
-    processes = _processes(slow)
-    replaced = [term for term in slow if term.role is not Role.RANDOM_WALK]
+    return _as_process(model, horizon, rate, walk=True)
+
+
+def _as_process(model: NoiseModel, horizon: float, rate: float, *, walk: bool) -> Mapped:
+    replaced = [term for term in _slow(model) if not (walk and term.role is Role.RANDOM_WALK)]
+    processes = _processes(replaced)
+    K = model.K if walk else 0.0
     if len(replaced) == len(processes) <= 1:
         B, T_B = (processes[0].B, processes[0].T_B) if processes else (0.0, None)
-        return Mapped(NoiseModel(N=model.N, B=B, T_B=T_B, K=model.K), _left_out(model))
+        return Mapped(NoiseModel(N=model.N, B=B, T_B=T_B, K=K), _left_out(model))
     process = _nearest_process(replaced, model.N, horizon)
-    replacement = NoiseModel(N=model.N, B=process.B, T_B=process.T_B, K=model.K)
+    replacement = NoiseModel(N=model.N, B=process.B, T_B=process.T_B, K=K)
     what = f"a Gauss-Markov process B = {process.B:.3e}, T_B = {process.T_B:.4g} s"
     return _compared(model, replacement, what, replaced, horizon, rate)
 
@@ -159,14 +152,11 @@ def _nearest_process(slow: Sequence[Term], N: float, horizon: float) -> GaussMar
     tau = np.geomspace(_SHORTEST * horizon, horizon, 60)
     white = N**2 / tau
     wanted = np.log(white + sum(term.allan_variance(tau) for term in slow))
-    kept = _variance(slow, horizon)
+    variance = _variance(slow, horizon)
 
     def process(T_B: float) -> GaussMarkov:
         unit = GaussMarkov(bias_instability(1.0, T_B), T_B)
-        return GaussMarkov(
-            bias_instability(kept / _variance([unit], horizon), T_B),
-            T_B,
-        )
+        return GaussMarkov(bias_instability(variance / _variance([unit], horizon), T_B), T_B)
 
     times = np.geomspace(_SHORTEST * horizon, _LONGEST_TIME * horizon, _TRIED)
     errors = [
@@ -200,11 +190,4 @@ def _compared(
         f"{horizon / 2:g} s, by {100 * twice:+.1f} % at {2 * horizon:g} s, and below the horizon "
         f"by at most {100 * float(below[worst]):+.1f} % (at {tau[worst]:.3g} s)"
     ]
-    return Mapped(
-        replacement,
-        [*words, *_left_out(model)],
-        half,
-        twice,
-        float(below[worst]),
-        float(tau[worst]),
-    )
+    return Mapped(replacement, [*words, *_left_out(model)], half, twice, float(below[worst]))

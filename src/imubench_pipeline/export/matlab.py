@@ -57,12 +57,7 @@ class _Parameters:
 
 
 def write(imu: Imu) -> str:
-    """Return the script; it leaves ``IMU``, an imuSensor.
-
-    Parameters
-    ----------
-    imu : Imu
-    """
+    """Return the script; it leaves ``IMU``, an imuSensor."""
     mapped: dict[str, Mapped] = {}
     parameters: dict[str, _Parameters] = {}
     for name, axis in imu.axes.items():
@@ -90,11 +85,11 @@ def write(imu: Imu) -> str:
         for i, (key, value, comment) in enumerate(lines):
             end = "); " if i == len(lines) - 1 else ", ..."
             text += f"    {key}, {value}{end} % {comment}\n"
-    told = [imu.temperature[name] for name in biases if biases[name][0]]
-    if told:
-        low, high = max(effect.low for effect in told), min(effect.high for effect in told)
+    effects = [imu.temperature[name] for name in biases if biases[name][0]]
+    if effects:
+        low, high = max(effect.low for effect in effects), min(effect.high for effect in effects)
         text += (
-            f"IMU.Temperature = {told[0].reference:.9g};  % degC; between {low:.9g} and "
+            f"IMU.Temperature = {effects[0].reference:.9g};  % degC; between {low:.9g} and "
             f"{high:.9g} the biases follow it\n"
         )
     return text

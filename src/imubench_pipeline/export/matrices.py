@@ -104,12 +104,7 @@ def matrices(model: NoiseModel, rate: float, horizon: float) -> Matrices:
 
 
 def write_json(imu: Imu) -> str:
-    """Return all matrices of gyro and accelerometer, as far as there are estimates, as JSON.
-
-    Parameters
-    ----------
-    imu : Imu
-    """
+    """Return all matrices of gyro and accelerometer, as far as there are estimates, as JSON."""
     content: dict[str, object] = {
         "about": heading(imu, "any Kalman filter", _CONVENTION.format(rate=imu.rate)),
         "sensor": imu.sensor,
@@ -155,12 +150,7 @@ def _parameters(model: NoiseModel) -> dict[str, object]:
 
 
 def write_npz(imu: Imu) -> bytes:
-    """Return the same matrices as NumPy arrays, such as ``gyro_Phi``, and ``about``.
-
-    Parameters
-    ----------
-    imu : Imu
-    """
+    """Return the same matrices as NumPy arrays, such as ``gyro_Phi``, and ``about``."""
     arrays: dict[str, Array] = {"rate": np.array(imu.rate), "horizon": np.array(imu.horizon)}
     for name, axis in imu.axes.items():
         of_axis = matrices(axis.model, imu.rate, imu.horizon)

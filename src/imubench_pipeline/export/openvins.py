@@ -10,13 +10,7 @@ ov_msckf/src/utils/NoiseManager.h (units), ov_msckf/src/state/Propagator.cpp (di
 
 from __future__ import annotations
 
-from imubench_pipeline.export.comments import (
-    commented,
-    heading,
-    mapping_words,
-    plain,
-    setting,
-)
+from imubench_pipeline.export.comments import commented, heading, mapping_words, plain, setting
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.target import Target
 from imubench_pipeline.export.walks import CONVENTION, densities, positive, walks

@@ -32,10 +32,6 @@ _CONVENTION = (
 def write(imu: Imu) -> str:
     """Return the lines of the settings that concern the noise of the sensor.
 
-    Parameters
-    ----------
-    imu : Imu
-
     Raises
     ------
     ExportError

@@ -213,10 +213,6 @@ def overbound(
     most_excess : float
         Largest Allan deviation of the model over the limit that it must lie above.
 
-    Returns
-    -------
-    Overbound
-
     Raises
     ------
     ValueError
@@ -233,10 +229,10 @@ def overbound(
     unsuited = _unsuited(fitted, family, max(horizon, reach))
     warning = None
     if excess[0] > most_excess or unsuited:
-        said = _offer(limits, family, times, excess, unsuited, most_excess)
+        offer = _offer(limits, family, times, excess, unsuited, most_excess)
         if excess[0] > most_excess:
-            raise ValueError(f"{said}; at most {most_excess:g} times is allowed")
-        warning = said
+            raise ValueError(f"{offer}; at most {most_excess:g} times is allowed")
+        warning = offer
     within = curve.tau <= reach * (1.0 + 1e-9)
     tau, measured = curve.tau[within], curve.variance[within]
     ratio = model.allan_variance(tau, rate) / measured
@@ -290,7 +286,7 @@ def _offer(
     most_excess: float,
 ) -> str:
     """Return how far a family is above its limits, why, and how far the others would be."""
-    said = (
+    words = (
         f"the Allan deviation of the smallest {family} is {excess[0]:.3g} times its limit at "
         f"{excess[1]:.4g} s"
     )
@@ -305,9 +301,9 @@ def _offer(
     reason = f": {unsuited}" if unsuited else ""
     offer = ", ".join(f"{other} is {value:.3g} times" for other, value in better.items())
     if offer:
-        return f"{said}{reason}; the smallest {offer} at most"
+        return f"{words}{reason}; the smallest {offer} at most"
     least = min([excess[0], *others.values()])
-    return f"{said}{reason}; no family comes closer than {least:.3g} times"
+    return f"{words}{reason}; no family comes closer than {least:.3g} times"
 
 
 def _passed_below(

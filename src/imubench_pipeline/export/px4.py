@@ -84,13 +84,14 @@ def write(imu: Imu, period: int = PERIOD) -> str:
     rows = []
     for name, (value, comment) in values.items():
         low, high = _RANGES[name]
-        kept = min(max(value, low), high)
-        if kept != value:
+        clipped = min(max(value, low), high)
+        if clipped != value:
             about.append(
-                f"{name}: {value:.4g} is outside the range of {low:g} to {high:g}; {kept:g} is set."
+                f"{name}: {value:.4g} is outside the range of {low:g} to {high:g}; {clipped:g} is "
+                "set."
             )
-        about.append(f"{name} = {kept:.6g} {comment}.")
-        rows.append(f"1\t1\t{name}\t{kept:.9g}\t{_REAL}\n")
+        about.append(f"{name} = {clipped:.6g} {comment}.")
+        rows.append(f"1\t1\t{name}\t{clipped:.9g}\t{_REAL}\n")
     rows.append(f"1\t1\tEKF2_PREDICT_US\t{period}\t{_INTEGER}\n")
     for quantity in imu.temperature:
         corrections = _corrections(imu, quantity)

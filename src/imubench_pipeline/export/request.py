@@ -130,8 +130,8 @@ def imu_of(tables: Tables, request: Request, folder: Path | None = None) -> Imu:
     """Return the sensor's noise as a request asks for it (see `made`)."""
     recordings = _rows(tables["recordings"], sensor=request.sensor)
     if not recordings:
-        there = sorted(set(tables["recordings"]["sensor"].to_pylist()))
-        raise ExportError(f"no sensor {request.sensor!r}; there are: {', '.join(there)}")
+        sensors = sorted(set(tables["recordings"]["sensor"].to_pylist()))
+        raise ExportError(f"no sensor {request.sensor!r}; there are: {', '.join(sensors)}")
     by_name = {row["recording"]: row for row in recordings}
     rows, cautions = _deciding(tables, request, recordings)
     axes: dict[str, AxisNoise] = {}
@@ -198,13 +198,13 @@ def _deciding(
     reasons = "; ".join(apart.values())
     if (request.because or "").strip():
         return rows, [f"{reasons}; used all the same, because: {request.because}", *without]
-    kept = [row for row in rows if (row["sensor"], row["recording"]) not in apart]
-    if rows and not kept:
+    deciding = [row for row in rows if (row["sensor"], row["recording"]) not in apart]
+    if rows and not deciding:
         raise ExportError(
             f"{request.sensor}: {reasons}; look at the findings, or say why it may be used all the "
             "same (--because; exports: because; decide: include)"
         )
-    return kept, [f"left out: {reasons}", *without]
+    return deciding, [f"left out: {reasons}", *without]
 
 
 def _drawn(folder: Path | None, sensor: str, choice: Choice) -> Sequence[NoiseModel]:

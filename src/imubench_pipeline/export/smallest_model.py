@@ -132,13 +132,13 @@ def _program(limits: Sequence[Limits], terms: Sequence[Term]) -> tuple[float, Ar
         if answer.status != 0 or answer.x is None:
             break
         # What the solver's tolerance leaves below a limit is made up for.
-        found = np.maximum(answer.x, 0.0)
-        found /= min(float(np.min(rows @ found)), 1.0)
-        ratio = curve @ found
+        solution = np.maximum(answer.x, 0.0)
+        solution /= min(float(np.min(rows @ solution)), 1.0)
+        ratio = curve @ solution
         lower = float(weights @ np.log(ratio))
         if lower > cost - _SAME:
             break
-        cost, powers = lower, found
+        cost, powers = lower, solution
     return cost, np.asarray(powers / scale)
 
 

@@ -68,12 +68,7 @@ if __name__ == "__main__":
 
 
 def write(imu: Imu) -> str:
-    """Return the program.
-
-    Parameters
-    ----------
-    imu : Imu
-    """
+    """Return the program."""
     entries = ""
     left_out: list[str] = []
     for name, axis in imu.axes.items():

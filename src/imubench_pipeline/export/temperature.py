@@ -65,10 +65,6 @@ def temperature_effect(
     horizon : float
         How long the program goes without a measurement, s: a sensor that may follow the
         temperature later than that is left out.
-
-    Returns
-    -------
-    TemperatureEffect
     """
     low, high = recording["temperature_min"], recording["temperature_max"]
     by_axis: dict[str, dict[str, Row]] = {}
@@ -91,36 +87,36 @@ def temperature_effect(
         if axis not in by_axis:
             notes.append(f"axis {axis} left out: no fit of the temperature")
             continue
-        found = by_axis[axis]
-        reason = _reason_against(found, high - low, horizon)
+        fit = by_axis[axis]
+        reason = _reason_against(fit, high - low, horizon)
         if reason is not None:
             notes.append(f"axis {axis} left out: {reason}")
             continue
-        q = found["quadratic"]["value"] or 0.0
+        q = fit["quadratic"]["value"] or 0.0
         # The axes of one quantity may come from files whose mean temperatures differ.
-        slope[axis] = found["sensitivity"]["value"] + 2.0 * q * (reference - found["T_0"]["value"])
+        slope[axis] = fit["sensitivity"]["value"] + 2.0 * q * (reference - fit["T_0"]["value"])
         if q:
             square[axis] = q
-        s = found["sensitivity"]
+        s = fit["sensitivity"]
         bends = f", square {q:.3e} {unit}/K^2" if q else ""
         notes.append(
             f"axis {axis}: {s['value']:.4e} {unit}/K, 95 % limits {s['lower']:.3e} to "
-            f"{s['upper']:.3e}{bends}; {_lag_words(found['lag'])}"
+            f"{s['upper']:.3e}{bends}; {_lag_words(fit['lag'])}"
         )
     return TemperatureEffect(reference, float(low), float(high), slope, square, notes)
 
 
-def _reason_against(found: Mapping[str, Row], span: float, horizon: float) -> str | None:
+def _reason_against(fit: Mapping[str, Row], span: float, horizon: float) -> str | None:
     """Return why a fit is not safe to correct with; None where it is."""
-    s, lag = found["sensitivity"], found["lag"]
+    s, lag = fit["sensitivity"], fit["lag"]
     if s["value"] is None or s["lower"] is None or s["upper"] is None:
         return f"the sensitivity is {s['status'].replace('_', ' ')}: {s['reason']}"
     if not s["compensated"]:
         return f"the log does not show it: {s['reason']}"
-    known = 0.5 * (s["upper"] - s["lower"]) / abs(s["value"])
-    if known > _LEAST_KNOWN:
+    error = 0.5 * (s["upper"] - s["lower"]) / abs(s["value"])
+    if error > _LEAST_KNOWN:
         return (
-            f"it is known to {100 * known:.0f} % only, by the noise and by what the register of "
+            f"it is known to {100 * error:.0f} % only, by the noise and by what the register of "
             f"the temperature leaves open; {100 * _LEAST_KNOWN:.0f} % is needed"
         )
     if span < _LEAST_RANGE:

@@ -92,8 +92,8 @@ def order_of(recordings: Iterable[Row]) -> tuple[list[Row], Order]:
 
 
 def _stamp(started: str) -> datetime:
-    found = datetime.fromisoformat(started.strip())
-    return found if found.tzinfo else found.replace(tzinfo=UTC)
+    stamp = datetime.fromisoformat(started.strip())
+    return stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)
 
 
 def _natural(name: str) -> tuple[list[tuple[str, int]], str]:
@@ -159,13 +159,13 @@ def _rows(series: Series, cells: Sequence[dict[tuple[str, str], Row]]) -> Iterat
     for column, index in columns.items():
         data[:, list(points[column]), index] = np.transpose(list(points[column].values()))
     tested_as = [columns.get(_tested_as(key), index) for key, index in columns.items()]
-    found = np.moveaxis(_Levels(data, np.array(tested_as, dtype=int)).found, 0, 2).tolist()
+    levels = np.moveaxis(_Levels(data, np.array(tested_as, dtype=int)).results, 0, 2).tolist()
     for key in sorted(units, key=lambda key: (key[0][0] != "g", key[0], _NAMES.index(key[1]))):
         noise = key[1] != "bias"
         for place, recording in enumerate(series.recordings):
             row = cells[place].get(key, _ABSENT)
             index = columns.get((*key, _kind(row)), -1)
-            *y, p, changed, count, alone = _NOTHING if index < 0 else found[place][index]
+            *y, p, changed, count, alone = _NOTHING if index < 0 else levels[place][index]
             expected = [None if math.isnan(x) else bounded_exp(x) if noise else x for x in y]
             value = row["value"] if row.get("status", "ok") == "ok" else None
             change = value / expected[0] - 1.0 if noise and value and expected[0] else None
@@ -179,9 +179,9 @@ def _rows(series: Series, cells: Sequence[dict[tuple[str, str], Row]]) -> Iterat
                     reasons.append("gravity is in it: the sensor may lie differently")
             judged = (None, None) if math.isnan(p) else (p, "changed" if changed else "as before")
             about = (series.sensor, series.device, *key, recording["recording"], place + 1)
-            here = (recording["started"], value, row.get("lower"), row.get("upper"), units[key])
-            found_here = (*expected, change, *judged, "; ".join(reasons) or None)
-            yield dict(zip(COLUMNS, about + here + found_here, strict=True))
+            measured = (recording["started"], value, row.get("lower"), row.get("upper"), units[key])
+            outcome = (*expected, change, *judged, "; ".join(reasons) or None)
+            yield dict(zip(COLUMNS, about + measured + outcome, strict=True))
 
 
 def _kind(row: Row) -> str:
@@ -224,7 +224,7 @@ class _Levels:
     """The levels of c columns through n recordings.
 
     ``points`` (3, n, c) are y, and the variances of its error where the truth lies below and above;
-    NaN is no value. ``found`` (7, n, c) are the expected y and its limits, p-value (NaN: not
+    NaN is no value. ``results`` (7, n, c) are the expected y and its limits, p-value (NaN: not
     judged), 1 or -1 where changed, how many the level has before it (-1: no value), and the flagged
     recording that this one shows to have stood alone (-1: none). A column has the p-value and the
     verdict of the one that it is ``tested_as`` (c,), wherever that is judged.
@@ -234,7 +234,7 @@ class _Levels:
         _, recordings, columns = points.shape
         self._points = points
         self._tested_as = tested_as
-        self.found = np.tile(np.reshape(_NOTHING, (-1, 1, 1)), (recordings, columns))
+        self.results = np.tile(np.reshape(_NOTHING, (-1, 1, 1)), (recordings, columns))
         self._member = np.zeros((recordings, columns), dtype=bool)
         self._state = np.zeros((7, columns))
         self._aside: dict[int, tuple[int, NDArray[np.bool_], NDArray[np.float64]]] = {}
@@ -250,10 +250,10 @@ class _Levels:
         self._settle()
         # Recordings, of them used for tau; mu, 1 / var mu, tau^2, its degrees of freedom times
         # their mean 1 / (v + tau^2), and these.
-        count, _, mean, weight, spread, known, freedom = self._state
+        count, _, mean, weight, spread, information, freedom = self._state
         own = spread + np.stack([np.where(y < mean, above, below), above, below])
         error = np.sqrt(own + 1.0 / weight)
-        degrees = np.minimum((own * known) ** 2 / freedom, freedom)
+        degrees = np.minimum((own * information) ** 2 / freedom, freedom)
         judged = present & (count >= _FEWEST) & (own[0] > 0.0) & (degrees[0] >= 1.0)
         p_value = 2.0 * stdtr(degrees[0], -np.abs(y - mean) / error[0])
         half = stdtrit(np.maximum(degrees[1:], 1.0), 0.975) * error[1:]
@@ -262,9 +262,9 @@ class _Levels:
         p_value = p_value[test]
         changed = judged & (p_value < LEVEL / max((judged & (test == here)).sum(), 1))
         of_judged = np.stack([mean - half[0], mean + half[1], p_value, changed * np.sign(y - mean)])
-        self.found[1:5, place, judged] = of_judged[:, judged]
-        self.found[5, place, present] = count[present]
-        self.found[0, place, present & (count > 0.0)] = mean[present & (count > 0.0)]
+        self.results[1:5, place, judged] = of_judged[:, judged]
+        self.results[5, place, present] = count[present]
+        self.results[0, place, present & (count > 0.0)] = mean[present & (count > 0.0)]
         for column in np.flatnonzero(changed).tolist():
             member, state = self._member[:, column], self._state[:, column]
             self._aside[column] = place, member.copy(), state.copy()
@@ -285,7 +285,7 @@ class _Levels:
         both = (above + new_below if y < new else below + new_above) + 2.0 * spread
         if (y - old) ** 2 * both < (y - new) ** 2 * own:
             self._member[:, column], self._state[:, column] = member, state
-            self.found[6, place, column] = flagged
+            self.results[6, place, column] = flagged
 
     def _settle(self) -> None:
         """Find mu and tau of the levels that have grown."""
@@ -307,9 +307,9 @@ class _Levels:
             squares = np.where(line, (weight * along**2).sum(axis=0), np.inf)
             left = y - mean - (weight * along * y).sum(axis=0) / squares * along
             free = weight * (1.0 - weight / total - weight * along**2 / squares)
-            known = free.sum(axis=0)
-            spread = np.fmax((weight * left**2 - free * variance).sum(axis=0) / known, 0.0)
+            information = free.sum(axis=0)
+            spread = np.fmax((weight * left**2 - free * variance).sum(axis=0) / information, 0.0)
             weight = member / np.where(variance + spread > 0.0, variance + spread, 1.0)
         self._state[1, due] = count[due]
         self._state[2, due] += mean
-        self._state[3:, due] = total, spread, known, count[due] - 1.0 - line
+        self._state[3:, due] = total, spread, information, count[due] - 1.0 - line

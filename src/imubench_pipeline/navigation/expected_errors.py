@@ -15,6 +15,7 @@ from imubench_pipeline.navigation.error_budget import (
     NO_FIGURES,
     NO_USE,
     Budget,
+    Figure,
     Figures,
     Gyrocompass,
     Quantity,
@@ -28,6 +29,7 @@ from imubench_pipeline.navigation.error_budget import (
     interval,
     time_until,
 )
+from imubench_pipeline.navigation.error_budget.in_use import SENSORS
 from imubench_pipeline.navigation.error_budget.parts import Largest, source_row
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
@@ -54,7 +56,6 @@ class AxisErrors:
 
 
 _NOTHING = AxisErrors()
-_NAMES = {"gyro": "gyro", "accel": "accelerometer"}
 
 
 @dataclass(frozen=True)
@@ -227,19 +228,21 @@ def error_rows(
         Of each channel, what is known of the errors that come in use (`printed_errors.in_use`).
     """
     # Of a log too short for any estimate nothing is known: that is not a sensor without noise.
-    known = {channel: estimate for channel, estimate in estimates.items() if estimate.model.terms}
+    with_noise = {
+        channel: estimate for channel, estimate in estimates.items() if estimate.model.terms
+    }
     axes = {
         channel: AxisErrors(estimate.model, figures.get(channel, NO_FIGURES))
-        for channel, estimate in known.items()
+        for channel, estimate in with_noise.items()
     }
 
     def drawn_of(channel: str) -> list[AxisErrors]:
         stream = partial(channel_rng, seed, *names.values(), channel)
-        models = draw_models(known[channel], draws, stream("budget"))
+        models = draw_models(with_noise[channel], draws, stream("budget"))
         of_use = _drawn(axes[channel].figures, draws, stream("temperature of the budget"))
         return [AxisErrors(*pair) for pair in zip(models, of_use, strict=True)]
 
-    drawn = {channel: drawn_of(channel) for channel in known}
+    drawn = {channel: drawn_of(channel) for channel in with_noise}
     for question in questions:
         asked: dict[str, Any] = {
             **names,
@@ -253,7 +256,7 @@ def error_rows(
         missing = [
             _missing(quantity, estimates)
             for quantity in question.needs
-            if not any(quantity_of(channel) == quantity for channel in known)
+            if not any(quantity_of(channel) == quantity for channel in with_noise)
         ]
         if missing:
             yield asked | {"source": "total", "reason": "; ".join(missing)}
@@ -264,20 +267,20 @@ def error_rows(
         }
         pair = [axes[c] if c else _NOTHING for c in chosen.values()]
         many = [drawn[c] if c else [_NOTHING] * draws for c in chosen.values()]
-        found = question.answer(*pair)
+        nominal = question.answer(*pair)
         budgets = [question.answer(*axes_drawn) for axes_drawn in zip(*many, strict=True)]
-        total = _total(question, found, budgets, chosen, estimates)
+        total = _total(question, nominal, budgets, chosen, estimates)
         yield asked | chosen | total | {"reached_after": question.reached(*pair)}
-        largest = Largest.of(found, question.limit, total["upper"])
-        for contribution in sorted(found.contributions, key=lambda part: -part.sigma):
+        largest = Largest.of(nominal, question.limit, total["upper"])
+        for contribution in sorted(nominal.contributions, key=lambda part: -part.sigma):
             yield asked | chosen | source_row(contribution) | largest.of_bias(contribution)
-        for missed in found.missing if question.limit is not None else ():
+        for missed in nominal.missing if question.limit is not None else ():
             yield asked | chosen | largest.of_missing(missed)
 
 
 def _total(
     question: Question,
-    found: Budget,
+    nominal: Budget,
     budgets: Sequence[Budget],
     chosen: Mapping[str, str | None],
     estimates: Mapping[str, Estimate],
@@ -286,17 +289,17 @@ def _total(
     lower, upper = interval(budgets)
     apart = [c for c in chosen.values() if c and not drawn_jointly(estimates[c])]
     reasons = (
-        *found.assumptions,
+        *nominal.assumptions,
         *_doubts(chosen, estimates),
         *_apart(apart, estimates),
         *_unknown(question, estimates),
     )
     return {
         "source": "total",
-        "sigma": found.total,
+        "sigma": nominal.total,
         # The draws of what is absent lie above it: the value itself is inside.
-        "lower": min(lower, found.total),
-        "upper": max(upper, found.total),
+        "lower": min(lower, nominal.total),
+        "upper": max(upper, nominal.total),
         "drawn": "one by one" if apart else "jointly",
         "within": question.limit and chance_within(question.limit, budgets),
         "reason": "; ".join(reasons) or None,
@@ -305,18 +308,20 @@ def _total(
 
 def _drawn(figures: Figures, draws: int, rng: np.random.Generator) -> list[Figures]:
     """Return draws of what is known of an axis, as sure as its measured figures are."""
-    spread = {cause: one for cause, one in figures.items() if one.spread and one.sigma is not None}
+    spread = {
+        cause: figure
+        for cause, figure in figures.items()
+        if figure.spread and figure.sigma is not None
+    }
     if not spread:
         return [figures] * draws
     normal = rng.standard_normal((draws, len(spread)))
+
+    def moved(figure: Figure, number: float) -> Figure:
+        return replace(figure, sigma=abs((figure.sigma or 0.0) + figure.spread * float(number)))
+
     return [
-        {
-            **figures,
-            **{
-                cause: replace(one, sigma=abs((one.sigma or 0.0) + one.spread * float(number)))
-                for (cause, one), number in zip(spread.items(), numbers, strict=True)
-            },
-        }
+        {**figures, **dict(zip(spread, map(moved, spread.values(), numbers), strict=True))}
         for numbers in normal
     ]
 
@@ -325,7 +330,7 @@ def _missing(quantity: str, estimates: Mapping[str, Estimate]) -> str:
     """Return why there is no noise of a quantity to answer with."""
     silent = [channel for channel in estimates if quantity_of(channel) == quantity]
     if not silent:
-        return f"no {_NAMES[quantity]} in the recording"
+        return f"no {SENSORS[quantity]} in the recording"
     return f"nothing is known of the noise of {', '.join(silent)}: {_why(estimates[silent[0]])}"
 
 

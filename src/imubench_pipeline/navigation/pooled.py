@@ -51,7 +51,10 @@ _NUMBERS = ("value", "lower", "upper", "unit", "spread", "spread_lower", "spread
 COLUMNS = (*_KEYS, *_NUMBERS, "p_value", "verdict", "reason")
 """The columns of the table ``pooled``."""
 
-_NORMAL, _NARROWEST_HALF = 1.959963984540054, 0.25  # 97.5 % of the standard normal
+NORMAL = 1.959963984540054
+"""97.5 % of the standard normal."""
+
+_NARROWEST_HALF = 0.25
 
 _Point = tuple[float, float, float]  # y, and its variance where the truth lies below and above
 _Present = tuple[str, Row]  # a device, and the row of one of its recordings
@@ -150,7 +153,7 @@ def pool(
     mean, q, _, weight = _minimum(points, spread_squared)
     centre = middle + mean
     error = 1.0 / math.sqrt(weight)
-    half = max(t * math.sqrt(q / freedom), _NORMAL) * error
+    half = max(t * math.sqrt(q / freedom), NORMAL) * error
     predicted = t * math.hypot(math.sqrt(spread_squared), error)
     outside = _outside(others, bounded_exp(centre - predicted), bounded_exp(centre + predicted))
     p_value = float(chdtrc(freedom, _minimum(points, 0.0)[1]))
@@ -203,7 +206,7 @@ def points_about_median(used: Iterable[tuple[float, float, float]]) -> tuple[flo
     for y, low, high in logs:
         narrowest = _NARROWEST_HALF * (high - low) / 2.0
         below, above = max(y - low, narrowest), max(high - y, narrowest)
-        points.append((y - middle, (below / _NORMAL) ** 2, (above / _NORMAL) ** 2))
+        points.append((y - middle, (below / NORMAL) ** 2, (above / NORMAL) ** 2))
     return middle, points
 
 
@@ -238,17 +241,17 @@ def _spread_squared(points: list[_Point], target: float) -> float:
         return 0.0
     average = math.fsum(y for y, _, _ in points) / len(points)
     low, high = 0.0, math.fsum((y - average) ** 2 for y, _, _ in points) / target
-    found = 0.0
+    spread_squared = 0.0
     # Newton's steps on 1/Q, a straight line in tau^2 where errors are equal, kept in a bracket.
     for _ in range(100):
-        before, found = found, found + q * (q / target - 1.0) / decline
-        if not low <= found <= high:
-            found = (low + high) / 2.0
-        if abs(found - before) <= 1e-12 * found:
+        before, spread_squared = spread_squared, spread_squared + q * (q / target - 1.0) / decline
+        if not low <= spread_squared <= high:
+            spread_squared = (low + high) / 2.0
+        if abs(spread_squared - before) <= 1e-12 * spread_squared:
             break
-        _, q, decline, _ = _minimum(points, found)
-        low, high = (found, high) if q > target else (low, found)
-    return found
+        _, q, decline, _ = _minimum(points, spread_squared)
+        low, high = (spread_squared, high) if q > target else (low, spread_squared)
+    return spread_squared
 
 
 def turn_on_bias(means: Iterable[float | None]) -> TurnOnBias:
@@ -268,18 +271,18 @@ def turn_on_bias(means: Iterable[float | None]) -> TurnOnBias:
         Of one mean only itself, of none only the counts.
     """
     listed = list(means)
-    found = [mean for mean in listed if mean is not None and math.isfinite(mean)]
-    counts = (len(found), len(listed) - len(found))
-    if not found:
+    present = [mean for mean in listed if mean is not None and math.isfinite(mean)]
+    counts = (len(present), len(listed) - len(present))
+    if not present:
         return TurnOnBias(*counts)
-    mean = math.fsum(found) / len(found)
-    freedom = len(found) - 1
+    mean = math.fsum(present) / len(present)
+    freedom = len(present) - 1
     if not freedom:
         return TurnOnBias(*counts, mean)
-    squares = math.fsum((value - mean) ** 2 for value in found)
+    squares = math.fsum((value - mean) ** 2 for value in present)
     low_q, high_q, t = _quantiles(freedom)
     deviation = math.sqrt(squares / freedom)
-    half = t * deviation / math.sqrt(len(found))
+    half = t * deviation / math.sqrt(len(present))
     limits = (math.sqrt(squares / high_q), math.sqrt(squares / low_q))
     return TurnOnBias(*counts, mean, mean - half, mean + half, deviation, *limits)
 
@@ -360,9 +363,9 @@ def pooled_rows(
                 present = [(device, entry) for device, entry in cells if entry is not None]
                 if len(cells) > 1 and present:
                     make = _bias_row if name == "bias" else _parameter_row
-                    found = make(present, len(cells) - len(present), several and group is None)
+                    values = make(present, len(cells) - len(present), several and group is None)
                     keys = (sensor, group, channel, name)
-                    yield dict(zip(COLUMNS, keys + found, strict=True))
+                    yield dict(zip(COLUMNS, keys + values, strict=True))
 
 
 def _parameter_row(present: list[_Present], absent: int, several: bool) -> tuple[Any, ...]:
@@ -370,7 +373,7 @@ def _parameter_row(present: list[_Present], absent: int, several: bool) -> tuple
         (row["value"] if row["status"] == "ok" else None, row["lower"], row["upper"])
         for _, row in present
     ]
-    found = pool(*zip(*triples, strict=True))
+    pooled = pool(*zip(*triples, strict=True))
     logs, left_out = [], Counter[str]()
     for (device, row), triple in zip(present, triples, strict=True):
         if usable(triple):
@@ -378,39 +381,39 @@ def _parameter_row(present: list[_Present], absent: int, several: bool) -> tuple
         else:
             left_out[row["status"].replace("ok", "no limits").replace("_", " ")] += 1
     reasons = [f"{number} left out: {status}" for status, number in left_out.items()]
-    if found.contradicting:
-        reasons.append(f"limits of {found.contradicting} left out lie outside what is predicted")
+    if pooled.contradicting:
+        reasons.append(f"limits of {pooled.contradicting} left out lie outside what is predicted")
     if absent:
         reasons.append(f"absent in {absent} of {absent + len(present)}: that is no agreement")
-    if found.verdict == "differ":
+    if pooled.verdict == "differ":
         reasons.append("differ: " + "the devices, or " * several + "the sensor is not stationary")
-    elif found.spread_upper == 0.0:
+    elif pooled.spread_upper == 0.0:
         reasons.append("the values agree better than their limits allow")
-    verdict = None if absent and found.verdict == "agree" else found.verdict
-    spread = (found.spread, found.spread_lower, found.spread_upper)
-    in_unit = [None if part is None else part * (found.value or 0.0) for part in spread]
-    limits = (found.lower, found.upper, present[0][1]["unit"])
+    verdict = None if absent and pooled.verdict == "agree" else pooled.verdict
+    spread = (pooled.spread, pooled.spread_lower, pooled.spread_upper)
+    in_unit = [None if part is None else part * (pooled.value or 0.0) for part in spread]
+    limits = (pooled.lower, pooled.upper, present[0][1]["unit"])
     reason = "; ".join(reasons + _device_reasons(logs, several)) or None
-    counts = (found.recordings, found.left_out + absent)
-    return *counts, found.value, *limits, *in_unit, found.p_value, verdict, reason
+    counts = (pooled.recordings, pooled.left_out + absent)
+    return *counts, pooled.value, *limits, *in_unit, pooled.p_value, verdict, reason
 
 
 def _bias_row(present: list[_Present], _: int, several: bool) -> tuple[Any, ...]:
     pairs = [(row["value"], device) for device, row in present]
-    found = turn_on_bias(value for value, _ in pairs)
-    reasons = [f"{found.left_out} left out: no mean"] * (found.left_out > 0)
+    bias = turn_on_bias(value for value, _ in pairs)
+    reasons = [f"{bias.left_out} left out: no mean"] * (bias.left_out > 0)
     if present[0][1]["channel"].startswith("accel"):
         reasons.append("gravity is in it: the spread also shows how differently the sensor lay")
-    spread = (found.deviation, found.deviation_lower, found.deviation_upper)
+    spread = (bias.deviation, bias.deviation_lower, bias.deviation_upper)
     reason = "; ".join(reasons + _device_reasons(pairs, several)) or None
-    limits = (found.lower, found.upper, present[0][1]["unit"])
-    return found.recordings, found.left_out, found.mean, *limits, *spread, None, None, reason
+    limits = (bias.lower, bias.upper, present[0][1]["unit"])
+    return bias.recordings, bias.left_out, bias.mean, *limits, *spread, None, None, reason
 
 
 def _device_reasons(pairs: Iterable[tuple[float | None, str]], several: bool) -> list[str]:
     """Say whether devices or repeats make the spread, where that can be told."""
-    found = [(y, device) for y, device in pairs if y is not None and math.isfinite(y)]
-    p_value = _same_devices(found) if several else None
+    finite = [(y, device) for y, device in pairs if y is not None and math.isfinite(y)]
+    p_value = _same_devices(finite) if several else None
     if p_value is None:
         return []
     beyond = "beyond the" if p_value < LEVEL else "no more than their"

@@ -40,13 +40,13 @@ def repeatability_rows(
         Relative difference that still counts as printed.
     """
     about = {(row["sensor"], row["recording"]): row for row in recordings if row["decides"]}
-    found: dict[tuple[str, str, str], list[tuple[Row, float]]] = {}
+    by_channel: dict[tuple[str, str, str], list[tuple[Row, float]]] = {}
     for bias in biases:
         row = about.get((bias["sensor"], bias["recording"]))
         if row is not None and row.get("power_cycled") is not False:
             key = (bias["sensor"], row["device"], bias["channel"])
-            found.setdefault(key, []).append((row, bias["value"]))
-    for (sensor, device, channel), several in found.items():
+            by_channel.setdefault(key, []).append((row, bias["value"]))
+    for (sensor, device, channel), several in by_channel.items():
         if sensor not in sensors or len(several) < 2:
             continue
         # The first recording of a device has none before it.
@@ -79,11 +79,11 @@ def _spread(channel: str, values: Sequence[float], unknown: bool) -> Parameter:
             "the power was off between the recordings, which is not known (power_cycled beside "
             "the log)",
         )
-    told = turn_on_bias(values)
+    bias = turn_on_bias(values)
     return Parameter(
-        told.deviation,
+        bias.deviation,
         "ok",
         f"on condition that {', and that '.join(conditions)}",
-        told.deviation_lower,
-        told.deviation_upper,
+        bias.deviation_lower,
+        bias.deviation_upper,
     )

@@ -28,53 +28,54 @@ def ranked(judged: Sequence[Judgement], basis: Basis) -> Iterator[Row]:
     basis : Basis
         Of the recordings that they stand on.
     """
-    for name in dict.fromkeys(one.name for one in judged):
-        own = [one for one in judged if one.name == name]
-        compared = {one.sensor: one for one in own if one.compared}
-        for one in own:
-            rank, tied = _rank(one.sensor, compared) if one.sensor in compared else (None, [])
+    for name in dict.fromkeys(judgement.name for judgement in judged):
+        own = [judgement for judgement in judged if judgement.name == name]
+        compared = {judgement.sensor: judgement for judgement in own if judgement.compared}
+        for judgement in own:
+            sensor = judgement.sensor
+            rank, tied = _rank(sensor, compared) if sensor in compared else (None, [])
             place = {"rank": rank, "tied_with": ", ".join(tied) or None}
-            apart = [reason for (of, _), reason in basis.apart.items() if of == one.sensor]
+            apart = [reason for (of, _), reason in basis.apart.items() if of == sensor]
             of_sensor = {
                 "requirement": name,
-                "sensor": one.sensor,
+                "sensor": sensor,
                 **place,
-                "verdict": one.verdict,
-                "conditions": one.conditions,
-                "confidence": one.requirement.confidence,
+                "verdict": judgement.verdict,
+                "conditions": judgement.conditions,
+                "confidence": judgement.requirement.confidence,
                 "left_out": "; ".join(apart) or None,
-                **_unless_row(one),
+                **_unless_row(judgement),
             }
-            for standing, weak in zip(one.standings, one.weak, strict=True):
+            for standing, weak in zip(judgement.standings, judgement.weak, strict=True):
                 yield {
                     **of_sensor,
-                    "at_most": standing.total["limit"] * one.requirement.sigmas,
-                    "decides": standing is one.decides,
+                    "at_most": standing.total["limit"] * judgement.requirement.sigmas,
+                    "decides": standing is judgement.decides,
                     **_limit_row(standing),
-                    **_evidence_row(one.sensor, standing, weak, basis),
+                    **_evidence_row(sensor, standing, weak, basis),
                     **_backtest_row(name, standing, basis),
-                    "doubts": _doubts(one.sensor, standing, basis),
+                    "doubts": _doubts(sensor, standing, basis),
                 }
 
 
 def _doubts(sensor: str, standing: Standing, basis: Basis) -> str:
     """Return what is doubted of the recordings that a standing rests on."""
-    found = [row["recording"] for row in standing.totals]
-    if len(found) < 2:
+    recordings = [row["recording"] for row in standing.totals]
+    if len(recordings) < 2:
         return basis.doubted((sensor, standing.total["recording"]))
-    said = [f"{name}: {words}" for name in found if (words := basis.doubted((sensor, name)))]
-    more = len(said) - _SHOWN
-    return "; ".join(said[:_SHOWN]) + (f"; and {more} more" if more > 0 else "")
+    doubts = [f"{name}: {words}" for name in recordings if (words := basis.doubted((sensor, name)))]
+    more = len(doubts) - _SHOWN
+    return "; ".join(doubts[:_SHOWN]) + (f"; and {more} more" if more > 0 else "")
 
 
 def _limit_row(standing: Standing) -> Row:
-    total, found = standing.total, standing.expected
+    total, expected = standing.total, standing.expected
     known = standing.known
     return {
         **{key: total[key] for key in ("recording", "error", "time", "limit", "unit")},
-        "sigma": found.sigma,
-        "lower": found.lower,
-        "upper": found.upper,
+        "sigma": expected.sigma,
+        "lower": expected.lower,
+        "upper": expected.upper,
         "margin": _margin(standing),
         "chance": standing.chance if known else None,
         "limit_verdict": standing.verdict,
@@ -83,17 +84,19 @@ def _limit_row(standing: Standing) -> Row:
         "parts": standing.parts,
         "reached_after": total["reached_after"],
         "reason": total["reason"],
-        "specimens": found.specimens,
-        "recordings": found.recordings,
-        "spread": found.spread.variance**0.5 if found.spread else None,
-        "spread_of": found.spread_of,
+        "specimens": expected.specimens,
+        "recordings": expected.recordings,
+        "spread": expected.spread.variance**0.5 if expected.spread else None,
+        "spread_of": expected.spread_of,
     }
 
 
 def _evidence_row(sensor: str, standing: Standing, weak: Sequence[str], basis: Basis) -> Row:
     durations = (basis.duration((sensor, row["recording"])) for row in standing.totals)
     return {
-        "longest_log": max((one for one in durations if one is not None), default=None),
+        "longest_log": max(
+            (duration for duration in durations if duration is not None), default=None
+        ),
         "evidence": ("weak" if weak else "strong") if standing.known else None,
         "evidence_reasons": ", ".join(weak) or None,
     }
@@ -105,27 +108,27 @@ def _backtest_row(requirement: str, standing: Standing, basis: Basis) -> Row:
     words = (standing.source or "").split()
     quantity = next((word for word in words if word in ("gyro", "accel")), None)
     where = {"requirement": requirement, "channel": total[quantity] if quantity else None}
-    found = basis.backtest({**total, **where})
+    backtest = basis.backtest({**total, **where})
     return {
-        "backtest_channel": where["channel"] if found.get("ratio") is not None else None,
+        "backtest_channel": where["channel"] if backtest.get("ratio") is not None else None,
         **{
-            f"backtest_{name}": found.get(name)
+            f"backtest_{name}": backtest.get(name)
             for name in ("ratio", "ratio_lower", "ratio_upper", "windows")
-            if found.get("ratio") is not None
+            if backtest.get("ratio") is not None
         },
     }
 
 
-def _unless_row(one: Judgement) -> Row:
-    found = one.unless
-    if found is None or one.outside:
+def _unless_row(judgement: Judgement) -> Row:
+    unless = judgement.unless
+    if unless is None or judgement.outside:
         return {}
     return {
-        "unless": unless_words(found),
-        "unless_verdict": found.mended and found.mended.verdict,
-        "unless_margin": _margin(found.mended),
-        "logged_verdict": found.logged and found.logged.verdict,
-        "logged_margin": _margin(found.logged),
+        "unless": unless_words(unless),
+        "unless_verdict": unless.mended and unless.mended.verdict,
+        "unless_margin": _margin(unless.mended),
+        "logged_verdict": unless.logged and unless.logged.verdict,
+        "logged_margin": _margin(unless.logged),
     }
 
 
@@ -136,10 +139,10 @@ def _margin(standing: Standing | None) -> float | None:
 def _rank(sensor: str, compared: Mapping[str, Judgement]) -> tuple[int, list[str]]:
     """Return the rank of a sensor, and the sensors that it is tied with."""
 
-    def better(one: str, other: str) -> bool:
-        this, that = compared[one], compared[other]
-        known = this.rests.figures.keys() <= that.rests.figures.keys()
-        return known and this.decides.margins[0] > that.decides.margins[1]
+    def better(first: str, second: str) -> bool:
+        this, that = compared[first], compared[second]
+        no_less_known = this.rests.figures.keys() <= that.rests.figures.keys()
+        return no_less_known and this.decides.margins[0] > that.decides.margins[1]
 
     above = [other for other in compared if better(other, sensor)]
     tied = [

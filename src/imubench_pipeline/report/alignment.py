@@ -30,13 +30,13 @@ def alignments(site: Site, arrays: Arrays) -> list[dict[str, Any]]:
     arrays : Arrays
         Takes what the figures are drawn from.
     """
-    found = []
+    entries = []
     for view in site.views:
         rows = view.rows("alignment")
         if rows:
             about = rows[0]
             unit, fine = page_unit("gyro", "adev", site.system), page_unit("accel", "adev", "si")
-            found.append(
+            entries.append(
                 {
                     "view": view,
                     "latitude": f"{number_text(math.degrees(about['latitude']))}°",
@@ -55,20 +55,20 @@ def alignments(site: Site, arrays: Arrays) -> list[dict[str, Any]]:
                     "drawn": _drawn(rows, arrays),
                 }
             )
-    return found
+    return entries
 
 
 def _axes(row: Row) -> str:
     """Return which axes stand for others that the log has not, in a sentence."""
-    told = []
+    lent_axes = []
     for name, words in (("gyros", "gyro"), ("accelerometers", "accelerometer")):
-        pairs = [one.split(": ") for one in row[name].split(", ")]
+        pairs = [entry.split(": ") for entry in row[name].split(", ")]
         lent = [axis for axis, channel in pairs if not channel.endswith(f"_{axis}")]
         if lent:
-            told.append(f"{words} {' and '.join(lent)}")
-    if not told:
+            lent_axes.append(f"{words} {' and '.join(lent)}")
+    if not lent_axes:
         return ""
-    return f"The log has no {', '.join(told)}: the axes that are there stand for them."
+    return f"The log has no {', '.join(lent_axes)}: the axes that are there stand for them."
 
 
 def _line(row: Row) -> dict[str, Any]:
@@ -86,28 +86,28 @@ def _angle(value: float | None) -> str:
 
 def _check(rows: Sequence[Row]) -> str:
     """Return what simulated triads say of the standard deviations, in a sentence."""
-    told = []
+    comparisons = []
     for row in rows:
         if row["simulated"] is None:
             continue
         ratios = {name: row[f"error_{name}"] for name in _ANGLES}
-        said = ", ".join(
+        ratio_words = ", ".join(
             f"{name} {number_text(ratio, 3)}" for name, ratio in ratios.items() if ratio is not None
         )
-        told.append(f"in {_POSITIONS[row['positions']]} {said}")
-    if not told:
+        comparisons.append(f"in {_POSITIONS[row['positions']]} {ratio_words}")
+    if not comparisons:
         return ""
     number = next(row["simulated"] for row in rows if row["simulated"] is not None)
     last = duration_text(max(row["time"] for row in rows))
     return (
         f"Check: {number} simulated triads of this noise, aligned for {last} by the filter; rms "
-        f"of their errors over the predicted σ: {'; '.join(told)}."
+        f"of their errors over the predicted σ: {'; '.join(comparisons)}."
     )
 
 
 def _drawn(rows: Sequence[Row], arrays: Arrays) -> list[dict[str, Any]]:
     """Return the courses of the figure: level is the worse of roll and pitch."""
-    found = []
+    courses = []
     for positions in _POSITIONS:
         for method in ("coarse", "fine"):
             own = [r for r in rows if r["positions"] == positions and r["method"] == method]
@@ -116,15 +116,15 @@ def _drawn(rows: Sequence[Row], arrays: Arrays) -> list[dict[str, Any]]:
                 "level": [max(r["roll"], r["pitch"]) for r in own],
             }
             for angle, sigma in values.items():
-                kept = [(row["time"], one) for row, one in zip(own, sigma, strict=True) if one]
-                if kept:
-                    found.append(
+                points = [(r["time"], s) for r, s in zip(own, sigma, strict=True) if s]
+                if points:
+                    courses.append(
                         {
                             "positions": positions,
                             "method": method,
                             "angle": angle,
-                            "time": arrays.exact([time for time, _ in kept]),
-                            "sigma": arrays.exact(np.degrees([one for _, one in kept]).tolist()),
+                            "time": arrays.exact([time for time, _ in points]),
+                            "sigma": arrays.exact(np.degrees([s for _, s in points]).tolist()),
                         }
                     )
-    return found
+    return courses

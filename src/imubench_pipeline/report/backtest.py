@@ -27,7 +27,7 @@ def backtest_lines(
     lines = []
     for row in rows:
         unit = unit_of(DIMENSIONS[row["error"]], system)
-        known = row["ratio"] is not None
+        has_ratio = row["ratio"] is not None
         lines.append(
             {
                 "requirement": requirements.get(row["requirement"], {}).get("title")
@@ -35,14 +35,14 @@ def backtest_lines(
                 "channel": row["channel"].replace("_", " "),
                 "error": f"{row['error']}, {duration_text(row['time'])}",
                 "window": duration_text(row["window"]) if row["window"] is not None else "–",
-                "measured": f"{unit.text(row['measured'], 3)} {unit.sign}" if known else "–",
+                "measured": f"{unit.text(row['measured'], 3)} {unit.sign}" if has_ratio else "–",
                 "predicted": f"{unit.text(row['predicted'], 3)} {unit.sign}"
                 if row["predicted"] is not None
                 else "–",
-                "ratio": number_text(row["ratio"], 3) if known else "–",
-                "range": range_text(row) if known else "",
+                "ratio": number_text(row["ratio"], 3) if has_ratio else "–",
+                "range": range_text(row) if has_ratio else "",
                 "windows": f"{row['windows']} ({number_text(row['independent'], 2)} independent)"
-                if known
+                if has_ratio
                 else "–",
                 "verdict": row["verdict"],
                 "contradicted": row["contradicted"],

@@ -71,7 +71,7 @@ BOARDS = Entry(
     title="Boards",
     context=_context,
     views=lambda site: [view for name in site.settings["boards"] for view in _views(site, name)],
-    there=lambda site: bool(site.settings.get("boards")),
+    exists=lambda site: bool(site.settings.get("boards")),
 )
 """The page that shows every board."""
 

@@ -6,12 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from imubench_pipeline.report.practical import (
-    System,
-    limit_digits,
-    number_text,
-    page_unit,
-)
+from imubench_pipeline.report.practical import System, limit_digits, number_text, page_unit
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.report.words import noise_words, sentence
@@ -52,20 +47,20 @@ def answer(rows: Sequence[Row], system: System) -> str:
         Of the table ``calibration``, of one recording.
     system : str
     """
-    found = {row["parameter"]: row for row in rows}
-    bias = found.get("bias")
+    by_parameter = {row["parameter"]: row for row in rows}
+    bias = by_parameter.get("bias")
     if bias is None:
         return "Nothing was found of this recording."
     if bias["value"] is None:
         return sentence(bias["reason"] or "")
     unit = page_unit("gyro", "adev", system)
     text = f"The bias is {_around(bias, unit.text)} {unit.sign} (95 %)"
-    scale = found.get("scale_factor")
+    scale = by_parameter.get("scale_factor")
     if scale is not None and scale["value"] is not None:
         error = {name: _PPM * (scale[name] - 1.0) for name in ("value", "lower", "upper")}
         text = f"The scale factor is off by {_around(error, number_text)} ppm. " + text
     text += ". "
-    straight = found.get("linearity")
+    straight = by_parameter.get("linearity")
     if straight is not None and straight["chance"] is not None:
         doubted = straight["chance"] < _DOUBTED
         largest = number_text(_PERCENT * straight["value"], 3)
@@ -79,10 +74,10 @@ def answer(rows: Sequence[Row], system: System) -> str:
     return text.strip()
 
 
-def _around(row: Row, said: Any) -> str:
+def _around(row: Row, as_text: Any) -> str:
     half = (row["upper"] - row["lower"]) / 2.0
     digits = limit_digits(row["lower"], row["upper"], 3)
-    return f"{said(row['value'], digits)} ± {said(half, 2)}"
+    return f"{as_text(row['value'], digits)} ± {as_text(half, 2)}"
 
 
 def lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
@@ -96,7 +91,7 @@ def lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
     for row in rows:
         if row["status"] == "not_observable" and row["parameter"] in ("earth_rate", "heading"):
             continue
-        one = {
+        line = {
             **row,
             "words": WORDS[row["parameter"]],
             "digits": limit_digits(row["lower"], row["upper"], 4),
@@ -106,7 +101,7 @@ def lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
             else f"{number_text(100.0 * row['chance'], 2)} %",
             "why": sentence(row["reason"] or ""),
         }
-        yield one | _texts(row)
+        yield line | _texts(row)
 
 
 def _texts(row: Row) -> dict[str, str]:
@@ -210,19 +205,13 @@ def _degrees(angle: float) -> str:
 
 
 def at_rest(view: RecordingView, system: System) -> dict[str, Any] | None:
-    """Return what the page of a static recording says of its bias; None without a direction.
-
-    Parameters
-    ----------
-    view : RecordingView
-    system : str
-    """
+    """Return what the page of a static recording says of its bias; None without a direction."""
     rows = [row for row in view.rows("calibration") if row["run"] == "at_rest"]
     if not rows:
         return None
     return {
         "channel": rows[0]["channel"],
-        "lines": [one for one in lines(rows) if one["status"] != "not_observable"],
+        "lines": [line for line in lines(rows) if line["status"] != "not_observable"],
         "open": not_observable(rows),
         "noise": noise_words(rows),
         "scatter": scatter_words(rows),
@@ -231,23 +220,18 @@ def at_rest(view: RecordingView, system: System) -> dict[str, Any] | None:
 
 
 def of_all(site: Site) -> dict[str, list[dict[str, Any]]]:
-    """Return the lines of the page that has all calibrated recordings, by kind of run.
-
-    Parameters
-    ----------
-    site : Site
-    """
-    found: dict[str, list[dict[str, Any]]] = {"rate_table": [], "at_rest": []}
+    """Return the lines of the page that has all calibrated recordings, by kind of run."""
+    by_run: dict[str, list[dict[str, Any]]] = {"rate_table": [], "at_rest": []}
     for view in site.calibrated:
         rows = view.rows("calibration")
         if not rows:
             continue
-        found[rows[0]["run"]].append(
+        by_run[rows[0]["run"]].append(
             {
                 "view": view,
-                "lines": {one["parameter"]: one for one in lines(rows)},
+                "lines": {line["parameter"]: line for line in lines(rows)},
                 "answer": answer(rows, site.system),
                 "earth": earth_words(rows, site.system),
             }
         )
-    return found
+    return by_run

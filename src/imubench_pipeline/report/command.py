@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run(given: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> int:
     """Write the report; return the exit status: 2 where there are no results."""
     # Templates and figures cost half a second, which the other commands need not wait for.
     from imubench_pipeline.report.publish import one_file, publish, published
@@ -29,21 +29,21 @@ def run(given: argparse.Namespace) -> int:
     from imubench_pipeline.tables import write_content
 
     try:
-        site = published(given.results)
+        site = published(arguments.results)
     except FileNotFoundError as error:
         print(
-            f"{given.results}: found no {Path(error.filename).name}; expected the results of a "
+            f"{arguments.results}: found no {Path(error.filename).name}; expected the results of a "
             "finished run: run snakemake -c2 first",
             file=sys.stderr,
         )
         return 2
-    if given.one_file is not None:
-        write_content(one_file(site), given.one_file)
-        print(f"{given.one_file}: {given.one_file.stat().st_size / 1e6:.1f} MB")
+    if arguments.one_file is not None:
+        write_content(one_file(site), arguments.one_file)
+        print(f"{arguments.one_file}: {arguments.one_file.stat().st_size / 1e6:.1f} MB")
         return 0
-    folder = given.output or given.results / "report"
+    folder = arguments.output or arguments.results / "report"
     written = publish(site, folder, _say if sys.stderr.isatty() else lambda _: None)
-    if given.output is not None:
+    if arguments.output is not None:
         draw_comparison(site.tables, site.system, folder / "figures")
     print(f"{folder / 'index.html'}: {len(written)} files written")
     return 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
 from typing import Any
 
 from imubench_pipeline.estimators.estimate import SHOWN
@@ -46,7 +47,8 @@ class Comparison:
         own = self._datasheets.setdefault(view.sensor, {})
         if channel.channel not in own:
             own[channel.channel] = datasheet_lines(channel)
-        self._symbols[channel.quantity].update(shown_symbols(channel))
+        symbols = shown_symbols(chain(*channel.parameters.values()))
+        self._symbols[channel.quantity].update(symbols)
         lines = self._lines[channel.quantity]
         lines.append(self._line(view, channel, channel.recommended, "recommended"))
         if _PAPERS in channel.parameters and channel.recommended != _PAPERS:
@@ -65,7 +67,7 @@ class Comparison:
             "model": model_text(channel.parameters[method][0]["model"]),
             "cells": {
                 symbol: cell(channel, method, symbol, duration, self._system)
-                for symbol in shown_symbols(channel)
+                for symbol in shown_symbols(chain(*channel.parameters.values()))
             },
         }
 

@@ -88,13 +88,13 @@ def deltas_of_sensors(views: Sequence[RecordingView], system: System) -> Iterato
                 figure = ("quantity", "statistic", "printed", "unit", "kind", "sidedness")
                 key = (view.sensor, view.simulated, row["channel"], *(row[f] for f in figure))
                 groups.setdefault(key, []).append(row)
-    for (sensor, simulated, channel, *_), found in groups.items():
-        first = found[0]
+    for (sensor, simulated, channel, *_), group in groups.items():
+        first = group[0]
         symbol = _SYMBOLS.get(first["quantity"], "B")
         unit = page_unit(quantity_of(channel), symbol, system)
-        deltas = sorted(row["delta"] for row in found)
-        measured = sorted(row["measured"] for row in found)
-        verdicts = Counter(row["verdict"] for row in found)
+        deltas = sorted(row["delta"] for row in group)
+        measured = sorted(row["measured"] for row in group)
+        verdicts = Counter(row["verdict"] for row in group)
         yield {
             "sensor": sensor,
             "simulated": simulated,
@@ -107,9 +107,9 @@ def deltas_of_sensors(views: Sequence[RecordingView], system: System) -> Iterato
             "measured": _range([unit.text(value) for value in (measured[0], measured[-1])]),
             "delta": median(deltas),
             "difference": _range([_percent(value) for value in (deltas[0], deltas[-1])]),
-            "recordings": len(found),
+            "recordings": len(group),
             "verdicts": ", ".join(
-                verdict if len(found) == 1 else f"{verdict} ({count})"
+                verdict if len(group) == 1 else f"{verdict} ({count})"
                 for verdict, count in verdicts.items()
             ),
         }
@@ -204,7 +204,7 @@ def coverage_tables(rows: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any
             }
         if not lines:
             continue
-        found = {
+        published = {
             figure: Counter(r["published"] for r in own if r["figure"] == figure)
             for figure in figures
         }
@@ -217,7 +217,7 @@ def coverage_tables(rows: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any
                 line | {"cells": [line["cells"][figure] for figure in figures]}
                 for line in sorted(lines.values(), key=lambda line: str(line["name"]))
             ],
-            "counts": [_count(found[figure]) for figure in figures],
+            "counts": [_count(published[figure]) for figure in figures],
         }
 
 

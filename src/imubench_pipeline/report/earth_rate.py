@@ -66,7 +66,7 @@ EARTH_RATE_PAGE = Entry(
     title="Earth’s rate",
     context=_context,
     views=_views,
-    there=lambda site: bool(_views(site)),
+    exists=lambda site: bool(_views(site)),
 )
 """The page of all experiments that look for the Earth's rate."""
 
@@ -91,13 +91,13 @@ def _run(site: Site, view: RecordingView) -> dict[str, Any]:
 
 def _predicted(site: Site) -> Iterator[dict[str, Any]]:
     """Yield what each sensor would need, once where several recordings say the same."""
-    told: list[tuple[str, Any]] = []
+    yielded: list[tuple[str, Any]] = []
     for view in [*site.turned, *site.predicted]:
         rows = view.rows("earth_rate_prediction")
         needed = needs(rows)
-        if needed is None or (view.sensor, needed) in told:
+        if needed is None or (view.sensor, needed) in yielded:
             continue
-        told.append((view.sensor, needed))
+        yielded.append((view.sensor, needed))
         place = f"{view.sensor}-{view.name}"
         latitude = latitude_text(rows)
         yield needed | {"view": view, "place": place, "rows": rows, "latitude": latitude}

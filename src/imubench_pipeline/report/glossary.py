@@ -82,14 +82,14 @@ def glossary() -> dict[str, Term]:
     UnknownTermError
         From the result, where an unknown key is asked for.
     """
-    found = _Glossary()
+    terms = _Glossary()
     for section, entries in parse(_Sections, read_yaml(_FILE), str(_FILE)).root.items():
         for key, entry in entries.items():
-            if key in found:
-                raise ConfigError(f"{_FILE}: {key} stands in {found[key].section} and {section}")
+            if key in terms:
+                raise ConfigError(f"{_FILE}: {key} stands in {terms[key].section} and {section}")
             anchor = f"finding-{key}" if entry.action else section
-            found[key] = Term(key, entry.name, entry.short, anchor, entry.action)
-    return found
+            terms[key] = Term(key, entry.name, entry.short, anchor, entry.action)
+    return terms
 
 
 def term(value: str, kind: str = "") -> Term:

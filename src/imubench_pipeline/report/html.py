@@ -25,7 +25,7 @@ from imubench_pipeline.report.words import started_text
 
 def environment(system: System) -> jinja2.Environment:
     """Return the templates, with the units in which the pages open."""
-    made = jinja2.Environment(
+    templates = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).with_name("templates")),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
@@ -40,16 +40,16 @@ def environment(system: System) -> jinja2.Environment:
         """
         if value is None:
             return Markup("–")
-        kept = f"{value:.7g}"
-        text = _unit(unit, system).text(float(kept), digits)
+        rounded = f"{value:.7g}"
+        text = _unit(unit, system).text(float(rounded), digits)
         of = "" if inside else Markup(' data-unit="{}" data-digits="{}"').format(unit, digits)
-        return Markup('<data value="{}"{}>{}</data>').format(kept, of, text)
+        return Markup('<data value="{}"{}>{}</data>').format(rounded, of, text)
 
     def sign(unit: str) -> Markup:
         """Return the sign of a unit that the reader can switch."""
         return Markup('<span data-sign="{}">{}</span>').format(unit, _unit(unit, system).sign)
 
-    made.globals |= {
+    templates.globals |= {
         "action": _action,
         "si": si,
         "sign": sign,
@@ -57,10 +57,10 @@ def environment(system: System) -> jinja2.Environment:
         "hint": _hint,
         "to": _to,
     }
-    made.filters |= {"duration": duration_text, "number": number_text, "json": _json}
-    made.filters |= {"started": started_text, "symbol_text": symbol_text}
-    made.filters["attribute"] = _compact
-    return made
+    templates.filters |= {"duration": duration_text, "number": number_text, "json": _json}
+    templates.filters |= {"started": started_text, "symbol_text": symbol_text}
+    templates.filters["attribute"] = _compact
+    return templates
 
 
 def _unit(reference: str, system: System) -> PageUnit:
@@ -77,16 +77,16 @@ def _to(context: Context, path: str) -> str:
 @jinja2.pass_context
 def _term(context: Context, key: str, text: str | None = None) -> Markup:
     """Return a term of the glossary, with its explanation and a link to the theory."""
-    one = term(key)
+    entry = term(key)
     return Markup('<a class="term" href="{}theory.html#{}" data-term="{}">{}</a>').format(
-        context["root"], one.section, one.key, escape(text or one.name)
+        context["root"], entry.section, entry.key, escape(text or entry.name)
     )
 
 
 def _hint(key: str, text: str | None = None) -> Markup:
     """Return a term with its explanation alone, for tables of many rows."""
-    one = term(key)
-    return Markup('<i data-term="{}">{}</i>').format(one.key, escape(text or one.name))
+    entry = term(key)
+    return Markup('<i data-term="{}">{}</i>').format(entry.key, escape(text or entry.name))
 
 
 def _action(key: str) -> str:

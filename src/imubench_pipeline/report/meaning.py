@@ -47,8 +47,8 @@ def rankings(
     system : str
         Units of the page.
     """
-    for name, given in requirements.items():
-        requirement = Requirement.model_validate(given)
+    for name, declared in requirements.items():
+        requirement = Requirement.model_validate(declared)
         own = [row for row in rows if row["requirement"] == name]
         groups = []
         for sensor in sorted(dict.fromkeys(row["sensor"] for row in own), key=_order(own)):
@@ -58,7 +58,9 @@ def rankings(
             groups.append(
                 {
                     "sensor": sensor,
-                    "simulated": all(simulated.get((sensor, one), False) for one in recordings),
+                    "simulated": all(
+                        simulated.get((sensor, recording), False) for recording in recordings
+                    ),
                     "rank": limits[0]["rank"] or "–",
                     "tied_with": limits[0]["tied_with"],
                     "verdict": stands["verdict"],
@@ -91,16 +93,16 @@ _MERIT = ("passes", "probably passes", "passes if", "probably passes if")
 
 def _limit(row: Row, system: System) -> dict[str, Any]:
     unit = unit_of(DIMENSIONS[row["error"]], system)
-    known = row["sigma"] is not None
+    has_sigma = row["sigma"] is not None
     reached = row["reached_after"]
     return {
         "limit": f"{_NAMES[row['error']]}, {duration_text(row['time'])}",
         "allowed": unit.text(row["limit"], 3),
-        "sigma": _shown(row["error"], row["sigma"], unit) if known else "–",
-        "interval": interval_text(row, unit) if known and _sensible(row, row["sigma"]) else "–",
+        "sigma": _shown(row["error"], row["sigma"], unit) if has_sigma else "–",
+        "interval": interval_text(row, unit) if has_sigma and _sensible(row, row["sigma"]) else "–",
         "unit": unit.sign,
-        "margin": number_text(row["margin"], 3) if known else "–",
-        "chance": _percent(row["chance"]) if known else "–",
+        "margin": number_text(row["margin"], 3) if has_sigma else "–",
+        "chance": _percent(row["chance"]) if has_sigma else "–",
         "source": f"{row['source']} ({_percent(row['share'])})" if row["source"] else "–",
         "parts": (row["parts"] or "–").split("; "),
         "reached": duration_text(reached) if reached is not None else "–",
@@ -156,12 +158,12 @@ def budget_tables(
 
 def _notes(lines: Iterable[Mapping[str, Any]]) -> Iterator[str]:
     """Yield what is said of the cells of a budget, each thing once, with the errors it is about."""
-    found: dict[str, dict[str, None]] = {}
+    by_note: dict[str, dict[str, None]] = {}
     for line in lines:
         for cell in line["cells"]:
             if cell["note"]:
-                found.setdefault(cell["note"], {})[line["error"].split(" (")[0]] = None
-    for note, errors in found.items():
+                by_note.setdefault(cell["note"], {})[line["error"].split(" (")[0]] = None
+    for note, errors in by_note.items():
         yield f"{', '.join(errors).capitalize()}: {note}"
 
 

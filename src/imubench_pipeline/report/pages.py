@@ -42,6 +42,6 @@ def pages(site: Site) -> Iterator[Page]:
     for path in dict.fromkeys(view.device_page for view in site.views):
         if path is not None:
             yield device_page(site, path)
-    first, *others = (entry for entry in site.entries if entry.there(site))
+    first, *others = (entry for entry in site.entries if entry.exists(site))
     for entry in (*others, first):
         yield entry.page(site)

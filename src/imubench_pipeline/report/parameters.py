@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from itertools import chain
 from typing import Any
 
 from imubench_pipeline.estimators.estimate import PARAMETERS, SHOWN
@@ -12,15 +13,10 @@ from imubench_pipeline.report.words import model_text, untold
 from imubench_pipeline.typing import Row
 
 
-def shown_symbols(channel: ChannelView) -> list[str]:
-    """Return the parameters of the papers' model, and those others that a channel has."""
-    there = {
-        row["parameter"]
-        for rows in channel.parameters.values()
-        for row in rows
-        if row["status"] != "absent"
-    }
-    return [symbol for symbol in SHOWN if symbol in PARAMETERS or symbol in there]
+def shown_symbols(rows: Iterable[Row]) -> list[str]:
+    """Return the parameters of the papers' model, and those others that estimates have."""
+    estimated = {row["parameter"] for row in rows if row["status"] != "absent"}
+    return [symbol for symbol in SHOWN if symbol in PARAMETERS or symbol in estimated]
 
 
 def methods_table(
@@ -34,7 +30,7 @@ def methods_table(
     lines : list of dict
         One a method.
     """
-    symbols = shown_symbols(channel)
+    symbols = shown_symbols(chain(*channel.parameters.values()))
     lines: list[dict[str, Any]] = [
         {
             "method": method,

@@ -51,13 +51,15 @@ class Arrays:
         return self._levels("e", np.asarray(values, dtype=np.float64), 254)
 
     def _levels(self, kind: str, values: NDArray[np.float64], levels: int) -> int:
-        there = np.isfinite(values)
+        finite = np.isfinite(values)
         low, high = (
-            (float(values[there].min()), float(values[there].max())) if there.any() else (0.0, 0.0)
+            (float(values[finite].min()), float(values[finite].max()))
+            if finite.any()
+            else (0.0, 0.0)
         )
         step = (high - low) / levels or 1.0
-        filled = np.where(there, values, low)
-        codes = np.where(there, 1.0 + np.rint((filled - low) / step), 0.0)
+        filled = np.where(finite, values, low)
+        codes = np.where(finite, 1.0 + np.rint((filled - low) / step), 0.0)
         return self._place(kind, low, step, codes.astype("<u2" if levels > 255 else "<u1"))
 
     def _place(self, kind: str, low: float, step: float, data: NDArray[Any]) -> int:
@@ -146,13 +148,13 @@ def channel_payload(view: ChannelView, rate: float, arrays: Arrays) -> dict[str,
 def _method(
     view: ChannelView, method: str, curve: Mapping[str, Any], arrays: Arrays
 ) -> dict[str, Any]:
-    found = {
+    curves = {
         "tau": arrays.log(curve["tau"]),
         "model": arrays.log(_curve(view.model(method), curve["tau"])),
     }
     if method == view.recommended:
-        found |= {name: arrays.log(curve[name]) for name in ("lower", "upper", "reconstructed")}
-    return found
+        curves |= {name: arrays.log(curve[name]) for name in ("lower", "upper", "reconstructed")}
+    return curves
 
 
 def _curve(model: NoiseModel, tau: Any) -> Any:
@@ -198,12 +200,12 @@ def datasheet_lines(view: ChannelView) -> list[dict[str, Any]]:
 
 def _estimates(view: ChannelView, method: str) -> dict[str, Any]:
     """Return value, limits and status of each component of the parameters that are compared."""
-    found: dict[str, list[list[Any]]] = {}
+    by_symbol: dict[str, list[list[Any]]] = {}
     for symbol in FOREST:
         for row in view.named(method, symbol):
             numbers = (_rounded(row[name]) for name in ("value", "lower", "upper"))
-            found.setdefault(symbol, []).append([*numbers, row["status"]])
-    return found
+            by_symbol.setdefault(symbol, []).append([*numbers, row["status"]])
+    return by_symbol
 
 
 def _spectrum(
@@ -246,10 +248,10 @@ def samples_payload(
         Rows of these tables, of one recording.
     arrays : Arrays
     """
-    found: dict[str, Any] = {"envelope": {}, "histogram": {}}
+    payload: dict[str, Any] = {"envelope": {}, "histogram": {}}
     for channel in dict.fromkeys(row["channel"] for row in envelope):
         rows = [row for row in envelope if row["channel"] == channel]
-        found["envelope"][channel] = {
+        payload["envelope"][channel] = {
             "start": rows[0]["start"],
             "end": rows[-1]["end"],
             "low": arrays.even([_number(row["low"]) for row in rows]),
@@ -258,11 +260,11 @@ def samples_payload(
         }
     for channel in dict.fromkeys(row["channel"] for row in histogram):
         rows = [row for row in histogram if row["channel"] == channel]
-        found["histogram"][channel] = {
+        payload["histogram"][channel] = {
             "edges": arrays.exact([rows[0]["lower"], *(row["upper"] for row in rows)]),
             "count": arrays.log([row["count"] for row in rows]),
         }
-    return found
+    return payload
 
 
 def _rounded(value: float | None) -> float | None:

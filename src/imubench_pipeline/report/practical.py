@@ -57,106 +57,34 @@ class PageUnit:
         return "–" if value is None else number_text(value * self.per_si, digits)
 
 
+def _signs(
+    level: str, *, Q: str, N: str, K: str, R: str, psd: str, signal: str | None = None
+) -> dict[str, str]:
+    """Return the signs of all symbols; ``level`` is that of B and of the Allan deviation."""
+    return {
+        **{"Q": Q, "N": N, "B": level, "B_curve": level, "sigma_min": level},
+        **{"T_B": "s", "tau_min": "s", "K": K, "R": R},
+        **{"adev": level, "psd": psd, "signal": signal or level},
+        **{"sensitivity": f"{level}/K", "quadratic": f"{level}/K²"},
+    }
+
+
 _CHOICES: dict[str, dict[str, dict[str, str]]] = {
     "gyro": {
-        "°/h and °/√h": {
-            "Q": "°",
-            "N": "°/√h",
-            "B": "°/h",
-            "B_curve": "°/h",
-            "sigma_min": "°/h",
-            "T_B": "s",
-            "tau_min": "s",
-            "K": "°/h/√h",
-            "R": "°/h/h",
-            "adev": "°/h",
-            "psd": "°/s/√Hz",
-            "signal": "°/s",
-            "sensitivity": "°/h/K",
-            "quadratic": "°/h/K²",
-        },
-        "°/s": {
-            "Q": "°",
-            "N": "°/s/√Hz",
-            "B": "°/s",
-            "B_curve": "°/s",
-            "sigma_min": "°/s",
-            "T_B": "s",
-            "tau_min": "s",
-            "K": "°/s/√s",
-            "R": "°/s/s",
-            "adev": "°/s",
-            "psd": "°/s/√Hz",
-            "signal": "°/s",
-            "sensitivity": "°/s/K",
-            "quadratic": "°/s/K²",
-        },
-        "SI: rad/s": {
-            "Q": "rad",
-            "N": "rad/s/√Hz",
-            "B": "rad/s",
-            "B_curve": "rad/s",
-            "sigma_min": "rad/s",
-            "T_B": "s",
-            "tau_min": "s",
-            "K": "rad/s/√s",
-            "R": "rad/s²",
-            "adev": "rad/s",
-            "psd": "rad/s/√Hz",
-            "signal": "rad/s",
-            "sensitivity": "rad/s/K",
-            "quadratic": "rad/s/K²",
-        },
+        "°/h and °/√h": _signs(
+            "°/h", Q="°", N="°/√h", K="°/h/√h", R="°/h/h", psd="°/s/√Hz", signal="°/s"
+        ),
+        "°/s": _signs("°/s", Q="°", N="°/s/√Hz", K="°/s/√s", R="°/s/s", psd="°/s/√Hz"),
+        "SI: rad/s": _signs(
+            "rad/s", Q="rad", N="rad/s/√Hz", K="rad/s/√s", R="rad/s²", psd="rad/s/√Hz"
+        ),
     },
     "accel": {
-        "µg and µg/√Hz": {
-            "Q": "m/s",
-            "N": "µg/√Hz",
-            "B": "µg",
-            "B_curve": "µg",
-            "sigma_min": "µg",
-            "T_B": "s",
-            "tau_min": "s",
-            "K": "µg/√h",
-            "R": "µg/h",
-            "adev": "µg",
-            "psd": "µg/√Hz",
-            "signal": "mg",
-            "sensitivity": "µg/K",
-            "quadratic": "µg/K²",
-        },
-        "mg and m/s/√h": {
-            "Q": "m/s",
-            "N": "m/s/√h",
-            "B": "mg",
-            "B_curve": "mg",
-            "sigma_min": "mg",
-            "T_B": "s",
-            "tau_min": "s",
-            "K": "mg/√h",
-            "R": "mg/h",
-            "adev": "mg",
-            "psd": "mg/√Hz",
-            "signal": "mg",
-            "sensitivity": "mg/K",
-            "quadratic": "mg/K²",
-        },
-        "SI: m/s²": {
-            "Q": "m/s",
-            "N": "m/s²/√Hz",
-            "B": "m/s²",
-            "B_curve": "m/s²",
-            "sigma_min": "m/s²",
-            "T_B": "s",
-            "tau_min": "s",
-            "K": "m/s²/√s",
-            "R": "m/s³",
-            "adev": "m/s²",
-            "psd": "m/s²/√Hz",
-            "signal": "m/s²",
-            "sensitivity": "m/s²/K",
-            "quadratic": "m/s²/K²",
-        },
+        "µg and µg/√Hz": _signs(
+            "µg", Q="m/s", N="µg/√Hz", K="µg/√h", R="µg/h", psd="µg/√Hz", signal="mg"
+        ),
+        "mg and m/s/√h": _signs("mg", Q="m/s", N="m/s/√h", K="mg/√h", R="mg/h", psd="mg/√Hz"),
+        "SI: m/s²": _signs("m/s²", Q="m/s", N="m/s²/√Hz", K="m/s²/√s", R="m/s³", psd="m/s²/√Hz"),
     },
 }
 
@@ -219,7 +147,7 @@ def _unit(quantity: str, symbol: str, choice: str) -> PageUnit:
     }.get(symbol, QUANTITIES[quantity])
     signs = _CHOICES[quantity][choice]
     # A parameter without a unit of its own has that of the first of its dimension.
-    alike = next((one for one in signs if dimensions.get(one) == dimension), symbol)
+    alike = next((other for other in signs if dimensions.get(other) == dimension), symbol)
     return _page_unit(signs.get(symbol) or signs[alike], dimension)
 
 

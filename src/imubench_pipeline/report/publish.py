@@ -61,17 +61,17 @@ def publish(site: Site, folder: Path, say: Progress = lambda _: None) -> list[st
     every = list(pages(site))
     keys = {page.path: page.key for page in every}
     before = _keys(folder / _KEYS)
-    kept = {
+    unchanged = {
         path: key
         for path, key in before.items()
         if keys.get(path) == key and (folder / path).is_file()
     }
     # A run that is killed must not leave the keys of pages that it has written anew.
-    if kept != before:
-        _put(folder, _KEYS, _text(kept))
+    if unchanged != before:
+        _put(folder, _KEYS, _text(unchanged))
     templates = environment(site.system)
     for page in every:
-        if page.path not in kept:
+        if page.path not in unchanged:
             say(page.path)
             written += _put(folder, page.path, _rendered(site, templates, page))
     for path in _pages_there(site, folder) - keys.keys():

@@ -15,8 +15,8 @@ from imubench_pipeline.report.calibration import (
     scatter_words,
 )
 from imubench_pipeline.report.payload import Arrays
-from imubench_pipeline.report.practical import duration_text, number_text
-from imubench_pipeline.report.recording import metadata_of, page_of, provenance
+from imubench_pipeline.report.practical import number_text
+from imubench_pipeline.report.recording import about_of, page_of, summary_words
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.report.words import counted, noise_words
@@ -39,9 +39,7 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
     rows = view.rows("calibration")
     points = view.rows("calibration_points")
     return {
-        "view": view,
-        "name": site.names[view.sensor],
-        "sensor_page": site.sensor_page(view.sensor),
+        **about_of(site, view, [], folder),
         "summary": _summary(view, points),
         "answer": answer(rows, site.system),
         "lines": list(lines(rows)),
@@ -51,8 +49,6 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         "earth": earth_words(rows, site.system),
         "points": points,
         "findings": view.findings,
-        "provenance": list(provenance(view, [], folder)),
-        "sources": metadata_of(folder).get("sources", []),
         "command": site.again(view, "calibration"),
         "page": {"looks": {}, "channels": [], "findings": [], **_payload(points)},
     }
@@ -69,10 +65,8 @@ def _payload(points: Sequence[Row]) -> dict[str, Any]:
 
 
 def _summary(view: RecordingView, points: Sequence[Row]) -> str:
-    row = view.row
-    parts = [f"{duration_text(row['duration'])} at {number_text(row['rate'])} Hz"]
-    if points:
-        most = math.degrees(max(abs(one["table_rate"]) for one in points))
-        parts.append(f"{counted(len(points), 'steady rate')} up to {number_text(most)} °/s")
-    kind = "Simulated from known parameters, not measured: " if view.simulated else ""
-    return kind + ", ".join(parts) + "."
+    if not points:
+        return summary_words(view, [])
+    most = math.degrees(max(abs(point["table_rate"]) for point in points))
+    rates = f"{counted(len(points), 'steady rate')} up to {number_text(most)} °/s"
+    return summary_words(view, [rates])

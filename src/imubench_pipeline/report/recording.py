@@ -85,18 +85,14 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         for i, row in enumerate(sorted(view.findings, key=lambda r: order[r["severity"]]), start=1)
     ]
     samples = samples_payload(envelope, histogram, arrays)
-    budgets = list(
-        budget_tables(view.budget, {(view.sensor, view.name): view.simulated}, site.system)
-    )
+    budgets = list(budget_tables(view.budget, {view.full_name: view.simulated}, site.system))
     return {
-        "view": view,
-        "name": site.names[view.sensor],
-        "sensor_page": site.sensor_page(view.sensor),
+        **about_of(site, view, channels, folder),
         "summary": _summary(view, len(channels)),
         "findings": numbered,
         "serious": [row for row in numbered if row["severity"] != "note"],
         "notes": [row for row in numbered if row["severity"] == "note"],
-        "channels": [_channel(site, view, one, samples) for one in channels],
+        "channels": [_channel(site, view, channel, samples) for channel in channels],
         "has_temperature": "temperature" in samples["envelope"],
         "at_rest": at_rest(view, site.system),
         "budget": budgets[0] if budgets else None,
@@ -104,8 +100,6 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
             view.rows("backtest"), site.settings["requirements"], site.system
         ),
         "budget_words": budget_words(site.settings["settings"]["error_budget"]),
-        "provenance": list(provenance(view, channels, folder)),
-        "sources": metadata_of(folder).get("sources", []),
         "command": site.again(view, "scores"),
         # Of one that is left out there is nothing to draw.
         "figures_command": None
@@ -115,7 +109,9 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         ),
         "page": {
             "looks": looks({view.sensor: site.looks[view.sensor]}),
-            "channels": [channel_payload(one, view.row["rate"], arrays) for one in channels],
+            "channels": [
+                channel_payload(channel, view.row["rate"], arrays) for channel in channels
+            ],
             "samples": samples,
             "findings": [
                 {name: row[name] for name in ("number", "finding", "channel", "start", "end")}
@@ -127,11 +123,10 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
 
 
 def _summary(view: RecordingView, channels: int) -> str:
-    row = view.row
     if view.left_out:
         why = "could not be used" if view.rejected else "could not be analysed: a step failed"
         return f"This recording {why}; nothing of it is in the comparison."
-    parts = [f"{duration_text(row['duration'])} at {number_text(row['rate'])} Hz"]
+    row, parts = view.row, []
     if row["started"]:
         parts.append(f"from {started_text(row['started'])}")
     if row["temperature_min"] is not None:
@@ -140,8 +135,15 @@ def _summary(view: RecordingView, channels: int) -> str:
     parts.append(counted(channels, "channel"))
     warnings = len(view.warnings)
     parts.append(counted(warnings, "warning") if warnings else "no warnings")
+    return summary_words(view, parts)
+
+
+def summary_words(view: RecordingView, parts: Sequence[str]) -> str:
+    """Return length and rate of a recording, and parts that say more, as a sentence."""
+    row = view.row
+    length = f"{duration_text(row['duration'])} at {number_text(row['rate'])} Hz"
     kind = "Simulated from known parameters, not measured: " if view.simulated else ""
-    return kind + ", ".join(parts) + "."
+    return kind + ", ".join([length, *parts]) + "."
 
 
 def _channel(
@@ -151,9 +153,9 @@ def _channel(
     used = next(line for line in lines if line["recommended"])
     for line in lines:
         score = channel.scores.get(line["method"] or "")
-        known = score is not None and score["rms_log10"] is not None
-        line["score"] = number_text(score["rms_log10"], 2) if known and score else "–"
-        line["inside"] = f"{100 * score['inside_band']:.0f} %" if known and score else "–"
+        scored = score is not None and score["rms_log10"] is not None
+        line["score"] = number_text(score["rms_log10"], 2) if scored and score else "–"
+        line["inside"] = f"{100 * score['inside_band']:.0f} %" if scored and score else "–"
     best = channel.models[0] if channel.models else None
     return {
         "view": channel,
@@ -187,7 +189,9 @@ def _untold(symbols: Sequence[str], cells: Sequence[Mapping[str, Any]]) -> Itera
     """Yield what the log does not tell."""
     of = dict(zip(symbols, cells, strict=True))
     statuses = {symbol: {part["status"] for part in cell["parts"]} for symbol, cell in of.items()}
-    words, of_time = (of[one]["words"] if one in of else "" for one in ("sigma_min", "tau_min"))
+    words, of_time = (
+        of[symbol]["words"] if symbol in of else "" for symbol in ("sigma_min", "tau_min")
+    )
     together = _of_lowest_point(words, of_time)
     for symbol, cell in of.items():
         if symbol == "T_B" and statuses["T_B"] == {"absent"}:
@@ -216,9 +220,9 @@ def _answer(channel: ChannelView, system: System) -> str:
         for row in channel.named(channel.recommended, symbol)[:1]:
             if row["value"] is not None:
                 doubt = "doubtful" if row["status"] == "doubtful" else ""
-                known = ", ".join(filter(None, [precision(row, unit), doubt]))
+                certainty = ", ".join(filter(None, [precision(row, unit), doubt]))
                 text = f"{symbol_text(symbol)} {unit.text(row['value'], 3)} {unit.sign}"
-                parts.append(f"{text} ({known})" if known else text)
+                parts.append(f"{text} ({certainty})" if certainty else text)
     if channel.fixed_bias is not None:
         unit = page_unit(channel.quantity, "signal", system)
         parts.append(f"mean {unit.text(channel.fixed_bias, 4)} {unit.sign}")
@@ -244,35 +248,50 @@ def _model_words(channel: ChannelView) -> str:
     return " ".join(filter(None, [text, *(sentence(n) for n in notes), sentence(band)]))
 
 
+def about_of(
+    site: Site, view: RecordingView, channels: Sequence[ChannelView], folder: Path
+) -> dict[str, Any]:
+    """Return what the page of a recording of any kind says; ``folder`` is the recording's."""
+    return {
+        "view": view,
+        "name": site.names[view.sensor],
+        "sensor_page": site.sensor_page(view.sensor),
+        "provenance": list(_provenance(view, channels, folder)),
+        "sources": metadata_of(folder).get("sources", []),
+    }
+
+
 def metadata_of(folder: Path) -> Mapping[str, Any]:
     """Return the metadata of the log in a folder of a recording; nothing where there is none."""
     paths = log_paths(folder)
     return read_metadata(paths[0]) if paths else {}
 
 
-def provenance(
+def _provenance(
     view: RecordingView, channels: Sequence[ChannelView], folder: Path
 ) -> Iterator[tuple[str, str]]:
     """Yield where a recording comes from, as names and texts; ``folder`` is the recording's."""
-    row, kept = view.row, metadata_of(folder)
+    row, metadata = view.row, metadata_of(folder)
     yield "Recording", f"{row['sensor']} / {row['recording']}"
     yield "Device", str(row["device"])
     yield "Kind", row["kind"] + (", simulated" if row["simulated"] else "")
     yield "Started", started_text(row["started"]) or "not stated in the log"
-    if "reader" in kept:
-        yield "Read as", str(kept["reader"] or "found by its content")
+    if "reader" in metadata:
+        yield "Read as", str(metadata["reader"] or "found by its content")
     if row["rate"] is not None:
-        known = ""
+        error = ""
         if row["rate_error"] is not None and row["rate_error"] > _EXACT * row["rate"]:
-            known = f" ± {number_text(row['rate_error'], 2)} Hz"
+            error = f" ± {number_text(row['rate_error'], 2)} Hz"
         yield (
             "Rate",
-            f"{number_text(row['rate'], 7)} Hz{known}, {_RATE_FROM.get(row['rate_from'], '')}",
+            f"{number_text(row['rate'], 7)} Hz{error}, {_RATE_FROM.get(row['rate_from'], '')}",
         )
     if row["samples"] is not None:
         yield "Samples", f"{row['samples']:,}".replace(",", " ")
-    segments: Sequence[Any] = kept.get("segments", [])
+    segments: Sequence[Any] = metadata.get("segments", [])
     if len(segments) > 1:
         yield "Segments", str(len(segments))
-    for truth in {one["source"] for channel in channels for one in channel.truth.values()}:
+    for truth in {
+        parameter["source"] for channel in channels for parameter in channel.truth.values()
+    }:
         yield "Simulated from", truth

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from imubench_pipeline.navigation.suitability.conditions import in_words
+from imubench_pipeline.report.words import counted
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.findings import LEFT_OUT
 from imubench_pipeline.typing import Row
@@ -55,7 +56,7 @@ def summary(results: Path) -> str:
     simulated = sum(row["simulated"] for row in recordings)
     failed = list(left_out(failures))
     analysed = sum(row["status"] == "ok" for row in recordings)
-    lines = [f"{_counted(analysed, 'recording')} analysed, {len(rejected)} rejected"]
+    lines = [f"{counted(analysed, 'recording')} analysed, {len(rejected)} rejected"]
     lines[0] += f", {len(recordings) - analysed - len(rejected)} failed" * bool(failed)
     lines[0] += f"; {simulated} of all are simulated, not measured" * (simulated > 0)
     lines += _bounded(f"  failed: {line}" for line in failed)
@@ -84,7 +85,7 @@ def failure(logs: Sequence[str], results: Path) -> str:
     if any(_INTERRUPTED in text for text in texts):
         lines = [f"stopped before its end; to go on, {again}"]
     else:
-        lines = [f"{_counted(len(steps), 'step') if steps else 'a step'} failed; why stands above"]
+        lines = [f"{counted(len(steps), 'step') if steps else 'a step'} failed; why stands above"]
         lines += _bounded(f"  {step}" for step in steps)
         lines.append(f"all that does not need them is done; to go on, mend it and {again}")
     lines += [f"log: {log}" for log in logs]
@@ -147,17 +148,19 @@ def warnings(findings: Iterable[Row]) -> Iterator[str]:
     findings : iterable of mapping
         The table ``findings``; notes, and that a recording is left out, are not.
     """
-    found: dict[str, Counter[str]] = {}
+    by_recording: dict[str, Counter[str]] = {}
     left_out: Counter[str] = Counter()
     for row in serious(findings):
         name = f"{row['sensor']}/{row['recording']}"
-        found.setdefault(name, Counter())[row["finding"].replace("_", " ")] += 1
+        by_recording.setdefault(name, Counter())[row["finding"].replace("_", " ")] += 1
         left_out[name] += row["severity"] == "fatal"
-    for name in sorted(found, key=lambda name: (-left_out[name], -found[name].total())):
+    for name in sorted(
+        by_recording, key=lambda name: (-left_out[name], -by_recording[name].total())
+    ):
         kinds = ", ".join(
-            kind + f" ({count})" * (count > 1) for kind, count in found[name].most_common()
+            kind + f" ({count})" * (count > 1) for kind, count in by_recording[name].most_common()
         )
-        yield one_line(f"{name}: {_counted(found[name].total(), 'warning')}: {kinds}")
+        yield one_line(f"{name}: {counted(by_recording[name].total(), 'warning')}: {kinds}")
 
 
 def serious(findings: Iterable[Row]) -> Iterator[Row]:
@@ -217,7 +220,3 @@ def _bounded(lines: Iterable[str]) -> list[str]:
     listed = list(lines)
     more = len(listed) - _MOST_LINES
     return listed if more <= 1 else [*listed[:_MOST_LINES], f"  and {more} more"]
-
-
-def _counted(number: int, noun: str) -> str:
-    return f"{number} {noun}{'s' * (number != 1)}"

@@ -46,7 +46,7 @@ def _sensor(site: Site, sensor: str, own: Sequence[RecordingView]) -> dict[str, 
     together = Comparison(own, site.names, site.system)
     pooled = [_pooled(row) for row in site.rows("pooled") if row["sensor"] == sensor]
     shown = own if len(own) <= _MANY else []
-    simulated = {(view.sensor, view.name): view.simulated for view in own}
+    simulated = {view.full_name: view.simulated for view in own}
     budget = [row for view in shown for row in view.budget]
     return {
         "name": site.names[sensor],
@@ -100,8 +100,8 @@ def _standings(site: Site, sensor: str) -> Iterator[dict[str, str]]:
             text = in_words(row)
             if row["rank"]:
                 judged = sum(
-                    one["rank"] is not None and one["requirement"] == row["requirement"]
-                    for one in deciding
+                    other["rank"] is not None and other["requirement"] == row["requirement"]
+                    for other in deciding
                 )
                 text = f"{verdict_words(row)}; rank {row['rank']} of {judged} that could be judged"
             if row["unless"]:
@@ -140,13 +140,39 @@ def device_page(site: Site, page: str) -> Page:
 
 def _device(site: Site, own: Sequence[RecordingView], rows: Sequence[Row]) -> dict[str, Any]:
     sensor, device = own[0].sensor, own[0].row["device"]
-    named = {(view.sensor, view.name) for view in own}
+    named = {view.full_name for view in own}
     rows = [row for row in rows if (row["sensor"], row["recording"]) in named]
     # As `navigation.drift.order_of` has it: stamps that are all the same tell no order.
     stamps = {row["started"] for row in rows}
     dated = None not in stamps and len(stamps) > 1
+    trends, payload = _trends(rows, dated=dated, simulated=own[0].simulated)
+    return {
+        "sensor_page": site.sensor_page(sensor),
+        "name": site.names[sensor],
+        "device": device,
+        "views": own,
+        "summary": summary(own, several=False),
+        "changes": [
+            change_words(row, simulated=own[0].simulated)
+            for row in rows
+            if row["verdict"] == "changed"
+        ],
+        "order": "The recordings stand at the time when they were started."
+        if dated
+        else "The logs do not all say when they were started: the recordings stand in the order "
+        "of their names.",
+        "trends": list(trends.items()),
+        "page": {"trends": payload, "arrays": []},
+    }
+
+
+def _trends(
+    rows: Sequence[Row], *, dated: bool, simulated: bool
+) -> tuple[dict[str, list[dict[str, Any]]], list[dict[str, Any]]]:
+    """Return the trends of a device by channel, and what their figures are drawn from."""
     trends: dict[str, list[dict[str, Any]]] = {}
     payload: list[dict[str, Any]] = []
+    mark = " (simulated)" * simulated
     for channel, parameter in dict.fromkeys((row["channel"], row["parameter"]) for row in rows):
         series = sorted(
             (row for row in rows if (row["channel"], row["parameter"]) == (channel, parameter)),
@@ -157,10 +183,9 @@ def _device(site: Site, own: Sequence[RecordingView], rows: Sequence[Row]) -> di
         quantity, axis = channel.split("_")
         title = f"{QUANTITY_NAMES[quantity]} {axis}"
         name = "fixed bias" if parameter == "bias" else symbol_text(parameter)
-        said = " (simulated)" if own[0].simulated else ""
-        changes = [row["recording"] + said for row in series if row["verdict"] == "changed"]
+        changes = [row["recording"] + mark for row in series if row["verdict"] == "changed"]
         outside = [
-            row["recording"] + said
+            row["recording"] + mark
             for row in series
             if row["verdict"] == "as before" and row["p_value"] < LEVEL
         ]
@@ -183,24 +208,7 @@ def _device(site: Site, own: Sequence[RecordingView], rows: Sequence[Row]) -> di
                 **{name: [row[name] for row in series] for name in columns},
             }
         )
-    return {
-        "sensor_page": site.sensor_page(sensor),
-        "name": site.names[sensor],
-        "device": device,
-        "views": own,
-        "summary": summary(own, several=False),
-        "changes": [
-            change_words(row, simulated=own[0].simulated)
-            for row in rows
-            if row["verdict"] == "changed"
-        ],
-        "order": "The recordings stand at the time when they were started."
-        if dated
-        else "The logs do not all say when they were started: the recordings stand in the order "
-        "of their names.",
-        "trends": list(trends.items()),
-        "page": {"trends": payload, "arrays": []},
-    }
+    return trends, payload
 
 
 def _trend_words(changes: Sequence[str], outside: Sequence[str]) -> str:

@@ -23,17 +23,17 @@ def imubench(name: str, results: str, options: Mapping[str, str] | None = None) 
     return shlex.join(["imubench", name, _place(results), *asked])
 
 
-def made_again(target: str, given: Sequence[str] = ()) -> str:
+def made_again(target: str, overrides: Sequence[str] = ()) -> str:
     """Return the command that makes a file of a recording again, from its log.
 
     Parameters
     ----------
     target : str
         The file.
-    given : sequence of str
-        What the run was given beside its configuration, as ``snakemake --config`` takes it.
+    overrides : sequence of str
+        What the run has beside its configuration, as ``snakemake --config`` takes it.
     """
-    stated = ["--config", *given] if given else []
+    stated = ["--config", *overrides] if overrides else []
     # What follows the two dashes is no option, whatever it begins with.
     return shlex.join(["snakemake", "-c2", *stated, "--forcerun", "ingest", "--", target])
 

@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run(given: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> int:
     """Print the comparison; return the exit status."""
     # Only this command draws: the others answer at once.
     from rich.console import Console
@@ -45,23 +45,23 @@ def run(given: argparse.Namespace) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a sign that a terminal lacks stops nothing
     try:
-        tables = _load(given.results)
-        _check(tables["ranking"], "requirement", given.requirement)
-        _check(tables["parameters"], "channel", given.channel)
-        _check(tables["parameters"], "method", given.method)
+        tables = _load(arguments.results)
+        _check(tables["ranking"], "requirement", arguments.requirement)
+        _check(tables["parameters"], "channel", arguments.channel)
+        _check(tables["parameters"], "method", arguments.method)
     except _ShowError as error:
         print(error, file=sys.stderr)
         return 2
-    console = Console(width=given.width, highlight=False, markup=False, emoji=False)
+    console = Console(width=arguments.width, highlight=False, markup=False, emoji=False)
     # Another program reads whole lines.
-    whole = given.width is None and not console.is_terminal
+    whole = arguments.width is None and not console.is_terminal
     with console.capture() as captured:
         for part in parts(
             tables,
-            requirement=given.requirement,
-            channel=given.channel,
-            method=given.method,
-            system=given.units,
+            requirement=arguments.requirement,
+            channel=arguments.channel,
+            method=arguments.method,
+            system=arguments.units,
             width=console.width,
         ):
             if isinstance(part, Text) and whole:
@@ -70,7 +70,7 @@ def run(given: argparse.Namespace) -> int:
                 console.print(part, no_wrap=part.no_wrap, overflow=part.overflow)
             else:
                 console.print(part)
-        console.print(_where(given.results), soft_wrap=True)
+        console.print(_where(arguments.results), soft_wrap=True)
     # Written at once, so that who calls sees that the reader has gone, as `head` has.
     sys.stdout.writelines(f"{line.rstrip()}\n" for line in captured.get().splitlines())
     return 0
@@ -108,9 +108,9 @@ def _where(results: Path) -> str:
 
 
 def _check(rows: Rows, column: str, asked: str | None) -> None:
-    there = list(dict.fromkeys(row[column] for row in rows))
-    if asked is not None and asked not in there:
-        raise _ShowError(f"no {column} {asked!r}; there are: {', '.join(there) or 'none'}")
+    existing = list(dict.fromkeys(row[column] for row in rows))
+    if asked is not None and asked not in existing:
+        raise _ShowError(f"no {column} {asked!r}; there are: {', '.join(existing) or 'none'}")
 
 
 def _width(text: str) -> int:

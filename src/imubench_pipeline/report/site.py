@@ -18,7 +18,7 @@ import pyarrow as pa
 from imubench_pipeline.report.palette import Appearance, sensor_appearances
 from imubench_pipeline.report.practical import System, first_choices, units_of_pages
 from imubench_pipeline.report.shell import made_again
-from imubench_pipeline.report.view import RecordingView, recording_views
+from imubench_pipeline.report.view import Name, RecordingView, recording_views
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from imubench_pipeline.typing import Row
 
@@ -70,7 +70,7 @@ class Entry:
         The joined tables that it shows: it is written again if one of them changes.
     views : callable
         Returns the recordings that it shows: likewise, whatever any table says of them alone.
-    there : callable
+    exists : callable
         Tells whether a report has it.
     """
 
@@ -79,7 +79,7 @@ class Entry:
     context: Callable[[Site], Mapping[str, Any]]
     tables: tuple[str, ...] = ()
     views: Callable[[Site], Sequence[RecordingView]] = lambda _: ()
-    there: Callable[[Site], bool] = lambda _: True
+    exists: Callable[[Site], bool] = lambda _: True
 
     def page(self, site: Site) -> Page:
         """Return the page of a report."""
@@ -159,20 +159,21 @@ class Site:
     @cached_property
     def calibrated(self) -> list[RecordingView]:
         """The recordings on a rate table, or at rest with a direction that is stated."""
-        rows = self.rows("calibration")
-        there = {(row["sensor"], row["recording"]) for row in rows}
+        named = self._named_in("calibration")
         return [
             view
             for view in self.views
-            if view.row["kind"] == "rate_table" or (view.sensor, view.name) in there
+            if view.row["kind"] == "rate_table" or view.full_name in named
         ]
 
     @cached_property
     def predicted(self) -> list[RecordingView]:
         """The recordings at rest by whose noise it is predicted what their sensor could find."""
-        rows = self.rows("earth_rate_prediction")
-        there = {(row["sensor"], row["recording"]) for row in rows}
-        return [view for view in self.views if view.static and (view.sensor, view.name) in there]
+        named = self._named_in("earth_rate_prediction")
+        return [view for view in self.views if view.static and view.full_name in named]
+
+    def _named_in(self, table: str) -> set[Name]:
+        return {(row["sensor"], row["recording"]) for row in self.rows(table)}
 
     def device_page_of(self, row: Row) -> str | None:
         """Return the page of the device of a row that names a recording."""
@@ -180,12 +181,12 @@ class Site:
 
     @cached_property
     def _device_pages(self) -> dict[tuple[str, str], str | None]:
-        return {(view.sensor, view.name): view.device_page for view in self.views}
+        return {view.full_name: view.device_page for view in self.views}
 
     @property
     def navigation(self) -> list[tuple[str, str]]:
         """The pages that every page leads to, with their names."""
-        return [(entry.file, entry.title) for entry in self.entries if entry.there(self)]
+        return [(entry.file, entry.title) for entry in self.entries if entry.exists(self)]
 
     @cached_property
     def sensors(self) -> list[str]:
@@ -205,8 +206,8 @@ class Site:
     @cached_property
     def channel_names(self) -> list[str]:
         """The channels that some recording has."""
-        there = set(self.tables["allan"]["channel"].unique().to_pylist())
-        return [name for name in _CHANNELS if name in there]
+        present = set(self.tables["allan"]["channel"].unique().to_pylist())
+        return [name for name in _CHANNELS if name in present]
 
     def sensor_page(self, sensor: str) -> str:
         """Return the page of a sensor."""
@@ -237,7 +238,7 @@ class Site:
             )
             name = "fixed bias" if row["parameter"] == "bias" else row["parameter"]
             device["what"].append(f"{name} of {row['channel'].replace('_', ' ')}")
-        simulated = {(view.sensor, view.name): view.simulated for view in self.views}
+        simulated = {view.full_name: view.simulated for view in self.views}
         return [
             device | {"channels": ", ".join(device["what"]), "simulated": simulated[key]}
             for key, device in devices.items()

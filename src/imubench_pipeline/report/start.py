@@ -36,11 +36,11 @@ def _start(site: Site) -> dict[str, Any]:
         "summary": summary(views),
         "failures": list(_failures(site)),
         "rejected": [view for view in views if view.rejected],
-        "warned": [{"view": view, "found": _grouped(view.warnings)} for view in warned],
+        "warned": [{"view": view, "findings": _grouped(view.warnings)} for view in warned],
         "warning_count": f"{counted(sum(len(v.warnings) for v in warned), 'warning')} in "
         f"{counted(len(warned), 'recording')}",
-        "not_found": list(_not_found(site)),
-        "not_calibrated": list(_not_calibrated(site)),
+        "not_found": list(_without_result(site.turned, "earth_rate")),
+        "not_calibrated": list(_without_result(site.calibrated, "calibration")),
         "changed": site.changed_devices(),
         "rankings": ranked,
         "next_steps": list(_next_steps(site)),
@@ -60,23 +60,15 @@ def _start(site: Site) -> dict[str, Any]:
 
 def _failures(site: Site) -> Iterator[dict[str, Any]]:
     """Yield the steps that failed, with the recording that is left out for it."""
-    views = {(view.sensor, view.name): view for view in site.views}
+    views = {view.full_name: view for view in site.views}
     for row in site.rows("failures"):
         yield {**row, "view": views.get((row["sensor"], row["recording"]))}
 
 
-def _not_found(site: Site) -> Iterator[dict[str, Any]]:
-    """Yield the recordings of turned gyros of which nothing could be estimated, and why."""
-    for view in site.turned:
-        rows = view.rows("earth_rate")
-        if rows and all(row["value"] is None for row in rows):
-            yield {"view": view, "reason": sentence(rows[0]["reason"])}
-
-
-def _not_calibrated(site: Site) -> Iterator[dict[str, Any]]:
-    """Yield the recordings on a rate table or with a stated direction without a result, and why."""
-    for view in site.calibrated:
-        rows = view.rows("calibration")
+def _without_result(views: Sequence[RecordingView], table: str) -> Iterator[dict[str, Any]]:
+    """Yield the recordings of an experiment of which nothing could be estimated, and why."""
+    for view in views:
+        rows = view.rows(table)
         if rows and all(row["value"] is None for row in rows):
             yield {"view": view, "reason": sentence(rows[0]["reason"])}
 
@@ -121,7 +113,7 @@ def _grouped(rows: Sequence[Row]) -> list[tuple[str, str]]:
 
 
 def _rankings(site: Site) -> Iterator[dict[str, Any]]:
-    simulated = {(view.sensor, view.name): view.simulated for view in site.views}
+    simulated = {view.full_name: view.simulated for view in site.views}
     rows = site.rows("ranking")
     for ranking in rankings(rows, site.settings["requirements"], simulated, site.system):
         decisive = {
@@ -208,13 +200,13 @@ _SPREAD_OF = {
 
 
 def _margin(row: Row, group: dict[str, Any]) -> dict[str, Any]:
-    known = row["margin"] is not None
-    bounded = known and bool(row["lower"]) and bool(row["upper"])
+    has_margin = row["margin"] is not None
+    bounded = has_margin and bool(row["lower"]) and bool(row["upper"])
     return {
         "sensor": row["sensor"],
         "verdict": group["verdict"],
         "weak": group["weak"],
-        "margin": row["margin"] if known else None,
+        "margin": row["margin"] if has_margin else None,
         "low": row["limit"] / row["upper"] if bounded else None,
         "high": row["limit"] / row["lower"] if bounded else None,
     }

@@ -9,9 +9,9 @@ from typing import Any
 from rich.console import RenderableType
 from rich.text import Text
 
-from imubench_pipeline.estimators.estimate import PARAMETERS, SHOWN
 from imubench_pipeline.navigation.suitability.conditions import in_words
 from imubench_pipeline.report.meaning import rankings
+from imubench_pipeline.report.parameters import shown_symbols
 from imubench_pipeline.report.practical import (
     PageUnit,
     System,
@@ -154,9 +154,9 @@ def _ranking_lines(group: Mapping[str, Any], *, every: bool) -> Iterator[list[st
     sensor = one_line(group["sensor"] + " (simulated)" * group["simulated"])
     if group["tied_with"]:
         sensor += "\n" + one_line(f"tied with {group['tied_with']}")
-    said = Text(one_line(in_words(group)), style=_STYLES.get(group["verdict"], "dim"))
+    verdict = Text(one_line(in_words(group)), style=_STYLES.get(group["verdict"], "dim"))
     if group["weak"]:
-        said.stylize("dim")
+        verdict.stylize("dim")
     weak = f"on weak evidence: {group['weak']}" if group["weak"] else ""
     doubts = f"in doubt: {group['doubts']}" if group["doubts"] else ""
     for line in (
@@ -165,8 +165,8 @@ def _ranking_lines(group: Mapping[str, Any], *, every: bool) -> Iterator[list[st
         one_line(group["unless"] or "", _LONGEST_FINDING),
     ):
         # The names have what the other columns leave.
-        said.append("".join(f"\n{part}" for part in wrap(line, _BESIDE)), style="yellow")
-    first: list[str | Text] = [str(group["rank"]), sensor, said]
+        verdict.append("".join(f"\n{part}" for part in wrap(line, _BESIDE)), style="yellow")
+    first: list[str | Text] = [str(group["rank"]), sensor, verdict]
     for limit in group["limits"]:
         if every or limit["decides"]:
             shown = limit["reason"]
@@ -183,8 +183,7 @@ def _parameter_lines(
     quantity: str, rows: Sequence[Row], about: About, system: System
 ) -> tuple[list[str], list[list[str | Text]]]:
     """Return the heads and a line a channel, with a column a parameter that some channel has."""
-    there = {row["parameter"] for row in rows if row["status"] != "absent"}
-    symbols = [symbol for symbol in SHOWN if symbol in PARAMETERS or symbol in there]
+    symbols = shown_symbols(rows)
     units = {symbol: page_unit(quantity, symbol, system) for symbol in symbols}
     by_channel: dict[tuple[str, str, str], list[Row]] = {}
     for row in rows:
@@ -195,7 +194,11 @@ def _parameter_lines(
         row = about[sensor, recording]
         badge = " (simulated)" * row["simulated"]
         cells = (
-            _cell([one for one in own if one["parameter"] == symbol], unit, row["duration"])
+            _cell(
+                [estimate for estimate in own if estimate["parameter"] == symbol],
+                unit,
+                row["duration"],
+            )
             for symbol, unit in units.items()
         )
         lines.append([one_line(f"{sensor} / {recording} {channel}{badge}"), *cells])

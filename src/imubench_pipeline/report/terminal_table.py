@@ -40,7 +40,7 @@ def fitting(
     """
     cells = [["-", *column] for column in zip(heads, *lines, strict=True)]
     widths = [max(cell_len(word) for cell in column for word in _words(cell)) for column in cells]
-    wanted = [max(cell_len(one) for cell in column for one in _lines(cell)) for column in cells]
+    wanted = [max(cell_len(text) for cell in column for text in _lines(cell)) for column in cells]
     widths[names] = min(widths[names], _NAME_FOLDS_AT)
     shown = len(heads)
     while shown > names + 1 and sum(widths[:shown]) + _GAP * (shown - 1) > width:

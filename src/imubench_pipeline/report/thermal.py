@@ -7,12 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from imubench_pipeline.report.practical import (
-    System,
-    limit_digits,
-    number_text,
-    page_unit,
-)
+from imubench_pipeline.report.practical import System, limit_digits, number_text, page_unit
 from imubench_pipeline.report.view import ChannelView
 from imubench_pipeline.report.words import sentence
 from imubench_pipeline.typing import Row
@@ -35,17 +30,12 @@ _SEEN = 1.05
 
 
 def figures(channel: ChannelView) -> Iterator[dict[str, Any]]:
-    """Yield the lines of the table: temperature's, where its effect was sought; the low-pass's.
-
-    Parameters
-    ----------
-    channel : ChannelView
-    """
-    found = (
+    """Yield the lines of the table: temperature's, where its effect was sought; the low-pass's."""
+    entries = (
         *((channel.temperature, *names) for names in _TEMPERATURE),
         *((channel.low_pass, *names) for names in _LOW_PASS),
     )
-    for rows, name, term, words in found:
+    for rows, name, term, words in entries:
         row = rows.get(name)
         if row is None or row["status"] == "absent" or _without_filter(name, rows):
             continue
@@ -70,35 +60,29 @@ def _without_filter(name: str, rows: Mapping[str, Row]) -> bool:
 
 
 def answer(channel: ChannelView, system: System) -> list[str]:
-    """Return in sentences what was found of temperature and low-pass.
-
-    Parameters
-    ----------
-    channel : ChannelView
-    system : str
-    """
-    said = []
+    """Return in sentences what was found of temperature and low-pass."""
+    lines = []
     temperature, low_pass = channel.temperature, channel.low_pass
     if temperature:
         sensitivity = temperature["sensitivity"]
         if sensitivity["compensated"]:
             unit = page_unit(channel.quantity, "sensitivity", system)
-            said.append(
+            lines.append(
                 f"The bias follows the temperature by {unit.text(sensitivity['value'], 3)} "
                 f"{unit.sign}.{_falls(channel)}"
             )
         else:
-            said.append(f"Temperature is not taken out: {sensitivity['reason']}.")
-        said.append(f"T₀, the mean temperature, is {number_text(temperature['T_0']['value'])} °C.")
+            lines.append(f"Temperature is not taken out: {sensitivity['reason']}.")
+        lines.append(f"T₀, the mean temperature, is {number_text(temperature['T_0']['value'])} °C.")
     if low_pass and low_pass["cutoff"]["status"] == "absent":
-        said.append("The spectrum shows no low-pass of the sensor.")
+        lines.append("The spectrum shows no low-pass of the sensor.")
     elif low_pass:
         order = low_pass["cutoff"]["order"]
         kind = "of first order" if order == 1 else f"as a Butterworth filter of order {order}"
         if low_pass["cutoff"]["value"] is not None:
             cutoff = number_text(low_pass["cutoff"]["value"])
-            said.append(f"The sensor's own low-pass cuts off at {cutoff} Hz, {kind}.")
-    return said
+            lines.append(f"The sensor's own low-pass cuts off at {cutoff} Hz, {kind}.")
+    return lines
 
 
 def _falls(channel: ChannelView) -> str:
@@ -107,11 +91,11 @@ def _falls(channel: ChannelView) -> str:
     if not left:
         return ""
     ratio = np.interp(np.log(left["tau"]), np.log(channel.tau), channel.adev) / left["adev"]
-    there = _AT[(_AT >= left["tau"][0]) & (_AT <= left["tau"][-1])]
-    at = np.interp(np.log(there), np.log(left["tau"]), ratio)
+    taus = _AT[(_AT >= left["tau"][0]) & (_AT <= left["tau"][-1])]
+    at = np.interp(np.log(taus), np.log(left["tau"]), ratio)
     parts = [
         f"{number_text(float(fall), 3)} times at τ = {number_text(float(tau))} s"
-        for tau, fall in zip(there, at, strict=True)
+        for tau, fall in zip(taus, at, strict=True)
         if fall > _SEEN
     ]
     return f" Without it the Allan deviation is lower: {', '.join(parts)}." if parts else ""

@@ -18,7 +18,7 @@ from imubench_pipeline.report.practical import (
     number_text,
     page_unit,
 )
-from imubench_pipeline.report.recording import metadata_of, page_of, provenance
+from imubench_pipeline.report.recording import about_of, page_of, summary_words
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.report.words import counted, noise_words, sentence
@@ -68,9 +68,7 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
     envelope = read("envelope", [path]).to_pylist() if path.is_file() else []
     prediction = view.rows("earth_rate_prediction")
     return {
-        "view": view,
-        "name": site.names[view.sensor],
-        "sensor_page": site.sensor_page(view.sensor),
+        **about_of(site, view, [], folder),
         "channel": channel,
         "summary": _summary(view, turning, rows),
         "answer": answer(whole, site.system),
@@ -87,8 +85,6 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         "needs": needs(prediction),
         "has_prediction": bool(prediction),
         "stretches": list(_stretches(turning)),
-        "provenance": list(provenance(view, [], folder)),
-        "sources": metadata_of(folder).get("sources", []),
         "command": site.again(view, "earth_rate"),
         "page": {
             "looks": {},
@@ -103,14 +99,11 @@ def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
 
 
 def _summary(view: RecordingView, turning: Sequence[Row], rows: Sequence[Row]) -> str:
-    row = view.row
-    parts = [f"{duration_text(row['duration'])} at {number_text(row['rate'])} Hz"]
-    turns = sum(one["what"] == "turn" for one in turning)
-    parts.append(f"{counted(turns, 'turn')} between north and south")
+    turns = sum(event["what"] == "turn" for event in turning)
+    parts = [f"{counted(turns, 'turn')} between north and south"]
     if rows:
         parts.append(f"at latitude {latitude_text(rows)}")
-    kind = "Simulated from known parameters, not measured: " if view.simulated else ""
-    return kind + ", ".join(parts) + "."
+    return summary_words(view, parts)
 
 
 def latitude_text(rows: Sequence[Row]) -> str:
@@ -133,8 +126,8 @@ def answer(rows: Sequence[Row], system: System) -> str:
         Of the table ``earth_rate``, of the whole recording.
     system : str
     """
-    found = {row["method"]: row for row in rows}
-    best = found.get("filter")
+    by_method = {row["method"]: row for row in rows}
+    best = by_method.get("filter")
     if best is None:
         return "Nothing was found of the turns of this recording."
     if best["value"] is None:
@@ -292,16 +285,16 @@ def _payload(
 
 
 def _courses(series: Sequence[Row], arrays: Arrays) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    courses: dict[str, Any] = {}
     for name in dict.fromkeys((row["quantity"], row["method"]) for row in series):
         own = [row for row in series if (row["quantity"], row["method"]) == name]
-        found["drift" if name[0] == "drift" else name[1]] = {
+        courses["drift" if name[0] == "drift" else name[1]] = {
             "name": "drift" if name[0] == "drift" else METHOD_WORDS[name[1]],
             "time": arrays.exact([row["time"] for row in own]),
             "value": arrays.exact(_numbers(own, "value")),
             "sigma": arrays.exact(_numbers(own, "sigma")),
         }
-    return found
+    return courses
 
 
 def _range(series: Sequence[Row], truth: float) -> list[float]:
@@ -325,11 +318,11 @@ def prediction_payload(rows: Sequence[Row], arrays: Arrays) -> dict[str, Any]:
     arrays : Arrays
     """
     goals = [row["goal"] for row in rows if row["of"] == "goal"]
-    found: dict[str, Any] = {"goals": goals, "truth": EARTH_RATE}
+    payload: dict[str, Any] = {"goals": goals, "truth": EARTH_RATE}
     for of, x in (("time", "time"), ("dwell", "dwell")):
         own = [row for row in rows if row["of"] == of and row["sigma"] is not None]
         own.sort(key=lambda row: float(row[x]))
-        found[of] = {
+        payload[of] = {
             "x": arrays.exact([row[x] for row in own]),
             "sigma": arrays.exact([row["sigma"] for row in own]),
             "turns": [row["turns"] for row in own],
@@ -338,7 +331,7 @@ def prediction_payload(rows: Sequence[Row], arrays: Arrays) -> dict[str, Any]:
             "best": next((k for k, row in enumerate(own) if row["best"]), None),
             "nearly": [row["dwell"] for row in own if row["nearly_best"]],
         }
-    return found
+    return payload
 
 
 def _numbers(rows: Sequence[Mapping[str, Any]], name: str) -> list[float]:

@@ -146,6 +146,11 @@ class RecordingView:
         return str(self.row["recording"])
 
     @property
+    def full_name(self) -> Name:
+        """Sensor and name."""
+        return self.sensor, self.name
+
+    @property
     def simulated(self) -> bool:
         """Made from known parameters, not measured."""
         return bool(self.row["simulated"])
@@ -168,7 +173,7 @@ class RecordingView:
     @property
     def key(self) -> str:
         """Digest of all that the tables say of it."""
-        return self.keys()[self.sensor, self.name]
+        return self.keys()[self.full_name]
 
     @cached_property
     def findings(self) -> list[Row]:
@@ -209,66 +214,57 @@ def recording_views(tables: Mapping[str, pa.Table]) -> list[RecordingView]:
     for row in tables["recordings"].to_pylist():
         name = (row["sensor"], row["recording"])
         parts = {
-            table: found[name] if name in found else tables[table].slice(0, 0)
-            for table, found in divided.items()
+            table: by_recording[name] if name in by_recording else tables[table].slice(0, 0)
+            for table, by_recording in divided.items()
         }
         views.append(RecordingView(row, parts, keys))
     return views
 
 
+_CURVE = ("tau", "adev", "lower", "upper")
+
+
 def _channels(view: RecordingView) -> list[ChannelView]:
-    channels = {
-        name: ChannelView(
-            view.sensor,
-            view.name,
-            name,
-            view.simulated,
-            tau=_floats(part, "tau"),
-            adev=_floats(part, "adev"),
-            lower=_floats(part, "lower"),
-            upper=_floats(part, "upper"),
-        )
-        for (name,), part in _by(view.parts["allan"], "channel").items()
-    }
-    for one in view.rows("parameters"):
-        channel = channels[one["channel"]]
-        channel.parameters.setdefault(one["method"], []).append(one)
-        if one["recommended"]:
-            channel.recommended = one["method"]
+    channels = {}
+    for (name,), part in _by(view.parts["allan"], "channel").items():
+        named = (view.sensor, view.name, name, view.simulated)
+        tau, adev, lower, upper = _floats(part, *_CURVE).values()
+        channels[name] = ChannelView(*named, tau, adev, lower, upper)
+    for row in view.rows("parameters"):
+        channel = channels[row["channel"]]
+        channel.parameters.setdefault(row["method"], []).append(row)
+        if row["recommended"]:
+            channel.recommended = row["method"]
     for (name, method), part in _by(view.parts["reconstruction"], "channel", "method").items():
-        channels[name].reconstruction[method] = {
-            column: _floats(part, column)
-            for column in ("tau", "adev", "lower", "upper", "reconstructed")
-        }
+        channels[name].reconstruction[method] = _floats(part, *_CURVE, "reconstructed")
     for table in ("models", "lines", "deterministic", "datasheet", "datasheet_curve"):
-        for one in view.rows(table):
-            getattr(channels[one["channel"]], table).append(one)
+        for row in view.rows(table):
+            getattr(channels[row["channel"]], table).append(row)
     for (name,), part in _by(view.parts["spectrum"], "channel").items():
-        channels[name].spectrum = {
-            column: _floats(part, column)
-            for column in ("frequency", "ordinates", "density", "fitted", "used")
-        }
+        columns = ("frequency", "ordinates", "density", "fitted", "used")
+        channels[name].spectrum = _floats(part, *columns)
     for (name,), part in _by(view.parts["allan_compensated"], "channel").items():
-        channels[name].compensated = {
-            column: _floats(part, column) for column in ("tau", "adev", "lower", "upper")
-        }
-    for one in view.rows("scores"):
-        channels[one["channel"]].scores[one["method"]] = one
-    for one in view.rows("fixed_bias"):
-        channels[one["channel"]].fixed_bias = one["value"]
-    for one in view.rows("temperature"):
-        channels[one["channel"]].temperature[one["parameter"]] = one
-    for one in view.rows("low_pass"):
-        channels[one["channel"]].low_pass[one["parameter"]] = one
-    for one in view.rows("simulated_truth"):
-        if one["channel"] in channels:
-            true = channels[one["channel"]].true_components.setdefault(one["parameter"], [])
-            true.append(one)
-    for one in view.rows("published"):
-        if one["channel"] in channels:
-            channels[one["channel"]].published.append(one)
+        channels[name].compensated = _floats(part, *_CURVE)
+    for table, key in (
+        ("scores", "method"),
+        ("temperature", "parameter"),
+        ("low_pass", "parameter"),
+    ):
+        for row in view.rows(table):
+            getattr(channels[row["channel"]], table)[row[key]] = row
+    for row in view.rows("fixed_bias"):
+        channels[row["channel"]].fixed_bias = row["value"]
+    for row in view.rows("simulated_truth"):
+        if row["channel"] in channels:
+            true = channels[row["channel"]].true_components.setdefault(row["parameter"], [])
+            true.append(row)
+    for row in view.rows("published"):
+        if row["channel"] in channels:
+            channels[row["channel"]].published.append(row)
     for name, channel in channels.items():
-        channel.findings = [one for one in view.findings if one["channel"] in (None, name)]
+        channel.findings = [
+            finding for finding in view.findings if finding["channel"] in (None, name)
+        ]
     return list(channels.values())
 
 
@@ -290,8 +286,8 @@ def _keys(tables: Mapping[str, pa.Table]) -> dict[Name, str]:
     return {name: digest.hexdigest() for name, digest in digests.items()}
 
 
-def _floats(part: pa.Table, column: str) -> NDArray[np.float64]:
-    return np.asarray(part[column].to_numpy(), dtype=np.float64)
+def _floats(part: pa.Table, *columns: str) -> dict[str, NDArray[np.float64]]:
+    return {name: np.asarray(part[name].to_numpy(), dtype=np.float64) for name in columns}
 
 
 def _by(table: pa.Table, *names: str) -> dict[tuple[str, ...], pa.Table]:

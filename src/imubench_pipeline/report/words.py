@@ -146,17 +146,19 @@ def requirement_verdict(
     if not groups:
         return ["No recording answers it."]
     ranked = [group for group in groups if group["rank"] != "–"]
-    turned = [f"{names[one['sensor']]}: {one['unless']}." for one in groups if one["unless"]]
+    turned = [
+        f"{names[group['sensor']]}: {group['unless']}." for group in groups if group["unless"]
+    ]
     if not ranked:
         return ["No sensor can be ranked for it.", *_others(groups, names), *turned]
     best = ranked[0]
     decides = next(limit for limit in best["limits"] if limit["decides"])
-    said = names[best["sensor"]] + (" (simulated)" if best["simulated"] else "")
+    best_name = names[best["sensor"]] + (" (simulated)" if best["simulated"] else "")
     verdict, conditions = in_words(best), []
     if (best["conditions"] or "").count("; ") and best["verdict"].endswith(" if"):
         conditions = best["conditions"].split("; ")
         verdict = f"{best['verdict'].removesuffix(' if')} on {len(conditions)} conditions"
-    first = _first(said, verdict, len(ranked), len(groups))
+    first = _first(best_name, verdict, len(ranked), len(groups))
     if best["weak"]:
         first += f", on weak evidence ({best['weak']})"
     figures = (
@@ -170,7 +172,7 @@ def requirement_verdict(
     if conditions:
         lines.append(f"Conditions: {'; '.join(conditions)}.")
     if best["tied_with"]:
-        tied = ", ".join(names.get(one, one) for one in listed_names(best["tied_with"], names))
+        tied = ", ".join(names.get(name, name) for name in listed_names(best["tied_with"], names))
         lines.append(f"It cannot be told apart from {tied}.")
     return [*lines, *_others([g for g in groups if g is not best], names), *turned]
 
@@ -191,33 +193,33 @@ def _first(sensor: str, verdict: str, judged: int, asked: int) -> str:
     return f"No sensor passes. Of {of} the nearest is {sensor}, which {verdict}"
 
 
-def listed_names(text: str, known: Mapping[str, str]) -> list[str]:
+def listed_names(text: str, names: Mapping[str, str]) -> list[str]:
     """Return the names of a list, of which each may contain commas itself."""
     parts = text.split(", ")
     for count in range(len(parts), 0, -1):
-        if (name := ", ".join(parts[:count])) in known:
+        if (name := ", ".join(parts[:count])) in names:
             rest = ", ".join(parts[count:])
-            return [name, *(listed_names(rest, known) if rest else [])]
+            return [name, *(listed_names(rest, names) if rest else [])]
     return [text]
 
 
 def _others(groups: Sequence[Mapping[str, Any]], names: Mapping[str, str]) -> list[str]:
     """Return how many sensors have each verdict, and which where they are few."""
     parts = []
-    found: dict[str, list[str]] = {}
+    by_verdict: dict[str, list[str]] = {}
     for verdict in _VERDICTS:
-        found[_CAPITALS[verdict]] = []
+        by_verdict[_CAPITALS[verdict]] = []
     for group in groups:
-        said = _CAPITALS.get(group["verdict"], group["verdict"].capitalize())
+        heading = _CAPITALS.get(group["verdict"], group["verdict"].capitalize())
         reason = next((limit["reason"] for limit in group["limits"] if limit["decides"]), "")
         if group["verdict"] == "not enough data" and reason:
-            said = f"{said} ({reason})"
+            heading = f"{heading} ({reason})"
         why = f" ({group['conditions']})" * (group["verdict"] == EXCLUDED)
-        found.setdefault(said, []).append(names[group["sensor"]] + why)
-    for said, own in found.items():
+        by_verdict.setdefault(heading, []).append(names[group["sensor"]] + why)
+    for heading, own in by_verdict.items():
         if own:
             listed = ", ".join(own) if len(own) <= _FEW else f"{len(own)} sensors"
-            parts.append(f"{said}: {listed}.")
+            parts.append(f"{heading}: {listed}.")
     return parts
 
 
@@ -261,7 +263,7 @@ def _stated(lead: str, group: Strict) -> str:
     stated: list[str] = []
     for name, value in group:
         if isinstance(value, Strict):
-            inner = ", ".join(f"{key} {one}" for key, one in value if one is not None)
+            inner = ", ".join(f"{key} {item}" for key, item in value if item is not None)
             value = inner or None
         elif isinstance(value, tuple):
             value = (" to " if name == "temperature" else ", ").join(value) or None
@@ -283,9 +285,9 @@ def sentence(text: str) -> str:
     return text[:1].upper() + text[1:].rstrip(".") + "." if text else ""
 
 
-def counted(number: int, one: str, many: str | None = None) -> str:
+def counted(number: int, singular: str, plural: str | None = None) -> str:
     """Return a number with its noun: ``1 recording``, ``3 recordings``."""
-    return f"{number} {one if number == 1 else many or one + 's'}"
+    return f"{number} {singular if number == 1 else plural or singular + 's'}"
 
 
 def started_text(started: str | None) -> str:
@@ -304,5 +306,5 @@ def noise_words(rows: Sequence[Row]) -> str:
     rows : sequence of mapping
         Of a table with ``model`` and ``model_from``, of one recording.
     """
-    known = next((row for row in rows if row["model"]), None)
-    return f"Noise model: {known['model']}, from {known['model_from']}." if known else ""
+    fitted = next((row for row in rows if row["model"]), None)
+    return f"Noise model: {fitted['model']}, from {fitted['model_from']}." if fitted else ""

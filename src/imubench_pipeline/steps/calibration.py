@@ -45,8 +45,8 @@ def calibration_tables(
     logs = kept_logs(folder)
     if not logs:
         return rows
-    given = json.loads(settings)
-    declared, simulated = _declared(given)
+    sections = json.loads(settings)
+    declared, simulated = _declared(sections)
     # Of several gyros the notes name one: the ingest has seen to it.
     metadata = read_metadata(next(iter(logs.values())).path)
     gyros = (name for name in [*logs, *metadata["unusable"]] if name.startswith("gyro_"))
@@ -58,7 +58,7 @@ def calibration_tables(
     log = GyroLog(
         key,
         logs[channel],
-        noise_source(folder, static, key, Sensor.model_validate(given["sensor"])),
+        noise_source(folder, static, key, Sensor.model_validate(sections["sensor"])),
         metadata.get("begins", 0.0),
         _truth(simulated, channel),
     )
@@ -68,14 +68,14 @@ def calibration_tables(
 
 
 def _declared(
-    given: Mapping[str, Any],
+    sections: Mapping[str, Any],
 ) -> tuple[OnRateTable | AtRest, SimulatedRecording | None]:
     """Return what stands beside a log, or would stand beside a simulated one."""
-    if "simulated" not in given:
-        if "rate_table" in given:
-            return OnRateTable.model_validate(given["rate_table"]), None
-        return AtRest.model_validate(given["pointing"]), None
-    simulated = SimulatedRecording.model_validate(given["simulated"])
+    if "simulated" not in sections:
+        if "rate_table" in sections:
+            return OnRateTable.model_validate(sections["rate_table"]), None
+        return AtRest.model_validate(sections["pointing"]), None
+    simulated = SimulatedRecording.model_validate(sections["simulated"])
     if simulated.rate_table is not None:
         return simulated.rate_table.declared, simulated
     assert simulated.pointing is not None  # only recordings with one of both are calibrated

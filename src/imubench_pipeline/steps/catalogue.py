@@ -12,10 +12,10 @@ from imubench_pipeline.tables import build, write_arrow
 
 def write_coverage(catalogue: str, outputs: list[Path]) -> None:
     """Write the tables ``coverage`` and ``coverage_by_vendor``, as Parquet and CSV."""
-    found = coverage(sensors_of(catalogue))
+    rows = coverage(sensors_of(catalogue))
     tables = {
-        "coverage": build("coverage", map(asdict, found)),
-        "coverage_by_vendor": build("coverage_by_vendor", map(asdict, by_vendor(found))),
+        "coverage": build("coverage", map(asdict, rows)),
+        "coverage_by_vendor": build("coverage_by_vendor", map(asdict, by_vendor(rows))),
     }
     for output in outputs:
         write_arrow(tables[output.stem], output)

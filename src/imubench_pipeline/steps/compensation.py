@@ -60,34 +60,34 @@ def temperature_of(
     )
 
 
-def compensated_estimate(found: ThermalFit) -> Estimate:
+def compensated_estimate(fit: ThermalFit) -> Estimate:
     """Return the estimate of method ``compensated``: the noise that temperature leaves."""
-    without = found.without_temperature.estimates[0]
+    without = fit.without_temperature.estimates[0]
     return replace(without, method="compensated")
 
 
-def compensated_curve(log: ChannelLog, found: ThermalFit, measured: AllanCurve) -> AllanCurve:
+def compensated_curve(log: ChannelLog, fit: ThermalFit, measured: AllanCurve) -> AllanCurve:
     """Return the Allan variance of a log less what temperature adds to it.
 
     Parameters
     ----------
     log : ChannelLog
-    found : ThermalFit
+    fit : ThermalFit
     measured : AllanCurve
         Of the log as it is: the same clusters are taken.
     """
-    blocks = found.compensate(log.blocks())
+    blocks = fit.compensate(log.blocks())
     sizes, rate = measured.cluster_size, log.rate
     return of_blocks(blocks, log.grid, rate, sizes, holes=log.holes, segments=log.segments)
 
 
-def temperature_curve(log: ChannelLog, found: ThermalFit, measured: AllanCurve) -> AllanCurve:
+def temperature_curve(log: ChannelLog, fit: ThermalFit, measured: AllanCurve) -> AllanCurve:
     """Return the Allan variance of what temperature adds to a log.
 
     Its parameters are those of `compensated_curve`.
     """
     nothing = (np.zeros(len(values)) for values in log.blocks())
-    blocks = shifted(nothing, found.path, found.effect, 1.0)
+    blocks = shifted(nothing, fit.path, fit.effect, 1.0)
     sizes, rate = measured.cluster_size, log.rate
     return of_blocks(blocks, log.grid, rate, sizes, holes=False, segments=log.segments)
 
@@ -105,34 +105,34 @@ def compensated_rows(key: Key, left: AllanCurve, added: AllanCurve) -> Iterator[
         yield asdict(key) | about | {"temperature": float(deviation)}
 
 
-def temperature_rows(key: Key, found: ThermalFit) -> Iterator[Row]:
+def temperature_rows(key: Key, fit: ThermalFit) -> Iterator[Row]:
     """Yield the rows of the table ``temperature``."""
     unit = SI_UNITS[quantity_of(key.channel)]["B"]
     figures = {
-        "T_0": (Parameter(found.reference), "degC"),
-        "sensitivity": (found.sensitivity, f"{unit}/K"),
-        "quadratic": (found.quadratic, f"{unit}/K^2"),
-        "lag": (found.lag, "s"),
-        "bias": (found.bias, unit),
+        "T_0": (Parameter(fit.reference), "degC"),
+        "sensitivity": (fit.sensitivity, f"{unit}/K"),
+        "quadratic": (fit.quadratic, f"{unit}/K^2"),
+        "lag": (fit.lag, "s"),
+        "bias": (fit.bias, unit),
     }
-    about = asdict(key) | {"compensated": found.compensated}
+    about = asdict(key) | {"compensated": fit.compensated}
     for name, (parameter, its_unit) in figures.items():
-        reason = parameter.reason or (found.reason if name == "sensitivity" else None)
+        reason = parameter.reason or (fit.reason if name == "sensitivity" else None)
         yield about | _figure(name, parameter, its_unit) | {"reason": reason}
 
 
-def low_pass_rows(key: Key, found: Likelihood) -> Iterator[Row]:
+def low_pass_rows(key: Key, fit: Likelihood) -> Iterator[Row]:
     """Yield the rows of the table ``low_pass``: none where a band was asked for.
 
     N is that of the estimate, which is the density before the filter.
     """
-    low_pass = found.low_pass
+    low_pass = fit.low_pass
     if low_pass is None:
         return
     density = SI_UNITS[quantity_of(key.channel)]["N"]
     about = asdict(key) | {"kind": low_pass.kind, "order": low_pass.order}
     yield about | _figure("cutoff", low_pass.frequency, "Hz")
-    yield about | _figure("N", found.estimates[0].parameters["N"], density)
+    yield about | _figure("N", fit.estimates[0].parameters["N"], density)
     if low_pass.order is not None:
         yield about | _figure("floor", Parameter(low_pass.floor), density)
 

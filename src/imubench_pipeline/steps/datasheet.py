@@ -26,10 +26,10 @@ def rows(folder: Path, sensor: str, recording: str, settings: str) -> Iterator[R
     thermal = read("temperature", [folder / "temperature.parquet"]).to_pylist()
     biases = read("fixed_bias", [folder / "fixed_bias.parquet"]).to_pylist()
     means = {row["channel"]: row["value"] for row in biases}
-    given = json.loads(settings)
-    datasheet, tolerance = Datasheet.model_validate(given["datasheet"]), given["tolerance"]
+    sections = json.loads(settings)
+    datasheet, tolerance = Datasheet.model_validate(sections["datasheet"]), sections["tolerance"]
     for channel, by_method in estimates(folder / "parameters.parquet").items():
-        tau = measured[channel].up_to(given["longest"])
+        tau = measured[channel].up_to(sections["longest"])
         names = {"sensor": sensor, "recording": recording, "channel": channel}
         for estimate in by_method:
             for delta in deltas(datasheet, channel, estimate, tau, tolerance):
@@ -49,11 +49,11 @@ def curve_rows(folder: Path, sensor: str, recording: str, settings: str) -> Iter
     for channel, curve in measured.items():
         names = {"sensor": sensor, "recording": recording, "channel": channel}
         printed = list(comparables(datasheet, channel))
-        for found in curve_rms(printed, curve.tau, curve.deviation):
+        for distance in curve_rms(printed, curve.tau, curve.deviation):
             yield names | {
-                "sidedness": found.noise.sidedness if found.noise else None,
-                "N": found.noise.value if found.noise else None,
-                "floor": found.floor.value if found.floor else None,
-                "rms": found.rms,
-                "rms_log10": found.rms_log10,
+                "sidedness": distance.noise.sidedness if distance.noise else None,
+                "N": distance.noise.value if distance.noise else None,
+                "floor": distance.floor.value if distance.floor else None,
+                "rms": distance.rms,
+                "rms_log10": distance.rms_log10,
             }

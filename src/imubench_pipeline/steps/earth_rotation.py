@@ -44,9 +44,11 @@ def earth_rate_tables(
         By table; no rows of a rejected recording.
     """
     rows: dict[str, list[Row]] = {name: [] for name in EARTH_RATE_TABLES}
-    given = json.loads(settings)
+    sections = json.loads(settings)
     simulated = (
-        SimulatedRecording.model_validate(given["simulated"]) if "simulated" in given else None
+        SimulatedRecording.model_validate(sections["simulated"])
+        if "simulated" in sections
+        else None
     )
     logs = kept_logs(folder)
     if not logs:
@@ -54,15 +56,15 @@ def earth_rate_tables(
     if simulated is not None and simulated.two_position is not None:
         declared = simulated.two_position.declared
     else:
-        declared = TwoPosition.model_validate(given["two_position"])
+        declared = TwoPosition.model_validate(sections["two_position"])
     metadata = read_metadata(next(iter(logs.values())).path)
     channel = declared.turned([*logs, *metadata["unusable"]])
     key = Key(sensor, recording, channel)
     if channel not in logs:
         rows["earth_rate"] = list(unusable(asdict(key), declared))
         return rows
-    how = EarthRateSettings.model_validate(given["earth_rate"])
-    source = noise_source(folder, static, key, Sensor.model_validate(given["sensor"]), how.draws)
+    how = EarthRateSettings.model_validate(sections["earth_rate"])
+    source = noise_source(folder, static, key, Sensor.model_validate(sections["sensor"]), how.draws)
     begins = metadata.get("begins", 0.0)
     rows |= asdict(earth_rate_of(key, logs[channel], declared, source, how, begins=begins))
     if simulated is not None:

@@ -23,15 +23,16 @@ def error_tables(
     inputs: dict[str, Path], names: dict[str, str], settings: str
 ) -> dict[str, Iterator[Row]]:
     """Return the rows of the tables ``error_budget`` and ``backtest``; none of a rejected log."""
-    given = json.loads(settings)
-    how = ErrorBudgetSettings.model_validate(given["error_budget"])
+    sections = json.loads(settings)
+    how = ErrorBudgetSettings.model_validate(sections["error_budget"])
     times = [quantity_to_si(time, "time") for time in how.times]
     window, latitude = (
         quantity_to_si(how.static_window, "time"),
         quantity_to_si(how.latitude, "angle"),
     )
     requirements = {
-        name: Requirement.model_validate(one) for name, one in given["requirements"].items()
+        name: Requirement.model_validate(section)
+        for name, section in sections["requirements"].items()
     }
     questions = list(standard(times, window, latitude, how.axes))
     for name, requirement in requirements.items():
@@ -43,7 +44,7 @@ def error_tables(
     logs = kept_static_logs(inputs["quality"].parent)
     apart = read("deterministic", [inputs["deterministic"]]).to_pylist()
     temperature = read("temperature", [inputs["temperature"]]).to_pylist()
-    figures = in_use(Datasheet.model_validate(given["datasheet"]), estimates, temperature)
+    figures = in_use(Datasheet.model_validate(sections["datasheet"]), estimates, temperature)
     return {
         "error_budget": error_rows(names, estimates, questions, figures=figures, **drawn),
         "backtest": backtest_rows(names, logs, estimates, requirements, apart, **drawn),

@@ -71,7 +71,7 @@ class Estimation:
 
     def add_findings(self, key: Key, findings: Iterable[Finding]) -> None:
         """Take what is found of a channel."""
-        self.estimate_findings += [one.row(key.sensor, key.recording) for one in findings]
+        self.estimate_findings += [finding.row(key.sensor, key.recording) for finding in findings]
 
 
 def estimate_channel(
@@ -172,8 +172,8 @@ class _Channel:
         """Return the estimates from the spectrum; the rows that go with them are taken."""
         key, log = self.key, self.log
         fitted = self._fitted(self._blocks)
-        there = presence(log.blocks(), log.grid, log.segments) if log.holes else None
-        limited = partial(with_fitted_limits, segments=log.segments, presence=there)
+        present = presence(log.blocks(), log.grid, log.segments) if log.holes else None
+        limited = partial(with_fitted_limits, segments=log.segments, presence=present)
         into.allan += allan_rows(key, limited(self.curve, fitted))
         if not self.courses.found:  # else what they explain is taken out
             white = fitted.estimates[0].parameters["N"].lower
@@ -230,8 +230,10 @@ class _Channel:
 
 def _unfiltered(band: float | None, bandwidth: float | None) -> float | None:
     """Return the frequency up to which a log shows its noise as it is, Hz; None: not known."""
-    known = [frequency for frequency in (band, 0.5 * bandwidth if bandwidth else None) if frequency]
-    return min(known) if known else None
+    limits = [
+        frequency for frequency in (band, 0.5 * bandwidth if bandwidth else None) if frequency
+    ]
+    return min(limits) if limits else None
 
 
 _BY_LIKELIHOOD = {"likelihood", "likelihood_gm", "compensated"}
@@ -298,11 +300,11 @@ def estimation(
     quality: Path, curve: Path, sensor: str, recording: str, settings: str
 ) -> Estimation:
     """Return the rows that the channels leave; none of a rejected recording."""
-    given = json.loads(settings)
+    sections = json.loads(settings)
     into = Estimation()
     measured = curves(curve, Quality.read(quality))
     for channel, log in kept_static_logs(quality.parent).items():
         key = Key(sensor, recording, channel)
-        how = EstimateSettings.model_validate(given["estimate"])
-        estimate_channel(key, log, measured[channel], how, given["bandwidth"], into)
+        how = EstimateSettings.model_validate(sections["estimate"])
+        estimate_channel(key, log, measured[channel], how, sections["bandwidth"], into)
     return into

@@ -13,6 +13,7 @@ import pyarrow.compute as pc
 
 from imubench_pipeline.estimators.estimate import JointDraws
 from imubench_pipeline.estimators.rows import draws, estimate_of
+from imubench_pipeline.navigation.error_budget.printed_errors import SIGMAS
 from imubench_pipeline.navigation.fusion.equivalence import (
     FusionChannel,
     TemperaturePart,
@@ -26,9 +27,6 @@ from imubench_pipeline.units import quantity_to_si
 
 NEEDED = ("recordings", "parameters", "allan_compensated", "temperature")
 """The tables of a run that it takes."""
-
-_OF_LIMIT = 1.96
-"""Standard deviations from an estimate to a 95 % limit."""
 
 
 def candidates(
@@ -44,10 +42,6 @@ def candidates(
         Those of `NEEDED`, of a run.
     joint : mapping of (str, str) to Path, optional
         The table ``draws`` of recordings, by sensor and recording.
-
-    Yields
-    ------
-    FusionChannel
     """
     recordings, parameters = tables["recordings"], tables["parameters"]
     warm = _temperature_parts(tables)
@@ -92,13 +86,13 @@ def _temperature_parts(
         curves.setdefault(_channel(row), []).append((row["tau"], row["temperature"]))
     temperature = tables["temperature"]
     chosen = pc.and_(temperature["compensated"], pc.equal(temperature["parameter"], "sensitivity"))
-    found = {}
+    parts = {}
     for row in temperature.filter(chosen).to_pylist():
         if _channel(row) in curves:
             tau, deviation = np.array(curves[_channel(row)]).T
-            error = (row["upper"] - row["lower"]) / (2.0 * _OF_LIMIT * abs(row["value"]))
-            found[_channel(row)] = TemperaturePart(tau, deviation, error)
-    return found
+            error = (row["upper"] - row["lower"]) / (2.0 * SIGMAS * abs(row["value"]))
+            parts[_channel(row)] = TemperaturePart(tau, deviation, error)
+    return parts
 
 
 def _channel(row: Row) -> tuple[str, str, str]:
@@ -119,10 +113,6 @@ def fusion_rows(
     how : FusionSettings
     joint : mapping of (str, str) to Path, optional
         As `candidates` takes it.
-
-    Returns
-    -------
-    iterator of mapping
     """
     rows = equivalence_rows(
         candidates(tables, joint),

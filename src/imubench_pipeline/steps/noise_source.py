@@ -64,7 +64,7 @@ class NoiseSource:
 
     def drawn_with_drift(self, drift: float) -> list[NoiseModel]:
         """Return the drawn models with the same drift beside their own, rad/s^2."""
-        return [_drifting(one, drift) for one in self.drawn]
+        return [_drifting(model, drift) for model in self.drawn]
 
 
 def _drifting(model: NoiseModel, drift: float) -> NoiseModel:
@@ -126,13 +126,13 @@ def static_recordings(
         What speaks against a recording, from its row.
     """
 
-    def order(kept: Kept) -> tuple[Any, ...]:
-        row = kept[0]
+    def order(recording: Kept) -> tuple[Any, ...]:
+        row = recording[0]
         return *far(row), -(row["duration"] or 0.0), row["recording"]
 
     every = [(Quality.read(folder / "quality.json").recording, folder) for folder in folders]
-    usable = [kept for kept in every if kept[0]["status"] == "ok" and kept[0]["kind"] == "static"]
-    return sorted(usable, key=order)
+    static = [(row, folder) for row, folder in every if row["kind"] == "static"]
+    return sorted((each for each in static if each[0]["status"] == "ok"), key=order)
 
 
 def noise_source(

@@ -104,7 +104,7 @@ def noise_at_rest(folders: Sequence[Path]) -> Noise | None:
     """
     for row, folder in static_recordings(folders, lambda row: (row["simulated"],)):
         best = recommended_estimates(folder / "parameters.parquet")
-        models = {name: one.model for name, one in best.items() if one.model.N}
+        models = {name: estimate.model for name, estimate in best.items() if estimate.model.N}
         if any(name.startswith("gyro_") for name in models):
             return Noise(row["recording"], row["rate"], models)
     return None
@@ -128,14 +128,14 @@ def outlook_tables(folders: Sequence[Path], sensor: str, settings: str) -> dict[
         where there is no accelerometer.
     """
     rows: dict[str, list[Row]] = {"alignment": [], "earth_rate_prediction": []}
-    given = json.loads(settings)
-    how = EarthRateSettings.model_validate(given["earth_rate"])
+    sections = json.loads(settings)
+    how = EarthRateSettings.model_validate(sections["earth_rate"])
     noise = noise_at_rest(folders)
     if noise is None:
         return rows
     rows["earth_rate_prediction"] = list(_predicted(sensor, noise, how))
     if any(name.startswith("accel_") for name in noise.models):
-        printed = Datasheet.model_validate(given["datasheet"])
+        printed = Datasheet.model_validate(sections["datasheet"])
         rows["alignment"] = list(_aligned(sensor, noise, printed, how))
     return rows
 
@@ -176,20 +176,22 @@ def _aligned(
         "accelerometers": ", ".join(accelerometers),
     }
     rng = channel_rng(_SEED, sensor, noise.recording, "alignment")
-    for one in accuracies(triad, site, noise.rate, TIMES, runs=_RUNS, rng=rng):
-        roll, pitch, heading = (float(value) for value in one.sigma)
+    for accuracy in accuracies(triad, site, noise.rate, TIMES, runs=_RUNS, rng=rng):
+        roll, pitch, heading = (float(value) for value in accuracy.sigma)
         row = about | {
-            "positions": one.positions,
-            "method": one.method,
-            "time": one.time,
+            "positions": accuracy.positions,
+            "method": accuracy.method,
+            "time": accuracy.time,
             "roll": roll,
             "pitch": pitch,
-            "heading": heading if one.reason is None else None,
-            "reason": one.reason,
+            "heading": heading if accuracy.reason is None else None,
+            "reason": accuracy.reason,
         }
-        if one.errors is not None:
-            row["simulated"] = one.simulated
-            for name, ratio in zip(("roll", "pitch", "heading"), one.errors.tolist(), strict=True):
+        if accuracy.errors is not None:
+            row["simulated"] = accuracy.simulated
+            for name, ratio in zip(
+                ("roll", "pitch", "heading"), accuracy.errors.tolist(), strict=True
+            ):
                 row[f"error_{name}"] = None if math.isnan(ratio) else ratio
         yield row
 

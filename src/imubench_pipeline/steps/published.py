@@ -44,7 +44,7 @@ def published_rows(
         ``parameters``, ``fixed_bias``, ``temperature`` and ``datasheet`` of the same sensor.
     """
     entries = [SimulatedRecording.model_validate(entry) for entry in json.loads(truths)]
-    if not any(one.published for entry in entries for one in entry.channels.values()):
+    if not any(settings.published for entry in entries for settings in entry.channels.values()):
         return
     true = _slowest(truth)
     curve, best = _estimates(tables)
@@ -55,7 +55,7 @@ def published_rows(
             units = SI_UNITS[quantity]
             for figure in settings.published:
                 key = (entry.sensor, entry.recording, str(channel), figure.parameter)
-                found = _as_shown(best.get(key, {}))
+                estimate = _as_shown(best.get(key, {}))
                 sheet = printed.get(key, [])
                 shown = true.get((*key[:3], f"{figure.parameter} in the log"), true.get(key, {}))
                 yield {
@@ -74,7 +74,7 @@ def published_rows(
                     ),
                     "truth": shown.get("value"),
                     "curve": curve.get(key),
-                    **{name: found.get(name) for name in ("value", "lower", "upper")},
+                    **{name: estimate.get(name) for name in ("value", "lower", "upper")},
                     "datasheet": min(sheet, default=None),
                     "datasheet_upper": max(sheet) if len(set(sheet)) > 1 else None,
                     "reason": figure.why,
@@ -112,10 +112,10 @@ def _estimates(tables: Mapping[str, pa.Table]) -> tuple[dict[_Place, Any], dict[
 
 def _slowest(rows: Iterable[Row]) -> dict[_Place, Row]:
     """Return rows by their place; of several processes the slowest, the floor of the curve."""
-    given = [row for row in rows if row["value"] is not None]
+    with_value = [row for row in rows if row["value"] is not None]
     times = {
         (_place(row, "B"), row["component"]): row["value"]
-        for row in given
+        for row in with_value
         if row["parameter"] == "T_B"
     }
 
@@ -124,18 +124,18 @@ def _slowest(rows: Iterable[Row]) -> dict[_Place, Row]:
         of_process = row["parameter"] == "B"
         return times.get((_place(row), row["component"]), math.inf) if of_process else 0.0
 
-    return {_place(row): row for row in sorted(given, key=slowness)}
+    return {_place(row): row for row in sorted(with_value, key=slowness)}
 
 
 def _printed(rows: Iterable[Row]) -> dict[_Place, list[float]]:
     """Return the figures of the datasheet, in the conventions of the parameters."""
-    found: dict[_Place, list[float]] = {}
+    figures: dict[_Place, list[float]] = {}
     for row in rows:
-        known = _DATASHEET.get(row["statistic"]) or _DATASHEET.get(row["quantity"])
-        if known is not None and row["comparable"] is not None:
-            parameter, factor = known
-            found.setdefault(_place(row, parameter), []).append(row["comparable"] * factor)
-    return found
+        convention = _DATASHEET.get(row["statistic"]) or _DATASHEET.get(row["quantity"])
+        if convention is not None and row["comparable"] is not None:
+            parameter, factor = convention
+            figures.setdefault(_place(row, parameter), []).append(row["comparable"] * factor)
+    return figures
 
 
 def truth_rows(truths: str) -> Iterator[Row]:

@@ -17,9 +17,10 @@ from imubench_pipeline.tables import build, read, write_arrow
 
 def write_ranking(tables: dict[str, Path], settings: str, outputs: list[Path]) -> None:
     """Write the tables ``ranking`` and ``next_steps``, as Parquet and CSV."""
-    given = json.loads(settings)
+    sections = json.loads(settings)
     requirements = {
-        name: Requirement.model_validate(one) for name, one in given["requirements"].items()
+        name: Requirement.model_validate(section)
+        for name, section in sections["requirements"].items()
     }
     joined = {name: read(name, [path]) for name, path in tables.items()}
     asked = joined.pop("error_budget").filter(pc.field("requirement").is_valid())
@@ -31,10 +32,10 @@ def write_ranking(tables: dict[str, Path], settings: str, outputs: list[Path]) -
         recommended.to_pylist(),
         joined["backtest"].to_pylist(),
     )
-    judged = list(judgements(asked.to_pylist(), requirements, given["sensors"], basis))
-    made = {
+    judged = list(judgements(asked.to_pylist(), requirements, sections["sensors"], basis))
+    built = {
         "ranking": build("ranking", ranked(judged, basis)),
         "next_steps": build("next_steps", next_step_rows(judged, basis)),
     }
     for output in outputs:
-        write_arrow(made[output.stem], output)
+        write_arrow(built[output.stem], output)

@@ -113,13 +113,13 @@ def write_reconstruction(
     about = Quality.read(quality)
     measured = curves(allan, about)
     left = compensated_curves(compensated, measured)
-    found = []
+    results = []
     for channel, by_method in estimates(parameters).items():
         key = Key(about.recording["sensor"], about.recording["recording"], channel)
         rate = about.channels[channel]["rate"]
         for estimate in by_method:
             series = quality.parent / "series" / f"{channel}.{estimate.method}.parquet"
             curve = (left if estimate.method == "compensated" else measured)[channel]
-            found.append(reconstruct(key, estimate, curve, rate, settings, series))
-    write("reconstruction", [row for result in found for row in result.curve_rows], outputs[0])
-    write("scores", [result.score_row for result in found], outputs[1])
+            results.append(reconstruct(key, estimate, curve, rate, settings, series))
+    write("reconstruction", [row for result in results for row in result.curve_rows], outputs[0])
+    write("scores", [result.score_row for result in results], outputs[1])

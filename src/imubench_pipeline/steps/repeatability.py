@@ -18,7 +18,7 @@ def write_repeatability(
     how = DatasheetSettings.model_validate(json.loads(settings))
     fixed = read("fixed_bias", [biases]).to_pylist()
     about = read("recordings", [recordings]).to_pylist()
-    found = repeatability_rows(fixed, about, sensors_of(catalogue), how.tolerance)
-    table = build("repeatability", found)
+    rows = repeatability_rows(fixed, about, sensors_of(catalogue), how.tolerance)
+    table = build("repeatability", rows)
     for output in outputs:
         write_arrow(table, output)

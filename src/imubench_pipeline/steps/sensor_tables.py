@@ -54,14 +54,14 @@ def joined_tables(
         Every table of recordings.
     """
     qualities = [Quality.read(path) for path in parts["quality"]]
-    told = [Failure(**quality.failure) for quality in qualities if quality.failure]
+    failed_steps = [Failure(**quality.failure) for quality in qualities if quality.failure]
     joined = {}
     for name, paths in parts.items():
         if name != "quality":
             joined[name], failed = read_with_failures(name, paths)
-            told += failed
-    failures = list(dict.fromkeys(told))
-    joined = without(joined, {(one.sensor, one.recording) for one in failures})
+            failed_steps += failed
+    failures = list(dict.fromkeys(failed_steps))
+    joined = without(joined, {(failure.sensor, failure.recording) for failure in failures})
     about = [quality.recording for quality in qualities]
     devices = {(row["sensor"], row["recording"]): row["device"] for row in about}
     recommended = joined["parameters"].filter(joined["parameters"]["recommended"])
@@ -81,14 +81,14 @@ def joined_tables(
     unusual = unusual_rows(estimated, sensors)
     of_estimates = joined.pop("estimate_findings").to_pylist()
     twins = recorded_twice(joined["models"].to_pylist(), biases)
-    found = [*of_logs, *of_levels, *of_estimates, *spectral_rows(joined), *unusual, *twins]
+    findings = [*of_logs, *of_levels, *of_estimates, *spectral_rows(joined), *unusual, *twins]
     if "backtest" in joined:
-        found += comparison.findings(joined["backtest"].to_pylist())
-    joined["findings"] = build("findings", found)
+        findings += comparison.findings(joined["backtest"].to_pylist())
+    joined["findings"] = build("findings", findings)
     doubted = list(doubts(joined["findings"].to_pylist(), estimated, joined["models"].to_pylist()))
     about = judged(about, doubted, json.loads(decide).get("include", ()))
     joined["recordings"] = build("recordings", about)
-    joined["doubts"] = build("doubts", (one.row() for one in doubted))
+    joined["doubts"] = build("doubts", (doubt.row() for doubt in doubted))
     apart = left_out(about)
     pools = pooled_rows(undecided(estimated, apart), undecided(biases, apart), devices)
     joined["pooled"] = build("pooled", with_doubts_of_all(pools, about))
@@ -125,16 +125,16 @@ def without_doubles(
     durations : mapping
         Of each sensor and recording, s.
     """
-    known: dict[tuple[str, str, str], list[Row]] = {}
+    by_place: dict[tuple[str, str, str], list[Row]] = {}
     for row in deterministic.to_pylist():
-        known.setdefault((row["sensor"], row["recording"], row["channel"]), []).append(row)
+        by_place.setdefault((row["sensor"], row["recording"], row["channel"]), []).append(row)
     for finding in findings:
         kind = _OF_LOGS.get(finding["finding"])
         if kind is None:
             yield finding
             continue
         place = (finding["sensor"], finding["recording"], finding["channel"])
-        same = (row for row in known.get(place, ()) if row["kind"] == kind)
+        same = (row for row in by_place.get(place, ()) if row["kind"] == kind)
         near = _NEAR * durations.get((finding["sensor"], finding["recording"]), 0.0)
         if not any(abs(row["start"] - (finding["start"] or 0.0)) <= near for row in same):
             yield finding

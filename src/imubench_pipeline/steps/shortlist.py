@@ -39,12 +39,12 @@ def rows_of_run(
     OSError, ValueError
         If a table cannot be read, or is of another form.
     """
-    found = {name: read(name, [path]).to_pylist() for name, path in tables.items()}
-    recordings = found.get("recordings", [])
+    rows = {name: read(name, [path]).to_pylist() for name, path in tables.items()}
+    recordings = rows.get("recordings", [])
     classes = {name: sensor.price_class for name, sensor in sensors.items()}
-    measured = measured_ranges(found.get("parameters", []), recordings, classes)
+    measured = measured_ranges(rows.get("parameters", []), recordings, classes)
     ranges = replace(measured, printed=printed_ranges(sensors))
-    yield from shortlist_rows(requirements, sensors, ranges, found.get("ranking", []), recordings)
+    yield from shortlist_rows(requirements, sensors, ranges, rows.get("ranking", []), recordings)
 
 
 def write_shortlist(
@@ -52,7 +52,7 @@ def write_shortlist(
 ) -> None:
     """Write the table ``shortlist``, as Parquet and CSV."""
     asked = json.loads(settings)["requirements"]
-    requirements = {name: Requirement.model_validate(one) for name, one in asked.items()}
+    requirements = {name: Requirement.model_validate(section) for name, section in asked.items()}
     table = build("shortlist", rows_of_run(requirements, sensors_of(catalogue), tables))
     for output in outputs:
         write_arrow(table, output)

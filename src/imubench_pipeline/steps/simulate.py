@@ -148,7 +148,7 @@ def _turned(
 
 def write_recording(settings: str, folder: Path) -> None:
     """Write the recording into ``folder``, which appears when it is complete."""
-    given = json.loads(settings)
-    recording = SimulatedRecording.model_validate(given["recording"])
+    sections = json.loads(settings)
+    recording = SimulatedRecording.model_validate(sections["recording"])
     with making(folder) as made:
-        write_simulated(recording, LogFormat.model_validate(given["log"]), made)
+        write_simulated(recording, LogFormat.model_validate(sections["log"]), made)

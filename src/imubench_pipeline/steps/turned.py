@@ -47,6 +47,12 @@ _GIVEN = (
 )
 
 
+_POSITION_ELSEWHERE = (
+    "the position has a clock of its own; give it as a column of the file that the gyro is in, or "
+    "leave 'position' out"
+)
+
+
 @dataclass
 class EarthRate:
     """Rows of the tables that an experiment leaves."""
@@ -92,14 +98,8 @@ def earth_rate_of(
         "model_from": source.words if source else None,
     }
     names = asdict(key) | about
-    if len(log.segments) > 1:
-        tables.earth_rate += _without(names, WHOLE, "not_shown", segments_reason(log))
-        return tables
-    if log.position_elsewhere:
-        reason = (
-            "the position has a clock of its own; give it as a column of the file that the gyro is "
-            "in, or leave 'position' out"
-        )
+    if len(log.segments) > 1 or log.position_elsewhere:
+        reason = segments_reason(log) if len(log.segments) > 1 else _POSITION_ELSEWHERE
         tables.earth_rate += _without(names, WHOLE, "not_shown", reason)
         return tables
     if source is not None:
@@ -215,7 +215,7 @@ def _turning_rows(key: Key, turning: Turning, samples: Array, rate: float) -> It
     used = _used(samples, turning, rate)
     for number, (dwell, part) in enumerate(_dwells(turning, rate), 1):
         values = used[part.start : part.stop]
-        there = np.isfinite(values)
+        finite = np.isfinite(values)
         yield names | {
             "what": "dwell",
             "number": number,
@@ -223,7 +223,7 @@ def _turning_rows(key: Key, turning: Turning, samples: Array, rate: float) -> It
             "stop": dwell.stop,
             "sense": dwell.sense,
             "found_by": dwell.found_by,
-            "mean": float(values[there].mean()) if there.any() else None,
+            "mean": float(values[finite].mean()) if finite.any() else None,
             "doubts": "; ".join(dwell.doubts) or None,
         }
     for number, turn in enumerate(turning.turns, 1):

@@ -77,13 +77,13 @@ class Predicted:
         (float, float)
             rad^2, (m/s)^2 or m^2.
         """
-        means = np.array([one.mean for one in self.spreads])
+        means = np.array([spread.mean for spread in self.spreads])
         logarithms = np.log(means)
-        scatter = float(np.mean([one.variance / one.mean**2 for one in self.spreads]))
-        known = float(np.var(logarithms))
-        left = scatter + known
+        scatter = float(np.mean([spread.variance / spread.mean**2 for spread in self.spreads]))
+        uncertainty = float(np.var(logarithms))
+        left = scatter + uncertainty
         if self.efficient:
-            left = max(scatter - known, _LEAST_SCATTER * scatter)
+            left = max(scatter - uncertainty, _LEAST_SCATTER * scatter)
         centre = math.exp(float(np.mean(logarithms)))
         tail = (1.0 - level) / 2.0
         lower, upper = centre * left * gammaincinv(1.0 / left, [tail, 1.0 - tail])
@@ -100,8 +100,8 @@ class Predicted:
         mean_square : float
             Of the log; rad^2, (m/s)^2 or m^2.
         """
-        means = np.array([one.mean for one in self.spreads])
-        variances = np.array([one.variance for one in self.spreads])
+        means = np.array([spread.mean for spread in self.spreads])
+        variances = np.array([spread.variance for spread in self.spreads])
         return float(np.mean(gammaincc(means**2 / variances, mean_square * means / variances)))
 
 
@@ -209,24 +209,28 @@ def compare(
         They are drawn jointly from a likelihood (`Predicted`).
     """
     predicted = asked.sigma(model)
-    lower, upper = np.quantile([asked.sigma(one) for one in drawn], [0.025, 0.975])
+    lower, upper = np.quantile([asked.sigma(candidate) for candidate in drawn], [0.025, 0.975])
     # The draws of what is absent lie above it: the value itself is inside.
     budget = (predicted, min(float(lower), predicted), max(float(upper), predicted))
     covariance = WindowCovariance(cut, asked.order, asked.factor)
-    found = errors(means, covariance.weights, covariance.lags)
-    if found.count <= (SHORTEST - 1) * cut.blocks:
-        return Comparison(found.count, *budget, reason=_too_few(asked, cut, means, found.count))
-    possible = [one for one in drawn if one.terms] or [model]
-    by_draws = Predicted([covariance.spread(one, found) for one in possible], efficient)
+    window_errors = errors(means, covariance.weights, covariance.lags)
+    if window_errors.count <= (SHORTEST - 1) * cut.blocks:
+        return Comparison(
+            window_errors.count, *budget, reason=_too_few(asked, cut, means, window_errors.count)
+        )
+    possible = [candidate for candidate in drawn if candidate.terms] or [model]
+    by_draws = Predicted(
+        [covariance.spread(candidate, window_errors) for candidate in possible], efficient
+    )
     least, most = by_draws.limits()
     return Comparison(
-        found.count,
+        window_errors.count,
         *budget,
-        measured=math.sqrt(found.mean_square),
-        independent=covariance.spread(model, found).degrees,
+        measured=math.sqrt(window_errors.mean_square),
+        independent=covariance.spread(model, window_errors).degrees,
         least=math.sqrt(least),
         most=math.sqrt(most),
-        chance=by_draws.chance_above(found.mean_square),
+        chance=by_draws.chance_above(window_errors.mean_square),
     )
 
 

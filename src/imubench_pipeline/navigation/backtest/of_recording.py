@@ -68,8 +68,8 @@ def backtest_rows(
         Of the run; each channel has a stream of its own.
     """
     apart: dict[str, dict[str, None]] = {}
-    for one in deterministic:
-        apart.setdefault(one["channel"], {})[one["kind"]] = None
+    for component in deterministic:
+        apart.setdefault(component["channel"], {})[component["kind"]] = None
     rows = [
         dict(names) | row | {"taken_out": ", ".join(apart.get(channel, ())) or None}
         for channel, log in logs.items()
@@ -116,8 +116,10 @@ def _of_channel(
                 "reason": f"two samples are further apart than the times: {log.rate:g} Hz"
             }
         else:
-            found = compare(asked, cut, means[cut.block], estimate.model, drawn, efficient=jointly)
-            yield about | _columns(asked, found)
+            comparison = compare(
+                asked, cut, means[cut.block], estimate.model, drawn, efficient=jointly
+            )
+            yield about | _columns(asked, comparison)
 
 
 def _about(channel: str, requirement: str, limit: Limit) -> dict[str, Any]:
@@ -145,21 +147,21 @@ def _asked(
     return DeadReckoning(order, rest, limit.seconds, factor)
 
 
-def _columns(asked: DeadReckoning, found: Comparison) -> dict[str, Any]:
-    predicted = found.predicted
+def _columns(asked: DeadReckoning, comparison: Comparison) -> dict[str, Any]:
+    predicted = comparison.predicted
     return {
         "window": asked.rest,
-        "windows": found.windows,
-        "independent": found.independent,
-        "measured": found.measured,
+        "windows": comparison.windows,
+        "independent": comparison.independent,
+        "measured": comparison.measured,
         "predicted": predicted,
-        "predicted_lower": found.lower,
-        "predicted_upper": found.upper,
-        "ratio": found.ratio,
-        "ratio_lower": None if found.least is None else found.least / predicted,
-        "ratio_upper": None if found.most is None else found.most / predicted,
-        "chance": found.chance,
-        "verdict": found.verdict,
+        "predicted_lower": comparison.lower,
+        "predicted_upper": comparison.upper,
+        "ratio": comparison.ratio,
+        "ratio_lower": None if comparison.least is None else comparison.least / predicted,
+        "ratio_upper": None if comparison.most is None else comparison.most / predicted,
+        "chance": comparison.chance,
+        "verdict": comparison.verdict,
         "duration_needed": asked.duration_needed,
-        "reason": found.reason,
+        "reason": comparison.reason,
     }

@@ -158,10 +158,10 @@ def errors(means: Sequence[Array], weights: Array, lags: int) -> Errors:
         gaps = ~np.isfinite(segment)
         # What all blocks have in common cancels; taken off, it does not eat digits.
         level = float(np.mean(segment[~gaps])) if not gaps.all() else 0.0
-        found = correlated(np.where(gaps, 0.0, segment - level), weights)
+        window_errors = correlated(np.where(gaps, 0.0, segment - level), weights)
         before = np.concatenate(([0], np.cumsum(gaps)))
         whole = before[len(weights) :] == before[: -len(weights)]
-        total += float(np.sum(found[whole] ** 2))
+        total += float(np.sum(window_errors[whole] ** 2))
         count += int(whole.sum())
         pairs += _pairs(whole, lags)
     return Errors(total / count if count else math.nan, count, pairs)
@@ -186,13 +186,13 @@ def correlated(values: Array, weights: Array) -> Array:
     return np.fft.irfft(product, length)[: len(values) - len(weights) + 1]
 
 
-def _pairs(there: NDArray[np.bool_], lags: int) -> Array:
-    """Return how many pairs of what is there are so far apart, by lag."""
-    length = 1 << (2 * len(there) - 1).bit_length()
-    power = np.abs(np.fft.rfft(there.astype(np.float64), length)) ** 2
+def _pairs(whole: NDArray[np.bool_], lags: int) -> Array:
+    """Return how many pairs of whole windows begin so many blocks apart, by lag."""
+    length = 1 << (2 * len(whole) - 1).bit_length()
+    power = np.abs(np.fft.rfft(whole.astype(np.float64), length)) ** 2
     number = np.zeros(lags)
-    kept = min(lags, len(there))
-    number[:kept] = np.rint(np.fft.irfft(power, length)[:kept])
+    counted = min(lags, len(whole))
+    number[:counted] = np.rint(np.fft.irfft(power, length)[:counted])
     return number
 
 
@@ -228,8 +228,11 @@ def block_means(
     }
     if not edges:
         return {}
-    sums = _sums(parts, np.unique(np.concatenate([one for many in edges.values() for one in many])))
-    return {length: [sums.means(one) for one in many] for length, many in edges.items()}
+    every = np.concatenate([of_segment for each in edges.values() for of_segment in each])
+    sums = _sums(parts, np.unique(every))
+    return {
+        length: [sums.means(of_segment) for of_segment in each] for length, each in edges.items()
+    }
 
 
 def _edges(start: int, stop: int, samples: float) -> NDArray[np.int64]:
@@ -248,10 +251,10 @@ class _Sums:
 
     def means(self, edges: NDArray[np.int64]) -> Array:
         places = np.searchsorted(self.edges, edges)
-        there, size = np.diff(self.present[places]), np.diff(edges)
+        present, size = np.diff(self.present[places]), np.diff(edges)
         means = np.full(len(size), np.nan)
-        enough = (there >= PRESENT * size) & (there > 0)
-        np.divide(np.diff(self.sums[places]), there, out=means, where=enough)
+        enough = (present >= PRESENT * size) & (present > 0)
+        np.divide(np.diff(self.sums[places]), present, out=means, where=enough)
         return means
 
 

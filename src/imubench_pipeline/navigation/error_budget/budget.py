@@ -36,11 +36,13 @@ from imubench_pipeline.navigation.error_budget.in_use import (
     NAMES,
     NO_FIGURES,
     NO_USE,
+    SENSORS,
     STATED,
     Cause,
     Figures,
     Measured,
     Use,
+    check_not_negative,
     levers,
 )
 from imubench_pipeline.navigation.error_budget.parts import (
@@ -56,8 +58,6 @@ from imubench_pipeline.noise.growth import Calibrated, SensorStart, Uncalibrated
 _GYRO_ORDER: dict[Quantity, int] = {"attitude": 0, "heading": 0, "velocity": 1, "position": 2}
 _ACCEL_ORDER: dict[Quantity, int] = {"velocity": 0, "position": 1}
 """Integrations but one, m of `growth`."""
-
-_WORDS: dict[Measured, str] = {"gyro": "gyro", "accel": "accelerometer"}
 
 
 _SHORTEST = 1e-6
@@ -93,7 +93,7 @@ class Levelled:
     on_time: float = 0.0
 
     def __post_init__(self) -> None:
-        _check_not_negative(bias=self.bias or 0.0, on_time=self.on_time)
+        check_not_negative(bias=self.bias or 0.0, on_time=self.on_time)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,9 +122,9 @@ class Start:
     heading: float = 0.0
 
     def __post_init__(self) -> None:
-        _check_not_negative(heading=self.heading)
+        check_not_negative(heading=self.heading)
         if not isinstance(self.tilt, Levelled):
-            _check_not_negative(tilt=self.tilt)
+            check_not_negative(tilt=self.tilt)
         elif not isinstance(self.accel, Calibrated):
             raise ValueError("a levelled start needs the window of calibrated accelerometers")
 
@@ -234,7 +234,7 @@ def budget(
         elif part is not None:
             missing.append(part)
             if cause == "turn_on_bias":
-                assumptions.append(f"turn-on bias of the {_WORDS[measured]}: not known, left out")
+                assumptions.append(f"turn-on bias of the {SENSORS[measured]}: not known, left out")
     return Budget(time, quantity, contributions, assumptions, missing)
 
 
@@ -311,12 +311,6 @@ def _of_levelling(accel: NoiseModel, window: float, levelled: Levelled) -> Itera
         yield Contribution(source, sigma, "turn_on_bias", STATED)
 
 
-def _check_not_negative(**values: float) -> None:
-    for name, value in values.items():
-        if not (math.isfinite(value) and value >= 0):
-            raise ValueError(f"{name} is {value}, expected a number from 0")
-
-
 def time_until(
     limit: float,
     quantity: Quantity,
@@ -359,18 +353,11 @@ def time_until(
     if not (math.isfinite(limit) and limit > 0):
         raise ValueError(f"limit is {limit}, expected a number above 0")
 
+    figures = {"gyro_figures": gyro_figures, "accel_figures": accel_figures}
+
     def excess(time: float) -> float:
-        found = budget(
-            quantity,
-            time,
-            gyro=gyro,
-            accel=accel,
-            start=start,
-            use=use,
-            gyro_figures=gyro_figures,
-            accel_figures=accel_figures,
-        )
-        return found.total - limit
+        after = budget(quantity, time, gyro=gyro, accel=accel, start=start, use=use, **figures)
+        return after.total - limit
 
     if excess(_SHORTEST) >= 0:
         return 0.0

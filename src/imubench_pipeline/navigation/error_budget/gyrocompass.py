@@ -18,7 +18,13 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.navigation.error_budget.in_use import BIASES, NAMES, STATED, Figures
+from imubench_pipeline.navigation.error_budget.in_use import (
+    BIASES,
+    NAMES,
+    STATED,
+    Figures,
+    check_not_negative,
+)
 from imubench_pipeline.navigation.error_budget.parts import Budget, Contribution, Missing, of_figure
 from imubench_pipeline.noise import NoiseModel, Sinusoid, Term
 
@@ -66,10 +72,7 @@ class Gyrocompass:
     def __post_init__(self) -> None:
         if not abs(self.latitude) < math.pi / 2.0:
             raise ValueError(f"latitude is {self.latitude}, expected one between the poles, in rad")
-        for name in ("bias", "on_time"):
-            value = getattr(self, name)
-            if value is not None and not (math.isfinite(value) and value >= 0):
-                raise ValueError(f"{name} is {value}, expected a number from 0")
+        check_not_negative(bias=self.bias or 0.0, on_time=self.on_time)
         if self.positions not in (1, 2):
             raise ValueError(f"positions is {self.positions}, expected 1 or 2")
 

@@ -34,6 +34,9 @@ from imubench_pipeline.noise.growth import Calibrated, SensorStart, Uncalibrated
 Measured = Literal["gyro", "accel"]
 """What a sensor measures."""
 
+SENSORS: Mapping[str, str] = {"gyro": "gyro", "accel": "accelerometer"}
+"""What measures it."""
+
 Cause = Literal[
     "turn_on_bias",
     "repeatability",
@@ -110,6 +113,19 @@ Figures = Mapping[Cause, Figure]
 NO_FIGURES: Figures = MappingProxyType({})
 
 
+def check_not_negative(**values: float) -> None:
+    """Check that numbers are finite and not negative.
+
+    Raises
+    ------
+    ValueError
+        If one is not; it is named.
+    """
+    for name, value in values.items():
+        if not (math.isfinite(value) and value >= 0):
+            raise ValueError(f"{name} is {value}, expected a number from 0")
+
+
 @dataclass(frozen=True, kw_only=True)
 class Use:
     """What happens to a sensor in dead reckoning; 0: it does not.
@@ -142,9 +158,7 @@ class Use:
 
     def __post_init__(self) -> None:
         for name in ("temperature_change", "turns", "speed_change", "vibration"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0):
-                raise ValueError(f"{name} is {value}, expected a number from 0")
+            check_not_negative(**{name: getattr(self, name)})
         if not (math.isfinite(self.over) and self.over > 0):
             raise ValueError(f"over is {self.over}, expected a time above 0")
 
@@ -252,9 +266,9 @@ def needed(measured: Measured, cause: Cause, figures: Figures) -> bool:
         Of the axis.
     """
 
-    def known(one: Cause) -> bool:
-        return one in figures and figures[one].sigma is not None
+    def has_figure(candidate: Cause) -> bool:
+        return candidate in figures and figures[candidate].sigma is not None
 
     asked = cause in _NEEDED or (measured, cause) == ("accel", "vibration_rectification")
     otherwise = _OTHERWISE.get((measured, cause))
-    return asked and not known(cause) and not (otherwise and known(otherwise))
+    return asked and not has_figure(cause) and not (otherwise and has_figure(otherwise))

@@ -161,12 +161,12 @@ class Largest:
     biases: tuple[Contribution, ...] = ()
 
     @classmethod
-    def of(cls, found: Budget, limit: float | None, upper: float) -> Largest:
+    def of(cls, budget: Budget, limit: float | None, upper: float) -> Largest:
         """Return the room in a budget.
 
         Parameters
         ----------
-        found : Budget
+        budget : Budget
         limit : float or None
             Largest standard deviation that is allowed, SI; None: there is none to keep.
         upper : float
@@ -175,41 +175,44 @@ class Largest:
         if limit is None:
             return cls(0.0)
         biases = tuple(
-            one
-            for one in found.contributions
-            if one.cause == "turn_on_bias" and one.figure and one.figure.origin == "datasheet"
+            contribution
+            for contribution in budget.contributions
+            if contribution.cause == "turn_on_bias"
+            and contribution.figure
+            and contribution.figure.origin == "datasheet"
         )
-        total = found.total
+        total = budget.total
         if total > limit:
-            taken = math.fsum(one.sigma**2 for one in biases)
-            total, upper = (math.sqrt(max(size**2 - taken, 0.0)) for size in (total, upper))
+            removed = math.fsum(bias.sigma**2 for bias in biases)
+            total, upper = (math.sqrt(max(size**2 - removed, 0.0)) for size in (total, upper))
         else:
             biases = ()
         room = limit**2 - (upper if upper < limit else total) ** 2
-        parts = len(biases) + len(found.missing)
+        parts = len(biases) + len(budget.missing)
         return cls(math.sqrt(max(room, 0.0) / parts) if parts else 0.0, biases)
 
-    def of_bias(self, one: Contribution) -> dict[str, Any]:
+    def of_bias(self, contribution: Contribution) -> dict[str, Any]:
         """Return the largest figure of a printed bias; nothing of what the limit can bear.
 
         Parameters
         ----------
-        one : Contribution
+        contribution : Contribution
             A source of the budget.
         """
-        if not self.room or one not in self.biases or one.figure is None or not one.figure.sigma:
+        figure = contribution.figure
+        if not self.room or contribution not in self.biases or figure is None or not figure.sigma:
             return {}
-        quantity = "accel" if "accel" in one.source.split() else "gyro"
-        return self._figure(quantity, one.cause, one.sigma / one.figure.sigma)
+        quantity = "accel" if "accel" in contribution.source.split() else "gyro"
+        return self._figure(quantity, contribution.cause, contribution.sigma / figure.sigma)
 
-    def of_missing(self, one: Missing) -> dict[str, Any]:
+    def of_missing(self, missing: Missing) -> dict[str, Any]:
         """Return the row of a source whose figure is not known."""
         return {
-            "source": one.source,
-            "cause": one.cause,
+            "source": missing.source,
+            "cause": missing.cause,
             "origin": "not known",
-            "reason": one.reason,
-        } | self._figure(one.quantity, one.cause, one.lever)
+            "reason": missing.reason,
+        } | self._figure(missing.quantity, missing.cause, missing.lever)
 
     def _figure(self, quantity: str, cause: str, lever: float) -> dict[str, Any]:
         dimension = FIGURE_DIMENSIONS[quantity][PRINTED[cause]][0]  # type: ignore[index]  # a cause

@@ -44,7 +44,7 @@ _CONVENTIONS: Mapping[str, tuple[float, str]] = {
 }
 """By kind, the first that counts first: how many sigma a figure is, and in words."""
 
-_SIGMAS = 1.96
+SIGMAS = 1.96
 """Half the width of a 95 % interval."""
 
 _MEASURED: Mapping[str, Cause] = {"sensitivity": "temperature", "quadratic": "temperature_squared"}
@@ -101,7 +101,7 @@ def of_log(rows: Iterable[Row]) -> dict[Cause, Figure]:
             sigma=abs(row["value"]),
             origin="measured",
             convention="of this specimen, at the mean temperature of the log",
-            spread=(row["upper"] - row["lower"]) / (2.0 * _SIGMAS),
+            spread=(row["upper"] - row["lower"]) / (2.0 * SIGMAS),
         )
         for row in rows
         if row["parameter"] in _MEASURED and row["status"] == "ok"

@@ -10,10 +10,8 @@ from scipy.special import ndtr
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.navigation.error_budget.parts import Budget
+from imubench_pipeline.navigation.error_budget.printed_errors import SIGMAS
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
-
-_SIGMAS = 1.96
-"""Half the width of a 95 % interval."""
 
 
 def interval(budgets: Sequence[Budget], level: float = 0.95) -> tuple[float, float]:
@@ -36,12 +34,12 @@ def interval(budgets: Sequence[Budget], level: float = 0.95) -> tuple[float, flo
     ValueError
         If there is no budget, they differ in quantity or time, or the level is not within 0..1.
     """
-    if len({(one.quantity, one.time) for one in budgets}) != 1:
+    if len({(budget.quantity, budget.time) for budget in budgets}) != 1:
         raise ValueError("expected budgets of one quantity at one time")
     if not 0 < level < 1:
         raise ValueError(f"level is {level}, expected one between 0 and 1")
     tail = (1.0 - level) / 2.0
-    lower, upper = np.quantile([one.total for one in budgets], [tail, 1.0 - tail])
+    lower, upper = np.quantile([budget.total for budget in budgets], [tail, 1.0 - tail])
     return float(lower), float(upper)
 
 
@@ -62,7 +60,7 @@ def chance_within(limit: float, budgets: Sequence[Budget]) -> float:
     ----------
     B. W. Silverman, "Density estimation for statistics and data analysis", 1986, eq. 3.31.
     """
-    totals = np.log(np.maximum([one.total for one in budgets], 1e-300))
+    totals = np.log(np.maximum([budget.total for budget in budgets], 1e-300))
     quarter = np.subtract(*np.quantile(totals, [0.75, 0.25])) / 1.349
     width = 0.9 * min(float(np.std(totals)), float(quarter)) * len(totals) ** -0.2
     left = math.log(limit) - totals
@@ -94,8 +92,8 @@ def draw_models(estimate: Estimate, draws: int, rng: np.random.Generator) -> lis
     """
     if estimate.draws is None:
         return [_drawn(estimate, rng) for _ in range(draws)]
-    kept = len(estimate.draws)
-    rows = (np.arange(draws) % kept) if draws > kept else (np.arange(draws) * kept) // draws
+    available, places = len(estimate.draws), np.arange(draws)
+    rows = places % available if draws > available else places * available // draws
     return [estimate.draws.model(int(row), _lines(estimate, rng)) for row in rng.permutation(rows)]
 
 
@@ -106,7 +104,7 @@ def drawn_jointly(estimate: Estimate) -> bool:
 
 def _lines(estimate: Estimate, rng: np.random.Generator) -> list[Sinusoid]:
     lines = [_values(group, rng) for group in estimate.lines]
-    return [Sinusoid(one["amplitude"], one["frequency"]) for one in lines]
+    return [Sinusoid(line["amplitude"], line["frequency"]) for line in lines]
 
 
 def _drawn(estimate: Estimate, rng: np.random.Generator) -> NoiseModel:
@@ -119,7 +117,11 @@ def _drawn(estimate: Estimate, rng: np.random.Generator) -> NoiseModel:
         T_B=first.get("T_B") or None,
         K=first.get("K", 0.0),
         R=first.get("R", 0.0),
-        further=[GaussMarkov(one["B"], one["T_B"]) for one in further if one["B"] and one["T_B"]],
+        further=[
+            GaussMarkov(process["B"], process["T_B"])
+            for process in further
+            if process["B"] and process["T_B"]
+        ],
         sinusoids=_lines(estimate, rng),
     )
 
@@ -128,18 +130,18 @@ def _values(parameters: Mapping[str, Parameter], rng: np.random.Generator) -> di
     """Return a draw of each parameter; 0 for what is not there."""
     # Every parameter takes its number, so that one more or less does not change the others.
     normal = {name: float(rng.standard_normal()) for name in parameters}
-    return {name: _value(name, one, normal[name]) for name, one in parameters.items()}
+    return {name: _value(name, parameter, normal[name]) for name, parameter in parameters.items()}
 
 
 def _value(name: str, parameter: Parameter, normal: float) -> float:
     value = parameter.in_model
     lower, upper = parameter.lower, parameter.upper
     if value is None or value == 0.0:
-        return 0.0 if name in ("R", "T_B") or upper is None else abs(normal) * upper / _SIGMAS
+        return 0.0 if name in ("R", "T_B") or upper is None else abs(normal) * upper / SIGMAS
     limit = lower if normal < 0 else upper
     if limit is None:
         return value
-    share = abs(normal) / _SIGMAS
+    share = abs(normal) / SIGMAS
     if name == "R":
         return value + (limit - value) * share
     if limit <= 0.0:

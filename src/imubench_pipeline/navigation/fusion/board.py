@@ -123,9 +123,9 @@ class Board:
                     f"a rate of {rate:g} Hz is no whole multiple of the lowest, {self.rate:g} Hz; "
                     "resample that sensor first"
                 )
-        for one in self.shared:
-            found = np.asarray(one.sensitivity, dtype=np.float64)
-            if found.shape != (len(self.models),) or not np.all(np.isfinite(found)):
+        for process in self.shared:
+            sensitivity = np.asarray(process.sensitivity, dtype=np.float64)
+            if sensitivity.shape != (len(self.models),) or not np.all(np.isfinite(sensitivity)):
                 raise ValueError("expected one finite sensitivity for every sensor")
 
     @classmethod
@@ -176,7 +176,7 @@ class Board:
     @property
     def sensitivities(self) -> Array:
         """Those of all shared processes, shape (s, n)."""
-        return np.array([one.sensitivity for one in self.shared], dtype=np.float64).reshape(
+        return np.array([process.sensitivity for process in self.shared], dtype=np.float64).reshape(
             len(self.shared), self.sensors
         )
 
@@ -191,7 +191,7 @@ class Board:
         t = np.atleast_1d(np.asarray(tau, dtype=np.float64))
         t = np.maximum(np.rint(t * self.rate), 1.0) / self.rate
         own = [m.allan_variance(t, r) for m, r in zip(self.models, self.rates, strict=True)]
-        common = [one.model.allan_variance(t, self.rate) for one in self.shared]
+        common = [process.model.allan_variance(t, self.rate) for process in self.shared]
         return self._parts(own, common, len(t))
 
     def spectral_parts(self, omega: ArrayLike) -> Parts:
@@ -203,13 +203,13 @@ class Board:
             rad a fused sample, above 0.
         """
         w = np.atleast_1d(np.asarray(omega, dtype=np.float64))
-        found: dict[tuple[int, int], Array] = {}  # specimens of one sensor have one spectrum
+        spectra: dict[tuple[int, int], Array] = {}  # specimens of one sensor have one spectrum
         keys = [(id(m), size) for m, size in zip(self.models, self.blocks, strict=True)]
         for key, model, rate in zip(keys, self.models, self.rates, strict=True):
-            if key not in found:
-                found[key] = block_mean_spectrum(model, w, rate, key[1])
-        common = [one.model.sampled_spectrum(w, self.rate) for one in self.shared]
-        return self._parts([found[key] for key in keys], common, len(w))
+            if key not in spectra:
+                spectra[key] = block_mean_spectrum(model, w, rate, key[1])
+        common = [process.model.sampled_spectrum(w, self.rate) for process in self.shared]
+        return self._parts([spectra[key] for key in keys], common, len(w))
 
     def _parts(self, own: Sequence[Array], common: Sequence[Array], points: int) -> Parts:
         shared = np.array(common).reshape(len(self.shared), points)

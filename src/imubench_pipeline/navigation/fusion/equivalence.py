@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import permutations
 from typing import Any
 
 import numpy as np
@@ -70,8 +71,8 @@ class TemperaturePart:
 
     def variance(self, tau: float) -> float:
         """Return its Allan variance at a tau in s, (rad/s)² or (m/s²)²."""
-        there = np.log(np.maximum(self.deviation, 1e-300))
-        return math.exp(2.0 * float(np.interp(math.log(tau), np.log(self.tau), there)))
+        log_deviation = np.log(np.maximum(self.deviation, 1e-300))
+        return math.exp(2.0 * float(np.interp(math.log(tau), np.log(self.tau), log_deviation)))
 
     def drawn(self, tau: float, draws: int, rng: np.random.Generator) -> Array:
         """Return Allan variances, shape (draws,), of sensitivities drawn from their interval."""
@@ -143,7 +144,10 @@ class FusionChannel:
 
 def _alone(name: str, group: Mapping[str, Parameter], tau: float) -> float:
     """Return the Allan variance that a parameter may stand for at most, by what is known of it."""
-    size = {key: one.in_model if one.upper is None else one.upper for key, one in group.items()}
+    size = {
+        key: parameter.in_model if parameter.upper is None else parameter.upper
+        for key, parameter in group.items()
+    }
     if name in ("B", "T_B"):
         time = group["T_B"].in_model if "T_B" in group else None
         model = NoiseModel(B=size["B"] or 0.0, T_B=time or None)
@@ -211,15 +215,15 @@ def answer(
     Answer or str
         The reason, where there is no answer.
     """
-    measured = [one for one in candidates if not one.simulated] or list(candidates)
-    long = [one for one in measured if tau <= longest * one.duration]
+    measured = [channel for channel in candidates if not channel.simulated] or list(candidates)
+    long = [channel for channel in measured if tau <= longest * channel.duration]
     if not long:
-        most = longest * max(one.duration for one in measured)
+        most = longest * max(channel.duration for channel in measured)
         return f"the logs of {sensor} tell tau up to {most:.3g} s alone"
-    noisy = sorted((one for one in long if one.model.terms), key=lambda one: one.variance(tau))
+    noisy = [channel for channel in long if channel.model.terms]
     if not noisy:
         return f"no noise model of {sensor}"
-    chosen = noisy[len(noisy) // 2]
+    chosen = sorted(noisy, key=lambda channel: channel.variance(tau))[len(noisy) // 2]
     stream = channel_rng(seed, chosen.sensor, chosen.recording, chosen.channel, "fusion")
     own, common = _parts([chosen.model], correlation, tau)
     drawn_own, drawn_common = _parts(chosen.drawn(draws, stream), correlation, tau)
@@ -268,45 +272,38 @@ def equivalence_rows(
     mapping
         By column of the table.
     """
-    listed = list(candidates)
-    sensors = sorted({one.sensor for one in listed})
+    listed = sorted(candidates, key=lambda channel: channel.sensor)
     for quantity in ("gyro", "accel"):
-        own = [one for one in listed if one.channel.startswith(quantity)]
-        there = [sensor for sensor in sensors if any(one.sensor == sensor for one in own)]
+        by_sensor: dict[str, list[FusionChannel]] = {}
+        for channel in listed:
+            if channel.channel.startswith(quantity):
+                by_sensor.setdefault(channel.sensor, []).append(channel)
         for tau in taus:
             answers = {
                 sensor: answer(
-                    sensor,
-                    [one for one in own if one.sensor == sensor],
-                    tau,
-                    correlation,
-                    longest=longest,
-                    draws=draws,
-                    seed=seed,
+                    sensor, own, tau, correlation, longest=longest, draws=draws, seed=seed
                 )
-                for sensor in there
+                for sensor, own in by_sensor.items()
             }
-            for a in there:
-                for b in there:
-                    if a != b:
-                        names = {"quantity": quantity, "tau": tau, "sensor": a, "other": b}
-                        yield names | _pair(answers[a], answers[b], tau)
+            for a, b in permutations(answers, 2):
+                names = {"quantity": quantity, "tau": tau, "sensor": a, "other": b}
+                yield names | _pair(answers[a], answers[b], tau)
 
 
 def _pair(a: Answer | str, b: Answer | str, tau: float) -> dict[str, Any]:
     row: dict[str, Any] = {}
     reasons: list[str] = []
-    for prefix, one in (("", a), ("other_", b)):
-        if isinstance(one, str):
-            reasons.append(one)
+    for prefix, sensor_answer in (("", a), ("other_", b)):
+        if isinstance(sensor_answer, str):
+            reasons.append(sensor_answer)
             continue
-        if one.unknown:
-            reasons.append(one.unknown)
+        if sensor_answer.unknown:
+            reasons.append(sensor_answer.unknown)
         row |= {
-            f"{prefix}recording": one.candidate.recording,
-            f"{prefix}channel": one.candidate.channel,
-            f"{prefix}simulated": one.candidate.simulated,
-            f"{prefix}adev": math.sqrt(one.own + one.common),
+            f"{prefix}recording": sensor_answer.candidate.recording,
+            f"{prefix}channel": sensor_answer.candidate.channel,
+            f"{prefix}simulated": sensor_answer.candidate.simulated,
+            f"{prefix}adev": math.sqrt(sensor_answer.own + sensor_answer.common),
         }
     plain = not reasons
     if not isinstance(a, str):

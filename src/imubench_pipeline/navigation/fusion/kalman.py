@@ -73,9 +73,9 @@ def steady_covariance(transition: Array, process_noise: Array, information: Arra
     a = transition
     g = information * scale**2
     p = process_noise / scale**2
-    one = np.eye(len(transition))
+    identity = np.eye(len(transition))
     for _ in range(_MOST_DOUBLINGS):
-        inner = np.linalg.solve((one + p @ g).T, np.column_stack((a.T, g))).T
+        inner = np.linalg.solve((identity + p @ g).T, np.column_stack((a.T, g))).T
         # a (I + P G)^-1 and g (I + P G)^-1
         through, seen = inner[: len(a)], inner[len(a) :]
         grown = p + through @ p @ a.T
@@ -164,8 +164,8 @@ class KalmanFusion:
         turn = np.expm1(1j * omega)
         solved = np.zeros((self.states, len(omega)), dtype=np.complex128)
         for j in range(self.states):
-            known = self._row[j] + self._triangle[:j, j] @ solved[:j]
-            solved[j] = known / (turn + (1.0 - self._triangle[j, j]))
+            right_side = self._row[j] + self._triangle[:j, j] @ solved[:j]
+            solved[j] = right_side / (turn + (1.0 - self._triangle[j, j]))
         return np.asarray(self.weights - solved.T @ self._columns)
 
     def fuse(self, blocks: Iterable[Array]) -> Iterator[Array]:
@@ -224,7 +224,10 @@ def _space(board: Board) -> _Space:
     white = np.zeros((board.sensors, board.sensors))
     members = [
         *zip(board.models, board.rates, board.blocks, np.eye(board.sensors), strict=True),
-        *((one.model, board.rate, 1, np.asarray(one.sensitivity)) for one in board.shared),
+        *(
+            (process.model, board.rate, 1, np.asarray(process.sensitivity))
+            for process in board.shared
+        ),
     ]
     for model, rate, size, gains in members:
         space = of_block_means(_steady(model).state_space(rate, _LONGEST), size)
@@ -241,12 +244,12 @@ def _space(board: Board) -> _Space:
 
 def _steady(model: NoiseModel) -> NoiseModel:
     """Return a model without what is deterministic, its walk bound to 0 by a long time."""
-    found = stochastic(model)
-    if not found.K:
-        return found
+    noise = stochastic(model)
+    if not noise.K:
+        return noise
     time = _WALK * _LONGEST
-    walk = GaussMarkov(bias_instability(found.K**2, time), time)
-    return replace(found, K=0.0, further=[*found.further, walk])
+    walk = GaussMarkov(bias_instability(noise.K**2, time), time)
+    return replace(noise, K=0.0, further=[*noise.further, walk])
 
 
 def _common(covariance: Array) -> Array:

@@ -95,11 +95,11 @@ def allan_of_spectrum(spectrum: Callable[[Array], NDArray[Any]], sizes: ArrayLik
     ndarray, shape (m, ...)
         SI^2.
     """
-    found = []
+    variances = []
     for n in np.atleast_1d(np.asarray(sizes, dtype=np.int64)):
         omega, weights = nodes(int(n))
-        found.append(np.tensordot(weights, spectrum(omega), axes=1))
-    return np.array(found)
+        variances.append(np.tensordot(weights, spectrum(omega), axes=1))
+    return np.array(variances)
 
 
 @lru_cache(maxsize=1)
@@ -179,7 +179,7 @@ def fused_allan(board: Board, weights: Weights, tau: ArrayLike) -> FusedCurve:
 
     With constant weights it is the sum of w_i^2 AV_i and, of each shared process, of
     (w^T g)^2 AV. With weights that change with the frequency it is the integral of the
-    fused spectrum (`quadrature.nodes`; relative error below 1e-7). A ramp passes with the weights
+    fused spectrum (`nodes`; relative error below 1e-7). A ramp passes with the weights
     at frequency 0, a line with those at its own; ramps of several sensors are taken as
     independent, of either sign.
 
@@ -212,7 +212,9 @@ def _of_deterministic(board: Board, weights: Weights, tau: Array) -> Array:
     """Return the Allan variances of ramps and lines, alone and common, shape (m, 2)."""
     # Each at its own rate: the means of the blocks of a faster sensor weaken its lines.
     alone = list(zip(board.models, board.rates, np.eye(board.sensors), strict=True))
-    common = [(one.model, board.rate, np.asarray(one.sensitivity)) for one in board.shared]
+    common = [
+        (process.model, board.rate, np.asarray(process.sensitivity)) for process in board.shared
+    ]
     parts = np.zeros((len(tau), 2))
     for column, members in enumerate((alone, common)):
         for model, rate, gains in members:
@@ -273,12 +275,12 @@ def prediction_limits(
     for estimate, stream in zip(estimates, streams, strict=True):
         if id(estimate) not in drawn:
             drawn[id(estimate)] = draw_models(estimate, draws, stream)
-    found = [
+    deviations = [
         fused_allan(
-            replace(board, models=[drawn[id(one)][i] for one in estimates]), weights, tau
+            replace(board, models=[drawn[id(estimate)][i] for estimate in estimates]), weights, tau
         ).deviation
         for i in range(draws)
     ]
     tail = (1.0 - level) / 2.0
-    lower, upper = np.quantile(found, [tail, 1.0 - tail], axis=0)
+    lower, upper = np.quantile(deviations, [tail, 1.0 - tail], axis=0)
     return lower, upper

@@ -119,7 +119,7 @@ def best_constant(board: Board, tau: float | None = None) -> Constant:
     """
     if tau is None:
         own = np.array([[model.N**2 for model in board.models]])
-        shared = np.array([one.model.N**2 for one in board.shared]).reshape(1, -1)
+        shared = np.array([process.model.N**2 for process in board.shared]).reshape(1, -1)
         parts = Parts(own, shared, board.sensitivities)
     else:
         parts = board.allan_parts([tau])
@@ -160,5 +160,5 @@ def least(parts: Parts) -> Array:
     normal[:, range(1, 1 + len(mean)), range(1, 1 + len(mean))] += 1.0
     rows = np.linalg.solve(normal, weighed)
     lever = root * mean / np.sqrt(unit[:, 0])
-    found = rows[:, 0] - np.einsum("ks,ksn->kn", lever, rows[:, 1:])
-    return np.asarray(found / found.sum(axis=1, keepdims=True))
+    weights = rows[:, 0] - np.einsum("ks,ksn->kn", lever, rows[:, 1:])
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True))

@@ -66,21 +66,21 @@ class MeasuredRanges:
             Over all measured sensors where none of the class is measured; of B where no sensor is
         measured over datasheets; None: nothing is known.
         """
-        there = {
+        by_sensor = {
             sensor: ends
             for (sensor, of, name), ends in self.of_sensor.items()
             if (of, name) == (quantity, figure)
         }
         source = "measured sensors"
-        if not there and figure == "B":
-            there = {sensor: ends for (sensor, of), ends in self.printed.items() if of == quantity}
+        if not by_sensor and figure == "B":
+            by_sensor = {name: ends for (name, of), ends in self.printed.items() if of == quantity}
             source = "datasheets"
-        if not there:
+        if not by_sensor:
             return None
         wanted = class_of(price_class)
-        own = {s: ends for s, ends in there.items() if wanted and self.classes.get(s) == wanted}
+        own = {s: ends for s, ends in by_sensor.items() if wanted and self.classes.get(s) == wanted}
         which = f"of class {wanted}" if own else "of any class, for there is none of its own"
-        used = own or there
+        used = own or by_sensor
         named = ", ".join(sorted(used))
         low, high = min(ends[0] for ends in used.values()), max(ends[1] for ends in used.values())
         return Span(low, high, f"that of {source} {which} ({named})")
@@ -133,12 +133,12 @@ def measured_ranges(
             shown.setdefault(key, []).append((low, high))
         elif row["status"] == "absent" and figure == "K":
             absent.setdefault(key, []).append(row["upper"] or 0.0)
-    found = {}
+    ranges = {}
     for key in {*shown, *absent}:
         several = shown.get(key, [(0.0, max(absent.get(key, [0.0])))])
-        low = 0.0 if key in absent else min(one[0] for one in several)
-        high = max(one[1] for one in several)
+        low = 0.0 if key in absent else min(ends[0] for ends in several)
+        high = max(ends[1] for ends in several)
         if math.isfinite(high):
-            found[key] = (low, high)
-    classes = {sensor: class_of(one) for sensor, one in price_classes.items() if one}
-    return MeasuredRanges(found, classes)
+            ranges[key] = (low, high)
+    classes = {sensor: class_of(text) for sensor, text in price_classes.items() if text}
+    return MeasuredRanges(ranges, classes)

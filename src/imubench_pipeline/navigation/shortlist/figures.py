@@ -14,14 +14,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 from imubench_pipeline.datasheets.comparable import Comparable, comparables
+from imubench_pipeline.navigation.error_budget.in_use import SENSORS
 from imubench_pipeline.navigation.shortlist.classes import MeasuredRanges, Span
 from imubench_pipeline.noise import FLOOR, NoiseModel
 from imubench_pipeline.settings.printed import Datasheet, QuantityDatasheet
 from imubench_pipeline.settings.sensor import Sensor
 
 End = Literal["best", "worst"]
-
-_NAMES = {"gyro": "gyro", "accel": "accelerometer"}
 
 
 @dataclass(frozen=True)
@@ -88,15 +87,9 @@ def figures_of(sensor: Sensor, quantity: str, ranges: MeasuredRanges) -> Figures
         str: why nothing can be said.
     """
     if getattr(sensor.datasheet, quantity) is None:
-        return f"it has no {_NAMES[quantity]}"
-    sheet, options = _of_every_option(sensor.datasheet, quantity)
-    printed = [
-        row
-        for axis in "xyz"
-        for row in comparables(sheet, f"{quantity}_{axis}")
-        if row.value is not None
-    ]
-    of = _NAMES[quantity]
+        return f"it has no {SENSORS[quantity]}"
+    printed, options = _printed(sensor.datasheet, quantity)
+    of = SENSORS[quantity]
     assumed: list[str] = [f"{of}: any of {', '.join(options)}"] if options else []
     unknown: list[str] = []
 
@@ -105,12 +98,12 @@ def figures_of(sensor: Sensor, quantity: str, ranges: MeasuredRanges) -> Figures
         if own:
             assumed.extend(f"{of} {figure}: {words}" for words in _readings(own))
             return _ends(own)
-        found = ranges.span(sensor.price_class, quantity, figure)
-        if found is None:
+        span = ranges.span(sensor.price_class, quantity, figure)
+        if span is None:
             unknown.append(figure)
         else:
-            assumed.append(f"{of} {figure}: {found.low:.2g} to {found.high:.2g} SI, {found.words}")
-        return found
+            assumed.append(f"{of} {figure}: {span.low:.2g} to {span.high:.2g} SI, {span.words}")
+        return span
 
     if not any(row.statistic == "N" for row in printed):
         return f"no noise density of the {of} is published"
@@ -142,22 +135,17 @@ def printed_ranges(sensors: Mapping[str, Sensor]) -> dict[tuple[str, str], tuple
     dict
         (sensor, quantity) -> (low, high), SI; without those that print none.
     """
-    found = {}
+    ranges = {}
     for name, sensor in sensors.items():
-        for quantity in _NAMES:
+        for quantity in SENSORS:
             if getattr(sensor.datasheet, quantity) is None:
                 continue
-            sheet, _ = _of_every_option(sensor.datasheet, quantity)
-            own = [
-                row
-                for axis in "xyz"
-                for row in comparables(sheet, f"{quantity}_{axis}")
-                if row.value is not None and row.statistic == "adev_minimum"
-            ]
+            printed, _ = _printed(sensor.datasheet, quantity)
+            own = [row for row in printed if row.statistic == "adev_minimum"]
             if own:
                 ends = _ends(own)
-                found[name, quantity] = (ends.low, ends.high / FLOOR)
-    return found
+                ranges[name, quantity] = (ends.low, ends.high / FLOOR)
+    return ranges
 
 
 def _ends(rows: Sequence[Comparable]) -> Span:
@@ -174,6 +162,13 @@ def _readings(rows: Sequence[Comparable]) -> list[str]:
     if all(row.figure is not None and row.figure.kind == "max" for row in rows):
         readings.append("a maximum alone is printed, the typical one may be better")
     return readings
+
+
+def _printed(datasheet: Datasheet, quantity: str) -> tuple[list[Comparable], list[str]]:
+    """Return what is printed of all axes of a quantity, and the options that are all taken."""
+    sheet, options = _of_every_option(datasheet, quantity)
+    rows = [row for axis in "xyz" for row in comparables(sheet, f"{quantity}_{axis}")]
+    return [row for row in rows if row.value is not None], options
 
 
 def _of_every_option(datasheet: Datasheet, quantity: str) -> tuple[Datasheet, list[str]]:

@@ -63,14 +63,14 @@ def shortlist_rows(
     """
     simulated = {(row["sensor"], row["recording"]): row["simulated"] for row in recordings}
     measured = {(row["requirement"], row["sensor"]): row for row in ranking if row["decides"]}
-    found = {
+    by_sensor = {
         name: {quantity: figures_of(sensor, quantity, ranges) for quantity in ("gyro", "accel")}
         for name, sensor in sensors.items()
     }
     for name, requirement in requirements.items():
         questions = list(of_requirement(name, requirement))
         rows = []
-        for sensor, figures in found.items():
+        for sensor, figures in by_sensor.items():
             row = _judged(requirement, questions, sensors[sensor], figures)
             standing = measured.get((name, sensor))
             if standing is not None and standing["margin"] is not None:
@@ -95,19 +95,19 @@ def _judged(
     lacking, unknown = judge(requirement.must, _before_buying(sensor))
     if lacking:
         return row | {"verdict": "cannot pass", "reason": "; ".join(lacking)}
-    needed = dict.fromkeys(quantity for one in questions for quantity in one.needs)
-    known = {q: one for q in needed if isinstance(one := figures[q], Figures)}
-    if len(known) < len(needed):
-        why = "; ".join(one for q in needed if isinstance(one := figures[q], str))
+    needed = dict.fromkeys(quantity for question in questions for quantity in question.needs)
+    published = {q: entry for q in needed if isinstance(entry := figures[q], Figures)}
+    if len(published) < len(needed):
+        why = "; ".join(entry for q in needed if isinstance(entry := figures[q], str))
         return row | {"verdict": "not judged", "reason": why}
-    in_use = {quantity: of_datasheet(sensor.datasheet, f"{quantity}_x") for quantity in known}
-    best, missing = _margins(questions, known, in_use, "best")
+    in_use = {quantity: of_datasheet(sensor.datasheet, f"{quantity}_x") for quantity in published}
+    best, missing = _margins(questions, published, in_use, "best")
     least = min(range(len(best)), key=best.__getitem__)
     worst = None
-    if all(one.bounded for one in known.values()):
-        margins, missing = _margins(questions, known, in_use, "worst")
+    if all(allowed.bounded for allowed in published.values()):
+        margins, missing = _margins(questions, published, in_use, "worst")
         worst = min(margins) if not missing else None
-    assumed = [words for one in known.values() for words in one.assumed] + missing
+    assumed = [words for allowed in published.values() for words in allowed.assumed] + missing
     row |= {
         "best_margin": best[least],
         "worst_margin": worst,
@@ -141,14 +141,16 @@ def _margins(
     end: End,
 ) -> tuple[list[float], list[str]]:
     """Return the limit over the error of each question, and what they all leave out, in words."""
-    budgets = [_budget(one, figures, in_use, end) for one in questions]
+    budgets = [_budget(question, figures, in_use, end) for question in questions]
     margins = [
-        one.limit / found.total if found.total > 0.0 else math.inf
-        for one, found in zip(questions, budgets, strict=True)
-        if one.limit is not None  # of a requirement every one has
+        question.limit / budget.total if budget.total > 0.0 else math.inf
+        for question, budget in zip(questions, budgets, strict=True)
+        if question.limit is not None  # of a requirement every one has
     ]
     missing = (
-        f"{one.source}: not known ({one.reason})" for found in budgets for one in found.missing
+        f"{missed.source}: not known ({missed.reason})"
+        for budget in budgets
+        for missed in budget.missing
     )
     return margins, list(dict.fromkeys(missing))
 
@@ -163,6 +165,6 @@ def _budget(
         models = figures[quantity].models(end)
         axes = [AxisErrors(model, {**in_use[quantity], **beside}) for model in models]
         # The quantities are independent: each has its own extreme.
-        totals = [question.answer(**{**_ALONE, quantity: one}).total for one in axes]
+        totals = [question.answer(**{**_ALONE, quantity: axis}).total for axis in axes]
         chosen[quantity] = axes[totals.index(pick(totals))]
     return question.answer(**chosen)

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import get_args
 
 from pydantic import Field
 
+from imubench_pipeline.navigation.error_budget.in_use import SENSORS, Measured
 from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, Datasheet, PrintedFigure
 from imubench_pipeline.settings.requirements import Must
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor
 from imubench_pipeline.settings.validation import Strict
 from imubench_pipeline.units import from_si, quantity_to_si, to_si
 
-Measured = Literal["gyro", "accel"]
-
-_NAMES: dict[Measured, str] = {"gyro": "gyro", "accel": "accelerometer"}
 _UNITS: dict[Measured, str] = {"gyro": "deg/s", "accel": "g"}
 
 _ROUNDED = 1.0 + 1e-9
@@ -60,13 +58,13 @@ class _Point:
     name: str
     fulfilled: bool | None
     asked: str
-    found: str = ""
+    shown: str = ""
 
 
 def abilities(sensor: Sensor) -> Abilities:
     """Return what the file of a sensor tells of what it has."""
     quantities: tuple[Measured, ...] = ("gyro", "accel")
-    found = {
+    printed = {
         name: {
             quantity: largest
             for quantity in quantities
@@ -76,8 +74,8 @@ def abilities(sensor: Sensor) -> Abilities:
     }
     ends = sensor.temperature_range
     return Abilities(
-        full_scale=found["full_scale"],
-        bandwidth=found["bandwidth"],
+        full_scale=printed["full_scale"],
+        bandwidth=printed["bandwidth"],
         logged_rate=sensor.log.rate_hz,
         rate=_si(sensor.rate, "frequency"),
         temperature=(
@@ -86,7 +84,9 @@ def abilities(sensor: Sensor) -> Abilities:
             else None
         ),
         channels=tuple(sensor.log.channels),
-        without=tuple(one for one in quantities if getattr(sensor.datasheet, one) is None),
+        without=tuple(
+            quantity for quantity in quantities if getattr(sensor.datasheet, quantity) is None
+        ),
         mass=_si(sensor.mass, "mass"),
         power=_si(sensor.power, "power"),
     )
@@ -108,10 +108,10 @@ def _largest(datasheet: Datasheet, quantity: Measured, name: str) -> float | Non
     for axis in "xyz":
         printed = [(figure, figure.on_axis(axis)) for figure in figures]
         values = [
-            to_si(one, figure.unit or "", FIGURE_DIMENSIONS[quantity][name][0])
+            to_si(size, figure.unit or "", FIGURE_DIMENSIONS[quantity][name][0])
             for figure, value in printed
             if value is not None
-            for one in (value if isinstance(value, tuple) else (value,))
+            for size in (value if isinstance(value, tuple) else (value,))
         ]
         if values:
             by_axis.append(max(values))
@@ -134,8 +134,8 @@ def judge(must: Must, has: Abilities) -> tuple[list[str], list[str]]:
             unknown.append(point.name)
         elif not point.fulfilled:
             lacking.append(
-                f"{point.name} {point.found}, {point.asked} asked"
-                if point.found
+                f"{point.name} {point.shown}, {point.asked} asked"
+                if point.shown
                 else f"no {point.name}"
             )
     return list(dict.fromkeys(lacking)), list(dict.fromkeys(unknown))
@@ -166,11 +166,11 @@ def _full_scales(must: Must, has: Abilities) -> Iterator[_Point]:
     for measured, text in asked.items():
         if text is None:
             continue
-        name = f"full scale of the {_NAMES[measured]}"
+        name = f"full scale of the {SENSORS[measured]}"
         dimension, largest = QUANTITIES[measured], has.full_scale.get(measured)
         shown = _shown(largest, _UNITS[measured], dimension)
         if measured in has.without:
-            yield _Point(_NAMES[measured], False, text)
+            yield _Point(SENSORS[measured], False, text)
         elif largest is None:
             yield _Point(name, None, text)
         else:
@@ -181,13 +181,13 @@ def _bandwidths(must: Must, has: Abilities) -> Iterator[_Point]:
     """Yield the bandwidth of the quantities whose axes must be there, or else of all."""
     if must.bandwidth is None:
         return
-    asked = {text.split("_")[0] for text in must.axes} or set(_NAMES)
-    for measured, name in _NAMES.items():
+    asked = {text.split("_")[0] for text in must.axes} or set(SENSORS)
+    for measured in get_args(Measured):
         if measured in asked and measured not in has.without:
             width = has.bandwidth.get(measured)
             wide = None if width is None else width >= quantity_to_si(must.bandwidth, "frequency")
             shown = _shown(width, "Hz", "frequency")
-            yield _Point(f"bandwidth of the {name}", wide, must.bandwidth, shown)
+            yield _Point(f"bandwidth of the {SENSORS[measured]}", wide, must.bandwidth, shown)
 
 
 def _rate(text: str, has: Abilities) -> _Point:
@@ -204,21 +204,21 @@ def _temperature(ends: tuple[str, str], has: Abilities) -> _Point:
     if has.temperature is None:
         return _Point(name, None, text)
     low, high = (quantity_to_si(end, "temperature") for end in ends)
-    found = has.temperature
-    within = found[0] <= low and high <= found[1]
-    return _Point(name, within, text, f"{found[0]:.4g} to {found[1]:.4g} degC")
+    covered = has.temperature
+    within = covered[0] <= low and high <= covered[1]
+    return _Point(name, within, text, f"{covered[0]:.4g} to {covered[1]:.4g} degC")
 
 
 def _axes(must: Must, has: Abilities) -> Iterator[_Point]:
     for text in must.axes:
         quantity, axes = text.split("_")
         if quantity in has.without:
-            yield _Point(_NAMES["gyro" if quantity == "gyro" else "accel"], False, text)
+            yield _Point(SENSORS[quantity], False, text)
             continue
         for axis in axes:
             # The logs may leave out an axis that the sensor has.
-            there = f"{quantity}_{axis}" in has.channels or None
-            yield _Point(f"axis {quantity}_{axis}", there, text)
+            logged = f"{quantity}_{axis}" in has.channels or None
+            yield _Point(f"axis {quantity}_{axis}", logged, text)
 
 
 def _shown(value: float | None, unit: str, dimension: str) -> str:

@@ -14,6 +14,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from decimal import ROUND_DOWN, Decimal
 
+from imubench_pipeline.navigation.error_budget.in_use import SENSORS
 from imubench_pipeline.navigation.suitability.abilities import Abilities, judge
 from imubench_pipeline.settings.requirements import Must
 from imubench_pipeline.typing import Row
@@ -23,8 +24,6 @@ EXCLUDED = "excluded"
 
 CONDITIONAL = {"passes": "passes if", "probably passes": "probably passes if"}
 """The verdicts that a condition changes: what fails without it fails with it, too."""
-
-_SENSORS = {"gyro": "gyro", "accel": "accelerometer"}
 
 _FIGURES = {
     "turn_on_bias": ("its {sensor}s are calibrated to {largest}", "deg/s", "mg"),
@@ -107,15 +106,15 @@ class Rests:
         """Return a verdict on the known errors with what it rests on, and the latter in words."""
         if self.lacking:
             return EXCLUDED, "; ".join(self.lacking)
-        said = list(self._conditions())
-        if words not in CONDITIONAL or not said:
+        conditions = list(self._conditions())
+        if words not in CONDITIONAL or not conditions:
             return words, None
-        return CONDITIONAL[words], "; ".join(said)
+        return CONDITIONAL[words], "; ".join(conditions)
 
     def unknown_figures(self) -> list[str]:
         """Return the names of the figures that its file does not say, but for turn-on biases."""
         causes = [
-            f"{_SENSORS[measured]} {_NAMES[cause]}"
+            f"{SENSORS[measured]} {_NAMES[cause]}"
             for measured, cause in self.figures
             if cause in _NAMES
         ]
@@ -126,7 +125,7 @@ class Rests:
             text, *units = _FIGURES[cause]
             unit = units[measured == "accel"]
             size = f"{_down(from_si(largest, unit, _DIMENSIONS[unit])):g} {unit} (1 sigma)"
-            yield text.format(sensor=_SENSORS[measured], largest=size)
+            yield text.format(sensor=SENSORS[measured], largest=size)
         if self.unknown:
             yield f"it has what it must (not known: {', '.join(self.unknown)})"
 
@@ -152,7 +151,7 @@ def in_words(row: Row) -> str:
 
 def _measured(row: Row) -> str:
     """Return whose figure a source is of."""
-    return next(word for word in row["source"].split() if word in _SENSORS)
+    return next(word for word in row["source"].split() if word in SENSORS)
 
 
 def is_condition(row: Row) -> bool:

@@ -100,7 +100,11 @@ class Basis:
         channels = self.channels.get(key)
         if channels is None:
             return None
-        return sum(quantity_of(channel) == quantity for channel, told in channels.items() if told)
+        return sum(
+            quantity_of(channel) == quantity
+            for channel, with_noise in channels.items()
+            if with_noise
+        )
 
     def lacks(self, key: Key, quantity: str) -> bool:
         """Tell whether a recording has no axis of a quantity."""
@@ -112,13 +116,13 @@ class Basis:
 
         A log has one unit for all axes of a quantity, so that a doubt of one axis is one of all.
         """
-        found: dict[str, float] = {}
+        factors: dict[str, float] = {}
         for row in self.doubts.get(key, ()):
             if row["factor"] is not None:
                 # Gravity is told by all axes together: its doubt names no channel.
                 quantity = quantity_of(row["channel"]) if row["channel"] else "accel"
-                found.setdefault(quantity, row["factor"])
-        return found
+                factors.setdefault(quantity, row["factor"])
+        return factors
 
 
 def _backtested(row: Row) -> tuple[Any, ...]:

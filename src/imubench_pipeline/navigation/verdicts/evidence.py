@@ -90,15 +90,15 @@ def weaknesses(standing: Standing, requirement: Requirement, basis: Basis) -> li
         `REASONS` and codes of the table ``doubts``. Axes and doubts count where they are those of
         half the recordings or more, the length is that of the longest.
     """
-    found = []
+    reasons = []
     if standing.expected.specimens == 1:
-        found.append("one_specimen")
+        reasons.append("one_specimen")
     durations = [basis.duration((row["sensor"], row["recording"])) for row in standing.totals]
-    longest = max((one for one in durations if one is not None), default=math.inf)
+    longest = max((duration for duration in durations if duration is not None), default=math.inf)
     if longest_asked(standing.total, requirement) > LONGEST_PART * longest:
-        found.append("short_log")
+        reasons.append("short_log")
     if standing.wide:
-        found.append("wide_interval")
+        reasons.append("wide_interval")
     of_logs = Counter(
         reason
         for total in standing.totals
@@ -106,8 +106,8 @@ def weaknesses(standing: Standing, requirement: Requirement, basis: Basis) -> li
     )
     half = len(standing.totals) / 2.0
     order = [*REASONS, *of_logs]
-    found += [reason for reason, count in of_logs.items() if count >= half]
-    return sorted(found, key=order.index)
+    reasons += [reason for reason, count in of_logs.items() if count >= half]
+    return sorted(reasons, key=order.index)
 
 
 def _of_log(

@@ -75,8 +75,8 @@ class Judgement:
     @property
     def _of_errors(self) -> str:
         """The verdict on what is known: of the limit that decides, or of all once calibrated."""
-        once = [_once_calibrated(one) for one in self.standings]
-        if self.decides.known and once != [one.verdict for one in self.standings]:
+        once = [_once_calibrated(standing) for standing in self.standings]
+        if self.decides.known and once != [standing.verdict for standing in self.standings]:
             return min(once, key=_WORST_FIRST.index)
         return self.decides.verdict
 
@@ -121,20 +121,20 @@ def judgements(
             keys = [(sensor, row["recording"]) for row in rows]
             devices = {key[1]: basis.device(key) for key in keys}
             made = all(basis.simulated(key) for key in keys)
-            found = standings(_deciding_rows(rows, basis), devices, usual[made])
-            one = deciding(found)
+            by_limit = standings(_deciding_rows(rows, basis), devices, usual[made])
+            decides = deciding(by_limit)
             yield Judgement(
                 name,
                 requirement,
                 sensor,
-                found,
-                one,
-                [weaknesses(each, requirement, basis) if each.known else [] for each in found],
+                by_limit,
+                decides,
+                [weaknesses(each, requirement, basis) if each.known else [] for each in by_limit],
                 _outside(requirement, sensors[sensor]["price_class"]),
                 Rests.of(
                     requirement.must,
                     Abilities.model_validate(sensors[sensor].get("abilities", {})),
-                    [row for each in found for row in each.conditions],
+                    [row for each in by_limit for row in each.conditions],
                 ),
                 unless(sensor, rows, basis),
             )
@@ -142,12 +142,12 @@ def judgements(
 
 def _deciding_rows(rows: Iterable[Row], basis: Basis) -> list[Row]:
     """Return rows without the figures of recordings that do not decide."""
-    found = []
+    deciding_rows = []
     for row in rows:
         key = row["sensor"], row["recording"]
         apart = basis.apart.get(key)
-        found.append(row if apart is None else {**row, **_NOTHING, "reason": apart})
-    return found
+        deciding_rows.append(row if apart is None else {**row, **_NOTHING, "reason": apart})
+    return deciding_rows
 
 
 def _usual(
@@ -160,20 +160,20 @@ def _usual(
         if all(basis.simulated(key) for key in keys) is not simulated:
             continue
         devices = {key[1]: basis.device(key) for key in keys}
-        for one in standings(_deciding_rows(rows, basis), devices):
-            if one.expected.spread is not None and one.expected.spread_of == "specimens":
-                by_limit.setdefault(limit_of(one.total), []).append(one.expected.spread)
-    found = {key: usual_spread(spreads) for key, spreads in by_limit.items()}
-    return {key: spread for key, spread in found.items() if spread is not None}
+        for standing in standings(_deciding_rows(rows, basis), devices):
+            if standing.expected.spread is not None and standing.expected.spread_of == "specimens":
+                by_limit.setdefault(limit_of(standing.total), []).append(standing.expected.spread)
+    usual = {key: usual_spread(spreads) for key, spreads in by_limit.items()}
+    return {key: spread for key, spread in usual.items() if spread is not None}
 
 
-def _once_calibrated(one: Standing) -> str:
+def _once_calibrated(standing: Standing) -> str:
     error = {
-        "limit": one.total["limit"],
-        "sigma": one.expected.sigma,
-        "upper": one.expected.upper,
+        "limit": standing.total["limit"],
+        "sigma": standing.expected.sigma,
+        "upper": standing.expected.upper,
     }
-    return once_calibrated(one.verdict, error, one.conditions)
+    return once_calibrated(standing.verdict, error, standing.conditions)
 
 
 def _outside(requirement: Requirement, price_class: str | None) -> str | None:

@@ -9,6 +9,7 @@ from typing import Any, Literal, get_args
 
 from scipy.special import stdtrit
 
+from imubench_pipeline.navigation.error_budget.in_use import SENSORS
 from imubench_pipeline.navigation.verdicts.basis import Basis, Key
 from imubench_pipeline.navigation.verdicts.evidence import LONGEST_PART, REASONS, longest_asked
 from imubench_pipeline.navigation.verdicts.judgement import Judgement
@@ -55,9 +56,9 @@ def next_step_rows(judged: Sequence[Judgement], basis: Basis) -> list[dict[str, 
         Of the recordings that they stand on.
     """
     groups: dict[tuple[Any, ...], list[_Step]] = {}
-    for one in judged:
-        if one.outside is None and not one.rests.lacking:
-            for step in _steps(one, basis):
+    for judgement in judged:
+        if judgement.outside is None and not judgement.rests.lacking:
+            for step in _steps(judgement, basis):
                 groups.setdefault((step.key, step.action), []).append(step)
     rows = [_row(steps, basis) for steps in groups.values()]
     return sorted(
@@ -72,53 +73,51 @@ def next_step_rows(judged: Sequence[Judgement], basis: Basis) -> list[dict[str, 
     )
 
 
-def _steps(one: Judgement, basis: Basis) -> Iterator[_Step]:
+def _steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
     """Yield what would help one verdict: to turn it, and to make its evidence stronger."""
-    if one.unless is not None:
-        action: Action = "check_unit" if one.unless.factors else "record_again"
-        either = one.unless.logged, one.unless.mended
+    unless, name = judgement.unless, judgement.name
+    if unless is not None:
+        action: Action = "check_unit" if unless.factors else "record_again"
+        either = unless.logged, unless.mended
         same = None not in either and len({each.verdict for each in either if each}) == 1
-        for key, doubts in one.unless.doubts.items():
+        for key, doubts in unless.doubts.items():
             what = _quantities(basis.factors(key)) or doubts
-            yield _Step(action, key, one.name, turns=not same, what=what)
-    if not one.decides.known:
-        yield from _to_know(one, basis)
+            yield _Step(action, key, name, turns=not same, what=what)
+    if not judgement.decides.known:
+        yield from _to_know(judgement, basis)
         return
-    if one.decides.verdict not in ("passes", "surely fails"):
-        yield from _to_settle(one, basis)
-    if one.compared and (unknown := one.rests.unknown_figures()):
+    if judgement.decides.verdict not in ("passes", "surely fails"):
+        yield from _to_settle(judgement, basis)
+    if judgement.compared and (unknown := judgement.rests.unknown_figures()):
         what = ", ".join(unknown)
-        yield _Step("find_figures", (one.sensor, None), one.name, turns=False, what=what)
-    for reason in one.reasons:
-        yield from _to_strengthen(one, reason, basis)
+        yield _Step("find_figures", (judgement.sensor, None), name, turns=False, what=what)
+    for reason in judgement.reasons:
+        yield from _to_strengthen(judgement, reason, basis)
 
 
-def _to_know(one: Judgement, basis: Basis) -> Iterator[_Step]:
+def _to_know(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
     """Yield what a recording lacks of which nothing is known, or how long it is to be."""
-    total = one.decides.total
-    key = one.sensor, total["recording"]
+    total = judgement.decides.total
+    key = judgement.sensor, total["recording"]
     if key in basis.apart:
         return
     needs = ("gyro",) if total["error"] in ("heading", "north") else ("gyro", "accel")
     missing = [name for name in needs if basis.lacks(key, name)]
     if missing:
-        yield _Step("add_channels", key, one.name, turns=True, what=_quantities(missing))
-    elif _told_by(one) > (basis.duration(key) or math.inf):
-        yield _Step("log_longer", key, one.name, turns=True, duration=_told_by(one))
+        yield _Step("add_channels", key, judgement.name, turns=True, what=_quantities(missing))
+    elif (needed := _duration_needed(judgement)) > (basis.duration(key) or math.inf):
+        yield _Step("log_longer", key, judgement.name, turns=True, duration=needed)
 
 
-_NAMES = {"gyro": "gyro", "accel": "accelerometer"}
-
-
-def _to_settle(one: Judgement, basis: Basis) -> Iterator[_Step]:
-    decides = one.decides
+def _to_settle(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
+    decides, sensor, name = judgement.decides, judgement.sensor, judgement.name
     away = abs(math.log(decides.margin))
     if decides.expected.spread is not None:
         more = specimens_needed(decides.expected, away)
         if more:
-            yield _Step("add_specimens", (one.sensor, None), one.name, True, specimens=more)
+            yield _Step("add_specimens", (sensor, None), name, True, specimens=more)
         return
-    key, duration = _longest(one.sensor, decides, basis)
+    key, duration = _longest(sensor, decides, basis)
     low, high = decides.margins
     if duration is None or not low or math.isinf(high):
         return
@@ -127,11 +126,11 @@ def _to_settle(one: Judgement, basis: Basis) -> Iterator[_Step]:
         math.log(decides.margin / low) if decides.margin > 1.0 else math.log(high / decides.margin)
     )
     if 0.0 < half <= away * math.sqrt(_LONGEST):
-        needed = duration * (half / away) ** 2
-        yield _Step("log_longer", key, one.name, True, duration=max(needed, _told_by(one)))
+        needed = max(duration * (half / away) ** 2, _duration_needed(judgement))
+        yield _Step("log_longer", key, name, True, duration=needed)
 
 
-def specimens_needed(found: Expected, away: float) -> int | None:
+def specimens_needed(expected: Expected, away: float) -> int | None:
     """Return how many more specimens would bring the limits of an error within a distance.
 
     t sqrt(tau^2 (1 + 1/n)) with n - 1 degrees of freedom, where the spread stays what it is: the
@@ -139,7 +138,7 @@ def specimens_needed(found: Expected, away: float) -> int | None:
 
     Parameters
     ----------
-    found : Expected
+    expected : Expected
         With a spread.
     away : float
         Logarithm of the margin: how far the limits may be.
@@ -149,51 +148,52 @@ def specimens_needed(found: Expected, away: float) -> int | None:
     int or None
         None where 20 specimens would not do.
     """
-    assert found.spread is not None
-    for number in range(found.specimens + 1, _MOST_SPECIMENS + 1):
+    assert expected.spread is not None
+    for number in range(expected.specimens + 1, _MOST_SPECIMENS + 1):
         half = float(stdtrit(number - 1, 0.975)) * math.sqrt(
-            found.spread.variance * (1.0 + 1.0 / number)
+            expected.spread.variance * (1.0 + 1.0 / number)
         )
         if half <= away:
-            return number - found.specimens
+            return number - expected.specimens
     return None
 
 
-def _to_strengthen(one: Judgement, reason: str, basis: Basis) -> Iterator[_Step]:
-    key, duration = _longest(one.sensor, one.decides, basis)
+def _to_strengthen(judgement: Judgement, reason: str, basis: Basis) -> Iterator[_Step]:
+    decides, sensor, name = judgement.decides, judgement.sensor, judgement.name
+    key, duration = _longest(sensor, decides, basis)
     if reason == "one_specimen":
-        more = _ENOUGH_SPECIMENS - one.decides.expected.specimens
-        yield _Step("add_specimens", (one.sensor, None), one.name, False, specimens=more)
+        more = _ENOUGH_SPECIMENS - decides.expected.specimens
+        yield _Step("add_specimens", (sensor, None), name, False, specimens=more)
     elif reason == "short_log" and duration is not None:
-        yield _Step("log_longer", key, one.name, False, duration=_told_by(one))
+        yield _Step("log_longer", key, name, False, duration=_duration_needed(judgement))
     elif reason == "few_axes":
-        yield _Step("add_channels", key, one.name, False, what="all three axes")
+        yield _Step("add_channels", key, name, False, what="all three axes")
     elif reason not in REASONS:
-        for total in one.decides.totals:
-            own = one.sensor, total["recording"]
-            said = [row for row in basis.doubts.get(own, ()) if row["code"] == reason]
-            if any(row["factor"] is not None for row in said):
+        for total in decides.totals:
+            own = sensor, total["recording"]
+            doubts = [row for row in basis.doubts.get(own, ()) if row["code"] == reason]
+            if any(row["factor"] is not None for row in doubts):
                 what = _quantities(basis.factors(own))
-                yield _Step("check_unit", own, one.name, False, what=what)
-            elif said:
+                yield _Step("check_unit", own, name, False, what=what)
+            elif doubts:
                 what = reason.replace("_", " ")
-                yield _Step("record_again", own, one.name, False, what=what)
+                yield _Step("record_again", own, name, False, what=what)
 
 
 def _quantities(names: Iterable[str]) -> str:
-    return " and ".join(f"the {_NAMES[name]}" for name in names)
+    return " and ".join(f"the {SENSORS[name]}" for name in names)
 
 
 def _longest(sensor: str, standing: Standing, basis: Basis) -> tuple[Key, float | None]:
     """Return the recording of a standing that is longest, and its duration."""
-    found = [(sensor, row["recording"]) for row in standing.totals]
-    key = max(found, key=lambda one: basis.duration(one) or 0.0)
+    keys = [(sensor, row["recording"]) for row in standing.totals]
+    key = max(keys, key=lambda candidate: basis.duration(candidate) or 0.0)
     return key, basis.duration(key)
 
 
-def _told_by(one: Judgement) -> float:
+def _duration_needed(judgement: Judgement) -> float:
     """Return the length of a log that tells the error of the limit that decides, s."""
-    return longest_asked(one.decides.total, one.requirement) / LONGEST_PART
+    return longest_asked(judgement.decides.total, judgement.requirement) / LONGEST_PART
 
 
 def _row(steps: Sequence[_Step], basis: Basis) -> dict[str, Any]:

@@ -30,7 +30,7 @@ from statistics import variance
 
 from scipy.special import stdtr, stdtrit
 
-from imubench_pipeline.navigation.pooled import Pool, bounded_exp, pool
+from imubench_pipeline.navigation.pooled import NORMAL, Pool, bounded_exp, pool
 from imubench_pipeline.typing import Row
 
 Limits = tuple[float, float, float]  # value, lower, upper
@@ -41,7 +41,6 @@ _LEAST_TAKEN = 0.5
 _FEWEST = 3
 """Degrees of freedom that a spread of other sensors needs; t = 3.2, of two it is 4.3."""
 
-_NORMAL = 1.959963984540054  # 97.5 % of the standard normal
 _FURTHEST = 1e-4  # of a value: a lower limit of 0 is no logarithm
 _NARROWEST = 1e-9  # likewise, for a value that is its own limit
 
@@ -105,24 +104,24 @@ def expected(
     usual : Spread, optional
         Of other sensors, for one specimen.
     """
-    known = [row for row in totals if row["sigma"] is not None]
-    if not known:
+    with_figure = [row for row in totals if row["sigma"] is not None]
+    if not with_figure:
         return Expected(None, None, None, None, 0, 0)
     groups: dict[str, list[Limits]] = {}
-    for row in known:
+    for row in with_figure:
         groups.setdefault(devices[row["recording"]], []).append(_limits(row))
-    counts = (len(groups), len(known))
-    if any(row["sigma"] <= 0.0 for row in known) or (len(known) == 1 and usual is None):
-        worst = max(known, key=lambda row: row["sigma"])
+    counts = (len(groups), len(with_figure))
+    if any(row["sigma"] <= 0.0 for row in with_figure) or (len(with_figure) == 1 and usual is None):
+        worst = max(with_figure, key=lambda row: row["sigma"])
         return Expected(worst["sigma"], worst["lower"], worst["upper"], worst["within"], *counts)
-    limit = known[0]["limit"]
+    limit = with_figure[0]["limit"]
     if len(groups) == 1 and usual is not None:
         value, lower, upper = _of_device(*groups.values())
-        error = math.log(upper / lower) / (2.0 * _NORMAL)
+        error = math.log(upper / lower) / (2.0 * NORMAL)
         # Of the specimen that is known, and of the next one.
         scale = math.sqrt(2.0 * usual.variance + error**2)
-        found = _predicted(math.log(value), scale, usual.freedom, limit)
-        return Expected(*found, *counts, usual, "other sensors")
+        prediction = _predicted(math.log(value), scale, usual.freedom, limit)
+        return Expected(*prediction, *counts, usual, "other sensors")
     if len(groups) == 1:
         (values,) = groups.values()
     else:
@@ -131,9 +130,9 @@ def expected(
     spread = _spread(values, together)
     assert together.value is not None and together.error is not None  # several, all usable
     scale = math.sqrt(spread.variance + together.error**2)
-    found = _predicted(math.log(together.value), scale, spread.freedom, limit)
+    prediction = _predicted(math.log(together.value), scale, spread.freedom, limit)
     of = "specimens" if len(groups) > 1 else "recordings"
-    return Expected(*found, *counts, spread, of)
+    return Expected(*prediction, *counts, spread, of)
 
 
 def usual_spread(spreads: Iterable[Spread]) -> Spread | None:
@@ -145,10 +144,12 @@ def usual_spread(spreads: Iterable[Spread]) -> Spread | None:
         Between specimens, of one sensor each.
     """
     listed = list(spreads)
-    freedom = sum(one.freedom for one in listed)
+    freedom = sum(spread.freedom for spread in listed)
     if freedom < _FEWEST:
         return None
-    return Spread(math.fsum(one.variance * one.freedom for one in listed) / freedom, freedom)
+    return Spread(
+        math.fsum(spread.variance * spread.freedom for spread in listed) / freedom, freedom
+    )
 
 
 def _limits(row: Row) -> Limits:
@@ -163,9 +164,9 @@ def _limits(row: Row) -> Limits:
 
 
 def _of_device(recordings: Sequence[Limits]) -> Limits:
-    found = pool(*zip(*recordings, strict=True))
-    assert found.value and found.lower and found.upper  # all are usable
-    return found.value, found.lower, found.upper
+    pooled = pool(*zip(*recordings, strict=True))
+    assert pooled.value and pooled.lower and pooled.upper  # all are usable
+    return pooled.value, pooled.lower, pooled.upper
 
 
 def _spread(values: Sequence[Limits], together: Pool) -> Spread:

@@ -125,11 +125,11 @@ def limit_of(row: Row) -> tuple[Any, ...]:
 
 def _standing(parts: Sequence[Row], devices: Mapping[str, str], usual: Spread | None) -> Standing:
     totals = [row for row in parts if row["source"] == "total"]
-    known = [row for row in totals if row["sigma"] is not None]
-    found = expected(known, devices, usual)
-    if found.sigma is None:
-        return Standing(totals[0], known, found)
-    answer = min(known, key=lambda row: _apart(row["sigma"], found.sigma))
+    with_figure = [row for row in totals if row["sigma"] is not None]
+    prediction = expected(with_figure, devices, usual)
+    if prediction.sigma is None:
+        return Standing(totals[0], with_figure, prediction)
+    answer = min(with_figure, key=lambda row: _apart(row["sigma"], prediction.sigma))
     own = [
         row for row in parts if row["source"] != "total" and row["recording"] == answer["recording"]
     ]
@@ -137,23 +137,25 @@ def _standing(parts: Sequence[Row], devices: Mapping[str, str], usual: Spread | 
     sources = [row for row in own if row["sigma"] is not None]
     largest = max(sources, key=lambda row: row["sigma"], default=None)
     if largest is None or answer["sigma"] == 0.0:
-        return Standing(answer, known, found, conditions=conditions)
+        return Standing(answer, with_figure, prediction, conditions=conditions)
     share = (largest["sigma"] / answer["sigma"]) ** 2
-    parts_said = parts_of(answer["sigma"], sources)
-    return Standing(answer, known, found, named(largest), share, parts_said, conditions)
+    parts_in_words = parts_of(answer["sigma"], sources)
+    return Standing(
+        answer, with_figure, prediction, named(largest), share, parts_in_words, conditions
+    )
 
 
-def deciding(found: Sequence[Standing]) -> Standing:
+def deciding(by_limit: Sequence[Standing]) -> Standing:
     """Return the limit that decides: one that surely fails, whatever is not known of others.
 
     Parameters
     ----------
-    found : sequence of Standing
+    by_limit : sequence of Standing
         Of one sensor.
     """
-    known = [one for one in found if one.known]
-    worst = min(known, key=lambda one: one.margin, default=found[0])
-    unknown = [one for one in found if not one.known]
+    known = [standing for standing in by_limit if standing.known]
+    worst = min(known, key=lambda standing: standing.margin, default=by_limit[0])
+    unknown = [standing for standing in by_limit if not standing.known]
     return worst if not unknown or worst.verdict == "surely fails" else unknown[0]
 
 

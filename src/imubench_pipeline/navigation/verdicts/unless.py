@@ -16,6 +16,7 @@ from typing import Any
 from scipy.special import ndtr
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.navigation.pooled import NORMAL
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.evidence import quantity_behind
 from imubench_pipeline.navigation.verdicts.standing import Standing, deciding, limit_of, standings
@@ -36,8 +37,6 @@ _MEANT = {
     ),
 }
 """What is meant where a factor mends figures."""
-
-_NORMAL = 1.959963984540054  # 97.5 % of the standard normal
 
 
 @dataclass(frozen=True)
@@ -94,7 +93,7 @@ def unless(sensor: str, rows: Sequence[Row], basis: Basis) -> Unless | None:
     if not logged.known or (mended is None and not unjudged):
         return None
     doubts = {key: basis.doubted(key) for key in (doubted or apart)}
-    together = {name: f for one in factors.values() for name, f in one.items()}
+    together = {name: f for of_recording in factors.values() for name, f in of_recording.items()}
     return Unless(logged if unjudged else None, mended, together, doubts)
 
 
@@ -144,19 +143,22 @@ def _within(total: Row) -> float | None:
     half = math.log(side)
     if half <= 0.0:
         return 1.0 if away >= 0.0 else 0.0
-    return float(ndtr(_NORMAL * away / half))
+    return float(ndtr(NORMAL * away / half))
 
 
-def unless_words(found: Unless) -> str:
+def unless_words(alternative: Unless) -> str:
     """Return in words what the verdict would be."""
     parts = []
-    if found.logged is not None:
-        parts.append(f"as logged it {_outcome(found.logged)}")
-    if found.mended is not None:
-        outcome = _outcome(found.mended)
-        if found.logged is not None and found.logged.verdict == found.mended.verdict:
-            outcome = outcome.replace(found.mended.verdict, "does so too")
-        parts.append(f"if {_units(found.factors)}, it {outcome}")
+    if alternative.logged is not None:
+        parts.append(f"as logged it {_outcome(alternative.logged)}")
+    if alternative.mended is not None:
+        outcome = _outcome(alternative.mended)
+        if (
+            alternative.logged is not None
+            and alternative.logged.verdict == alternative.mended.verdict
+        ):
+            outcome = outcome.replace(alternative.mended.verdict, "does so too")
+        parts.append(f"if {_units(alternative.factors)}, it {outcome}")
     return "; ".join(parts)
 
 

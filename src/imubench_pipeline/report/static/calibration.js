@@ -58,21 +58,21 @@ const ALIGNED = {
 
 kinds.alignment = (figure) => {
   const courses = pageData.alignments[figure.dataset.sensor];
-  const all = courses.map((one) => [array(one.time), array(one.sigma)]);
+  const all = courses.map((course) => [array(course.time), array(course.sigma)]);
   const traces = [];
   const groups = [];
-  courses.forEach((one, i) => {
-    const key = `${one.positions} ${one.angle} ${one.method}`;
-    const look = { ...ALIGNED[`${one.positions} ${one.angle}`], dash: one.method === "fine" ? "solid" : "dot", width: one.method === "fine" ? 2 : 1.4 };
+  courses.forEach((course, i) => {
+    const key = `${course.positions} ${course.angle} ${course.method}`;
+    const look = { ...ALIGNED[`${course.positions} ${course.angle}`], dash: course.method === "fine" ? "solid" : "dot", width: course.method === "fine" ? 2 : 1.4 };
     const [time, sigma] = all[i];
-    const what = one.angle === "level" ? "roll and pitch" : "heading";
-    const where = one.positions === 1 ? "one position" : "two positions";
+    const what = course.angle === "level" ? "roll and pitch" : "heading";
+    const where = course.positions === 1 ? "one position" : "two positions";
     traces.push({
       type: "scatter", mode: "lines+markers", group: key, x: time, y: sigma,
       line: { color: colourOf(look), width: look.width, dash: look.dash }, marker: { color: colourOf(look), symbol: look.marker, size: 5 },
-      text: time.map((at, k) => `${what}, ${where}, ${one.method}, ${numberText(at, 4)} s: <b>${numberText(sigma[k], 3)}°</b>`), hovertemplate: "%{text}<extra></extra>",
+      text: time.map((at, k) => `${what}, ${where}, ${course.method}, ${numberText(at, 4)} s: <b>${numberText(sigma[k], 3)}°</b>`), hovertemplate: "%{text}<extra></extra>",
     });
-    groups.push({ key, label: `${what}, ${where}, ${one.method}`, on: true, look });
+    groups.push({ key, label: `${what}, ${where}, ${course.method}`, on: true, look });
   });
   return {
     traces, groups,

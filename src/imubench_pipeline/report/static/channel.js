@@ -13,18 +13,18 @@ const termLook = (place) => {
 function channelOf(figure) {
   // A sensor may be on several boards, which one page shows.
   const { channel, sensor, recording } = figure.dataset;
-  return pageData.channels.find((one) => (
-    one.channel === channel && one.sensor === (sensor ?? one.sensor) && one.recording === (recording ?? one.recording)
+  return pageData.channels.find((entry) => (
+    entry.channel === channel && entry.sensor === (sensor ?? entry.sensor) && entry.recording === (recording ?? entry.recording)
   ));
 }
 
 kinds.allan = (figure) => {
-  const one = channelOf(figure);
-  const unit = unitOf(quantityOf(one.channel), "adev");
-  const tau = array(one.tau);
-  const [y, low, high] = [one.adev, one.lower, one.upper].map((place) => scaled(place, unit.factor));
-  const what = one.simulated ? "simulated log" : "measured";
-  const best = one.methods[one.recommended];
+  const view = channelOf(figure);
+  const unit = unitOf(quantityOf(view.channel), "adev");
+  const tau = array(view.tau);
+  const [y, low, high] = [view.adev, view.lower, view.upper].map((place) => scaled(place, unit.factor));
+  const what = view.simulated ? "simulated log" : "measured";
+  const best = view.methods[view.recommended];
   const look = pageData.looks.methods;
   const traces = [
     ...band(tau, low, high, black(), 0.2).map((trace) => ({ ...trace, group: "limits" })),
@@ -35,11 +35,11 @@ kinds.allan = (figure) => {
   ];
   if (best) {
     const times = array(best.tau);
-    traces.push(...band(times, scaled(best.lower, unit.factor), scaled(best.upper, unit.factor), look[one.recommended], 0.22)
+    traces.push(...band(times, scaled(best.lower, unit.factor), scaled(best.upper, unit.factor), look[view.recommended], 0.22)
       .map((trace) => ({ ...trace, group: "band" })));
     traces.push({
       group: "reconstructed", type: "scatter", mode: "markers", x: times, y: scaled(best.reconstructed, unit.factor), hoverinfo: "skip",
-      marker: { color: colourOf(look[one.recommended]), symbol: "x-thin-open", size: 6 },
+      marker: { color: colourOf(look[view.recommended]), symbol: "x-thin-open", size: 6 },
     });
   }
   traces.push({
@@ -47,10 +47,10 @@ kinds.allan = (figure) => {
     text: tau.map((t, i) => `τ ${numberText(t, 3)} s: <b>${numberText(y[i], 3)} ${unit.sign}</b><br>95 %: ${interval(low[i], high[i])} ${unit.sign}`),
     hovertemplate: `${what}<br>%{text}<extra></extra>`,
   });
-  if ("tau" in one.compensated) {
+  if ("tau" in view.compensated) {
     const own = look.compensated;
-    const times = array(one.compensated.tau);
-    const [left, least, most] = ["adev", "lower", "upper"].map((name) => scaled(one.compensated[name], unit.factor));
+    const times = array(view.compensated.tau);
+    const [left, least, most] = ["adev", "lower", "upper"].map((name) => scaled(view.compensated[name], unit.factor));
     traces.push({
       group: "compensated", type: "scatter", mode: "lines+markers", x: times, y: left, line: { color: colourOf(own), width: 1.2 }, marker: { size: 4, color: colourOf(own) },
       text: times.map((t, i) => `τ ${numberText(t, 3)} s: <b>${numberText(left[i], 3)} ${unit.sign}</b><br>95 %: ${interval(least[i], most[i])} ${unit.sign}`),
@@ -58,26 +58,26 @@ kinds.allan = (figure) => {
     });
     groups.push({ key: "compensated", label: `${what}, temperature taken out`, on: true, look: own });
   }
-  for (const [method, curve] of Object.entries(one.methods)) {
+  for (const [method, curve] of Object.entries(view.methods)) {
     const key = `method ${method}`;
-    const use = method === one.recommended;
+    const use = method === view.recommended;
     traces.push(line(array(curve.tau), scaled(curve.model, unit.factor), { ...look[method], width: use ? 2.4 : 1.3 }, {
       group: key, hoverinfo: "name", name: look[method].name,
     }));
     const on = use || (figure.dataset.methods ?? "").split(" ").includes(method);
     groups.push({ key, label: look[method].name + (use ? " (use this)" : ""), on, look: { ...look[method], marker: undefined } });
   }
-  one.terms.forEach((term, place) => {
+  view.terms.forEach((term, place) => {
     traces.push(line(tau, scaled(term.adev, unit.factor), termLook(place), { group: `term ${place}`, hoverinfo: "name", name: term.name }));
     groups.push({ key: `term ${place}`, label: term.name, on: false, look: termLook(place) });
   });
   if (best) {
     groups.push(
-      { key: "band", label: "95 % band of reconstructions", on: true, look: { ...look[one.recommended], filled: true, marker: undefined } },
-      { key: "reconstructed", label: "a log simulated from the model", on: false, look: { ...look[one.recommended], line: false, marker: "x" } },
+      { key: "band", label: "95 % band of reconstructions", on: true, look: { ...look[view.recommended], filled: true, marker: undefined } },
+      { key: "reconstructed", label: "a log simulated from the model", on: false, look: { ...look[view.recommended], line: false, marker: "x" } },
     );
   }
-  one.datasheet.forEach((printed, place) => {
+  view.datasheet.forEach((printed, place) => {
     const value = printed.value * unit.factor;
     const own = { light: "#B3001B", dark: "#FF8F8F", dash: TERM_DASHES[place % 4], width: 1.6 };
     traces.push(line(tau, printed.of === "N" ? tau.map((t) => value / Math.sqrt(t)) : tau.map(() => value), own, {
@@ -95,12 +95,12 @@ kinds.allan = (figure) => {
 };
 
 kinds.spectrum = (figure) => {
-  const one = channelOf(figure);
-  const found = one.spectrum;
-  const unit = unitOf(quantityOf(one.channel), "psd");
-  const f = array(found.frequency);
-  const density = scaled(found.density, unit.factor);
-  const left = new Set(found.left);
+  const view = channelOf(figure);
+  const spectrum = view.spectrum;
+  const unit = unitOf(quantityOf(view.channel), "psd");
+  const f = array(spectrum.frequency);
+  const density = scaled(spectrum.density, unit.factor);
+  const left = new Set(spectrum.left);
   const look = pageData.looks.methods.likelihood;
   const points = (keep, key, colour, symbol) => {
     const chosen = f.map((_, i) => i).filter((i) => left.has(i) !== keep);
@@ -116,21 +116,21 @@ kinds.spectrum = (figure) => {
     { key: "used", label: "bins used", on: true, look: { ...black(), line: false, marker: "circle" } },
     { key: "left", label: "bins left out", on: true, look: { light: inks().soft, dark: inks().soft, line: false, marker: "x" }, absent: left.size === 0 },
   ];
-  traces.push(line(array(found.fit_frequency), scaled(found.fitted, unit.factor), { ...look, width: 2.2 }, { group: "fit" }));
-  groups.push({ key: "fit", label: `fit ${found.model}`, on: true, look: { ...look, marker: undefined } });
-  found.terms.forEach((term, place) => {
-    traces.push(line(array(found.smooth), scaled(term.density, unit.factor), termLook(place), { group: `term ${place}`, hoverinfo: "name", name: term.name }));
+  traces.push(line(array(spectrum.fit_frequency), scaled(spectrum.fitted, unit.factor), { ...look, width: 2.2 }, { group: "fit" }));
+  groups.push({ key: "fit", label: `fit ${spectrum.model}`, on: true, look: { ...look, marker: undefined } });
+  spectrum.terms.forEach((term, place) => {
+    traces.push(line(array(spectrum.smooth), scaled(term.density, unit.factor), termLook(place), { group: `term ${place}`, hoverinfo: "name", name: term.name }));
     groups.push({ key: `term ${place}`, label: term.name, on: false, look: termLook(place) });
   });
   const range = logRange(density, 0.3);
-  if (found.lines.length > 0) {
+  if (spectrum.lines.length > 0) {
     const own = { light: "#B3001B", dark: "#FF8F8F", dash: "dot", width: 1.2 };
-    for (const each of found.lines) {
+    for (const each of spectrum.lines) {
       traces.push(line([each.frequency, each.frequency], range.map((power) => 10 ** power), own, {
         group: "lines", hoverinfo: "text", text: `${each.kind}, ${numberText(each.frequency, 5)} Hz`,
       }));
     }
-    groups.push({ key: "lines", label: found.lines.length === 1 ? "line" : "lines", on: true, look: own });
+    groups.push({ key: "lines", label: spectrum.lines.length === 1 ? "line" : "lines", on: true, look: own });
   }
   return {
     traces, groups,
@@ -181,17 +181,17 @@ kinds.series = (figure) => {
       layout.xaxis.anchor = "y2";
     }
   }
-  const there = pageData.findings.filter((one) => one.start !== null && (one.channel === null || one.channel === channel));
-  if (there.length > 0) {
+  const marked = pageData.findings.filter((finding) => finding.start !== null && (finding.channel === null || finding.channel === channel));
+  if (marked.length > 0) {
     groups.push({ key: "findings", label: "findings", on: true, look: { light: "#B3001B", dark: "#FF8F8F", filled: true } });
     if (shown(figure, "findings")) {
       // Knocks are moments between the first and the last: only their range is marked.
-      layout.shapes = there.map((one) => ({
-        type: "rect", xref: "x", yref: "paper", y0: one.finding === "knocks" ? 0.97 : 0, y1: 1, x0: one.start / scale.size, x1: (one.end ?? one.start) / scale.size,
+      layout.shapes = marked.map((finding) => ({
+        type: "rect", xref: "x", yref: "paper", y0: finding.finding === "knocks" ? 0.97 : 0, y1: 1, x0: finding.start / scale.size, x1: (finding.end ?? finding.start) / scale.size,
         fillcolor: faint(inks().mark, 0.13), line: { color: inks().mark, width: 1, dash: "dot" }, layer: "below",
       }));
-      layout.annotations = there.map((one, i) => ({
-        xref: "x", yref: "paper", x: one.start / scale.size, y: 1 - 0.06 * (i % 4), text: `${one.number}`, showarrow: false,
+      layout.annotations = marked.map((finding, i) => ({
+        xref: "x", yref: "paper", x: finding.start / scale.size, y: 1 - 0.06 * (i % 4), text: `${finding.number}`, showarrow: false,
         font: { color: inks().mark, size: 12 }, bgcolor: inks().paper, borderpad: 1, xanchor: "left", yanchor: "top",
       }));
     }
@@ -201,11 +201,11 @@ kinds.series = (figure) => {
 
 kinds.histogram = (figure) => {
   const channel = figure.dataset.channel;
-  const found = pageData.samples.histogram[channel];
+  const histogram = pageData.samples.histogram[channel];
   const unit = unitOf(quantityOf(channel), "signal");
-  const edges = scaled(found.edges, unit.factor);
+  const edges = scaled(histogram.edges, unit.factor);
   const [lower, upper] = [edges.slice(0, -1), edges.slice(1)];
-  const count = array(found.count).map((each) => Math.round(each || 0));
+  const count = array(histogram.count).map((each) => Math.round(each || 0));
   const total = count.reduce((sum, each) => sum + each, 0);
   const height = count.map((each, i) => each / total / (upper[i] - lower[i] || 1));
   const middle = lower.map((low, i) => (low + upper[i]) / 2);

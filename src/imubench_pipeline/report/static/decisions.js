@@ -1,22 +1,22 @@
 // The figures that decide: the margin to a requirement, and a device over time.
 
 kinds.margins = (figure) => {
-  const found = pageData.rankings[figure.dataset.requirement].filter((one) => one.margin !== null);
-  const names = found.map((one) => one.sensor).reverse();
+  const standings = pageData.rankings[figure.dataset.requirement].filter((standing) => standing.margin !== null);
+  const names = standings.map((standing) => standing.sensor).reverse();
   const { ink, mark, paper } = inks();
-  const traces = found.map((one) => {
-    const look = pageData.looks.sensors[one.sensor];
+  const traces = standings.map((standing) => {
+    const look = pageData.looks.sensors[standing.sensor];
     const colour = colourOf(look);
     return {
-      type: "scatter", mode: "markers", x: [one.margin], y: [names.indexOf(one.sensor)],
-      marker: { color: one.weak ? paper : colour, size: 11, symbol: look.marker, line: { color: colour, width: one.weak ? 2 : 0 } },
-      error_x: one.low !== null ? {
-        type: "data", symmetric: false, array: [one.high - one.margin], arrayminus: [one.margin - one.low], color: colour, thickness: 2, width: 5,
+      type: "scatter", mode: "markers", x: [standing.margin], y: [names.indexOf(standing.sensor)],
+      marker: { color: standing.weak ? paper : colour, size: 11, symbol: look.marker, line: { color: colour, width: standing.weak ? 2 : 0 } },
+      error_x: standing.low !== null ? {
+        type: "data", symmetric: false, array: [standing.high - standing.margin], arrayminus: [standing.margin - standing.low], color: colour, thickness: 2, width: 5,
       } : undefined,
-      hovertemplate: `${nameOf(one.sensor)}: ${one.verdict}${one.weak ? `<br>weak evidence: ${one.weak}` : ""}<br>allowed over expected error: <b>${numberText(one.margin, 3)}</b><br>95 %: ${interval(one.low ?? NaN, one.high ?? NaN)}<extra></extra>`,
+      hovertemplate: `${nameOf(standing.sensor)}: ${standing.verdict}${standing.weak ? `<br>weak evidence: ${standing.weak}` : ""}<br>allowed over expected error: <b>${numberText(standing.margin, 3)}</b><br>95 %: ${interval(standing.low ?? NaN, standing.high ?? NaN)}<extra></extra>`,
     };
   });
-  const every = found.flatMap((one) => [one.margin, one.low, one.high]).filter((value) => value > 0);
+  const every = standings.flatMap((standing) => [standing.margin, standing.low, standing.high]).filter((value) => value > 0);
   return {
     traces, groups: [], height: 100 + 34 * names.length,
     layout: {
@@ -33,15 +33,15 @@ kinds.margins = (figure) => {
 };
 
 kinds.trend = (figure) => {
-  const found = pageData.trends[figure.dataset.trend];
-  const unit = unitOf(quantityOf(found.channel), found.parameter === "bias" ? "signal" : found.parameter);
-  const x = found.dated ? found.started : found.recordings;
+  const trend = pageData.trends[figure.dataset.trend];
+  const unit = unitOf(quantityOf(trend.channel), trend.parameter === "bias" ? "signal" : trend.parameter);
+  const x = trend.dated ? trend.started : trend.recordings;
   const factor = (values) => values.map((value) => (value === null ? null : value * unit.factor));
   const [value, lower, upper, expectedLow, expectedHigh] =
-    [found.value, found.lower, found.upper, found.expected_lower, found.expected_upper].map(factor);
+    [trend.value, trend.lower, trend.upper, trend.expected_lower, trend.expected_upper].map(factor);
   const look = { light: "#0072B2", dark: "#4DA3D9" };
   const { ink, mark } = inks();
-  const changed = found.verdict.map((word) => word === "changed");
+  const changed = trend.verdict.map((word) => word === "changed");
   const traces = [
     ...band(x, expectedLow, expectedHigh, look, 0.2).map((trace) => ({ ...trace, group: "expected" })),
     {
@@ -53,7 +53,7 @@ kinds.trend = (figure) => {
         array: value.map((each, i) => (each === null || upper[i] === null ? 0 : upper[i] - each)),
         arrayminus: value.map((each, i) => (each === null || lower[i] === null ? 0 : each - lower[i])),
       },
-      text: value.map((each, i) => `${found.recordings[i]}<br>${symbolText(found.parameter)} ${each === null ? "not known" : `<b>${numberText(each, 4)} ${unit.sign}</b>`}<br>${found.verdict[i] ?? ""}`),
+      text: value.map((each, i) => `${trend.recordings[i]}<br>${symbolText(trend.parameter)} ${each === null ? "not known" : `<b>${numberText(each, 4)} ${unit.sign}</b>`}<br>${trend.verdict[i] ?? ""}`),
       hovertemplate: "%{text}<extra></extra>",
     },
   ];
@@ -64,8 +64,8 @@ kinds.trend = (figure) => {
       { key: "expected", label: "expected from the earlier recordings (95 %)", on: true, look: { ...look, filled: true } },
     ],
     layout: {
-      xaxis: { ...linearAxis(found.dated ? "" : "recordings in their order"), type: found.dated ? "date" : "category", nticks: 8 },
-      yaxis: linearAxis(`${found.parameter === "bias" ? "fixed bias" : symbolMarkup(found.parameter)} (${unit.sign})`),
+      xaxis: { ...linearAxis(trend.dated ? "" : "recordings in their order"), type: trend.dated ? "date" : "category", nticks: 8 },
+      yaxis: linearAxis(`${trend.parameter === "bias" ? "fixed bias" : symbolMarkup(trend.parameter)} (${unit.sign})`),
     },
   };
 };

@@ -30,8 +30,8 @@ kinds.turning = (figure) => {
   const x = mean.map((_, i) => (envelope.start + ((i + 0.5) * (envelope.end - envelope.start)) / mean.length) / scale.size);
   const look = { light: "#5a636b", dark: "#a9b1b8" };
   const turns = array(turned.turns).map((time) => time / scale.size);
-  const there = (values) => values.filter(Number.isFinite);
-  const [bottom, top] = [Math.min(...there(low)), Math.max(...there(high))];
+  const finite = (values) => values.filter(Number.isFinite);
+  const [bottom, top] = [Math.min(...finite(low)), Math.max(...finite(high))];
   // Many lines would hide the samples: then each turn has a tick at the top.
   const marks = uprights(turns, turns.length > MANY_TURNS ? top - 0.05 * (top - bottom) : bottom, top);
   const traces = [
@@ -103,18 +103,18 @@ kinds.earth_rate = (figure) => {
     const x = array(course.time).map((at) => at / scale.size);
     const value = scaled(course.value, unit.factor);
     const sigma = scaled(course.sigma, unit.factor);
-    const known = Number.isFinite(sigma[0]);
-    if (known) {
+    const hasSigma = Number.isFinite(sigma[0]);
+    if (hasSigma) {
       traces.push(...band(x, value.map((v, i) => v - 2 * sigma[i]), value.map((v, i) => v + 2 * sigma[i]), look, 0.14)
         .map((trace) => ({ ...trace, group: [method, `${method} band`] })));
     }
     traces.push({
       ...line(x, value, look), group: method, hoverinfo: "text",
-      text: value.map((v, i) => `${course.name}<br>${numberText(x[i], 4)} ${scale.name}: <b>${numberText(v, 4)} ${unit.sign}</b>${known ? ` ± ${numberText(2 * sigma[i], 2)} (2σ)` : ", no σ"}`),
+      text: value.map((v, i) => `${course.name}<br>${numberText(x[i], 4)} ${scale.name}: <b>${numberText(v, 4)} ${unit.sign}</b>${hasSigma ? ` ± ${numberText(2 * sigma[i], 2)} (2σ)` : ", no σ"}`),
     });
     const label = method === "known_rate" ? `${course.name} (given the rate: no estimate)` : course.name;
     groups.push({ key: method, label, on: true, look });
-    if (known) groups.push({ key: `${method} band`, label: `2σ of the ${method === "triples" ? "A-B-A differences" : method}`, on: method === "filter" || method === "pairs", look: { ...look, filled: true } });
+    if (hasSigma) groups.push({ key: `${method} band`, label: `2σ of the ${method === "triples" ? "A-B-A differences" : method}`, on: method === "filter" || method === "pairs", look: { ...look, filled: true } });
   }
   const truth = turned.truth * unit.factor;
   traces.push({ ...line([0, last / scale.size], [truth, truth], TRUE_RATE), group: "truth" });
@@ -130,33 +130,33 @@ kinds.earth_rate = (figure) => {
 
 kinds.bound = (figure) => {
   const all = figure.dataset.place ? pageData.predictions[figure.dataset.place] : pageData.prediction;
-  const found = all[figure.dataset.over];
+  const bound = all[figure.dataset.over];
   const overDwell = figure.dataset.over === "dwell";
   const unit = unitOf("gyro", "adev");
-  const x = array(found.x);
-  const sigma = scaled(found.sigma, unit.factor);
+  const x = array(bound.x);
+  const sigma = scaled(bound.sigma, unit.factor);
   const truth = all.truth;
   const look = COURSES.filter;
   const traces = [{
     type: "scatter", mode: "lines+markers", group: "bound", x, y: sigma, line: { color: colourOf(look), width: 1.6 }, marker: { color: colourOf(look), size: 4 },
     text: x.map((at, i) => {
-      const relative = array(found.sigma)[i] / truth;
+      const relative = array(bound.sigma)[i] / truth;
       const where = overDwell ? `dwells of ${numberText(at, 3)} s` : `${numberText(at, 4)} s`;
-      return `${where}, ${found.turns[i]} turns: <b>${numberText(sigma[i], 3)} ${unit.sign}</b><br>${numberText(100 * relative, 3)} % of the Earth’s rate${relative < 0.5 ? `; heading ${numberText((relative * 180) / Math.PI, 3)}°` : ""}`;
+      return `${where}, ${bound.turns[i]} turns: <b>${numberText(sigma[i], 3)} ${unit.sign}</b><br>${numberText(100 * relative, 3)} % of the Earth’s rate${relative < 0.5 ? `; heading ${numberText((relative * 180) / Math.PI, 3)}°` : ""}`;
     }),
     hovertemplate: "%{text}<extra></extra>",
   }];
   const groups = [{ key: "bound", label: "least σ", on: true, look: { ...look, marker: "circle" } }];
   const shownSigmas = [...sigma];
-  if (overDwell && found.best !== null) {
-    const range = [Math.min(...found.nearly), Math.max(...found.nearly)];
+  if (overDwell && bound.best !== null) {
+    const range = [Math.min(...bound.nearly), Math.max(...bound.nearly)];
     traces.push({
-      type: "scatter", mode: "markers", group: "best", x: [x[found.best]], y: [sigma[found.best]], marker: { color: colourOf(SOUTH), symbol: "diamond", size: 11 },
-      text: [`best: ${numberText(x[found.best], 3)} s`], hovertemplate: "%{text}<extra></extra>",
+      type: "scatter", mode: "markers", group: "best", x: [x[bound.best]], y: [sigma[bound.best]], marker: { color: colourOf(SOUTH), symbol: "diamond", size: 11 },
+      text: [`best: ${numberText(x[bound.best], 3)} s`], hovertemplate: "%{text}<extra></extra>",
     });
-    traces.push({ ...line(range, [sigma[found.best], sigma[found.best]].map((v) => v * 0.97), { ...SOUTH, width: 5 }), group: "nearly" });
+    traces.push({ ...line(range, [sigma[bound.best], sigma[bound.best]].map((v) => v * 0.97), { ...SOUTH, width: 5 }), group: "nearly" });
     groups.push(
-      { key: "best", label: `best dwell, ${numberText(x[found.best], 3)} s`, on: true, look: { ...SOUTH, line: false, marker: "diamond" } },
+      { key: "best", label: `best dwell, ${numberText(x[bound.best], 3)} s`, on: true, look: { ...SOUTH, line: false, marker: "diamond" } },
       { key: "nearly", label: "less than 1 % worse", on: true, look: { ...SOUTH, marker: undefined } },
     );
   } else {
@@ -181,15 +181,15 @@ kinds.published_rates = () => {
   const runs = pageData.published;
   const unit = unitOf("gyro", "adev");
   const y = runs.map((_, i) => runs.length - i);
-  const value = (key) => runs.map((one) => (one[key] === null ? null : one[key] * unit.factor));
+  const value = (key) => runs.map((run) => (run[key] === null ? null : run[key] * unit.factor));
   const [truth, published, simulated, sigma] = ["truth", "published", "simulated", "sigma"].map(value);
   const noise = { light: "#0072B2", dark: "#4DA3D9" };
   const points = (key, x, look, name) => ({
     group: key, type: "scatter", mode: "markers", x, y, marker: { color: colourOf(look), symbol: look.marker, size: 10 },
-    text: runs.map((one, i) => (x[i] === null ? "" : `${one.name}, ${name}: <b>${numberText(x[i], 4)} ${unit.sign}</b>`)), hovertemplate: "%{text}<extra></extra>",
+    text: runs.map((run, i) => (x[i] === null ? "" : `${run.name}, ${name}: <b>${numberText(x[i], 4)} ${unit.sign}</b>`)), hovertemplate: "%{text}<extra></extra>",
   });
   const made = { light: "#5B5FC7", dark: "#A3A6F2", marker: "circle" };
-  const said = { light: "#D55E00", dark: "#F08A3C", marker: "diamond" };
+  const printed = { light: "#D55E00", dark: "#F08A3C", marker: "diamond" };
   const upright = uprights([truth[0]], 0.4, runs.length + 0.6);
   return {
     height: 120 + 48 * runs.length,
@@ -200,17 +200,17 @@ kinds.published_rates = () => {
         x: runs.flatMap((_, i) => [truth[i] - 1.96 * sigma[i], truth[i] + 1.96 * sigma[i], null]), y: y.flatMap((at) => [at, at, null]),
       },
       points("simulated", simulated, made, "simulated, pairs"),
-      points("published", published, said, "published"),
+      points("published", published, printed, "published"),
     ],
     groups: [
-      { key: "published", label: "published", on: true, look: { ...said, line: false } },
+      { key: "published", label: "published", on: true, look: { ...printed, line: false } },
       { key: "simulated", label: "found in the simulated log (pairs)", on: true, look: { ...made, line: false } },
       { key: "noise", label: "95 % by the noise", on: true, look: { ...noise, filled: true } },
       { key: "truth", label: "true rate", on: true, look: TRUE_RATE },
     ],
     layout: {
       xaxis: linearAxis(`Earth’s rate (${unit.sign})`),
-      yaxis: { ...linearAxis(""), tickmode: "array", tickvals: y, ticktext: runs.map((one) => one.name), range: [0.4, runs.length + 0.6], fixedrange: true },
+      yaxis: { ...linearAxis(""), tickmode: "array", tickvals: y, ticktext: runs.map((run) => run.name), range: [0.4, runs.length + 0.6], fixedrange: true },
     },
   };
 };

@@ -13,9 +13,9 @@ const quantityOf = (channel) => channel.split("_")[0];
 function startChooser(root) {
   const chooser = root.querySelector(".chooser");
   if (!chooser || !pageData.channels) return;
-  const present = Object.keys(CHANNEL_NAMES).filter((name) => pageData.channels.some((one) => one.channel === name));
+  const present = Object.keys(CHANNEL_NAMES).filter((name) => pageData.channels.some((view) => view.channel === name));
   if (!present.includes(chosenChannel)) chosenChannel = present[0];
-  const most = Math.max(0, ...present.map((name) => pageData.channels.filter((one) => one.channel === name).length));
+  const most = Math.max(0, ...present.map((name) => pageData.channels.filter((view) => view.channel === name).length));
   everyRecording = most <= MANY || pageData.grouped === "recording";
   const set = document.createElement("fieldset");
   set.append(Object.assign(document.createElement("legend"), { textContent: "Axis" }));
@@ -40,7 +40,7 @@ function startChooser(root) {
     redrawAll();
   });
   chooser.append(set, labelled("Model drawn", method));
-  if (pageData.grouped === "sensor" && new Set(pageData.channels.map((one) => one.recording)).size > 1) {
+  if (pageData.grouped === "sensor" && new Set(pageData.channels.map((view) => view.recording)).size > 1) {
     const which = document.createElement("select");
     which.append(new Option("all", "all"), new Option("the last of each sensor", "last"));
     which.value = everyRecording ? "all" : "last";
@@ -53,21 +53,21 @@ function startChooser(root) {
 }
 
 function comparedChannels(channel) {
-  const found = pageData.channels.filter((one) => one.channel === channel);
-  if (everyRecording) return found;
-  return [...new Map(found.map((one) => [one.sensor, one])).values()];
+  const views = pageData.channels.filter((view) => view.channel === channel);
+  if (everyRecording) return views;
+  return [...new Map(views.map((view) => [view.sensor, view])).values()];
 }
 
 // Among sensors, a curve looks as its sensor; among recordings of one, as its place.
-function lookOf(one) {
-  const own = pageData.looks.sensors[one.sensor];
+function lookOf(view) {
+  const own = pageData.looks.sensors[view.sensor];
   if (pageData.grouped === "sensor") return own;
-  const place = pageData.recordings.indexOf(one.recording);
+  const place = pageData.recordings.indexOf(view.recording);
   return pageData.looks.places[place % pageData.looks.places.length];
 }
 
-function groupOf(one) {
-  return pageData.grouped === "sensor" ? one.sensor : one.recording;
+function groupOf(view) {
+  return pageData.grouped === "sensor" ? view.sensor : view.recording;
 }
 
 function nameOf(key) {
@@ -88,21 +88,21 @@ kinds.overlay = (figure) => {
   const here = comparedChannels(chosenChannel);
   const traces = [];
   const groups = new Map();
-  for (const one of pageData.channels) {
-    const key = groupOf(one);
+  for (const view of pageData.channels) {
+    const key = groupOf(view);
     if (!groups.has(key)) {
-      groups.set(key, { key, label: nameOf(key) + (one.simulated ? " (simulated)" : ""), on: true, look: lookOf(one), absent: true });
+      groups.set(key, { key, label: nameOf(key) + (view.simulated ? " (simulated)" : ""), on: true, look: lookOf(view), absent: true });
     }
   }
-  for (const one of here) {
-    const key = groupOf(one);
+  for (const view of here) {
+    const key = groupOf(view);
     groups.get(key).absent = false;
-    const look = lookOf(one);
+    const look = lookOf(view);
     const colour = colourOf(look);
-    const tau = array(one.tau);
-    const [y, low, high] = [one.adev, one.lower, one.upper].map((place) => scaled(place, unit.factor));
+    const tau = array(view.tau);
+    const [y, low, high] = [view.adev, view.lower, view.upper].map((place) => scaled(place, unit.factor));
     traces.push(...band(tau, low, high, look).map((trace) => ({ ...trace, group: [key, "limits"] })));
-    const title = `${nameOf(one.sensor)}${one.simulated ? " (simulated)" : ""}, ${one.recording}`;
+    const title = `${nameOf(view.sensor)}${view.simulated ? " (simulated)" : ""}, ${view.recording}`;
     traces.push({
       group: [key, "measured"], type: "scatter", mode: "lines+markers", x: tau, y, name: title,
       line: { color: colour, dash: look.dash, width: 1.6 },
@@ -110,23 +110,23 @@ kinds.overlay = (figure) => {
       text: tau.map((t, i) => `τ ${numberText(t, 3)} s: <b>${numberText(y[i], 3)} ${unit.sign}</b><br>95 %: ${interval(low[i], high[i])} ${unit.sign}`),
       hovertemplate: `${title}<br>%{text}<extra></extra>`,
     });
-    const method = chosenMethod === "recommended" ? one.recommended : chosenMethod;
-    if (one.models[method] !== undefined) {
-      const [times, curve] = one.models[method];
+    const method = chosenMethod === "recommended" ? view.recommended : chosenMethod;
+    if (view.models[method] !== undefined) {
+      const [times, curve] = view.models[method];
       traces.push(line(array(times), scaled(curve, unit.factor), { ...look, width: 1.2 }, { group: [key, "model"], opacity: 0.8 }));
     }
   }
   const drawnSheets = new Set();
-  for (const one of here) {
-    if (drawnSheets.has(one.sensor)) continue;
-    drawnSheets.add(one.sensor);
-    const look = lookOf(one);
-    const tau = array(one.tau);
-    pageData.datasheets[one.sensor][chosenChannel].forEach((printed) => {
+  for (const view of here) {
+    if (drawnSheets.has(view.sensor)) continue;
+    drawnSheets.add(view.sensor);
+    const look = lookOf(view);
+    const tau = array(view.tau);
+    pageData.datasheets[view.sensor][chosenChannel].forEach((printed) => {
       const value = printed.value * unit.factor;
       traces.push(line(tau, printed.of === "N" ? tau.map((t) => value / Math.sqrt(t)) : tau.map(() => value),
         { ...look, dash: "dot", width: 1.2 }, {
-          group: [groupOf(one), "datasheet"], hoverinfo: "text", text: `${nameOf(one.sensor)}, datasheet: ${printed.label}`,
+          group: [groupOf(view), "datasheet"], hoverinfo: "text", text: `${nameOf(view.sensor)}, datasheet: ${printed.label}`,
         }));
     });
   }
@@ -141,8 +141,8 @@ kinds.overlay = (figure) => {
   return {
     traces, groups: [...layers, ...groups.values()],
     layout: {
-      xaxis: logAxis("averaging time τ (s)", logRange(here.flatMap((one) => array(one.tau)), 0.1)),
-      yaxis: logAxis(`Allan deviation (${unit.sign})`, logRange(here.flatMap((one) => scaled(one.adev, unit.factor)), 0.4)),
+      xaxis: logAxis("averaging time τ (s)", logRange(here.flatMap((view) => array(view.tau)), 0.1)),
+      yaxis: logAxis(`Allan deviation (${unit.sign})`, logRange(here.flatMap((view) => scaled(view.adev, unit.factor)), 0.4)),
     },
   };
 };
@@ -161,32 +161,32 @@ kinds.forest = (figure) => {
   const names = [...new Set(here.map(groupOf))].reverse();
   const traces = [];
   const counts = new Map();
-  for (const one of here) counts.set(groupOf(one), (counts.get(groupOf(one)) ?? 0) + 1);
+  for (const view of here) counts.set(groupOf(view), (counts.get(groupOf(view)) ?? 0) + 1);
   const seen = new Map();
   const extent = [];
-  for (const one of here) {
-    const key = groupOf(one);
+  for (const view of here) {
+    const key = groupOf(view);
     const number = seen.get(key) ?? 0;
     seen.set(key, number + 1);
-    const method = chosenMethod === "recommended" || !one.parameters[chosenMethod] ? one.recommended : chosenMethod;
+    const method = chosenMethod === "recommended" || !view.parameters[chosenMethod] ? view.recommended : chosenMethod;
     const place = names.indexOf(key) + ((number + 1) / (counts.get(key) + 1) - 0.5) * -0.7;
-    const name = `${nameOf(one.sensor)}${one.simulated ? " (simulated)" : ""}, ${one.recording}`;
-    for (const [value, lower, upper, status] of one.parameters[method]?.[symbol] ?? []) {
-      const known = value !== null && status === "ok";
+    const name = `${nameOf(view.sensor)}${view.simulated ? " (simulated)" : ""}, ${view.recording}`;
+    for (const [value, lower, upper, status] of view.parameters[method]?.[symbol] ?? []) {
+      const identified = value !== null && status === "ok";
       const bounded = lower !== null && lower > 0 && upper !== null;
       const middle = value ?? (bounded ? Math.sqrt(lower * upper) : upper);
       if (middle === null || middle <= 0) continue;
       extent.push(middle * unit.factor, ...(bounded ? [lower * unit.factor, upper * unit.factor] : []));
-      const look = lookOf(one);
+      const look = lookOf(view);
       const colour = colourOf(look);
-      const words = value !== null ? `<b>${numberText(value * unit.factor, 4)} ${unit.sign}</b>${known ? "" : ` (${status.replaceAll("_", " ")})`}`
+      const words = value !== null ? `<b>${numberText(value * unit.factor, 4)} ${unit.sign}</b>${identified ? "" : ` (${status.replaceAll("_", " ")})`}`
         : status === "absent" ? `absent: below ${numberText(upper * unit.factor, 3)} ${unit.sign}` : status.replaceAll("_", " ");
       const limits = bounded ? `<br>95 %: ${interval(lower * unit.factor, upper * unit.factor)} ${unit.sign}` : "";
       traces.push({
         type: "scatter", mode: "markers", x: [middle * unit.factor], y: [place],
         marker: {
-          color: known ? colour : inks().paper, size: known ? 9 : 8, line: { color: colour, width: known ? 0 : 2 },
-          symbol: known ? look.marker : status === "absent" ? "triangle-left" : "circle",
+          color: identified ? colour : inks().paper, size: identified ? 9 : 8, line: { color: colour, width: identified ? 0 : 2 },
+          symbol: identified ? look.marker : status === "absent" ? "triangle-left" : "circle",
         },
         error_x: bounded ? {
           type: "data", symmetric: false, array: [(upper - middle) * unit.factor], arrayminus: [(middle - lower) * unit.factor],

@@ -67,15 +67,15 @@ function line(x, y, look, more = {}) {
 function band(x, low, high, look, opacity = 0.18) {
   const edge = { type: "scatter", mode: "lines", x, hoverinfo: "skip", line: { width: 0, color: colourOf(look) } };
   const fillcolor = faint(colourOf(look), opacity);
-  const there = x.map((_, i) => Number.isFinite(low[i]) && Number.isFinite(high[i]));
-  const stretches = there.filter((one, i) => one && !there[i - 1]).length;
+  const present = x.map((_, i) => Number.isFinite(low[i]) && Number.isFinite(high[i]));
+  const stretches = present.filter((inside, i) => inside && !present[i - 1]).length;
   if (stretches < 2) return [{ ...edge, y: low }, { ...edge, y: high, fill: "tonexty", fillcolor }];
   // "tonexty" would join the two sides of a gap: each stretch is a shape by itself.
   const shapes = { x: [], y: [] };
   for (let first = 0; first < x.length; first += 1) {
-    if (!there[first]) continue;
+    if (!present[first]) continue;
     let stop = first;
-    while (there[stop]) stop += 1;
+    while (present[stop]) stop += 1;
     const own = x.slice(first, stop);
     shapes.x.push(...own, ...[...own].reverse(), null);
     shapes.y.push(...low.slice(first, stop), ...high.slice(first, stop).reverse(), null);
@@ -230,8 +230,8 @@ function allOrNone(figure, on) {
   button.type = "button";
   button.textContent = on ? "all on" : "all off";
   button.addEventListener("click", () => {
-    const known = choices.get(figure);
-    known.forEach((_, key) => known.set(key, on));
+    const shownGroups = choices.get(figure);
+    shownGroups.forEach((_, key) => shownGroups.set(key, on));
     figure.querySelectorAll(".controls input[type=checkbox]").forEach((box) => (box.checked = on));
     drawFigure(figure);
   });
@@ -240,9 +240,9 @@ function allOrNone(figure, on) {
 
 // Colours follow the theme; what has no data under the present choices is not offered.
 function syncControls(figure, groups) {
-  const known = new Map(groups.map((group) => [group.key, group]));
+  const byKey = new Map(groups.map((group) => [group.key, group]));
   figure.querySelectorAll(".controls .toggle").forEach((label) => {
-    const group = known.get(label.dataset.group);
+    const group = byKey.get(label.dataset.group);
     label.hidden = !group || group.absent === true;
     if (group) label.querySelector("span").innerHTML = group.look ? swatch(group.look) : "";
   });

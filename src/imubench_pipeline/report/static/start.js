@@ -1,8 +1,8 @@
 // What happens when a page opens; in a report of one file, when a page of it is chosen.
 
 function openPage(main) {
-  const found = main.querySelector("script[type='application/json'].page");
-  pageData = found ? JSON.parse(found.textContent) : {};
+  const data = main.querySelector("script[type='application/json'].page");
+  pageData = data ? JSON.parse(data.textContent) : {};
   decoded = [];
   showUnits(main);
   startTables(main);
@@ -12,14 +12,14 @@ function openPage(main) {
 
 // One file: the pages lie in <template id="page:PATH">, and #/PATH or #/PATH#SECTION shows one.
 function startPages(main) {
-  const known = (path) => document.getElementById(`page:${path}`);
+  const pageOf = (path) => document.getElementById(`page:${path}`);
   let here = null;
   const show = () => {
     const [path, section] = decodeURIComponent(location.hash.slice(2) || "index.html").split("#");
-    const page = known(path) ? path : "index.html";
+    const page = pageOf(path) ? path : "index.html";
     if (page !== here) {
       here = page;
-      main.replaceChildren(known(page).content.cloneNode(true));
+      main.replaceChildren(pageOf(page).content.cloneNode(true));
       document.title = main.querySelector("h1").textContent;
       document.querySelectorAll("header nav a").forEach((link) =>
         link.toggleAttribute("aria-current", resolved(link.getAttribute("href"), "") === page));
@@ -38,7 +38,7 @@ function startPages(main) {
     const [target, section] = link.getAttribute("href").split("#");
     const inHeader = link.closest("header") !== null;
     const path = target === "" ? here : resolved(target, inHeader ? "" : here);
-    if (!known(path)) return;
+    if (!pageOf(path)) return;
     event.preventDefault();
     const hash = `#/${encodeURI(path)}${section ? `#${section}` : ""}`;
     if (location.hash === hash) show();

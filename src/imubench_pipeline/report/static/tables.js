@@ -97,24 +97,24 @@ class LongTable {
   }
 
   show() {
-    const found = this.every.filter((row) => this.fits(row));
-    if (this.order) sortRows(found, this.order);
-    const shown = this.all ? found : found.slice(0, FEW);
+    const fitting = this.every.filter((row) => this.fits(row));
+    if (this.order) sortRows(fitting, this.order);
+    const shown = this.all ? fitting : fitting.slice(0, FEW);
     shown.forEach((row) => (row.hidden = false));
     this.body.replaceChildren(...shown);
     showUnits(this.body);
-    const those = found.length === this.rows.length ? `${found.length} rows` : `${found.length} of ${this.rows.length} rows`;
-    this.count.textContent = shown.length < found.length ? `the first ${shown.length} of ${those}` : those;
-    this.more.hidden = shown.length === found.length;
-    this.more.textContent = `show all ${found.length}`;
+    const those = fitting.length === this.rows.length ? `${fitting.length} rows` : `${fitting.length} of ${this.rows.length} rows`;
+    this.count.textContent = shown.length < fitting.length ? `the first ${shown.length} of ${those}` : those;
+    this.more.hidden = shown.length === fitting.length;
+    this.more.textContent = `show all ${fitting.length}`;
   }
 }
 
 function sortRows(rows, { column, direction, kind }) {
   const collator = new Intl.Collator("en", { numeric: true });
   const keys = new Map(rows.map((row) => [row, sortKey(row, column, kind)]));
-  rows.sort((one, other) => {
-    const [a, b] = [keys.get(one), keys.get(other)];
+  rows.sort((first, second) => {
+    const [a, b] = [keys.get(first), keys.get(second)];
     if (a === null || b === null) return (a === null) - (b === null); // what is not known stands last
     return direction * (typeof a === "number" ? a - b : collator.compare(a, b));
   });

@@ -66,32 +66,32 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--output", type=Path, help="folder; default: RESULTS/figures")
 
 
-def _listed(known: Sequence[str]) -> Callable[[str], tuple[str, ...]]:
+def _listed(choices: Sequence[str]) -> Callable[[str], tuple[str, ...]]:
     """Return a reader of names with commas between them; ``all`` stands for every one."""
 
     def names(text: str) -> tuple[str, ...]:
         asked = [name.strip() for name in text.split(",")]
         for name in asked:
-            if name not in known and name != "all":
+            if name not in choices and name != "all":
                 raise argparse.ArgumentTypeError(
-                    f"found {name!r}, expected all, or some of {', '.join(known)}"
+                    f"found {name!r}, expected all, or some of {', '.join(choices)}"
                 )
-        return tuple(known) if "all" in asked else tuple(dict.fromkeys(asked))
+        return tuple(choices) if "all" in asked else tuple(dict.fromkeys(asked))
 
     return names
 
 
-def run(given: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> int:
     """Write the figures that are asked for; return the exit status."""
     try:
-        tables = _load(given.results)
-        chosen = select(tables, given.sensor, given.recording, given.channel)
-        written = _write(tables, chosen, given)
+        tables = _load(arguments.results)
+        chosen = select(tables, arguments.sensor, arguments.recording, arguments.channel)
+        written = _write(tables, chosen, arguments)
     except (SelectionError, OSError) as error:
         print(error, file=sys.stderr)
         return 2
     if not written:
-        needs = [f"{kind} needs {_NEEDS[kind]}" for kind in given.kind if kind in _NEEDS]
+        needs = [f"{kind} needs {_NEEDS[kind]}" for kind in arguments.kind if kind in _NEEDS]
         print(f"found nothing to draw: {'; '.join(needs)}", file=sys.stderr)
         return 2
     return 0
@@ -132,11 +132,11 @@ def select(
     for column, asked in (("sensor", sensor), ("recording", recording), ("channel", channel)):
         if asked is None:
             continue
-        known = chosen["allan"][column].unique().to_pylist()
-        if asked not in known:
+        existing = chosen["allan"][column].unique().to_pylist()
+        if asked not in existing:
             reason = _rejection(chosen["recordings"], column, asked)
             raise SelectionError(
-                f"found no {column} {asked!r}{reason}; there are: {', '.join(sorted(known))}"
+                f"found no {column} {asked!r}{reason}; there are: {', '.join(sorted(existing))}"
             )
         chosen = {name: _part(table, column, asked) for name, table in chosen.items()}
     if not chosen["allan"].num_rows:
@@ -147,9 +147,9 @@ def select(
 def _part(table: pa.Table, column: str, asked: str) -> pa.Table:
     if column not in table.schema.names:
         return table
-    kept = pc.equal(table[column], asked)
+    mask = pc.equal(table[column], asked)
     # A finding without a channel is about all of them.
-    return table.filter(pc.fill_null(kept, True) if column == "channel" else kept)
+    return table.filter(pc.fill_null(mask, True) if column == "channel" else mask)
 
 
 def _rejection(recordings: pa.Table, column: str, asked: str) -> str:
@@ -165,21 +165,21 @@ def _rejection(recordings: pa.Table, column: str, asked: str) -> str:
 
 
 def _write(
-    tables: Mapping[str, pa.Table], chosen: Mapping[str, pa.Table], given: argparse.Namespace
+    tables: Mapping[str, pa.Table], chosen: Mapping[str, pa.Table], arguments: argparse.Namespace
 ) -> int:
     """Write the figures, and say which; return how many files."""
     # Matplotlib is loaded when it is sure that there is something to draw.
     from imubench_pipeline.report.static_figures.files import save
 
-    output: Path = given.output or given.results / "figures"
+    output: Path = arguments.output or arguments.results / "figures"
     # The order of the pages of the report, so that a sensor looks the same in both.
     sensors = sorted(set(tables["recordings"]["sensor"].to_pylist()))
     written = 0
-    for name, make in _figures(chosen, sensors, given):
+    for name, make in _figures(chosen, sensors, arguments):
         figure = make()
         if figure is None:
             continue
-        for ending in given.format:
+        for ending in arguments.format:
             path = output / f"{name}.{ending}"
             save(figure, path)
             written += 1
@@ -188,7 +188,7 @@ def _write(
 
 
 def _figures(
-    chosen: Mapping[str, pa.Table], sensors: Sequence[str], given: argparse.Namespace
+    chosen: Mapping[str, pa.Table], sensors: Sequence[str], arguments: argparse.Namespace
 ) -> Iterator[tuple[str, Make]]:
     """Yield name and maker of each figure that is asked for."""
     from imubench_pipeline.report.static_figures.files import (
@@ -200,17 +200,17 @@ def _figures(
     from imubench_pipeline.report.static_figures.theory import theory_figure
     from imubench_pipeline.report.view import recording_views
 
-    cross = [kind for kind in given.kind if kind in CROSS_KINDS]
-    of_channel = [kind for kind in given.kind if kind in CHANNEL_KINDS]
-    if "theory" in given.kind:
-        yield "theory", partial(theory_figure, given.units)
+    cross = [kind for kind in arguments.kind if kind in CROSS_KINDS]
+    of_channel = [kind for kind in arguments.kind if kind in CHANNEL_KINDS]
+    if "theory" in arguments.kind:
+        yield "theory", partial(theory_figure, arguments.units)
     views = []
     if cross or of_channel:
-        views = [view for one in recording_views(chosen) for view in one.channels()]
+        views = [view for recording in recording_views(chosen) for view in recording.channels()]
     # What shows only a part must not take the place of the figure of all sensors.
-    part = "".join(f"{name}/" for name in (given.sensor, given.recording) if name)
-    for name, make in cross_figures(views, given.units, sensors=sensors, kinds=cross):
+    part = "".join(f"{name}/" for name in (arguments.sensor, arguments.recording) if name)
+    for name, make in cross_figures(views, arguments.units, sensors=sensors, kinds=cross):
         yield part + name, make
     for number, view in enumerate(views if of_channel else [], start=1):
         print(f"channel {number} of {len(views)}: {view.label} {view.channel}", file=sys.stderr)
-        yield from channel_figures(view, given.units, kinds=of_channel)
+        yield from channel_figures(view, arguments.units, kinds=of_channel)

@@ -135,11 +135,11 @@ def _bytes(figure: Figure, kind: str) -> bytes:
     return _SPACE_BEFORE.sub(b"\n", data)
 
 
-def _styled_once(found: re.Match[bytes]) -> bytes:
-    group, marks, looks = found.groups()
-    said = b' style="' + looks + b'"'
-    return group + said + b">" + marks.replace(said, b"")
+def _styled_once(match: re.Match[bytes]) -> bytes:
+    group, marks, looks = match.groups()
+    attribute = b' style="' + looks + b'"'
+    return group + attribute + b">" + marks.replace(attribute, b"")
 
 
-def _shortened(found: re.Match[bytes]) -> bytes:
-    return _DECIMALS.sub(rb"\1", found[0])
+def _shortened(match: re.Match[bytes]) -> bytes:
+    return _DECIMALS.sub(rb"\1", match[0])

@@ -152,7 +152,7 @@ def _draw_panel(
 ) -> set[str]:
     """Draw one parameter of all sensors; return the kinds of marks there are."""
     unit = page_unit(blocks[0].views[0].quantity, symbol, system)
-    there: list[Mark] = []
+    drawn: list[Mark] = []
     truths: list[tuple[float, float]] = []
     for number, block in enumerate(blocks):
         if number % 2:
@@ -171,7 +171,7 @@ def _draw_panel(
         _draw_marks(axes, of_block, looks[block.sensor], unit.per_si, step)
         if not of_block:
             _say_why(axes, block, symbol)
-        there += of_block
+        drawn += of_block
     if truths:
         axes.plot(
             [value for _, value in truths],
@@ -183,19 +183,19 @@ def _draw_panel(
             mew=0.8,
             zorder=3.5,
         )
-    _limit(axes, there, [value for _, value in truths], unit.per_si, ticks)
+    _limit(axes, drawn, [value for _, value in truths], unit.per_si, ticks)
     axes.set_xlabel(f"{SYMBOLS[symbol]} ({unit.sign})")
-    return {mark.kind for mark in there} | ({"truth"} if truths else set())
+    return {mark.kind for mark in drawn} | ({"truth"} if truths else set())
 
 
 def _limit(
-    axes: Axes, there: Sequence[Mark], truths: Sequence[float], scale: float, ticks: int
+    axes: Axes, drawn: Sequence[Mark], truths: Sequence[float], scale: float, ticks: int
 ) -> None:
     """Set limits that hold all values, and their intervals within reason."""
-    values = [mark.value * scale for mark in there if mark.value] + list(truths)
+    values = [mark.value * scale for mark in drawn if mark.value] + list(truths)
     # The arrow of a limit needs room at its left.
-    values += [mark.value * scale / 2.5 for mark in there if mark.value and mark.kind == "limit"]
-    ends = [end * scale for mark in there for end in (mark.lower, mark.upper) if end]
+    values += [mark.value * scale / 2.5 for mark in drawn if mark.value and mark.kind == "limit"]
+    ends = [end * scale for mark in drawn for end in (mark.lower, mark.upper) if end]
     values = values or ends
     if not values:
         axes.set_xticks([])
@@ -244,14 +244,14 @@ def _draw_marks(
 
 def _say_why(axes: Axes, block: _Block, symbol: str) -> None:
     """Write why a row of a panel is empty."""
-    found = {
+    statuses = {
         row["status"].replace("_", " ")
         for view in block.views
         if view.recommended in view.parameters
         for row in view.named(view.recommended, symbol)
     }
     axes.annotate(
-        ", ".join(sorted(found)) or "not estimated",
+        ", ".join(sorted(statuses)) or "not estimated",
         (0.0, (block.top + block.bottom) / 2.0),
         xycoords=("axes fraction", "data"),
         xytext=(3.0, 0.0),

@@ -20,7 +20,7 @@ def draw_comparison(tables: Mapping[str, pa.Table], system: System, folder: Path
     Parameters
     ----------
     tables : mapping of str to pyarrow.Table
-        Those of `COMPARED`.
+        Joined; those of recordings that are left out count as empty.
     system : str
         Units: ``practical`` or ``si``.
     folder : Path

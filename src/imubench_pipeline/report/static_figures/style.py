@@ -153,11 +153,11 @@ def text_width(figure: Figure, text: str) -> float:
 
 def shortened(figure: Figure, name: str, width: float) -> str:
     """Return a name, its middle left out where it is wider than ``width`` pt."""
-    text, kept = name, len(name)
-    while kept > 2 and (excess := text_width(figure, plain(text)) / width) > 1.0:
-        kept = min(kept - 1, int(kept / excess))
-        half = kept // 2
-        text = f"{name[: kept - half]}…{name[len(name) - half :]}"
+    text, length = name, len(name)
+    while length > 2 and (excess := text_width(figure, plain(text)) / width) > 1.0:
+        length = min(length - 1, int(length / excess))
+        half = length // 2
+        text = f"{name[: length - half]}…{name[len(name) - half :]}"
     return plain(text)
 
 
@@ -211,8 +211,8 @@ def settled(figure: Figure) -> Figure:
 def extent(*values: ArrayLike, margin: float = 1.25) -> tuple[float, float]:
     """Return limits of a logarithmic axis that holds all values above 0, and some margin."""
     joined = np.concatenate([np.ravel(np.asarray(each, dtype=np.float64)) for each in values])
-    there = joined[np.isfinite(joined) & (joined > 0)]
-    low, high = (there.min(), there.max()) if len(there) else (1.0, 1.0)
+    positive = joined[np.isfinite(joined) & (joined > 0)]
+    low, high = (positive.min(), positive.max()) if len(positive) else (1.0, 1.0)
     missing = max(0.0, _LEAST_SPAN - math.log10(high / low)) / 2.0
     return float(low / margin / 10.0**missing), float(high * margin * 10.0**missing)
 

@@ -96,26 +96,28 @@ def _looks(terms: Sequence[Term]) -> Iterator[tuple[Term, dict[str, Any]]]:
         yield term, TERM_LOOKS[term.symbol] | dash
 
 
+def mark_point(axes: Axes, symbol: str, tau: float, level: float) -> None:
+    """Draw the point of a curve at which the parameter of a term is read."""
+    axes.plot(
+        tau,
+        level,
+        ls="none",
+        marker="o",
+        markersize=4.0,
+        markerfacecolor="white",
+        markeredgecolor=TERM_LOOKS[symbol]["color"],
+        markeredgewidth=0.9,
+        zorder=3.2,
+    )
+
+
 def _mark_readings(
     axes: Axes, terms: Sequence[Term], scale: float, tau: NDArray[np.float64], floor_tau: float
 ) -> list[float]:
     """Mark the points at which the terms have the values of their parameters.
 
-    Parameters
-    ----------
-    axes : Axes
-    terms : sequence of Term
-    scale : float
-        From SI to the unit of the axes.
-    tau : ndarray
-        Averaging times that the axes show, s.
-    floor_tau : float
-        Where the curve is lowest, s.
-
-    Returns
-    -------
-    list of float
-        Levels that the axes must hold: the points and what is written at them.
+    ``scale`` is from SI to the unit of the axes, which show ``tau``; the curve is lowest at
+    ``floor_tau``. Returned are the levels that the axes must hold: of points and of texts.
     """
     levels = []
     for term in terms:
@@ -130,17 +132,7 @@ def _mark_readings(
         levels.append(level * scale * (0.6 if below else 1.6))
         if reading.peak:
             axes.axhline(level * scale, color=colour, lw=0.5, ls=(0, (1, 2)))
-        axes.plot(
-            where,
-            level * scale,
-            ls="none",
-            marker="o",
-            markersize=4.0,
-            markerfacecolor="white",
-            markeredgecolor=colour,
-            markeredgewidth=0.9,
-            zorder=3.2,
-        )
+        mark_point(axes, term.symbol, where, level * scale)
         axes.annotate(
             f"{factor}${reading.symbol}$",
             (where, level * scale),

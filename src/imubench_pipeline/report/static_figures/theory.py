@@ -20,7 +20,7 @@ from imubench_pipeline.report.static_figures.style import (
     settled,
     style,
 )
-from imubench_pipeline.report.static_figures.terms import SUM_LOOK, TERM_LOOKS
+from imubench_pipeline.report.static_figures.terms import SUM_LOOK, TERM_LOOKS, mark_point
 
 DEGREE_PER_HOUR = math.pi / 180.0 / 3600.0
 
@@ -60,12 +60,12 @@ def theory_figure(system: System = "practical") -> Figure:
     axes.set_ylabel(f"Allan deviation σ(τ) ({unit.sign})")
     flat = _flat_tau(model)
     white, walk = model.N * unit.per_si, model.K * unit.per_si
-    _mark(axes, "N", 1.0, white)
+    mark_point(axes, "N", 1.0, white)
     _write(axes, "N", 1.0, white, "$N$: at τ = 1 s", (6.0, 6.0))
-    _mark(axes, "K", 3.0, walk)
+    mark_point(axes, "K", 3.0, walk)
     _write(axes, "K", 3.0, walk, "$K$: at τ = 3 s", (7.0, -7.0))
     plateau = FLOOR * model.B * unit.per_si
-    _mark(axes, "F", flat, plateau)
+    mark_point(axes, "F", flat, plateau)
     # Beside the point the three lines cross; at their end there is room.
     _write(axes, "F", float(_TAU[-1]), plateau, f"{FLOOR:.3f} $B$", (-4.0, -6.0))
     legend_below(figure, axes.get_legend_handles_labels()[0])
@@ -80,21 +80,6 @@ def theory_figure(system: System = "practical") -> Figure:
 def _flat_tau(model: NoiseModel) -> float:
     """Return where the curve is flat: N / sqrt(tau) and K sqrt(tau / 3) are equal."""
     return math.sqrt(3.0) * model.N / model.K
-
-
-def _mark(axes: Axes, symbol: str, tau: float, level: float) -> None:
-    colour = TERM_LOOKS[symbol]["color"]
-    axes.plot(
-        tau,
-        level,
-        ls="none",
-        marker="o",
-        markersize=4.0,
-        markerfacecolor="white",
-        markeredgecolor=colour,
-        markeredgewidth=0.9,
-        zorder=3.2,
-    )
 
 
 def _write(
