@@ -15,7 +15,8 @@ from pathlib import Path
 from pydantic import BaseModel
 
 from imubench_pipeline.navigation.suitability.abilities import abilities
-from imubench_pipeline.recordings.drop_zone import Recording, fingerprint, fingerprints, found_logs
+from imubench_pipeline.recordings.drop_zone import Recording, found_logs
+from imubench_pipeline.recordings.known_logs import versions
 from imubench_pipeline.run.faults import Faults
 from imubench_pipeline.settings.config import Run, given_beside, read_run
 from imubench_pipeline.settings.printed import IN_USE
@@ -38,6 +39,7 @@ from imubench_pipeline.settings.simulated_recordings import (
 )
 from imubench_pipeline.settings.validation import ConfigError, parse
 from imubench_pipeline.settings.yaml_files import read_yaml
+from imubench_pipeline.tables.digests import digest_of
 from imubench_pipeline.tables.provenance import source_digest
 from imubench_pipeline.units import quantity_to_si
 
@@ -128,7 +130,7 @@ class Plan:
     def ingest_settings(self, sensor: str, name: str) -> str:
         """Return what the ingest of a recording depends on, its error where it cannot be read.
 
-        The log is known by its `fingerprint`, which is taken once a run.
+        The log is known by its `versions`, which are looked up once a run.
         """
         key = (sensor, name)
         if key not in self._of_ingest:
@@ -154,9 +156,20 @@ class Plan:
                 log = log.model_copy(update={"table_rate": None})
             written = log.model_dump(mode="json", exclude={"bandwidth"})
             said = notes.model_dump(mode="json", exclude={"log", *_EXPERIMENTS})
-            return settings | {"notes": said, "log": written, "files": fingerprints(recording)}
+            return settings | {"notes": said, "log": written, "files": self._files(recording)}
         except ConfigError as error:
             return settings | {"error": str(error)}
+
+    def _files(self, recording: Recording) -> dict[str, str]:
+        """Return the `versions` of the files of a log; of one that is to be simulated, none."""
+        if recording.simulated:
+            return {}
+        folder = self.run.results / "recordings" / recording.sensor / recording.name
+        try:
+            return versions(recording.path, folder)
+        except OSError as error:
+            name = recording.path.name
+            raise ConfigError(f"{name!a} cannot be read ({error.strerror})") from None
 
     def kind(self, sensor: str, name: str) -> Kind:
         """Return what was done with the sensor; what its notes were to say, if they are wrong."""
@@ -293,7 +306,7 @@ class Plan:
     @staticmethod
     def _profiles(recording: SimulatedRecording) -> dict[str, str]:
         try:
-            return {str(path): fingerprint(path) for path in profile_files(recording)}
+            return {str(path): digest_of(path) for path in profile_files(recording)}
         except OSError as error:
             raise ConfigError(
                 f"{recording.sensor}/{recording.recording}: {error.filename} cannot be read "
