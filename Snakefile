@@ -12,14 +12,14 @@ include: "workflow/rules/comparison.smk"  # all sensors: tables, ranking, shortl
 include: "workflow/rules/report.smk"  # what is read: pages, figures, exports
 
 
-# What is missing is asked for by name: Snakemake takes away what a failed step left, and else makes
-# a file again only for a step that is run again itself.
+# What is missing or not as it was left is asked for by name: Snakemake takes away what a failed step
+# left, and else makes a file again only for a step that is run again itself.
 rule all:
     input:
         rules.report.output,
         rules.figures.output,
         rules.exports.output,
-        missing(),
+        made_again,
 
 
 localrules:

@@ -24,9 +24,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(given: argparse.Namespace) -> int:
     """Write the report; return the exit status: 2 where there are no results."""
     # Templates and figures cost half a second, which the other commands need not wait for.
+    from imubench_pipeline.report.folder import files_of_report
     from imubench_pipeline.report.publish import one_file, publish, published
     from imubench_pipeline.report.static_figures.of_run import draw_comparison
     from imubench_pipeline.tables import write_content
+    from imubench_pipeline.tables.seals import seal_again
 
     try:
         site = published(given.results)
@@ -37,13 +39,18 @@ def run(given: argparse.Namespace) -> int:
             file=sys.stderr,
         )
         return 2
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        return 2
     if given.one_file is not None:
         write_content(one_file(site), given.one_file)
         print(f"{given.one_file}: {given.one_file.stat().st_size / 1e6:.1f} MB")
         return 0
     folder = given.output or given.results / "report"
     written = publish(site, folder, _say if sys.stderr.isatty() else lambda _: None)
-    if given.output is not None:
+    if given.output is None:
+        seal_again(given.results, "report", files_of_report(folder))
+    else:
         draw_comparison(site.tables, site.system, folder / "figures")
     print(f"{folder / 'index.html'}: {len(written)} files written")
     return 0

@@ -21,7 +21,8 @@ from typing import Any
 import psutil
 
 _FOLDERS = (
-    *("recordings", "sensors", "tables", "simulated", "report", "exports", "faults", "nightly"),
+    *("recordings", "sensors", "tables", "simulated", "report", "exports", "seals", "faults"),
+    "nightly",
 )
 """What a run writes to, below the results: nothing else is touched."""
 
