@@ -30,12 +30,14 @@ onstart:
     from imubench_pipeline.run.progress import follow
 
     follow()
+    remove_temporary(plan.run.results, BEGUN)
 
 
 # Tables are read at the end of a run alone: a run should begin at once.
 onsuccess:
     from imubench_pipeline.report.run_summary import summary
 
+    remove_temporary(plan.run.results, BEGUN + STILL_WRITTEN)
     print(summary(plan.run.results))
     if left_out := plan.faults.left_out():
         raise WorkflowError(left_out)
@@ -45,4 +47,5 @@ onerror:
     import sys
     from imubench_pipeline.report.run_summary import failure
 
+    remove_temporary(plan.run.results, BEGUN + STILL_WRITTEN)
     print(failure(log, plan.run.results), file=sys.stderr)

@@ -2,7 +2,9 @@
 
 import atexit
 import gc
+import time
 
+from imubench_pipeline.run.nightly.recovery import STILL_WRITTEN, remove_temporary
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.run.resources import OfMany, OfRecording, asked, limits_of_steps
 from imubench_pipeline.run.scripts import Scripts
@@ -15,6 +17,10 @@ from imubench_pipeline.tables.seals import place_of
 # for garbage among them as often as Python does, and at the end, takes a fourth of the time.
 gc.set_threshold(100_000, 20, 100)
 atexit.register(gc.freeze)
+
+# What is not complete was left by a killed run: at the beginning if it is older than a command of
+# somebody takes, at the end if nothing was done to it since the beginning.
+BEGUN = time.time()
 
 try:
     plan = Plan(config)

@@ -5,6 +5,10 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from imubench_pipeline.report.site import Site
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,11 +28,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(given: argparse.Namespace) -> int:
     """Write the report; return the exit status: 2 where there are no results."""
     # Templates and figures cost half a second, which the other commands need not wait for.
-    from imubench_pipeline.report.folder import files_of_report
-    from imubench_pipeline.report.publish import one_file, publish, published
-    from imubench_pipeline.report.static_figures.of_run import draw_comparison
-    from imubench_pipeline.tables import write_content
-    from imubench_pipeline.tables.seals import seal_again
+    from imubench_pipeline.report.publish import published
+    from imubench_pipeline.tables.findings import RecordingError
+    from imubench_pipeline.tables.seals import lost_inputs
 
     try:
         site = published(given.results)
@@ -42,6 +44,28 @@ def run(given: argparse.Namespace) -> int:
     except ValueError as error:
         print(error, file=sys.stderr)
         return 2
+    if lost := lost_inputs(given.results, "report"):
+        print(
+            f"{given.results / lost[0]}: is no longer there; run snakemake -c2 again, as for these "
+            "results, and it is made anew",
+            file=sys.stderr,
+        )
+        return 2
+    try:
+        return _write(site, given)
+    except RecordingError as error:
+        print(error, file=sys.stderr)
+        return 2
+
+
+def _write(site: Site, given: argparse.Namespace) -> int:
+    """Write the pages of a site where they are asked for."""
+    from imubench_pipeline.report.folder import files_of_report
+    from imubench_pipeline.report.publish import one_file, publish
+    from imubench_pipeline.report.static_figures.of_run import draw_comparison
+    from imubench_pipeline.tables import write_content
+    from imubench_pipeline.tables.seals import seal_again
+
     if given.one_file is not None:
         write_content(one_file(site), given.one_file)
         print(f"{given.one_file}: {given.one_file.stat().st_size / 1e6:.1f} MB")

@@ -11,6 +11,7 @@ from typing import Any
 from snakemake.sourcecache import LocalSourceFile, SourceCache, infer_source_file
 
 from imubench_pipeline.run.faults import Faults, Of
+from imubench_pipeline.run.nightly.recovery import remove_unfinished
 from imubench_pipeline.run.processes import Job, Processes, StepError
 from imubench_pipeline.run.sealing import sealed
 from imubench_pipeline.tables.failures import Failure
@@ -99,6 +100,7 @@ class Scripts:
             else:
                 self._bounded(job, attempt, self._limits)
         except StepError as error:
+            remove_unfinished(map(Path, job.output))
             sys.stderr.write(error.trace)
             raise
 
@@ -119,6 +121,7 @@ class Scripts:
             words = f" ({limit.words})" * (error.cause == "time")
             reason = f"the step {job.name} {_VERBS[error.cause]}{error.reason}{words}"
             failure = Failure(of[1], of[2], job.name, error.cause, reason)
+            remove_unfinished(outputs)
             sys.stderr.write(error.trace)
             print(f"{failure.name} is left out: {reason}", file=sys.stderr, flush=True)
             self._faults.failed(failure, attempt, job.log)

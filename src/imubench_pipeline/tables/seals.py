@@ -149,6 +149,21 @@ def seal_again(results: Path, place: str, outputs: Iterable[Path]) -> None:
     seal_files(results, place, outputs, digests(results, (results / name for name in inputs)))
 
 
+def lost_inputs(results: Path, place: str) -> list[str]:
+    """Return what a step read and is no longer there; nothing where there is no seal of it.
+
+    Parameters
+    ----------
+    results : Path
+    place : str
+    """
+    try:
+        inputs = read_seal(results, place).inputs
+    except (FileNotFoundError, SealError):
+        return []
+    return [name for name in inputs if not (results / name).is_file()]
+
+
 def digests(results: Path, paths: Iterable[Path]) -> dict[str, str]:
     """Return the digests of files below the results, by their places there.
 

@@ -242,6 +242,7 @@ class Night:
         # Last: what could not be said is said by the next run.
         if after is not None:
             after.write(self._state)
+            seal_files(self.results, night_place("state"), [self._state], {})
 
 
 def _settings(file: Path, config: Sequence[str]) -> Run:
