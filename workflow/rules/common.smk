@@ -4,11 +4,13 @@ import atexit
 import gc
 import time
 
+from snakemake.iocontainers import Wildcards
+
 from imubench_pipeline.run.nightly.recovery import STILL_WRITTEN, remove_temporary
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.run.resources import OfMany, OfRecording, asked, limits_of_steps
 from imubench_pipeline.run.scripts import Scripts
-from imubench_pipeline.run.sealing import unsound
+from imubench_pipeline.run.sealing import settings_digest, unsound
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, SAMPLES, TABLES
 from imubench_pipeline.tables.seals import place_of
@@ -103,13 +105,21 @@ def tried(step):
 
 
 def jobs():
-    """The first output of every job of this run, by the place of its seal."""
+    """The first output and the settings of every job of this run, by the place of its seal."""
     found = {}
     for rule in workflow.rules:
         if not rule.norun:
             for of in jobs_of(rule):
-                place = place_of(rule.name, *of.values())
-                found[place] = str(rule.output[0].apply_wildcards(of))
+                wildcards = Wildcards(fromdict=of)
+                params = {
+                    name: value(wildcards) if callable(value) else value
+                    for name, value in rule.params.items()
+                    if name != "attempt"
+                }
+                found[place_of(rule.name, *of.values())] = (
+                    str(rule.output[0].apply_wildcards(of)),
+                    settings_digest(params),
+                )
     return found
 
 
@@ -138,9 +148,10 @@ def made_again(wildcards):
         for key, log in plan.recordings.items()
         if log.held_back
     }
+    settings = {place: digest for place, (_, digest) in every.items()}
     files = [
-        every[place]
-        for place in unsound(plan.run.results, every)
+        every[place][0]
+        for place in unsound(plan.run.results, settings)
         if place not in held_back
     ]
     workflow.dag.forcefiles.update(files)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Collection, Iterator, Mapping, Sequence
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from imubench_pipeline.report.folder import files_of_report
@@ -34,7 +36,20 @@ def sealed(job: Job) -> Iterator[None]:
     inputs = digests(job.results, map(Path, job.input))
     yield
     place = place_of(job.name, job.wildcards.get("sensor"), job.wildcards.get("recording"))
-    seal_files(job.results, place, left_by(job.name, [Path(path) for path in job.output]), inputs)
+    outputs = left_by(job.name, [Path(path) for path in job.output])
+    seal_files(job.results, place, outputs, inputs, settings_digest(dict(job.params.items())))
+
+
+def settings_digest(params: Mapping[str, object]) -> str:
+    """Return a digest of the parameters of a job, how often it was tried apart.
+
+    Parameters
+    ----------
+    params : mapping of str to object
+        Texts and numbers.
+    """
+    told = {name: value for name, value in params.items() if name != "attempt"}
+    return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
 
 
 def left_by(step: str, outputs: Sequence[Path]) -> list[Path]:
@@ -46,17 +61,19 @@ def left_by(step: str, outputs: Sequence[Path]) -> list[Path]:
     return [*outputs, *([series] if step == "reconstruct" and series.is_dir() else [])]
 
 
-def unsound(results: Path, jobs: Collection[str]) -> Iterator[str]:
+def unsound(results: Path, jobs: Mapping[str, str]) -> Iterator[str]:
     """Yield the jobs whose outputs are not those that they left, of what is there now.
 
-    They are missing or changed, have no seal, are of another form, or were made of other files. A
-    file that has its size and its date is taken as it is: `imubench verify` reads all of it.
+    They are missing or changed, have no seal, are of another form, or were made of other files or
+    with other settings. That does not rest on what Snakemake has noted: results may come from a
+    backup, or from a run elsewhere. A file that has its size and its date is taken as it is:
+    `imubench verify` reads all of it.
 
     Parameters
     ----------
     results : Path
-    jobs : collection of str
-        The places of the seals of all jobs of a run.
+    jobs : mapping of str to str
+        The `settings_digest` of each job of a run, by the place of its seal.
 
     Yields
     ------
@@ -68,9 +85,9 @@ def unsound(results: Path, jobs: Collection[str]) -> Iterator[str]:
         with contextlib.suppress(FileNotFoundError, SealError):
             seals[place] = read_seal(results, place)
     left = {name: file.sha256 for seal in seals.values() for name, file in seal.outputs.items()}
-    for place in jobs:
+    for place, settings in jobs.items():
         seal = seals.get(place)
-        if seal is None or not _sound(results, seal, left):
+        if seal is None or seal.settings != settings or not _sound(results, seal, left):
             yield place
 
 

@@ -85,12 +85,15 @@ class Seal:
         Digests of what it read, by their places below the results.
     outputs : dict of str to SealedFile
         Likewise, what it wrote.
+    settings : str
+        Digest of the settings and the code that it ran with.
     """
 
     place: str
     form: str
     inputs: dict[str, str]
     outputs: dict[str, SealedFile]
+    settings: str = ""
 
     def write(self, results: Path) -> None:
         """Keep it, atomically."""
@@ -114,7 +117,11 @@ def night_place(name: str) -> str:
 
 
 def seal_files(
-    results: Path, place: str, outputs: Iterable[Path], inputs: Mapping[str, str]
+    results: Path,
+    place: str,
+    outputs: Iterable[Path],
+    inputs: Mapping[str, str],
+    settings: str = "",
 ) -> None:
     """Seal what a step left.
 
@@ -127,9 +134,11 @@ def seal_files(
         Files, and folders of which all files are meant.
     inputs : mapping of str to str
         As `digests` gave them.
+    settings : str
+        Digest of the settings and the code of the step.
     """
     left = {name: SealedFile.of(path) for name, path in sorted(_below(results, outputs))}
-    Seal(place, form(), dict(inputs), left).write(results)
+    Seal(place, form(), dict(inputs), left, settings).write(results)
 
 
 def seal_again(results: Path, place: str, outputs: Iterable[Path]) -> None:
@@ -143,10 +152,11 @@ def seal_again(results: Path, place: str, outputs: Iterable[Path]) -> None:
     outputs : iterable of Path
     """
     try:
-        inputs = read_seal(results, place).inputs
+        before = read_seal(results, place)
     except (FileNotFoundError, SealError):
         return
-    seal_files(results, place, outputs, digests(results, (results / name for name in inputs)))
+    inputs = digests(results, (results / name for name in before.inputs))
+    seal_files(results, place, outputs, inputs, before.settings)
 
 
 def lost_inputs(results: Path, place: str) -> list[str]:
