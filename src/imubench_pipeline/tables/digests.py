@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from imubench_pipeline.tables.files import write_json
+from imubench_pipeline.tables.files import write_content
 
-_DIGEST = "digest"
+_END = "\n}"
+_LAST_LINE = re.compile(r',\n "digest": "[0-9a-f]{64}"\n\}\n\Z')
 
 
 def write_sealed_json(data: Mapping[str, Any], path: Path) -> None:
@@ -22,8 +24,8 @@ def write_sealed_json(data: Mapping[str, Any], path: Path) -> None:
         What JSON can hold, no NaN among it.
     path : Path
     """
-    plain = json.loads(json.dumps(data, allow_nan=False))
-    write_json(plain | {_DIGEST: _digest(plain)}, path)
+    text = json.dumps(dict(data), indent=1, allow_nan=False)
+    write_content(text.removesuffix(_END) + _last_line(text), path)
 
 
 def read_sealed_json(path: Path) -> dict[str, Any]:
@@ -36,12 +38,13 @@ def read_sealed_json(path: Path) -> dict[str, Any]:
     ValueError
         If it is not, letter for letter, as it was written.
     """
+    # All letters count, and not only what they mean.
     text = path.read_bytes().decode()
-    data = json.loads(text)
-    if not isinstance(data, dict) or json.dumps(data, indent=1, allow_nan=False) + "\n" != text:
-        raise ValueError(f"{path}: is not laid out as it was written")
-    if data.pop(_DIGEST, None) != _digest(data):
+    found = _LAST_LINE.search(text)
+    rest = text[: found.start()] + _END if found else text
+    if found is None or found[0] != _last_line(rest):
         raise ValueError(f"{path}: its digest is another one")
+    data: dict[str, Any] = json.loads(rest)
     return data
 
 
@@ -51,5 +54,6 @@ def digest_of(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _digest(data: dict[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()
+def _last_line(text: str) -> str:
+    """Return how a file ends that has the digest of a text, which is that of an object of JSON."""
+    return f',\n "digest": "{hashlib.sha256(text.encode()).hexdigest()}"{_END}\n'
