@@ -35,6 +35,7 @@ _SEALED = ("recordings", "sensors", "tables", "simulated", "report", "exports")
 """Folders in which every file has a seal, but for those that have a digest of their own."""
 
 _SAMPLES = "log*.parquet"
+_NO_SEAL = "expected a seal of the step that left it, found none"
 
 
 @dataclass(frozen=True)
@@ -122,7 +123,7 @@ class Results:
     def _every(self) -> Iterator[Fault]:
         for place, error in self._broken.items():
             found = f"expected the seal of {place}, found one that {error}"
-            yield Fault(seal_file(place), found, self._removed(seal_file(place)))
+            yield Fault(seal_file(place), found, self._mended(seal_file(place), place))
         if older := sum(seal.form != form() for seal in self.seals.values()):
             found = f"expected the form {form()}, found {older} steps of another version"
             yield Fault("seals", found, self.run_again)
@@ -236,6 +237,10 @@ class Results:
                 known = own or path.is_dir() or place.as_posix() in self._left
                 if not known and visible(place):
                     yield self._stray(place.as_posix())
+        for path in sorted((self.folder / NIGHTS).glob("[ls]*.*")):  # the latest, and the state
+            name = path.relative_to(self.folder).as_posix()
+            if name not in self._left:
+                yield Fault(name, _NO_SEAL, self._mended(name, NIGHTS + "/"))
 
     def _strange_rows(self) -> Iterator[Fault]:
         """Yield the tables that speak of recordings which were not compared."""
@@ -263,13 +268,14 @@ class Results:
                 yield Fault(place, found.format(*min(strange)), self._mended(place, "tables"))
 
     def _stray(self, name: str) -> Fault:
-        found = "expected a seal of the step that left it, found none"
-        return Fault(name, found, self._removed(name))
+        return Fault(name, _NO_SEAL, self._removed(name))
 
     def _mended(self, name: str, place: str) -> str:
         """Return how a file is made again that a step left."""
         if place.startswith(f"{NIGHTS}/"):
-            return f"restore it, or rm -f {self._quoted(name)} {self._quoted(seal_file(place))}"
+            files = [name] if place == f"{NIGHTS}/" else dict.fromkeys([name, seal_file(place)])
+            rm = " ".join(["rm -f", *map(self._quoted, files)])
+            return f"restore it, or {rm}: the next night writes its own"
         if place.startswith("recordings/") and place not in self._current:
             folder = self._quoted("/".join(place.split("/")[:3]))
             return f"restore it, or rm -r {folder}: its log is in no comparison any more"
