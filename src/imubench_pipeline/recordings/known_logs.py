@@ -17,6 +17,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from imubench_pipeline.readers import log_files
+from imubench_pipeline.recordings.drop_zone import Recording
+from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables.digests import digest_of, read_sealed_json, write_sealed_json
 
 KNOWN = "log.json"
@@ -161,6 +163,28 @@ def versions(source: Path, folder: Path) -> dict[str, str]:
         with contextlib.suppress(OSError):  # of results that this user may only read
             write_known(known | touched, folder)
     return found
+
+
+def versions_of(recording: Recording, results: Path) -> dict[str, str]:
+    """Return the `versions` of the files of a recording; of one that is to be simulated, none.
+
+    Parameters
+    ----------
+    recording : Recording
+    results : Path
+
+    Raises
+    ------
+    ConfigError
+        If one of them has gone.
+    """
+    if recording.simulated:
+        return {}
+    path = recording.path
+    try:
+        return versions(path, results / "recordings" / recording.sensor / recording.name)
+    except OSError as error:
+        raise ConfigError(f"{path.name!a} cannot be read ({error.strerror})") from None
 
 
 def glimpse(path: Path) -> str:

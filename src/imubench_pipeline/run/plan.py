@@ -16,7 +16,7 @@ from pydantic import BaseModel
 
 from imubench_pipeline.navigation.suitability.abilities import abilities
 from imubench_pipeline.recordings.drop_zone import Recording, found_logs
-from imubench_pipeline.recordings.known_logs import versions
+from imubench_pipeline.recordings.known_logs import versions_of
 from imubench_pipeline.run.faults import Faults
 from imubench_pipeline.settings.config import Run, given_beside, read_run
 from imubench_pipeline.settings.printed import IN_USE
@@ -128,10 +128,7 @@ class Plan:
         return self.faults.attempt((step, sensor, name), again=not held_back)
 
     def ingest_settings(self, sensor: str, name: str) -> str:
-        """Return what the ingest of a recording depends on, its error where it cannot be read.
-
-        The log is known by its `versions`, which are looked up once a run.
-        """
+        """Return what the ingest of a recording depends on, its error where it cannot be read."""
         key = (sensor, name)
         if key not in self._of_ingest:
             self._of_ingest[key] = _text(self._ingest(self.recordings[key]))
@@ -156,20 +153,10 @@ class Plan:
                 log = log.model_copy(update={"table_rate": None})
             written = log.model_dump(mode="json", exclude={"bandwidth"})
             said = notes.model_dump(mode="json", exclude={"log", *_EXPERIMENTS})
-            return settings | {"notes": said, "log": written, "files": self._files(recording)}
+            files = versions_of(recording, self.run.results)
+            return settings | {"notes": said, "log": written, "files": files}
         except ConfigError as error:
             return settings | {"error": str(error)}
-
-    def _files(self, recording: Recording) -> dict[str, str]:
-        """Return the `versions` of the files of a log; of one that is to be simulated, none."""
-        if recording.simulated:
-            return {}
-        folder = self.run.results / "recordings" / recording.sensor / recording.name
-        try:
-            return versions(recording.path, folder)
-        except OSError as error:
-            name = recording.path.name
-            raise ConfigError(f"{name!a} cannot be read ({error.strerror})") from None
 
     def kind(self, sensor: str, name: str) -> Kind:
         """Return what was done with the sensor; what its notes were to say, if they are wrong."""
