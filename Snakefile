@@ -12,14 +12,14 @@ include: "workflow/rules/comparison.smk"  # all sensors: tables, ranking, shortl
 include: "workflow/rules/report.smk"  # what is read: pages, figures, exports
 
 
-# What is missing is asked for by name: Snakemake takes away what a failed step left, and else makes
-# a file again only for a step that is run again itself.
+# What is missing or not as it was left is asked for by name: Snakemake takes away what a failed step
+# left, and else makes a file again only for a step that is run again itself.
 rule all:
     input:
         rules.report.output,
         rules.figures.output,
         rules.exports.output,
-        missing(),
+        made_again,
 
 
 localrules:
@@ -30,12 +30,14 @@ onstart:
     from imubench_pipeline.run.progress import follow
 
     follow()
+    remove_temporary(plan.run.results, BEGUN)
 
 
 # Tables are read at the end of a run alone: a run should begin at once.
 onsuccess:
     from imubench_pipeline.report.run_summary import summary
 
+    remove_temporary(plan.run.results, BEGUN + STILL_WRITTEN)
     print(summary(plan.run.results))
     if left_out := plan.faults.left_out():
         raise WorkflowError(left_out)
@@ -45,4 +47,5 @@ onerror:
     import sys
     from imubench_pipeline.report.run_summary import failure
 
+    remove_temporary(plan.run.results, BEGUN + STILL_WRITTEN)
     print(failure(log, plan.run.results), file=sys.stderr)

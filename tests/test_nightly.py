@@ -24,7 +24,7 @@ from imubench_pipeline.run.nightly.settling import (
     settled,
     unsettled,
 )
-from imubench_pipeline.run.nightly.state import State, load_tables, read_state, state_of
+from imubench_pipeline.run.nightly.state import State, StateError, load_tables, read_state, state_of
 from imubench_pipeline.run.nightly.summary import STATUS, Summary, compared, in_words
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.settings.validation import ConfigError
@@ -551,10 +551,16 @@ def test_of_a_log_written_to_during_the_run_nothing_is_said_yet(tmp_path: Path) 
     assert kept.warned == [] and kept.logs == {}
 
 
-def test_a_state_that_cannot_be_read_is_none(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "text",
+    ['{"finished": "2026-', '{"finished": "2026-01-01T00:00:00Z", "logs": {}}', "[]"],
+    ids=["cut off", "of an older version", "no state"],
+)
+def test_a_state_that_cannot_be_read_is_told(tmp_path: Path, text: str) -> None:
     assert read_state(tmp_path / "state.json") is None
-    (tmp_path / "state.json").write_text('{"finished": "2026-')
-    assert read_state(tmp_path / "state.json") is None
+    (tmp_path / "state.json").write_text(text)
+    with pytest.raises(StateError, match=r"state\.json is damaged, or of another version"):
+        read_state(tmp_path / "state.json")
 
 
 def test_long_lists_end_with_how_many_more() -> None:

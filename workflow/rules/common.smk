@@ -2,18 +2,27 @@
 
 import atexit
 import gc
-import os
+import time
 
+from snakemake.iocontainers import Wildcards
+
+from imubench_pipeline.run.nightly.recovery import STILL_WRITTEN, remove_temporary
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.run.resources import OfMany, OfRecording, asked, limits_of_steps
 from imubench_pipeline.run.scripts import Scripts
+from imubench_pipeline.run.sealing import settings_digest, unsound
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, SAMPLES, TABLES
+from imubench_pipeline.tables.seals import place_of
 
 # The graph of a thousand recordings is millions of objects, which live as long as the run: to look
 # for garbage among them as often as Python does, and at the end, takes a fourth of the time.
 gc.set_threshold(100_000, 20, 100)
 atexit.register(gc.freeze)
+
+# What is not complete was left by a killed run: at the beginning if it is older than a command of
+# somebody takes, at the end if nothing was done to it since the beginning.
+BEGUN = time.time()
 
 try:
     plan = Plan(config)
@@ -95,25 +104,55 @@ def tried(step):
     return lambda w: plan.attempt(step, w.sensor, w.get("recording"))
 
 
-def missing():
-    """The files of this run that are not there."""
-    made = [
-        *(
-            file
-            for name in TABLES
-            if name not in OF_ONE_RECORDING
-            for file in as_files(name)[name]
-        ),
-        *(file for table in (*OF_SENSOR, *OUTLOOK) for file in of_each_sensor(table)),
-        *(file for table in TURNED for file in of_each(plan.turned, table)),
-        *(file for table in CALIBRATED for file in of_each(plan.calibrated, table)),
-        *(str(found.path) for found in plan.recordings.values() if found.simulated),
+def jobs():
+    """The first output and the settings of every job of this run, by the place of its seal."""
+    found = {}
+    for rule in workflow.rules:
+        if not rule.norun:
+            for of in jobs_of(rule):
+                wildcards = Wildcards(fromdict=of)
+                params = {
+                    name: value(wildcards) if callable(value) else value
+                    for name, value in rule.params.items()
+                    if name != "attempt"
+                }
+                found[place_of(rule.name, *of.values())] = (
+                    str(rule.output[0].apply_wildcards(of)),
+                    settings_digest(params),
+                )
+    return found
+
+
+def jobs_of(rule):
+    """The sensor and recording of each job of a rule."""
+    if "recording" not in rule.wildcard_names:
+        return [{"sensor": name} for name in FOLDERS] if rule.wildcard_names else [{}]
+    chosen = {
+        "simulate": [key for key, found in plan.recordings.items() if found.simulated],
+        "earth_rotation": plan.turned,
+        "calibration": plan.calibrated,
+    }
+    recordings = chosen.get(rule.name, plan.recordings)
+    return [{"sensor": sensor, "recording": name} for sensor, name in recordings]
+
+
+def made_again(wildcards):
+    """The files of this run that are not as they were left; Snakemake is to make them anew.
+
+    It does so by itself for what is missing and needed by a step that runs, and not for what is
+    another file, or is damaged.
+    """
+    every = jobs()
+    held_back = {
+        place_of("ingest", *key)
+        for key, log in plan.recordings.items()
+        if log.held_back
+    }
+    settings = {place: digest for place, (_, digest) in every.items()}
+    files = [
+        every[place][0]
+        for place in unsound(plan.run.results, settings)
+        if place not in held_back
     ]
-    for (sensor, recording), found in plan.recordings.items():
-        if not found.held_back:
-            for rule in OF_RECORDING:
-                made += [
-                    file.format(sensor=sensor, recording=recording)
-                    for file in rule.output
-                ]
-    return [file for file in made if not os.path.exists(file)]
+    workflow.dag.forcefiles.update(files)
+    return files

@@ -4,6 +4,7 @@
 rule report:
     input:
         tables=[table(name) for name in TABLES if name not in OF_ONE_RECORDING],
+        quality=every("quality.json"),
         samples=[file for name in SAMPLES for file in every(f"{name}.parquet")],
     output:
         page=report(RESULTS + "/report/index.html", category="Comparison"),

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import re
 from dataclasses import dataclass
 from pathlib import Path
 
 from imubench_pipeline.readers import log_files
-from imubench_pipeline.settings.validation import ConfigError
 
 PARTIAL = frozenset({".part", ".tmp", ".filepart", ".crdownload"})
 """How the names of files end that are still being transferred."""
@@ -20,9 +18,6 @@ COMPRESSED = frozenset({".gz", ".zst", ".xz", ".bz2", ".zip"})
 _NOT_LOGS = {".yaml", ".yml", ".md"} | PARTIAL
 _UNUSABLE_IN_NAMES = re.compile(r"[^\w .+()-]")
 _LONGEST_NAME = 120
-_READ_WHOLE = 1 << 20  # bytes; of a larger file, blocks are read
-_BLOCKS = 16
-_BLOCK = 4096  # bytes
 
 
 @dataclass(frozen=True)
@@ -131,48 +126,6 @@ def _fault(path: Path, name: str) -> str | None:
     except OSError as error:
         return f"{shown} cannot be read ({error.strerror})"
     return None
-
-
-def fingerprint(path: Path) -> str:
-    """Return the size of a file and a digest of it; of a large file, of blocks spread over it.
-
-    The first and the last block are among them: what grew, was cut short or compressed anew has
-    another fingerprint, as has another log of the same size. A change that leaves the size and all
-    16 blocks of 4 kB as they are is not seen, in a file above 1 MB.
-
-    Parameters
-    ----------
-    path : Path
-        A file.
-    """
-    digest = hashlib.sha256()
-    with path.open("rb", buffering=0) as file:
-        size = os.fstat(file.fileno()).st_size
-        if size <= _READ_WHOLE:
-            digest.update(file.read(_READ_WHOLE + 1))
-        else:
-            for number in range(_BLOCKS):
-                place = (size - _BLOCK) * number // (_BLOCKS - 1)
-                digest.update(os.pread(file.fileno(), _BLOCK, place))
-    return f"{size} {digest.hexdigest()[:32]}"
-
-
-def fingerprints(recording: Recording) -> dict[str, str]:
-    """Return those of the files of a recording; of one that is to be simulated, none.
-
-    Raises
-    ------
-    ConfigError
-        If one of them has gone.
-    """
-    if recording.simulated:
-        return {}
-    path = recording.path
-    try:
-        files = log_files(path)
-        return {file.relative_to(path).as_posix(): fingerprint(file) for file in files}
-    except OSError as error:
-        raise ConfigError(f"{path.name!a} cannot be read ({error.strerror})") from None
 
 
 def _stem(path: Path) -> str:

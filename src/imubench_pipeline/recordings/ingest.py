@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
+import contextlib
 import json
 import shutil
 import tempfile
@@ -11,9 +11,10 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from imubench_pipeline.readers import log_files, read
+from imubench_pipeline.readers import read
 from imubench_pipeline.recordings import timebase
 from imubench_pipeline.recordings.assembly import assemble, counted, names_of
+from imubench_pipeline.recordings.known_logs import KnownFile, read_log, write_known
 from imubench_pipeline.recordings.opening import check_opening
 from imubench_pipeline.recordings.parts import Part, leave_out_knocks, read_part
 from imubench_pipeline.recordings.quality.columns import column_findings
@@ -51,6 +52,8 @@ class Ingested:
         The files of samples (`imubench_pipeline.recordings.quality_file.identified`).
     gravity : GravityTurn or None
         How gravity turns against the sensor.
+    sources : dict
+        The files of the log, by their place in it; None: they were not read to their end.
     """
 
     summary: dict[str, Any]
@@ -58,6 +61,7 @@ class Ingested:
     channels: dict[str, dict[str, Any]] = field(default_factory=dict)
     kept: dict[str, dict[str, Any]] = field(default_factory=dict)
     gravity: GravityTurn | None = None
+    sources: dict[str, KnownFile] | None = None
 
     def quality(self, names: dict[str, Any]) -> Quality:
         """Return what ``quality.json`` says, with the names of the recording."""
@@ -106,7 +110,7 @@ def ingest(
     scratch = Path(tempfile.mkdtemp(prefix=".ingest.", suffix=".part", dir=folder))
     # The files are identified while they are read.
     beside = ThreadPoolExecutor(1)
-    sources = beside.submit(_identified, source)
+    sources = beside.submit(read_log, source)
     try:
         found = _ingest(source, log, notes, settings, folder, scratch, provenance, sources)
         end = max((f.end or 0.0 for f in found.findings if f.finding == "warm_up"), default=0.0)
@@ -138,7 +142,7 @@ def _ingest(
     folder: Path,
     scratch: Path,
     provenance: dict[str, Any],
-    sources: Future[list[dict[str, Any]]],
+    sources: Future[dict[str, KnownFile]],
 ) -> Ingested:
     parts = [
         read_part(file, notes.use, scratch, number) for number, file in enumerate(read(source, log))
@@ -150,7 +154,10 @@ def _ingest(
     unusable = {finding.channel for finding in findings if finding.severity == "fatal"}
     names = names_of(parts, groups)
     metadata = provenance | {
-        "sources": sources.result(),
+        "sources": [
+            {"name": (source / place).name, "size": one.size, "sha256": one.sha256}
+            for place, one in sources.result().items()
+        ],
         "reader": log.reader,
         "begins": notes.use.start,
         "started": notes.started
@@ -186,7 +193,7 @@ def _ingest(
         for f in findings
     ]
     kept = identified(log_paths(folder))
-    return Ingested(summary, findings, channels, kept, _gravity(parts, bases))
+    return Ingested(summary, findings, channels, kept, _gravity(parts, bases), sources.result())
 
 
 def _findings(
@@ -327,16 +334,6 @@ def _summary(
     }
 
 
-def _identified(source: Path) -> list[dict[str, Any]]:
-    """Return name, size and digest of each file of a recording."""
-    found = []
-    for path in log_files(source):
-        with path.open("rb") as file:
-            digest = hashlib.file_digest(file, "sha256").hexdigest()
-        found.append({"name": path.name, "size": path.stat().st_size, "sha256": digest})
-    return found
-
-
 def ingest_as_planned(
     source: Path, settings: str, sensor: str, recording: str, folder: Path
 ) -> Quality:
@@ -366,6 +363,15 @@ def ingest_as_planned(
     except RecordingError as error:
         remove_kept(folder)
         kept = rejected(error, notes)
+    if versions := given.get("files"):
+        read = kept.sources
+        if read is None:
+            with contextlib.suppress(OSError):  # what is rejected may not be readable at all
+                read = read_log(source)
+        known = {
+            name: replace(one, version=versions.get(name, "")) for name, one in (read or {}).items()
+        }
+        write_known(known, folder)
     return kept.quality(names | {"power_cycled": notes.power_cycled})
 
 

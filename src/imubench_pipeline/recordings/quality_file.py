@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from imubench_pipeline.tables import write_json
+from imubench_pipeline.tables.digests import digest_of, read_sealed_json, write_sealed_json
 from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.tables.parquet import end_of
 
-_DIGEST = "digest"
 MEND = "remove it, and the next run reads the log again"
 
 
@@ -46,18 +44,13 @@ class Quality:
             If it is damaged.
         """
         try:
-            data = json.loads(path.read_text(encoding="utf-8"))
-            stated = data.pop(_DIGEST, None)
-            if stated is None or stated == _digest(data):
-                return cls(**{one.name: data[one.name] for one in fields(cls) if one.name in data})
-        except (ValueError, TypeError, AttributeError):
-            pass  # no JSON any more, or not of these keys
-        raise RecordingError(f"{path}: is not as the ingest wrote it: {MEND}")
+            return cls(**read_sealed_json(path))
+        except (ValueError, TypeError) as error:  # other letters, or other keys
+            raise RecordingError(f"{path}: is not as the ingest wrote it: {MEND}") from error
 
     def write(self, path: Path) -> None:
         """Write the file, atomically."""
-        data = json.loads(json.dumps(asdict(self), allow_nan=False))
-        write_json(data | {_DIGEST: _digest(data)}, path)
+        write_sealed_json(asdict(self), path)
 
     def fault(self, folder: Path, *, whole: bool = False) -> str | None:
         """Return what is wrong with the samples that are kept; None where nothing is seen.
@@ -76,7 +69,7 @@ class Quality:
                 if path.stat().st_size != stated["size"]:
                     found = f"has {path.stat().st_size} bytes instead of {stated['size']}"
                 elif _footer(path) != stated["footer"] or (
-                    whole and _whole(path) != stated["sha256"]
+                    whole and digest_of(path) != stated["sha256"]
                 ):
                     found = "is not as the ingest wrote it"
                 else:
@@ -95,20 +88,11 @@ def identified(paths: Iterable[Path]) -> dict[str, dict[str, Any]]:
         path.name: {
             "size": path.stat().st_size,
             "footer": _footer(path),
-            "sha256": _whole(path),
+            "sha256": digest_of(path),
         }
         for path in paths
     }
 
 
-def _whole(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
 def _footer(path: Path) -> str:
     return hashlib.sha256(end_of(path)).hexdigest()
-
-
-def _digest(data: dict[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()

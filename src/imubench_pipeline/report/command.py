@@ -5,6 +5,10 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from imubench_pipeline.report.site import Site
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,9 +28,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the report; return the exit status: 2 where there are no results."""
     # Templates and figures cost half a second, which the other commands need not wait for.
-    from imubench_pipeline.report.publish import one_file, publish, published
-    from imubench_pipeline.report.static_figures.of_run import draw_comparison
-    from imubench_pipeline.tables import write_content
+    from imubench_pipeline.report.publish import published
+    from imubench_pipeline.tables.findings import RecordingError
+    from imubench_pipeline.tables.seals import lost_inputs
 
     try:
         site = published(arguments.results)
@@ -37,13 +41,40 @@ def run(arguments: argparse.Namespace) -> int:
             file=sys.stderr,
         )
         return 2
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        return 2
+    if lost := lost_inputs(arguments.results, "report"):
+        print(
+            f"{arguments.results / lost[0]}: is no longer there; run snakemake -c2 again, as for these "
+            "results, and it is made anew",
+            file=sys.stderr,
+        )
+        return 2
+    try:
+        return _write(site, arguments)
+    except RecordingError as error:
+        print(error, file=sys.stderr)
+        return 2
+
+
+def _write(site: Site, arguments: argparse.Namespace) -> int:
+    """Write the pages of a site where they are asked for."""
+    from imubench_pipeline.report.folder import files_of_report
+    from imubench_pipeline.report.publish import one_file, publish
+    from imubench_pipeline.report.static_figures.of_run import draw_comparison
+    from imubench_pipeline.tables import write_content
+    from imubench_pipeline.tables.seals import seal_again
+
     if arguments.one_file is not None:
         write_content(one_file(site), arguments.one_file)
         print(f"{arguments.one_file}: {arguments.one_file.stat().st_size / 1e6:.1f} MB")
         return 0
     folder = arguments.output or arguments.results / "report"
     written = publish(site, folder, _say if sys.stderr.isatty() else lambda _: None)
-    if arguments.output is not None:
+    if arguments.output is None:
+        seal_again(arguments.results, "report", files_of_report(folder))
+    else:
         draw_comparison(site.tables, site.system, folder / "figures")
     print(f"{folder / 'index.html'}: {len(written)} files written")
     return 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -21,6 +22,8 @@ from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 
 _KEYS = "pages.json"
 _SETTINGS = "settings.json"
+_OF_SETTINGS = {"report", "settings", "sensors", "boards", "requirements"}
+"""Without which there are no pages."""
 _FOLDERS = ("recordings", "sensors", "devices")
 _STATIC = Path(__file__).with_name("static")
 _SCRIPTS = (
@@ -64,25 +67,35 @@ def publish(site: Site, folder: Path, say: Progress = lambda _: None) -> list[st
     unchanged = {
         path: key
         for path, key in before.items()
-        if keys.get(path) == key and (folder / path).is_file()
+        if path in keys
+        and (folder / path).is_file()
+        and key == _key(keys[path], (folder / path).read_bytes())
     }
     # A run that is killed must not leave the keys of pages that it has written anew.
     if unchanged != before:
         _put(folder, _KEYS, _text(unchanged))
     templates = environment(site.system)
+    shown = dict(kept)
     for page in every:
         if page.path not in unchanged:
             say(page.path)
-            written += _put(folder, page.path, _rendered(site, templates, page))
+            rendered = _rendered(site, templates, page).encode()
+            shown[page.path] = _key(page.key, rendered)
+            written += _put(folder, page.path, rendered)
     for path in _pages_there(site, folder) - keys.keys():
         (folder / path).unlink()
     _put(folder, _SETTINGS, _text(site.settings))
-    _put(folder, _KEYS, _text(keys))
+    _put(folder, _KEYS, _text(shown))
     return written
 
 
 def _text(data: object) -> str:
     return json.dumps(data, indent=1, sort_keys=True, ensure_ascii=False) + "\n"
+
+
+def _key(key: str, content: bytes) -> str:
+    """Return what says that a page shows what it should, and is as it was written."""
+    return f"{key} {hashlib.sha256(content).hexdigest()}"
 
 
 def _keys(path: Path) -> dict[str, str]:
@@ -187,8 +200,20 @@ def published(results: Path) -> Site:
     ------
     FileNotFoundError
         If there is no report.
+    ValueError
+        If it is damaged, or that of another version.
     """
-    settings = (results / "report" / _SETTINGS).read_text(encoding="utf-8")
+    path = results / "report" / _SETTINGS
+    settings = path.read_text(encoding="utf-8")
+    try:
+        missing = _OF_SETTINGS - json.loads(settings).keys()
+    except (ValueError, AttributeError) as error:
+        raise ValueError(f"{path}: is damaged; remove it, and run snakemake -c2 again") from error
+    if missing:
+        raise ValueError(
+            f"{path}: was made by another version of imubench_pipeline: it has no "
+            f"{', '.join(sorted(missing))}; run snakemake -c2 again, as for these results"
+        )
     names = sorted(set(TABLES) - set(OF_ONE_RECORDING))
     paths = {name: results / f"tables/{name}.parquet" for name in names}
     for path in paths.values():

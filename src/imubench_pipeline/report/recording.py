@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from imubench_pipeline.recordings.quality_file import Quality
 from imubench_pipeline.recordings.recording import log_paths, read_metadata
 from imubench_pipeline.report import thermal
 from imubench_pipeline.report.backtest import backtest_lines
@@ -26,6 +27,7 @@ from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.report.words import counted, model_text, precision, sentence, started_text
 from imubench_pipeline.tables import read
+from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.typing import Row
 
 _EXACT = 1e-9
@@ -262,7 +264,16 @@ def about_of(
 
 
 def metadata_of(folder: Path) -> Mapping[str, Any]:
-    """Return the metadata of the log in a folder of a recording; nothing where there is none."""
+    """Return the metadata of the log in a folder of a recording; nothing where none was kept.
+
+    Raises
+    ------
+    RecordingError
+        If it is not there any more, or not as the ingest left it.
+    """
+    quality = folder / "quality.json"
+    if quality.is_file() and (fault := Quality.read(quality).fault(folder)):
+        raise RecordingError(fault)
     paths = log_paths(folder)
     return read_metadata(paths[0]) if paths else {}
 

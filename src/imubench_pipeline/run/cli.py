@@ -19,6 +19,7 @@ from imubench_pipeline.run import formats_command as formats
 from imubench_pipeline.run import shortlist_command as shortlist
 from imubench_pipeline.run import simulate_command as simulation
 from imubench_pipeline.run.nightly import command as nightly
+from imubench_pipeline.run.verification import command as verification
 from imubench_pipeline.settings.config import Run
 from imubench_pipeline.settings.sensor import RecordingNotes, Sensor
 from imubench_pipeline.settings.simulated_recordings import Board, Simulated
@@ -98,6 +99,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         commands.add_parser(
             "nightly", help="run on the logs that are complete, and say what is new: for timers"
         )
+    )
+    verification.add_arguments(
+        commands.add_parser("verify", help="say whether all results are as runs left them")
     )
     given = parser.parse_args(arguments)
     try:
@@ -288,4 +292,5 @@ _COMMANDS = {
     "figures": figures.run,
     "simulate": simulation.run,
     "nightly": nightly.run,
+    "verify": verification.run,
 }

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 from collections.abc import Iterator
 from dataclasses import asdict
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.tables.digests import read_sealed_json, write_sealed_json
 from imubench_pipeline.tables.failures import Failure
 from imubench_pipeline.tables.findings import RecordingError
 
@@ -36,7 +36,7 @@ class Faults:
     """
 
     def __init__(self, results: Path) -> None:
-        self._results = results
+        self.results = results
         self._folder = results / _FOLDER
         self._before = dict(self._records())
         self._failed = {of[1:] for of, record in self._before.items() if record["failed"]}
@@ -64,7 +64,7 @@ class Faults:
         if step != "ingest" or recording is None:
             return False
         if of not in self._lost:
-            folder = self._results / "recordings" / sensor / recording
+            folder = self.results / "recordings" / sensor / recording
             try:
                 quality = Quality.read(folder / "quality.json")
                 fault = quality.fault(folder, whole=(sensor, recording) in self._failed)
@@ -86,11 +86,9 @@ class Faults:
         log : Path
             Of the step, which is told, too.
         """
-        from imubench_pipeline.tables import write_json
-
         path = self._path((failure.step, failure.sensor, failure.recording))
         record = {"attempt": attempt, "failed": True, "log": str(log), **asdict(failure)}
-        write_json(record, path)
+        write_sealed_json(record, path)
         log.parent.mkdir(parents=True, exist_ok=True)
         with log.open("a", encoding="utf-8") as file:
             file.write(f"{failure.name}, {failure.step}: {failure.reason}\n")
@@ -99,11 +97,9 @@ class Faults:
         """Keep that a step which had failed did not any more."""
         path = self._path(of)
         if attempt or path.is_file():
-            from imubench_pipeline.tables import write_json
-
             step, sensor, recording = of
             about = {"step": step, "sensor": sensor, "recording": recording}
-            write_json({"attempt": attempt, "failed": False, **about}, path)
+            write_sealed_json({"attempt": attempt, "failed": False, **about}, path)
 
     def now(self) -> Iterator[tuple[Failure, Path]]:
         """Yield what has failed in this run, with the log of it."""
@@ -133,5 +129,5 @@ class Faults:
     def _records(self) -> Iterator[tuple[Of, dict[str, Any]]]:
         for path in sorted(self._folder.glob("*/**/*.json")):
             with contextlib.suppress(OSError, ValueError, KeyError):  # one that was cut off
-                record = json.loads(path.read_text(encoding="utf-8"))
+                record = read_sealed_json(path)
                 yield (record["step"], record["sensor"], record["recording"]), record

@@ -15,7 +15,8 @@ from pathlib import Path
 from pydantic import BaseModel
 
 from imubench_pipeline.navigation.suitability.abilities import abilities
-from imubench_pipeline.recordings.drop_zone import Recording, fingerprint, fingerprints, found_logs
+from imubench_pipeline.recordings.drop_zone import Recording, found_logs
+from imubench_pipeline.recordings.known_logs import versions_of
 from imubench_pipeline.run.faults import Faults
 from imubench_pipeline.settings.config import Run, given_beside, read_run
 from imubench_pipeline.settings.printed import IN_USE
@@ -38,6 +39,7 @@ from imubench_pipeline.settings.simulated_recordings import (
 )
 from imubench_pipeline.settings.validation import ConfigError, parse
 from imubench_pipeline.settings.yaml_files import read_yaml
+from imubench_pipeline.tables.digests import digest_of
 from imubench_pipeline.tables.provenance import source_digest
 from imubench_pipeline.units import quantity_to_si
 
@@ -126,10 +128,7 @@ class Plan:
         return self.faults.attempt((step, sensor, name), again=not held_back)
 
     def ingest_settings(self, sensor: str, name: str) -> str:
-        """Return what the ingest of a recording depends on, its error where it cannot be read.
-
-        The log is known by its `fingerprint`, which is taken once a run.
-        """
+        """Return what the ingest of a recording depends on, its error where it cannot be read."""
         key = (sensor, name)
         if key not in self._of_ingest:
             self._of_ingest[key] = _text(self._ingest(self.recordings[key]))
@@ -154,7 +153,8 @@ class Plan:
                 log = log.model_copy(update={"table_rate": None})
             written = log.model_dump(mode="json", exclude={"bandwidth"})
             said = notes.model_dump(mode="json", exclude={"log", *_EXPERIMENTS})
-            return settings | {"notes": said, "log": written, "files": fingerprints(recording)}
+            files = versions_of(recording, self.run.results)
+            return settings | {"notes": said, "log": written, "files": files}
         except ConfigError as error:
             return settings | {"error": str(error)}
 
@@ -293,7 +293,7 @@ class Plan:
     @staticmethod
     def _profiles(recording: SimulatedRecording) -> dict[str, str]:
         try:
-            return {str(path): fingerprint(path) for path in profile_files(recording)}
+            return {str(path): digest_of(path) for path in profile_files(recording)}
         except OSError as error:
             raise ConfigError(
                 f"{recording.sensor}/{recording.recording}: {error.filename} cannot be read "

@@ -87,6 +87,8 @@ class Job:
         What is printed goes to the end of it.
     memory : int or None
         Bytes that it may take beside what the process that forks has; None: no limit.
+    results : Path or None
+        Where what it leaves is sealed (`imubench_pipeline.run.sealing`); None: nowhere.
     """
 
     script: Path
@@ -96,6 +98,7 @@ class Job:
     wildcards: Any
     log: Path
     memory: int | None = None
+    results: Path | None = None
 
     @property
     def name(self) -> str:

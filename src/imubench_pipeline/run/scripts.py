@@ -11,7 +11,9 @@ from typing import Any
 from snakemake.sourcecache import LocalSourceFile, SourceCache, infer_source_file
 
 from imubench_pipeline.run.faults import Faults, Of
+from imubench_pipeline.run.nightly.recovery import remove_unfinished
 from imubench_pipeline.run.processes import Job, Processes, StepError
+from imubench_pipeline.run.sealing import sealed
 from imubench_pipeline.tables.failures import Failure
 
 
@@ -55,6 +57,7 @@ class Scripts:
 
     def __init__(self, faults: Faults, limits: Limits | None) -> None:
         self._faults = faults
+        self._results = faults.results
         self._limits = limits
         self._processes = Processes()
 
@@ -88,7 +91,7 @@ class Scripts:
             If the run cannot go on without the script.
         """
         script = _fetched(path, basedir, *others[-3:-1])
-        job = Job(script, input, output, params, wildcards, Path(log[0]))
+        job = Job(script, input, output, params, wildcards, Path(log[0]), results=self._results)
         job.log.unlink(missing_ok=True)
         attempt = params.get("attempt")
         try:
@@ -97,6 +100,7 @@ class Scripts:
             else:
                 self._bounded(job, attempt, self._limits)
         except StepError as error:
+            remove_unfinished(map(Path, job.output))
             sys.stderr.write(error.trace)
             raise
 
@@ -105,7 +109,8 @@ class Scripts:
         of: Of = (job.name, job.wildcards["sensor"], job.wildcards.get("recording"))
         outputs = [Path(path) for path in job.output]
         if before := _before(job.input, outputs[0].parent):
-            _leave_out(outputs, job.params, before)
+            with sealed(job):
+                _leave_out(outputs, job.params, before)
             return
         limit = limits(*of[1:])
         try:
@@ -116,10 +121,12 @@ class Scripts:
             words = f" ({limit.words})" * (error.cause == "time")
             reason = f"the step {job.name} {_VERBS[error.cause]}{error.reason}{words}"
             failure = Failure(of[1], of[2], job.name, error.cause, reason)
+            remove_unfinished(outputs)
             sys.stderr.write(error.trace)
             print(f"{failure.name} is left out: {reason}", file=sys.stderr, flush=True)
             self._faults.failed(failure, attempt, job.log)
-            _leave_out(outputs, job.params, failure)
+            with sealed(job):
+                _leave_out(outputs, job.params, failure)
         else:
             self._faults.succeeded(of, attempt)
 

@@ -26,6 +26,7 @@ from numba import njit
 from imubench_pipeline.readers.bounded import limit_memory
 from imubench_pipeline.report.run_summary import one_line
 from imubench_pipeline.run.processes import BEGUN, DONE, FAILED, KILLED, LENGTH, Job
+from imubench_pipeline.run.sealing import sealed
 
 _LONGEST = 300
 """Letters of an error in one line."""
@@ -124,7 +125,8 @@ def _run(connection: socket.socket, job: Job, *, imported: bool) -> None:
         _print_to(job.log)
         if job.memory is not None:
             limit_memory(job.memory)
-        runpy.run_path(str(job.script), init_globals={"snakemake": job}, run_name="__main__")
+        with sealed(job):
+            runpy.run_path(str(job.script), init_globals={"snakemake": job}, run_name="__main__")
         how = DONE
     except BaseException as error:
         told["trace"] = _said(error, str(job.script))

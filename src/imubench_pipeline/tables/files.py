@@ -160,7 +160,6 @@ def read_part(table: str, path: Path) -> pa.Table:
             raise pa.ArrowInvalid("its metadata are not those that were written")
         with checked_parquet(path) as file:
             part = file.read(use_threads=False)
-        names = part.schema.names
         told = {key: text for key, text in (part.schema.metadata or {}).items() if key != SEAL}
         part = part.replace_schema_metadata(told)
     except FileNotFoundError:
@@ -169,11 +168,33 @@ def read_part(table: str, path: Path) -> pa.Table:
         raise TableError(
             f"{path}: is damaged ({error}); remove it, and the next run makes it again"
         ) from error
-    if names != expected.names:
-        raise TableError(f"{path}: columns {names}, expected {expected.names}")
+    if other := _other_columns(part.schema, expected):
+        raise TableError(
+            f"{path}: was made by another version of imubench_pipeline: {other}; run snakemake -c2 "
+            "again, as for these results, and it is made anew"
+        )
     if part.schema.equals(expected):
         return part
     return part.cast(expected).replace_schema_metadata(part.schema.metadata)
+
+
+def _other_columns(found: pa.Schema, expected: pa.Schema) -> str:
+    """Return in which columns a table is another than expected; nothing where it is not."""
+    if found.names != expected.names:
+        missing = [name for name in expected.names if name not in found.names]
+        unknown = [name for name in found.names if name not in expected.names]
+        said = [f"it has no {', '.join(missing)}"] * bool(missing)
+        said += [f"it has {', '.join(unknown)}, not known here"] * bool(unknown)
+        return " and ".join(said) or "its columns have another order"
+    for name in expected.names:
+        here, there = found.field(name), expected.field(name)
+        if here.type != there.type:
+            return f"{name} is {here.type}, expected {there.type}"
+        due = (there.metadata or {})[b"unit"]
+        unit = (here.metadata or {}).get(b"unit", due)
+        if unit != due:
+            return f"{name} is in {unit.decode()!r}, expected {due.decode()!r}"
+    return ""
 
 
 def write_content(content: str | bytes, path: Path) -> None:

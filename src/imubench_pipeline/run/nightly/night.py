@@ -18,12 +18,19 @@ from imubench_pipeline.run.nightly import recovery
 from imubench_pipeline.run.nightly.lock import Lock, TakenError
 from imubench_pipeline.run.nightly.running import errors, last_lines, run_snakemake
 from imubench_pipeline.run.nightly.settling import Found, Skip, look, moved, settled
-from imubench_pipeline.run.nightly.state import State, load_tables, read_state, state_of
+from imubench_pipeline.run.nightly.state import (
+    State,
+    StateError,
+    load_tables,
+    read_state,
+    state_of,
+)
 from imubench_pipeline.run.nightly.summary import Skipped, Summary, compared, in_words
 from imubench_pipeline.settings.config import Run, read_run
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.settings.yaml_files import read_yaml
 from imubench_pipeline.tables import write_content, write_json
+from imubench_pipeline.tables.seals import night_place, seal_files
 
 __all__ = ["Night", "TakenError"]
 
@@ -95,7 +102,7 @@ class Night:
             lock.acquire(wait)
             self._began = datetime.now(UTC)
             self._wait_for_others(until)
-            before = read_state(self.folder / "state.json")
+            before = self._before()
             self._recover(lock)
             seen, skips = settled(self.logs, settle, before.logs if before else {})
             try:
@@ -113,8 +120,19 @@ class Night:
         return summary
 
     @property
+    def _state(self) -> Path:
+        return self.folder / "state.json"
+
+    @property
     def _log(self) -> Path:
         return self.folder / f"{self._began:%Y%m%dT%H%M%SZ}.log"
+
+    def _before(self) -> State | None:
+        try:
+            return read_state(self._state)
+        except StateError as error:
+            self._put_right.append(str(error))
+            return None
 
     def _wait_for_others(self, until: float) -> None:
         """Wait for a Snakemake that somebody runs on these results by hand."""
@@ -216,11 +234,15 @@ class Night:
 
     def _keep(self, summary: Summary, after: State | None) -> None:
         for name in (self._log.stem, "latest"):
-            write_content(summary.model_dump_json(indent=1) + "\n", self.folder / f"{name}.json")
-            write_content(in_words(summary), self.folder / f"{name}.txt")
+            files = [self.folder / f"{name}.{kind}" for kind in ("json", "txt")]
+            write_content(summary.model_dump_json(indent=1) + "\n", files[0])
+            write_content(in_words(summary), files[1])
+            said = [self._log] if name != "latest" and self._log.is_file() else []
+            seal_files(self.results, night_place(name), [*files, *said], {})
         # Last: what could not be said is said by the next run.
         if after is not None:
-            after.write(self.folder / "state.json")
+            after.write(self._state)
+            seal_files(self.results, night_place("state"), [self._state], {})
 
 
 def _settings(file: Path, config: Sequence[str]) -> Run:

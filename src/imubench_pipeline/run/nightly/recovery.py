@@ -8,6 +8,7 @@ when the machine stopped.
 from __future__ import annotations
 
 import contextlib
+import glob
 import os
 import platform
 import re
@@ -21,16 +22,17 @@ from typing import Any
 import psutil
 
 _FOLDERS = (
-    *("recordings", "sensors", "tables", "simulated", "report", "exports", "faults", "nightly"),
+    *("recordings", "sensors", "tables", "simulated", "report", "exports", "seals", "faults"),
+    "nightly",
 )
 """What a run writes to, below the results: nothing else is touched."""
 
 _TEMPORARY = re.compile(r"\..+\.[a-z0-9_]{8}\.part")
 """Names that `tables.replacing`, `tables.making` and the ingest give to what is not complete."""
 
-_STILL_WRITTEN = (
-    60.0  # s; what has changed so shortly before the lock may be a command's of someone
-)
+STILL_WRITTEN = 60.0
+"""s; what has changed so shortly before a run may be a command's of someone."""
+
 _ON_ITS_WAY = 60.0  # s; a system keeps what is written in memory for half a minute or so
 _PATIENCE = 10.0  # s; for a process to end
 
@@ -174,10 +176,31 @@ def remove_temporary(results: Path, taken: float) -> tuple[int, int]:
         inside = list(path.rglob("*")) if path.is_dir() else []
         with contextlib.suppress(OSError):
             about = [one.lstat() for one in (path, *inside)]
-            if max(one.st_mtime for one in about) < taken - _STILL_WRITTEN:
+            if max(one.st_mtime for one in about) < taken - STILL_WRITTEN:
                 _remove(path)
                 number, size = number + 1, size + sum(one.st_size for one in about)
     return number, size
+
+
+def temporary(results: Path) -> list[Path]:
+    """Return the files and folders below the results that are not complete."""
+    found = [path for path in _below(results) if _TEMPORARY.fullmatch(path.name)]
+    return [path for path in found if not any(other in path.parents for other in found)]
+
+
+def remove_unfinished(outputs: Iterable[Path]) -> None:
+    """Remove what a step that was ended had not completed.
+
+    Parameters
+    ----------
+    outputs : iterable of Path
+        What it was to make.
+    """
+    for path in outputs:
+        for left in path.parent.glob(f".{glob.escape(path.name)}.*.part"):
+            if _TEMPORARY.fullmatch(left.name):
+                with contextlib.suppress(FileNotFoundError):
+                    _remove(left)
 
 
 def remove_doubtful(results: Path) -> int:

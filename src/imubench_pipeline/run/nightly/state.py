@@ -9,16 +9,21 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict
 
 from imubench_pipeline.report.run_summary import serious
 from imubench_pipeline.run.nightly.settling import Signature
-from imubench_pipeline.tables import read, write_content
+from imubench_pipeline.tables import read
+from imubench_pipeline.tables.digests import read_sealed_json, write_sealed_json
 
 Rows = list[dict[str, Any]]
 
 _OF_A_RECORDING = ("recordings", "parameters", "fixed_bias")
 """The tables whose rows tell whether a recording was analysed again with another outcome."""
+
+
+class StateError(ValueError):
+    """A state that cannot be read; the text says what follows."""
 
 
 class Warned(NamedTuple):
@@ -87,7 +92,7 @@ class State(BaseModel):
 
     def write(self, path: Path) -> None:
         """Keep it, atomically."""
-        write_content(self.model_dump_json(indent=1) + "\n", path)
+        write_sealed_json(self.model_dump(mode="json"), path)
 
     def without(self, names: Collection[str], before: State | None) -> State:
         """Return a state in which some recordings are as they were before, if they were.
@@ -115,16 +120,26 @@ class State(BaseModel):
 
 
 def read_state(path: Path) -> State | None:
-    """Return the state that a run has kept; None where there is none that can be read.
+    """Return the state that a run has kept; None where there is none.
 
     Parameters
     ----------
     path : Path
+
+    Raises
+    ------
+    StateError
+        If it is damaged, or of another version.
     """
     try:
-        return State.model_validate_json(path.read_bytes())
-    except (OSError, ValidationError):
+        return State.model_validate(read_sealed_json(path))
+    except FileNotFoundError:
         return None
+    except (OSError, ValueError) as error:  # that of the model, too
+        raise StateError(
+            f"{path.name} is damaged, or of another version: what is new is not known, and "
+            "everything is told"
+        ) from error
 
 
 def load_tables(results: Path) -> dict[str, Rows]:

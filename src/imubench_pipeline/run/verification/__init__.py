@@ -1,0 +1,1 @@
+"""`imubench verify`: whether all that runs have left is as they left it."""

@@ -1,0 +1,84 @@
+"""The command `imubench verify`: whether all that runs have left is as they left it."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+_PATIENCE = 3.0
+"""Seconds until it is said how far it is, and between two lines where there is no terminal."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command is given."""
+    parser.description = (
+        "Read all that runs have left, and hold it against the digests that they left, too. Each "
+        "line says what is wrong with a file, and the command that has it made again."
+    )
+    parser.epilog = (
+        "Exit status: 0 all is as it was left; 1 something is not; 2 there are no results."
+    )
+    parser.add_argument("results", type=Path, help="folder of the results of runs")
+
+
+def run(given: argparse.Namespace) -> int:
+    """Print what is wrong; return the exit status."""
+    # Arrow is loaded for this command only: the others answer at once.
+    from imubench_pipeline.run.verification.results import Results
+    from imubench_pipeline.tables.seals import FOLDER
+    from imubench_pipeline.tables.texts import printable
+
+    folder: Path = given.results
+    made = [name for name in ("recordings", "tables", "report") if (folder / name).is_dir()]
+    if not made and not (folder / FOLDER).is_dir():
+        print(
+            f"{folder}: found no results; expected the folder of the results of a run, such as "
+            "results",
+            file=sys.stderr,
+        )
+        return 2
+    if not (folder / FOLDER).is_dir():
+        print(
+            f"{folder}/{FOLDER}: expected the seals of the steps, found none: the results are of "
+            "an older version, or their seals were removed; to mend: "
+            f"{Results(folder).run_again}, which makes everything again"
+        )
+        return 1
+    results = Results(folder)
+    number = 0
+    with _progress(results.size) as results.read:
+        for fault in results.faults():
+            number += 1
+            line = f"{folder / fault.path}: {fault.found}; to mend: {fault.mend}"
+            print(printable(line), flush=True)
+    if waiting := results.waiting():
+        print(f"{len(waiting)} steps are still to be done by the next run: {results.run_again}")
+    read = f"{results.files} files, {results.size / 1e6:.1f} MB"
+    print(f"{read}: {f'{number} faults' if number else 'all as they were left'}")
+    return int(bool(number))
+
+
+@contextmanager
+def _progress(size: int) -> Iterator[Callable[[int], None]]:
+    """Give what is told how many bytes were read, and shows it where it takes longer."""
+    begun = last = time.monotonic()
+    terminal = sys.stderr.isatty()
+    done = 0
+
+    def read(more: int) -> None:
+        nonlocal done, last
+        done += more
+        now = time.monotonic()
+        if now - begun >= _PATIENCE and now - last >= (0.2 if terminal else _PATIENCE):
+            last = now
+            said = f"{100 * done / max(size, 1):.0f} % of {size / 1e9:.2f} GB read"
+            print(f"\r{said}" if terminal else said, end="" if terminal else "\n", file=sys.stderr)
+            sys.stderr.flush()
+
+    yield read
+    if terminal and last != begun:
+        print("\r\x1b[K", end="", file=sys.stderr)

@@ -1,0 +1,298 @@
+"""Whether the results of runs are as they were left: each file, and all of them together."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import pyarrow.parquet as pq
+
+from imubench_pipeline.recordings.known_logs import KNOWN
+from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.run.nightly.recovery import temporary
+from imubench_pipeline.tables import read
+from imubench_pipeline.tables.digests import read_sealed_json
+from imubench_pipeline.tables.findings import RecordingError
+from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
+from imubench_pipeline.tables.seals import (
+    NIGHTS,
+    Seal,
+    SealedFile,
+    SealError,
+    form,
+    places,
+    read_seal,
+    seal_file,
+    visible,
+)
+
+_SEALED = ("recordings", "sensors", "tables", "simulated", "report", "exports")
+"""Folders in which every file has a seal, but for those that have a digest of their own."""
+
+_SAMPLES = "log*.parquet"
+_NO_SEAL = "expected a seal of the step that left it, found none"
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A file that is not as it was left.
+
+    Attributes
+    ----------
+    path : str
+        Below the results.
+    found : str
+        What was expected, and what is found.
+    mend : str
+        The command that has it made again, or what else is to be done.
+    """
+
+    path: str
+    found: str
+    mend: str
+
+
+@dataclass
+class Results:
+    """What lies in a folder of results.
+
+    Parameters
+    ----------
+    folder : Path
+    read : callable
+        Is told how many bytes were read.
+    """
+
+    folder: Path
+    read: Callable[[int], None] = lambda _: None
+    seals: dict[str, Seal] = field(default_factory=dict, init=False)
+    _broken: dict[str, str] = field(default_factory=dict, init=False)
+
+    def __post_init__(self) -> None:
+        for place in places(self.folder):
+            try:
+                self.seals[place] = read_seal(self.folder, place)
+            except (FileNotFoundError, SealError) as error:
+                self._broken[place] = str(error)
+
+    @cached_property
+    def size(self) -> int:
+        """Bytes that `faults` reads."""
+        samples = self.folder.glob(f"recordings/*/*/{_SAMPLES}")
+        return sum(file.size for file in self._left.values()) + sum(
+            path.stat().st_size for path in samples if path.is_file()
+        )
+
+    @property
+    def files(self) -> int:
+        """How many files have a seal."""
+        return len(self._left)
+
+    @cached_property
+    def run_again(self) -> str:
+        """The command of the run, as far as the report says how it was called."""
+        given: list[str] = []
+        try:
+            settings = json.loads((self.folder / "report/settings.json").read_text("utf-8"))
+            given = [str(one) for one in settings["given"]]
+        except (OSError, ValueError, KeyError, TypeError):
+            pass  # it is told that this file is damaged
+        return shlex.join(["snakemake", "-c2", *(["--config", *given] if given else [])])
+
+    def faults(self) -> Iterator[Fault]:
+        """Yield what is not as it was left, each file once."""
+        told = set()
+        for fault in self._every():
+            if fault.path not in told:
+                told.add(fault.path)
+                yield fault
+
+    def waiting(self) -> list[str]:
+        """Return the steps that the next run does by itself: what they read was made anew since."""
+        return [
+            place
+            for place in self._current
+            if any(newer for _, newer in self._others_now(self.seals[place]))
+        ]
+
+    def _every(self) -> Iterator[Fault]:
+        for place, error in self._broken.items():
+            found = f"expected the seal of {place}, found one that {error}"
+            yield Fault(seal_file(place), found, self._mended(seal_file(place), place))
+        if older := sum(seal.form != form() for seal in self.seals.values()):
+            found = f"expected the form {form()}, found {older} steps of another version"
+            yield Fault("seals", found, self.run_again)
+        for place, seal in self.seals.items():
+            yield from self._changed(place, seal)
+        for path in sorted(self.folder.glob("recordings/*/*/quality.json")):
+            yield from self._samples(path)
+        yield from self._own_digests()
+        yield from self._of_others()
+        yield from self._unsealed()
+        yield from self._strange_rows()
+        for path in temporary(self.folder):
+            place = path.relative_to(self.folder).as_posix()
+            found = "expected nothing, found what a run had not completed that was killed"
+            yield Fault(place, found, f"where no run goes on: rm -r {self._quoted(place)}")
+
+    def _changed(self, place: str, seal: Seal) -> Iterator[Fault]:
+        """Yield the files of a step that are not those that it left."""
+        there = any(os.path.lexists(self.folder / name) for name in seal.outputs)
+        last = place in (f"{NIGHTS}/latest", f"{NIGHTS}/state")
+        if not (there or last or place in self._current):
+            return  # all of a recording was removed, or of a night that is long past
+        for name, file in seal.outputs.items():
+            if found := file.fault(self.folder / name, whole=True):
+                yield Fault(name, found, self._mended(name, place))
+            self.read(file.size)
+
+    def _samples(self, path: Path) -> Iterator[Fault]:
+        """Yield the samples of a recording that are not those that the ingest left."""
+        place = path.parent.relative_to(self.folder).as_posix()
+        step, name = f"{place}/ingest", f"{place}/{path.name}"
+        try:
+            quality = Quality.read(path)
+        except (RecordingError, OSError) as error:
+            yield Fault(name, f"expected what the ingest wrote, {_of(error)}",
+                        self._mended(name, step))  # fmt: skip
+            return
+        of = f"{quality.recording.get('sensor')}/{quality.recording.get('recording')}"
+        if f"recordings/{of}" != place:
+            yield Fault(name, f"expected that of {place}, found that of {of}",
+                        self._mended(name, step))  # fmt: skip
+        kept = quality.kept or {}
+        for file, stated in kept.items():
+            expected = SealedFile(stated["size"], stated["sha256"], 0)
+            if found := expected.fault(path.with_name(file), whole=True):
+                yield Fault(f"{place}/{file}", found, self._mended(f"{place}/{file}", step))
+            self.read(expected.size)
+        for other in sorted(path.parent.glob(_SAMPLES)):
+            if other.name not in kept:
+                yield self._stray(f"{place}/{other.name}")
+        known = path.with_name(KNOWN)
+        if kept and not quality.recording["simulated"] and not known.exists():
+            found = "expected what is known of the log, found no such file"
+            yield Fault(f"{place}/{KNOWN}", found, self.run_again)
+
+    def _own_digests(self) -> Iterator[Fault]:
+        """Yield the files with a digest of their own that are not as they were written."""
+        own = [*self.folder.glob(f"recordings/*/*/{KNOWN}"), *self.folder.glob("faults/**/*.json")]
+        for path in sorted(own):
+            place = path.relative_to(self.folder).as_posix()
+            try:
+                read_sealed_json(path)
+            except (OSError, ValueError) as error:
+                yield Fault(place, f"expected what a run wrote, {_of(error)}", self._removed(place))
+
+    def _of_others(self) -> Iterator[Fault]:
+        """Yield what was made of other files than those that are there, which are not newer."""
+        for place in self._current:
+            others = [name for name, newer in self._others_now(self.seals[place]) if not newer]
+            if others:
+                first = next(iter(self.seals[place].outputs), seal_file(place))
+                found = (
+                    f"expected it made of the {others[0]} that is there, found it made of another"
+                )
+                yield Fault(first, found, self._mended(first, place))
+
+    def _others_now(self, seal: Seal) -> list[tuple[str, bool]]:
+        """Return the inputs of a step that are others by now, and whether they are newer."""
+        made = min((file.changed for file in seal.outputs.values()), default=0)
+        now = ((name, digest, self._left.get(name)) for name, digest in seal.inputs.items())
+        return [
+            (name, file is not None and file.changed > made)
+            for name, digest, file in now
+            if file is None or file.sha256 != digest
+        ]
+
+    @cached_property
+    def _left(self) -> dict[str, SealedFile]:
+        """What every step left, by its place."""
+        return {name: file for seal in self.seals.values() for name, file in seal.outputs.items()}
+
+    @cached_property
+    def _current(self) -> list[str]:
+        """The steps that the comparison stands on: not those of logs that were removed."""
+        by = {name: place for place, seal in self.seals.items() for name in seal.outputs}
+        found: set[str] = set()
+        todo = [place for place in self.seals if "/" not in place]
+        while todo:
+            place = todo.pop()
+            if place not in found:
+                found.add(place)
+                todo += [by[name] for name in self.seals[place].inputs if name in by]
+        return sorted(found)
+
+    def _unsealed(self) -> Iterator[Fault]:
+        """Yield the files that no step is known to have left."""
+        for folder in _SEALED:
+            for path in sorted((self.folder / folder).rglob("*")):
+                place = path.relative_to(self.folder)
+                own = any(place.match(f"recordings/*/*/{name}") for name in (KNOWN, _SAMPLES))
+                known = own or path.is_dir() or place.as_posix() in self._left
+                if not known and visible(place):
+                    yield self._stray(place.as_posix())
+        for path in sorted((self.folder / NIGHTS).glob("[ls]*.*")):  # the latest, and the state
+            name = path.relative_to(self.folder).as_posix()
+            if name not in self._left:
+                yield Fault(name, _NO_SEAL, self._mended(name, NIGHTS + "/"))
+
+    def _strange_rows(self) -> Iterator[Fault]:
+        """Yield the tables that speak of recordings which were not compared."""
+        if "tables" not in self.seals:
+            return
+        compared = {
+            (sensor, recording)
+            for place in self._current
+            if place.endswith("/sensor_tables")
+            for name in self.seals[place].inputs
+            if name.endswith("/quality.json")
+            for _, sensor, recording, _ in [name.split("/")]
+        }
+        for name in sorted(set(TABLES) - set(OF_ONE_RECORDING)):
+            place = f"tables/{name}.parquet"
+            try:
+                if not {"sensor", "recording"} <= set(pq.read_schema(self.folder / place).names):
+                    continue
+                rows = read(name, [self.folder / place])
+            except (OSError, ValueError):
+                continue  # it is told that it is damaged, or of another version
+            keys = zip(rows["sensor"].to_pylist(), rows["recording"].to_pylist(), strict=True)
+            if strange := {key for key in keys if key[1] is not None} - compared:
+                found = "expected rows of the recordings compared, found some of {}/{}"
+                yield Fault(place, found.format(*min(strange)), self._mended(place, "tables"))
+
+    def _stray(self, name: str) -> Fault:
+        return Fault(name, _NO_SEAL, self._removed(name))
+
+    def _mended(self, name: str, place: str) -> str:
+        """Return how a file is made again that a step left."""
+        if place.startswith(f"{NIGHTS}/"):
+            files = [name] if place == f"{NIGHTS}/" else dict.fromkeys([name, seal_file(place)])
+            rm = " ".join(["rm -f", *map(self._quoted, files)])
+            return f"restore it, or {rm}: the next night writes its own"
+        if place.startswith("recordings/") and place not in self._current:
+            folder = self._quoted("/".join(place.split("/")[:3]))
+            return f"restore it, or rm -r {folder}: its log is in no comparison any more"
+        return self._removed(name)
+
+    def _removed(self, name: str) -> str:
+        path = self.folder / name
+        if not os.path.lexists(path):
+            return self.run_again
+        rm = "rm -r" if path.is_dir() and not path.is_symlink() else "rm"
+        return f"{rm} {self._quoted(name)} && {self.run_again}"
+
+    def _quoted(self, name: str) -> str:
+        return shlex.quote(str(self.folder / name))
+
+
+def _of(error: Exception) -> str:
+    if isinstance(error, OSError):
+        return f"found what cannot be read ({error.strerror})"
+    return "found other letters"

@@ -1,0 +1,59 @@
+"""Digests of files, and JSON of which no bit changes unseen: a digest of it stands at its end."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from imubench_pipeline.tables.files import write_content
+
+_END = "\n}"
+_LAST_LINE = re.compile(r',\n "digest": "[0-9a-f]{64}"\n\}\n\Z')
+
+
+def write_sealed_json(data: Mapping[str, Any], path: Path) -> None:
+    """Write a mapping with a digest of it, atomically.
+
+    Parameters
+    ----------
+    data : mapping
+        What JSON can hold, no NaN among it.
+    path : Path
+    """
+    text = json.dumps(dict(data), indent=1, allow_nan=False)
+    write_content(text.removesuffix(_END) + _last_line(text), path)
+
+
+def read_sealed_json(path: Path) -> dict[str, Any]:
+    """Return what `write_sealed_json` wrote.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    ValueError
+        If it is not, letter for letter, as it was written.
+    """
+    # All letters count, and not only what they mean.
+    text = path.read_bytes().decode()
+    found = _LAST_LINE.search(text)
+    rest = text[: found.start()] + _END if found else text
+    if found is None or found[0] != _last_line(rest):
+        raise ValueError(f"{path}: its digest is another one")
+    data: dict[str, Any] = json.loads(rest)
+    return data
+
+
+def digest_of(path: Path) -> str:
+    """Return the SHA-256 of the content of a file."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _last_line(text: str) -> str:
+    """Return how a file ends that has the digest of a text, which is that of an object of JSON."""
+    return f',\n "digest": "{hashlib.sha256(text.encode()).hexdigest()}"{_END}\n'
