@@ -218,7 +218,7 @@ def of_log(case: Case, number: int) -> Held:
     chosen = found.candidates[0]
     explained = chosen.goodness.verdict == "explained"
     return Held(
-        curve.cluster_size / case.rate, rows[0], rows[1], explained, chosen.found.terms.name
+        curve.cluster_size / case.rate, rows[0], rows[1], explained, chosen.maximum.terms.name
     )
 
 

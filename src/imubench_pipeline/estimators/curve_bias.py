@@ -91,11 +91,11 @@ def models_of(model: NoiseModel) -> Models:
         letters["F"] = model.B
     elif model.B > 0.0:
         processes.append(GaussMarkov(model.B, model.T_B))
-    there = "".join(letter for letter, value in letters.items() if value > 0.0)
-    values = [letters[letter] for letter in there] + [one.B for one in processes]
-    times = [one.T_B for one in processes]
+    linear = "".join(letter for letter, value in letters.items() if value > 0.0)
+    values = [letters[letter] for letter in linear] + [process.B for process in processes]
+    times = [process.T_B for process in processes]
     return Models(
-        Terms(there, len(processes)),
+        Terms(linear, len(processes)),
         np.array([values], dtype=np.float64),
         np.array([times], dtype=np.float64).reshape(1, len(times)),
     )
@@ -216,12 +216,18 @@ def with_curve(
         As `averaging_times` gives them.
     """
     chosen = alike[0]
-    best = [_best(one) for one in alike]
-    drawn = [_drawn(one, draws) for one in alike]
+    best = [_best(candidate) for candidate in alike]
+    drawn = [_drawn(candidate, draws) for candidate in alike]
     if not best[0].has_bias:
-        having = [one for one in alike if as_good(one, chosen) and _best(one).has_bias]
-        every = [*(one for one in wider if _best(one).has_bias), *having]
-        bias = _weak_bias([_drawn(one, draws) for one in every], bool(having), float(tau[-1]))
+        having = [
+            candidate
+            for candidate in alike
+            if as_good(candidate, chosen) and _best(candidate).has_bias
+        ]
+        every = [*(candidate for candidate in wider if _best(candidate).has_bias), *having]
+        bias = _weak_bias(
+            [_drawn(candidate, draws) for candidate in every], bool(having), float(tau[-1])
+        )
     else:
         bias = _bias(best, drawn, float(tau[-1]))
     return replace(estimate, curve={"B_curve": bias} | lowest_parameters(best, drawn, tau))
@@ -252,7 +258,7 @@ def _weak_bias(drawn: Sequence[Models], as_good: bool, longest: float) -> Parame
     """Return what is said where the chosen model has no bias instability."""
     if not drawn:
         return Parameter(None, "absent", "the data do not ask for it")
-    upper = max(float(np.quantile(bias_of_curve(one, longest)[0], 0.975)) for one in drawn)
+    upper = max(float(np.quantile(bias_of_curve(models, longest)[0], 0.975)) for models in drawn)
     if as_good:
         reason = "models with a bias instability are about as good; only its interval is given"
         return Parameter(None, "not_identified", reason, 0.0, upper)
@@ -293,15 +299,15 @@ def lowest_parameters(
     tau : ndarray, shape (m,)
         As `averaging_times` gives them.
     """
-    points = [lowest_point(one, tau) for one in best]
-    weights = [one.weight for one in best]
+    points = [lowest_point(models, tau) for models in best]
+    weights = [models.weight for models in best]
     values = [_mean([float(point[i][0]) for point in points], weights) for i in (0, 1)]
-    found = [lowest_point(one, tau) for one in drawn]
+    drawn_points = [lowest_point(models, tau) for models in drawn]
     limits: list[tuple[float | None, float | None]] = [(None, None), (None, None)]
     if drawn:
-        sizes = [one.weight for one in drawn]
-        lows = list(zip([point[0] for point in found], sizes, strict=True))
-        times = list(zip([point[1] for point in found], sizes, strict=True))
+        sizes = [models.weight for models in drawn]
+        lows = list(zip([point[0] for point in drawn_points], sizes, strict=True))
+        times = list(zip([point[1] for point in drawn_points], sizes, strict=True))
         limits = [_limits(lows, values[0]), _limits(times, values[1])]
     if not points[0][2][0]:
         falls = points[0][1][0] > tau[0]
@@ -316,19 +322,20 @@ def lowest_parameters(
         }
     return {
         "sigma_min": Parameter(values[0], "ok", None, *limits[0]),
-        "tau_min": _time_of_lowest(values[1], limits[1], found, drawn),
+        "tau_min": _time_of_lowest(values[1], limits[1], drawn_points, drawn),
     }
 
 
 def _time_of_lowest(
     value: float,
     limits: tuple[float | None, float | None],
-    found: Sequence[tuple[Array, Array, NDArray[np.bool_]]],
+    points: Sequence[tuple[Array, Array, NDArray[np.bool_]]],
     drawn: Sequence[Models],
 ) -> Parameter:
-    weight = sum(one.weight for one in drawn)
+    weight = sum(models.weight for models in drawn)
     outside = sum(
-        one.weight * float(np.mean(~point[2])) for one, point in zip(drawn, found, strict=True)
+        models.weight * float(np.mean(~point[2]))
+        for models, point in zip(drawn, points, strict=True)
     )
     if outside > 0.025 * weight:
         reason = "models that the log does not rule out have no minimum within a ninth of it"
@@ -352,23 +359,27 @@ def _limits(parts: Sequence[tuple[Array, float]], value: float) -> tuple[float, 
 
 def _mean(values: Sequence[float], weights: Sequence[float]) -> float:
     """Return the weighted geometric mean; the first value where it or all weight is 0."""
-    there = [(value, weight) for value, weight in zip(values, weights, strict=True) if value > 0.0]
-    total = sum(weight for _, weight in there)
+    positive = [
+        (value, weight) for value, weight in zip(values, weights, strict=True) if value > 0.0
+    ]
+    total = sum(weight for _, weight in positive)
     if values[0] == 0.0 or total == 0.0:
         return values[0]
-    return math.exp(sum(weight * math.log(value) for value, weight in there) / total)
+    return math.exp(sum(weight * math.log(value) for value, weight in positive) / total)
 
 
 def _best(candidate: Candidate) -> Models:
-    found = candidate.found
-    return Models(found.terms, np.sqrt(found.powers)[None], found.times[None], candidate.weight)
+    maximum = candidate.maximum
+    return Models(
+        maximum.terms, np.sqrt(maximum.powers)[None], maximum.times[None], candidate.weight
+    )
 
 
 def _drawn(candidate: Candidate, draws: Mapping[Terms, Posterior]) -> Models:
-    posterior = draws[candidate.found.terms]
+    posterior = draws[candidate.maximum.terms]
     every = max(1, len(posterior.parameters) // _DRAWS)
     return Models(
-        candidate.found.terms,
+        candidate.maximum.terms,
         posterior.parameters[::every],
         posterior.times[::every],
         candidate.weight,

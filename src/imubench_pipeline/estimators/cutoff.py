@@ -217,7 +217,7 @@ def find_cutoff(
     if used.sum() < FEWEST_BINS:
         unknown = Parameter(None, "not_shown", f"the spectrum has {used.sum()} bins only")
         return Cutoff(unknown, None, unknown, 0.0, 0.0)
-    fits = FilterFits(spectrum.taken(used))
+    fits = FilterFits(spectrum.select(used))
     if not fits.may_bend(filters):
         absent = Parameter(None, "absent", "the spectrum shows no low-pass")
         return Cutoff(absent, None, Parameter(fits.unfiltered()[0]), 0.0, 0.0)
@@ -234,11 +234,12 @@ def find_cutoff(
     best = tried[0]
     # A floor is taken to be there where it shows only: with it a high cut-off is never told.
     alike = [
-        one
-        for one in tried
-        if one.floor <= best.floor and one.cost + one.floor < best.cost + best.floor + RULED_OUT
+        trial
+        for trial in tried
+        if trial.floor <= best.floor
+        and trial.cost + trial.floor < best.cost + best.floor + RULED_OUT
     ]
-    limits = [fits.limits(one) for one in alike]
+    limits = [fits.limits(trial) for trial in alike]
     lower, upper = min(low for low, _ in limits), max(high for _, high in limits)
     N, after = fits.density(best)
     highest = upper >= 0.999 * fits.highest(best.kind, best.order)
@@ -252,7 +253,7 @@ def find_cutoff(
         alone = math.log(N_alone / N)
         readings.append(Reading(_WITHOUT, alone, alone, alone))
     error = SIGMAS / math.sqrt(2.0 * float(spectrum.ordinates[used].sum()))
-    ends = [end for one in readings for end in (one.below, one.above)]
+    ends = [end for reading in readings for end in (reading.below, reading.above)]
     density = Parameter(
         N, lower=N * math.exp(min(0.0, *ends) - error), upper=N * math.exp(max(0.0, *ends) + error)
     )
@@ -267,17 +268,17 @@ def find_cutoff(
     elif not fits.explains(best):
         reason = NOT_AS_BEHIND.format(len(filters))
     if reason:
-        found = Parameter(None, "not_identified", reason, lower, upper, fitted=shown)
+        frequency = Parameter(None, "not_identified", reason, lower, upper, fitted=shown)
         density = replace(
             density, value=None, status="not_identified", reason=reason, fitted=density.value
         )
     else:
-        found = Parameter(shown, lower=lower, upper=upper)
+        frequency = Parameter(shown, lower=lower, upper=upper)
     whole = FilterFits(spectrum)
     whole.rounded = fits.rounded
     white, *slow = whole.gains(best)
     return Cutoff(
-        found,
+        frequency,
         best.order,
         density,
         math.hypot(after, math.sqrt(rounding)),
@@ -288,8 +289,8 @@ def find_cutoff(
         ruled=settled.ruled,
         readings=readings,
         allowed=[
-            Allowed(one, max(0.5 * math.log(high / low), _LEAST_WIDTH))
-            for one, (low, high) in zip(alike, limits, strict=True)
+            Allowed(trial, max(0.5 * math.log(high / low), _LEAST_WIDTH))
+            for trial, (low, high) in zip(alike, limits, strict=True)
         ],
         rounded=fits.rounded,
     )
@@ -322,7 +323,7 @@ def _settled(
         near = usable & ~ruled & (spectrum.frequency > _NEAR * tried[0].cutoff)
         if near.sum() >= FEWEST_BINS:
             used = near
-            fits = FilterFits(spectrum.taken(used))
+            fits = FilterFits(spectrum.select(used))
         if rounding > 0.0:
             fits.rounded = rounding / fits.density(tried[0])[0] ** 2
         fits.choose_slow(tried[0])
@@ -340,8 +341,8 @@ def _without_filter(N_alone: float, gained: float, doubt: tuple[str, float] | No
     reason, before = doubt
     low, high = sorted((N_alone, before))
     unknown = Parameter(None, "not_identified", reason, low, high, fitted=N_alone)
-    told = replace(absent, status="not_identified", reason=reason)
-    return Cutoff(told, None, unknown, 0.0, gained, or_process=reason, N_behind=before)
+    frequency = replace(absent, status="not_identified", reason=reason)
+    return Cutoff(frequency, None, unknown, 0.0, gained, or_process=reason, N_behind=before)
 
 
 def _readings(
@@ -352,18 +353,18 @@ def _readings(
     N = fits.density(best)[0]
     readings = [
         Reading(
-            math.exp(best.cost - one.cost),
+            math.exp(best.cost - trial.cost),
             *(
-                math.log(max(fits.density(replace(one, cutoff=cutoff))[0] / N, _LEAST_N))
-                for cutoff in (low, one.cutoff, high)
+                math.log(max(fits.density(replace(trial, cutoff=cutoff))[0] / N, _LEAST_N))
+                for cutoff in (low, trial.cutoff, high)
             ),
         )
-        for one, (low, high) in zip(alike, limits, strict=True)
+        for trial, (low, high) in zip(alike, limits, strict=True)
     ]
     readings += [
-        also_after_sampling(reading, one, fits.rate)
-        for reading, one in zip(readings, alike, strict=True)
-        if one.is_first_order_analogue
+        also_after_sampling(reading, trial, fits.rate)
+        for reading, trial in zip(readings, alike, strict=True)
+        if trial.is_first_order_analogue
     ]
     return readings
 
@@ -376,10 +377,10 @@ def _ruled_by_ends(
     Those in which something else stands are none of them.
     """
     N = fits.density(best)[0]
-    one = best.low_pass
-    within = one.white(inside(spectrum), spectrum.rate) + rounding / N**2
+    low_pass = best.low_pass
+    within = low_pass.white(inside(spectrum), spectrum.rate) + rounding / N**2
     white = within.mean(axis=1)
-    leak = one.leak(spectrum.frequency, spectrum.length, spectrum.rate)
+    leak = low_pass.leak(spectrum.frequency, spectrum.length, spectrum.rate)
     leak = np.where(spectrum.block == 1, leak, 0.0)
     rules = (leak > _ENDS_RULE * white) | (within.min(axis=1) < _STEEP * within.max(axis=1))
     return np.asarray(rules & (spectrum.density < _SOMETHING_ELSE * N**2 * (white + leak)))
@@ -393,7 +394,9 @@ def _process_or_filter(
     Only a filter of first order looks like a process, and only where no white noise shows beside
     it up to Nyquist.
     """
-    first = next((one for one in tried if one.is_first_order_analogue and not one.floor), None)
+    first = next(
+        (trial for trial in tried if trial.is_first_order_analogue and not trial.floor), None
+    )
     if first is None or first.correlation(fits.rate) < PROCESSES:
         return None
     if stated is not None and 1.0 / _AS_STATED < first.cutoff / stated < _AS_STATED:

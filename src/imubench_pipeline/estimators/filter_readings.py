@@ -74,7 +74,7 @@ class OfModel:
     gained: float
 
 
-def also_after_sampling(reading: Reading, one: Tried, rate: float) -> Reading:
+def also_after_sampling(reading: Reading, trial: Tried, rate: float) -> Reading:
     """Return the reading of the same first-order filter applied to the samples.
 
     Its shape is the same, and it folds nothing into N.
@@ -82,12 +82,12 @@ def also_after_sampling(reading: Reading, one: Tried, rate: float) -> Reading:
     Parameters
     ----------
     reading : Reading
-    one : Tried
+    trial : Tried
         An analogue filter of first order.
     rate : float
         Hz.
     """
-    gain = 0.5 * math.log(float(LowPass(one.cutoff).folded_power(0.0, rate)))
+    gain = 0.5 * math.log(float(LowPass(trial.cutoff).folded_power(0.0, rate)))
     return Reading(
         _TWIN * reading.weight, reading.below + gain, reading.at + gain, reading.above + gain
     )
@@ -103,10 +103,10 @@ def drawn(readings: Sequence[Reading], number: int, rng: np.random.Generator) ->
     number : int
     rng : numpy.random.Generator
     """
-    weight = np.array([one.weight for one in readings])
+    weight = np.array([reading.weight for reading in readings])
     which = rng.choice(len(weight), number, p=weight / weight.sum())
     below, at, above = (
-        np.array([getattr(one, name) for one in readings])[which]
+        np.array([getattr(reading, name) for reading in readings])[which]
         for name in ("below", "at", "above")
     )
     normal = rng.standard_normal(number)

@@ -91,11 +91,11 @@ class Frame:
     def _whittle(self, spectrum: Spectrum, bins: Mask, shapes: int) -> Whittle:
         behind = self.low_pass.behind if self.low_pass is not None else None
         return whittle_of(
-            spectrum.taken(bins),
+            spectrum.select(bins),
             self.band.highest,
             shapes,
             shortest=self.shortest,
-            behind=behind.taken(bins) if behind is not None else None,
+            behind=behind.select(bins) if behind is not None else None,
         )
 
     def has_a_bend_of_each_model(self, spectrum: Spectrum, times: NDArray[np.float64]) -> bool:
@@ -112,7 +112,7 @@ class Frame:
         """
         if self.low_pass is None or self.low_pass.behind is None:
             return False
-        cutoffs = [one.filter.cutoff for one in self.low_pass.allowed]
+        cutoffs = [allowed.filter.cutoff for allowed in self.low_pass.allowed]
         shared = len(times) > 0 and times.min() < _APART / (2.0 * np.pi * cutoffs[0])
         return bool(shared or max(cutoffs) < UNFOLDED * spectrum.rate)
 
@@ -127,7 +127,7 @@ class Frame:
     def rescored(self, candidates: Sequence[Candidate]) -> list[Candidate]:
         """Return models by what they explain with a cut-off of their own, the best first."""
         models = self.low_pass.models if self.low_pass is not None else {}
-        gained = {terms: one.gained for terms, one in models.items()}
+        gained = {terms: model.gained for terms, model in models.items()}
         return rescored(candidates, gained)
 
     @property
@@ -263,11 +263,11 @@ def _lines(
     below = spectrum.upper <= start
     if below.sum() < FEWEST_BINS:
         below = everything
-    found = whittle_of(spectrum.taken(below), start, COARSE).maximum(Terms("NFK", 1))
+    maximum = whittle_of(spectrum.select(below), start, COARSE).maximum(Terms("NFK", 1))
     low = spectrum.block > 1
     crossover = float(spectrum.upper[low].max()) if low.any() else 0.0
-    lines = find(line_spectra, model_of(found), spectrum.rate, crossover)
+    lines = find(line_spectra, model_of(maximum), spectrum.rate, crossover)
     if not lines:
         return lines, everything
-    density = whittle_of(spectrum, 0.5 * spectrum.rate, COARSE).density(found)
+    density = whittle_of(spectrum, 0.5 * spectrum.rate, COARSE).density(maximum)
     return lines, without_lines(spectrum, lines, density)

@@ -64,25 +64,34 @@ def with_upper_limits(
     for name in ("K", "B"):
         if parameters[name].status != "absent":
             continue
-        having = [one for one in (*wider, *alike) if _has(name, one.found.terms)]
+        having = [
+            candidate for candidate in (*wider, *alike) if _has(name, candidate.maximum.terms)
+        ]
         if not having:
             continue
         limits = [
-            float(np.quantile(_draws_of(name, one.found.terms, draws), 0.975)) for one in having
+            float(np.quantile(_draws_of(name, candidate.maximum.terms, draws), 0.975))
+            for candidate in having
         ]
-        good = [one for one in alike[1:] if as_good(one, alike[0]) and _in_model(name, one.found)]
+        good = [
+            candidate
+            for candidate in alike[1:]
+            if as_good(candidate, alike[0]) and _in_model(name, candidate.maximum)
+        ]
         if not good:
             parameters[name] = Parameter(None, "absent", _ABSENT_BELOW, 0.0, max(limits))
             continue
-        names = " and ".join(one.found.terms.name for one in good)
+        names = " and ".join(candidate.maximum.terms.name for candidate in good)
         verb = "is" if len(good) == 1 else "are"
         reason = f"{names}, which {'has' if len(good) == 1 else 'have'} it, {verb} about as good"
-        reason += f" as {alike[0].found.terms.name}; only its interval is given"
+        reason += f" as {alike[0].maximum.terms.name}; only its interval is given"
         parameters[name] = Parameter(None, "not_identified", reason, 0.0, max(limits))
-        timed = [one.found.terms for one in good if _has("T_B", one.found.terms)]
+        timed = [
+            candidate.maximum.terms for candidate in good if _has("T_B", candidate.maximum.terms)
+        ]
         times = [_draws_of("T_B", terms, draws) for terms in timed]
         if name == "B" and times:
-            ends = [np.quantile(one, (0.025, 0.975)) for one in times]
+            ends = [np.quantile(drawn_times, (0.025, 0.975)) for drawn_times in times]
             low, high = float(min(end[0] for end in ends)), float(max(end[1] for end in ends))
             parameters["T_B"] = Parameter(None, "not_identified", reason, low, high)
     return replace(estimate, parameters=parameters)
@@ -97,10 +106,10 @@ def as_good(other: Candidate, chosen: Candidate) -> bool:
     return other.aic <= chosen.aic or other.bic <= chosen.bic + _ABOUT_AS_GOOD
 
 
-def _in_model(name: str, found: Maximum) -> bool:
+def _in_model(name: str, maximum: Maximum) -> bool:
     """Tell whether a fit has a parameter above 0."""
-    names = parameter_names(found.terms)
-    return name in names and bool(found.powers[names.index(name)] > 0.0)
+    names = parameter_names(maximum.terms)
+    return name in names and bool(maximum.powers[names.index(name)] > 0.0)
 
 
 def papers_only(parameters: Mapping[str, Parameter]) -> dict[str, Parameter]:
@@ -141,24 +150,24 @@ def describe(
         than that of one of them where it is known badly. The model that stands beside it has its
         own.
     """
-    found = chosen.found
-    names = parameter_names(found.terms)
-    values = [*np.sqrt(found.powers), *found.times] + [found.ramp] * found.terms.ramp
-    errors = relative_errors(whittle, found)
+    maximum = chosen.maximum
+    names = parameter_names(maximum.terms)
+    values = [*np.sqrt(maximum.powers), *maximum.times] + [maximum.ramp] * maximum.terms.ramp
+    errors = relative_errors(whittle, maximum)
     needed = durations_needed(
-        found, whittle.spectrum.rate, float(whittle.spectrum.duration), band.highest
+        maximum, whittle.spectrum.rate, float(whittle.spectrum.duration), band.highest
     )
     described: dict[str, Parameter] = {}
     for i, (name, value) in enumerate(zip(names, values, strict=True)):
         lower, upper = _interval(name, chosen, alike, draws)
         error = float(errors[i])
         if name == "K" and value > 0.0:
-            error = max(error, _spread(_draws_of(name, found.terms, draws)))
+            error = max(error, _spread(_draws_of(name, maximum.terms, draws)))
         described[name] = _parameter(name, float(value), error, lower, upper, needed[i], whittle)
     if "K" in described and described["K"].status == "ok":
-        there = _over_models("K", chosen, alike, draws)
-        if len(there) > 1:
-            own, middle = described["K"], mixture_quantile(there, 0.5)
+        weighted_draws = _over_models("K", chosen, alike, draws)
+        if len(weighted_draws) > 1:
+            own, middle = described["K"], mixture_quantile(weighted_draws, 0.5)
             described["K"] = replace(own, value=middle, fitted=own.value)
     for number in ("", " 2"):
         if f"B{number}" in described and described[f"B{number}"].status == "absent":
@@ -228,11 +237,11 @@ def _interval(
     That of the chosen model lies inside: of models that the log hardly tells apart, AIC likes a
     process that is as slow as a walk better than the walk.
     """
-    there = _over_models(name, chosen, alike, draws)
-    own = [(_draws_of(name, chosen.found.terms, draws), 1.0)]
+    weighted_draws = _over_models(name, chosen, alike, draws)
+    own = [(_draws_of(name, chosen.maximum.terms, draws), 1.0)]
     return (
-        min(mixture_quantile(there, 0.025), mixture_quantile(own, 0.025)),
-        max(mixture_quantile(there, 0.975), mixture_quantile(own, 0.975)),
+        min(mixture_quantile(weighted_draws, 0.025), mixture_quantile(own, 0.025)),
+        max(mixture_quantile(weighted_draws, 0.975), mixture_quantile(own, 0.975)),
     )
 
 
@@ -243,11 +252,14 @@ def _over_models(
     draws: dict[Terms, Posterior],
 ) -> list[tuple[Array, float]]:
     """Return the draws of a parameter in each model that has it, with the weight of the model."""
-    terms = chosen.found.terms
+    terms = chosen.maximum.terms
     return [
-        (_draws_of(name, one.found.terms, draws), math.exp(0.5 * (chosen.aic - one.aic)))
-        for one in alike
-        if one.found.terms == terms or _comparable(name, terms, one.found.terms)
+        (
+            _draws_of(name, candidate.maximum.terms, draws),
+            math.exp(0.5 * (chosen.aic - candidate.aic)),
+        )
+        for candidate in alike
+        if candidate.maximum.terms == terms or _comparable(name, terms, candidate.maximum.terms)
     ]
 
 

@@ -229,35 +229,35 @@ class _Search:
         costs = [self.densities(T_B)[1] for T_B in scan]
         best = int(np.argmin(costs))
         low, high = scan[max(best - 1, 0)], scan[min(best + 1, _SCAN - 1)]
-        found = minimize_scalar(
+        minimum = minimize_scalar(
             lambda u: self.densities(math.exp(u))[1],
             bounds=(math.log(low), math.log(high)),
             method="bounded",
             options={"xatol": 1e-10},
         )
-        T_B = math.exp(found.x) if found.fun < costs[best] else float(scan[best])
+        T_B = math.exp(minimum.x) if minimum.fun < costs[best] else float(scan[best])
         return self._described(T_B)
 
     def _described(self, T_B: float) -> Estimate:
         (white, drive, walk), _ = self.densities(T_B)
         parts = {"N": white * self._white, "B": drive * self._shape(T_B), "K": walk * self._walk}
-        there = {
+        present = {
             name: bool((part > _ABSENT * self._variance).any()) for name, part in parts.items()
         }
         absent = Parameter(None, "absent", "the fit is best without this term")
         at_end = self._at_end(T_B)
-        bias = Parameter(bias_instability(drive, T_B)) if there["B"] else absent
-        time = Parameter(T_B) if there["B"] else absent
-        if there["B"] and at_end:
+        bias = Parameter(bias_instability(drive, T_B)) if present["B"] else absent
+        time = Parameter(T_B) if present["B"] else absent
+        if present["B"] and at_end:
             bias = Parameter(bias.value, "at_bound", at_end)
             time = Parameter(T_B, "at_bound", at_end)
         return Estimate(
             self._method,
             {
-                "N": Parameter(math.sqrt(white)) if there["N"] else absent,
+                "N": Parameter(math.sqrt(white)) if present["N"] else absent,
                 "B": bias,
                 "T_B": time,
-                "K": Parameter(math.sqrt(walk)) if there["K"] else absent,
+                "K": Parameter(math.sqrt(walk)) if present["K"] else absent,
             },
         )
 

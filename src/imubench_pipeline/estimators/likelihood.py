@@ -194,7 +194,7 @@ def fit_blocks(
         if frame.used.sum() < FEWEST_BINS:
             break
         if number < rounds:
-            model = model_of(compare(frame.whittle(spectrum), quantization=False)[0].found)
+            model = model_of(compare(frame.whittle(spectrum), quantization=False)[0].maximum)
     return fit_spectrum(spectrum, frame, rng=rng)
 
 
@@ -212,8 +212,8 @@ def _first_model(
     try:
         return least_squares.fit(curve).model
     except ValueError:
-        there = np.concatenate([part[np.isfinite(part)] for part in blocks()])
-        return NoiseModel(N=float(np.std(there)) / math.sqrt(rate))
+        present = np.concatenate([part[np.isfinite(part)] for part in blocks()])
+        return NoiseModel(N=float(np.std(present)) / math.sqrt(rate))
 
 
 def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) -> Likelihood:
@@ -257,29 +257,29 @@ def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) 
     draws: dict[Terms, Posterior] = {}
     # A ramp is no noise: it is believed or not, and does not widen intervals as a possibility.
     alike = [chosen] + [
-        c for c in candidates[1:] if c.share >= _LEAST_SHARE and not c.found.terms.ramp
+        c for c in candidates[1:] if c.share >= _LEAST_SHARE and not c.maximum.terms.ramp
     ]
-    wider = [c for c in candidates if c.found.terms in _with_one_more(chosen.found.terms)]
+    wider = [c for c in candidates if c.maximum.terms in _with_one_more(chosen.maximum.terms)]
     for candidate in candidates:
-        terms = candidate.found.terms
+        terms = candidate.maximum.terms
         if candidate in alike or candidate in wider or terms == PAPERS:
             part = 1.0 if terms == PAPERS or candidate is chosen else candidate.share
             number = max(_FEWEST_DRAWS, round(part * DRAWS))
-            shown[terms] = sample(whittle, candidate.found, rng, number)
+            shown[terms] = sample(whittle, candidate.maximum, rng, number)
             draws[terms] = frame.before_the_filter(shown[terms], terms, rng)
     estimate = describe("likelihood", whittle, chosen, alike, draws, frame.band)
     estimate = with_upper_limits(estimate, alike, wider, draws)
     tau = averaging_times(spectrum.rate, float(spectrum.length.max()))
     estimate = with_curve(estimate, alike, wider, draws, tau)
-    papers = next(c for c in candidates if c.found.terms == PAPERS)
+    papers = next(c for c in candidates if c.maximum.terms == PAPERS)
     gauss_markov = describe("likelihood_gm", whittle, papers, [papers], draws, frame.band)
     gauss_markov = with_curve(gauss_markov, [papers], (), draws, tau)
-    fitted = frame.whole(spectrum).density(chosen.found) + chosen.found.ramp**2 * spectrum.ramp
-    drift = instead_of_walk(whittle, chosen.found)
+    fitted = frame.whole(spectrum).density(chosen.maximum) + chosen.maximum.ramp**2 * spectrum.ramp
+    drift = instead_of_walk(whittle, chosen.maximum)
     estimate, gauss_markov = doubted(
         estimate, gauss_markov, spectrum, frame, candidates, papers, fitted, drift
     )
-    estimate, gauss_markov = (_with_folds(one, frame) for one in (estimate, gauss_markov))
+    estimate, gauss_markov = (_with_folds(each, frame) for each in (estimate, gauss_markov))
     return Likelihood(
         (
             replace(
@@ -288,8 +288,8 @@ def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) 
                 draws=joint_draws(
                     [
                         (
-                            c.found.terms,
-                            frame.in_the_log(shown[c.found.terms], c.found.terms),
+                            c.maximum.terms,
+                            frame.in_the_log(shown[c.maximum.terms], c.maximum.terms),
                             drawn_share(c, len(whittle.spectrum.density)),
                         )
                         for c in alike
@@ -357,9 +357,9 @@ def explaining(spectrum: Spectrum, frame: Frame) -> tuple[Frame, Whittle, list[C
     if frame.low_pass is None:
         return first
     if not _explains(first):
-        flexible = [one for one in first[2] if one.found.terms == _FLEXIBLE]
+        flexible = [candidate for candidate in first[2] if candidate.maximum.terms == _FLEXIBLE]
         first = fitted(frame.refined(spectrum, flexible))
-    if _explains(first) and first[0].has_a_bend_of_each_model(spectrum, first[2][0].found.times):
+    if _explains(first) and first[0].has_a_bend_of_each_model(spectrum, first[2][0].maximum.times):
         first = fitted(first[0].refined(spectrum, joined(first[2], PAPERS)))
     if _explains(first):
         return first

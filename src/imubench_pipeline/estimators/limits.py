@@ -222,8 +222,8 @@ def with_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) 
     errors = fit_errors(curve, used, model, estimate.method)
     unknown: dict[str, str] = {}
     if estimate.parameters["T_B"].status == "at_bound":
-        there = fit_errors(curve, used, model, estimate.method, held=["T_B"])
-        unknown = _unknown_at_bound(there.of("B"))
+        errors_at_bound = fit_errors(curve, used, model, estimate.method, held=["T_B"])
+        unknown = _unknown_at_bound(errors_at_bound.of("B"))
     elif "B" in errors.names:
         unknown = _unknown_bias(errors.of("B"), errors.of("T_B"))
     apart = errors
@@ -238,22 +238,22 @@ def with_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) 
         unknown[name] = f"its relative standard error is {_percent(errors.of(name))}, above 50 %"
     doubtful = [name for name in ("B", "K") if name in unknown]
     parameters = dict(estimate.parameters)
-    for name, found in estimate.parameters.items():
-        if found.value is None:
+    for name, parameter in estimate.parameters.items():
+        if parameter.value is None:
             continue
-        parameters[name] = replace(found, fitted=found.value)
+        parameters[name] = replace(parameter, fitted=parameter.value)
         if name in unknown:
-            lower, upper = _wide_limits(name, found.value, errors)
-            reason = f"{found.reason}; {unknown[name]}" if found.reason else unknown[name]
+            lower, upper = _wide_limits(name, parameter.value, errors)
+            reason = f"{parameter.reason}; {unknown[name]}" if parameter.reason else unknown[name]
             parameters[name] = Parameter(
-                None, "not_identified", reason, lower, upper, fitted=found.value
+                None, "not_identified", reason, lower, upper, fitted=parameter.value
             )
-        elif found.status == "ok":
+        elif parameter.status == "ok":
             # Beyond a half it has a value only as what the curve shows beside a doubtful B.
-            held = apart.of(name) if errors.of(name) > _MOST_ERROR else None
-            low, high = errors.factors(name, doubtful, held)
+            error_beside_bias = apart.of(name) if errors.of(name) > _MOST_ERROR else None
+            low, high = errors.factors(name, doubtful, error_beside_bias)
             parameters[name] = replace(
-                parameters[name], lower=found.value * low, upper=found.value * high
+                parameters[name], lower=parameter.value * low, upper=parameter.value * high
             )
     return Estimate(
         estimate.method,
@@ -267,28 +267,30 @@ def _lowest_point(model: NoiseModel, errors: Errors, curve: AllanCurve) -> dict[
     tau = averaging_times(_rate(curve), curve.samples / _rate(curve))
     best = models_of(model)
     at = [getattr(model, name) for name in errors.names]
-    found = lowest_parameters([best], [], tau)
-    known = bool(np.isfinite(errors.covariance).all())
-    if not known or any(one.value is None for one in found.values()):
-        return found
+    lowest = lowest_parameters([best], [], tau)
+    finite = bool(np.isfinite(errors.covariance).all())
+    if not finite or any(parameter.value is None for parameter in lowest.values()):
+        return lowest
     ends = []
     for sign in (-1.0, 1.0):
         moved = [
             models_of(replace(model, **{name: value * math.exp(sign * _STEP_OF_LOWEST)}))
             for name, value in zip(errors.names, at, strict=True)
         ]
-        ends.append([lowest_point(one, tau)[:2] for one in moved])
+        ends.append([lowest_point(models, tau)[:2] for models in moved])
     slopes = np.log(np.array(ends[1]) / np.array(ends[0]))[:, :, 0].T / (2.0 * _STEP_OF_LOWEST)
     described = {}
-    for (name, one), slope in zip(found.items(), slopes, strict=True):
+    for (name, parameter), slope in zip(lowest.items(), slopes, strict=True):
         error = min(math.sqrt(max(float(slope @ errors.covariance @ slope), 0.0)), _NOTHING_KNOWN)
         if error > _MOST_ERROR:
             reason = f"its relative standard error is {_percent(error)}, above 50 %"
-            described[name] = Parameter(None, "not_identified", reason, fitted=one.value)
+            described[name] = Parameter(None, "not_identified", reason, fitted=parameter.value)
             continue
         factor = math.exp(_SIGMAS * error)
-        assert one.value is not None
-        described[name] = replace(one, lower=one.value / factor, upper=one.value * factor)
+        assert parameter.value is not None
+        described[name] = replace(
+            parameter, lower=parameter.value / factor, upper=parameter.value * factor
+        )
     return described
 
 

@@ -124,11 +124,11 @@ def samples_present(
     """
     reached = 0
     for values in parts:
-        there = np.flatnonzero(np.isfinite(values))
-        place = np.searchsorted(begin, reached + there, side="right") - 1
-        inside = (place >= 0) & (reached + there < end[place])
+        finite = np.flatnonzero(np.isfinite(values))
+        place = np.searchsorted(begin, reached + finite, side="right") - 1
+        inside = (place >= 0) & (reached + finite < end[place])
         if inside.any():
-            yield place[inside], values[there[inside]]
+            yield place[inside], values[finite[inside]]
         reached += len(values)
 
 
@@ -149,12 +149,12 @@ def divided(means: BlockMeans, segments: Sequence[tuple[int, int]]) -> tuple[tup
     parts: list[tuple[int, int]] = []
     for start, stop in segments:
         chosen = means.within(start, stop)
-        there = np.flatnonzero(means.count[chosen] > 0) + chosen.start
-        if len(there) == 0:
+        occupied = np.flatnonzero(means.count[chosen] > 0) + chosen.start
+        if len(occupied) == 0:
             continue
-        cuts = np.flatnonzero(np.diff(there) > _AHEAD)
-        begins = means.begin[there[np.concatenate(([0], cuts + 1))]]
-        ends = means.end[there[np.append(cuts, len(there) - 1)]]
+        cuts = np.flatnonzero(np.diff(occupied) > _AHEAD)
+        begins = means.begin[occupied[np.concatenate(([0], cuts + 1))]]
+        ends = means.end[occupied[np.append(cuts, len(occupied) - 1)]]
         parts += zip(begins.tolist(), ends.tolist(), strict=True)
     return tuple(parts)
 
@@ -253,7 +253,7 @@ def filled(
 @njit(cache=True)
 def _smoothed(
     mean: Array,
-    there: NDArray[np.bool_],
+    present: NDArray[np.bool_],
     error: Array,
     decay: Array,
     drive: Array,
@@ -271,7 +271,7 @@ def _smoothed(
     difference = np.zeros(n)
     for k in range(n):
         simulated[k] = state.sum()
-        if there[k]:
+        if present[k]:
             difference[k] = mean[k] - simulated[k] - np.sqrt(error[k]) * normals[k, s]
         for a in range(s):
             state[a] = decay[a] * state[a] + np.sqrt(drive[a]) * normals[k, a]
@@ -293,7 +293,7 @@ def _smoothed(
             means[i] = here
             spreads[i] = matrix
             total = matrix.sum(axis=1)
-            if there[k]:
+            if present[k]:
                 variance = total.sum() + error[k]
                 gain = total / variance
                 wrong = difference[k] - here.sum()
@@ -309,7 +309,7 @@ def _smoothed(
         for k in range(last - 1, first - 1, -1):
             i = k - first
             back = back * decay
-            if there[k]:
+            if present[k]:
                 # L = Phi (I - gain H): its transpose, and H / F times the innovation.
                 along = 0.0
                 for a in range(s):

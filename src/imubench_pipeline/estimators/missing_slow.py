@@ -64,10 +64,10 @@ def slow_noise_missing(
     power = np.cumsum(spectrum.ordinates[order] * spectrum.density[order]) / level
     sums = np.floor(np.log(np.maximum(degrees, 1.0)) / np.log(_APART))
     looked = (degrees >= _FEWEST) & (np.diff(sums, prepend=-1.0) > 0.0)
-    told = looked & (power < _LESS * degrees)
-    if not told.any():
+    lacking = looked & (power < _LESS * degrees)
+    if not lacking.any():
         return None
-    chance = np.where(told, chdtr(degrees, power), 1.0) * looked.sum()
+    chance = np.where(lacking, chdtr(degrees, power), 1.0) * looked.sum()
     worst = int(np.argmin(chance))
     if chance[worst] > _CHANCE:
         return None

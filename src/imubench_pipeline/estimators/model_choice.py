@@ -51,7 +51,7 @@ class Candidate:
 
     Attributes
     ----------
-    found : Maximum
+    maximum : Maximum
     bic, aic : float
         2 (-log L) + p log(number of bins), and + 2 p. Where a Gauss-Markov process or a ramp
         stands for a random walk, 4 is added to the BIC; for a ramp and for quantization noise, 6
@@ -64,7 +64,7 @@ class Candidate:
     goodness : Goodness
     """
 
-    found: Maximum
+    maximum: Maximum
     bic: float
     aic: float
     weight: float
@@ -85,18 +85,18 @@ def compare(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
     penalty = math.log(bins)
     tried: dict[Terms, Maximum] = {}
 
-    def bic(found: Maximum) -> float:
+    def bic(maximum: Maximum) -> float:
         like_a_walk = (
-            "K" not in found.terms.linear
-            and len(found.times) > 0
-            and found.times[-1] > LIKE_A_WALK * whittle.longest
+            "K" not in maximum.terms.linear
+            and len(maximum.times) > 0
+            and maximum.times[-1] > LIKE_A_WALK * whittle.longest
         )
         # A ramp is tried beside a walk: it stands for the walk where none is left.
-        like_a_walk |= found.terms.ramp and found.parameter("K") == 0.0
-        unlikely = found.terms.ramp + ("Q" in found.terms.linear)
+        like_a_walk |= maximum.terms.ramp and maximum.parameter("K") == 0.0
+        unlikely = maximum.terms.ramp + ("Q" in maximum.terms.linear)
         return (
-            2.0 * found.cost
-            + found.terms.parameters * penalty
+            2.0 * maximum.cost
+            + maximum.terms.parameters * penalty
             + UNIT_ROOT * like_a_walk
             + UNLIKELY * unlikely
         )
@@ -108,10 +108,10 @@ def compare(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
     for terms in CANDIDATES:
         add(terms)
     if quantization:
-        found = min(tried.values(), key=bic)
-        rounded = Terms("Q" + found.terms.linear, found.terms.gauss_markov)
+        without_rounding = min(tried.values(), key=bic)
+        rounded = Terms("Q" + without_rounding.terms.linear, without_rounding.terms.gauss_markov)
         add(rounded)
-        if rounded in tried and bic(tried[rounded]) < bic(found):
+        if rounded in tried and bic(tried[rounded]) < bic(without_rounding):
             # Without quantization noise other terms had to stand for it.
             for terms in CANDIDATES:
                 add(Terms("Q" + terms.linear, terms.gauss_markov))
@@ -120,25 +120,25 @@ def compare(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
     linear = best.linear if "K" in best.linear else best.linear + "K"
     add(Terms(linear, best.gauss_markov, ramp=True))
     order = sorted(tried.values(), key=bic)
-    bics = np.array([bic(found) for found in order])
-    aics = np.array([2.0 * (found.cost + found.terms.parameters) for found in order])
+    bics = np.array([bic(maximum) for maximum in order])
+    aics = np.array([2.0 * (maximum.cost + maximum.terms.parameters) for maximum in order])
     weights, shares = _relative(bics), _relative(aics)
     return [
         Candidate(
-            found,
+            maximum,
             float(bics[i]),
             float(aics[i]),
             float(weights[i]),
             float(shares[i]),
             goodness(
                 whittle.spectrum.ordinates,
-                whittle.data(found),
-                whittle.density(found),
+                whittle.data(maximum),
+                whittle.density(maximum),
                 whittle.spectrum.frequency,
-                found.terms.parameters,
+                maximum.terms.parameters,
             ),
         )
-        for i, found in enumerate(order)
+        for i, maximum in enumerate(order)
     ]
 
 
@@ -151,9 +151,11 @@ def rescored(candidates: Sequence[Candidate], gained: Mapping[Terms, float]) -> 
     gained : mapping of Terms to float
         Log likelihood that models gain; with a ramp as without it.
     """
-    more = [gained.get(replace(one.found.terms, ramp=False), 0.0) for one in candidates]
-    bics = np.array([one.bic for one in candidates]) - 2.0 * np.array(more)
-    aics = np.array([one.aic for one in candidates]) - 2.0 * np.array(more)
+    more = [
+        gained.get(replace(candidate.maximum.terms, ramp=False), 0.0) for candidate in candidates
+    ]
+    bics = np.array([candidate.bic for candidate in candidates]) - 2.0 * np.array(more)
+    aics = np.array([candidate.aic for candidate in candidates]) - 2.0 * np.array(more)
     weights, shares = _relative(bics), _relative(aics)
     return [
         replace(
@@ -179,6 +181,6 @@ def disagreement(candidates: Sequence[Candidate]) -> str | None:
     if by_aic is chosen:
         return None
     return (
-        f"AIC favours {by_aic.found.terms.name} by {chosen.aic - by_aic.aic:.1f}, "
-        f"BIC {chosen.found.terms.name} by {by_aic.bic - chosen.bic:.1f}"
+        f"AIC favours {by_aic.maximum.terms.name} by {chosen.aic - by_aic.aic:.1f}, "
+        f"BIC {chosen.maximum.terms.name} by {by_aic.bic - chosen.bic:.1f}"
     )

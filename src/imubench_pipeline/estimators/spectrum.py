@@ -82,7 +82,7 @@ class Spectrum:
     duration: float
     mean: float
 
-    def taken(self, chosen: NDArray[np.bool_]) -> Spectrum:
+    def select(self, chosen: NDArray[np.bool_]) -> Spectrum:
         """Return the spectrum of chosen bins."""
         names = (
             "frequency",

@@ -313,7 +313,7 @@ def one_process(
     best, lowest = _scanned(place, 0, first, last, fixed, bins, with_ramp, table)
     reach = _SCAN_STEP * step
     place[0] = best
-    found, cost = _polished(
+    polished, cost = _polished(
         place,
         0,
         max(first, best - reach),
@@ -323,7 +323,7 @@ def one_process(
         with_ramp,
         table,
     )
-    place[0] = found if cost < lowest else best
+    place[0] = polished if cost < lowest else best
     return place
 
 
@@ -396,10 +396,10 @@ def _descended(
                 low = max(low, best[0] + apart)
             if high <= low:
                 continue
-            found, cost = _polished(best, g, low, high, fixed, bins, with_ramp, table)
+            polished, cost = _polished(best, g, low, high, fixed, bins, with_ramp, table)
             if cost < lowest:
                 lowest = cost
-                best[g] = found
+                best[g] = polished
         reach = max(0.7 * reach, 0.1 * step)
         if before - lowest < 1e-4:
             break

@@ -57,18 +57,18 @@ def candidates(ordinates: Ordinates, fit: Fit) -> list[tuple[Score, Array]]:
     fit : Fit
         What is there already.
     """
-    found: dict[Regressor, tuple[Score, Array]] = {}
+    scores: dict[Regressor, tuple[Score, Array]] = {}
     pauses = restarts(ordinates)
     for seen in best_scores(ordinates, fit, fit.density):
         score = _at_its_pause(seen, pauses, fit)
         slow = score.regressor.kind in _SLOW
         if score.gain > (_SEEN if slow else score.threshold - _NEARLY):
-            found[score.regressor] = score, fit.density
+            scores[score.regressor] = score, fit.density
     carried_on = ordinates.carried_on(fit, _HELD_OUT)
     for score in best_scores(ordinates, fit, carried_on, smooth=True):
         if score.gain > score.threshold:
-            found[score.regressor] = score, carried_on
-    return list(found.values())
+            scores[score.regressor] = score, carried_on
+    return list(scores.values())
 
 
 def restarts(ordinates: Ordinates) -> tuple[Regressor, ...]:
@@ -145,9 +145,9 @@ def polished(
     for _ in range(5):
         for side in (-1.0, 1.0):
             moved = replace(best, where=max(best.where + side * step, least))
-            there = gain.of(moved)
-            if there > most:
-                best, most = moved, there
+            moved_gain = gain.of(moved)
+            if moved_gain > most:
+                best, most = moved, moved_gain
         step *= 0.5
     return (*regressors[:which], best, *regressors[which + 1 :])
 

@@ -82,7 +82,7 @@ class Courses:
 
     Attributes
     ----------
-    found : tuple of Course
+    courses : tuple of Course
     means : Means or None
         The block means that were searched; None where the log is too short.
     searched : Searched or None
@@ -90,7 +90,7 @@ class Courses:
         There are more steps than can be told one by one: nothing was taken out.
     """
 
-    found: tuple[Course, ...]
+    courses: tuple[Course, ...]
     means: Means | None
     searched: Searched | None
     telegraph: bool = False
@@ -106,7 +106,7 @@ class Courses:
         reached = 0
         for values in blocks:
             stop = reached + len(values)
-            yield values - self.at(reached, stop) if self.found else values
+            yield values - self.at(reached, stop) if self.courses else values
             reached = stop
 
     def at(self, start: int, stop: int) -> Array:
@@ -114,7 +114,7 @@ class Courses:
         total = np.zeros(stop - start)
         if self.means is None:
             return total
-        for course in self.found:
+        for course in self.courses:
             part = self.means.parts[course.regressor.part]
             first, last = self._span(course.regressor.part)
             low, high = max(start, first), min(stop, last)
@@ -144,7 +144,7 @@ class Courses:
         parts = []
         for number, part in enumerate(self.means.parts):
             mean = part.mean.copy()
-            for course in self.found:
+            for course in self.courses:
                 if course.regressor.part == number:
                     mean -= course.amplitudes @ course.regressor.means(len(mean))
             parts.append(replace(part, mean=mean))
@@ -159,7 +159,7 @@ class Courses:
         if rival is not None:
             what = _in_words(rival.courses, self.means)
             return f"{what} would explain the log about as well as a random walk"
-        if self.found and _leverage_on_walk(self.searched.fit) > _MOST_LEVERAGE:
+        if self.courses and _leverage_on_walk(self.searched.fit) > _MOST_LEVERAGE:
             return (
                 "what is taken out as deterministic takes most of what the log tells of a random "
                 "walk with it"
@@ -321,7 +321,7 @@ def _spread(
     for where in limits:
         moved = tuple(replace(x, where=where) if x is regressor else x for x in fit.regressors)
         sizes.append(ordinates.solved(moved, fit.density)[0][here])
-    return 0.5 * float(np.ptp([_size(one) for one in (fit.sizes[here], *sizes)]))
+    return 0.5 * float(np.ptp([_size(amplitudes) for amplitudes in (fit.sizes[here], *sizes)]))
 
 
 def _size(amplitudes: Array) -> float:
@@ -374,9 +374,9 @@ def _placed(blocks: Callable[[], Iterable[Array]], means: Means, fit: Fit) -> tu
 
 def _change_point(samples: Array) -> int:
     """Return where two levels explain samples best: the first of the second level."""
-    there = np.isfinite(samples)
-    values = np.where(there, samples - np.nanmean(samples), 0.0)
-    count = np.cumsum(there)
+    present = np.isfinite(samples)
+    values = np.where(present, samples - np.nanmean(samples), 0.0)
+    count = np.cumsum(present)
     total = np.cumsum(values)
     before, after = count[:-1], count[-1] - count[:-1]
     left, right = total[:-1], total[-1] - total[:-1]

@@ -221,7 +221,7 @@ class Ordinates:
         beyond = np.rint(2.0 * spectrum.frequency * spectrum.length) > held_out
         if beyond.sum() < 4 * NOISE.parameters:
             return fit.density
-        whittle = self._whittle.taken(spectrum, beyond)
+        whittle = self._whittle.select(spectrum, beyond)
         return self.density(whittle.maximum(fit.noise.terms))
 
     def log_likelihood(self, residual: Array, density: Array) -> float:

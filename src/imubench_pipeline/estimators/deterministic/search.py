@@ -149,8 +149,10 @@ def anew_at_pauses(ordinates: Ordinates, fit: Fit, walk: float = 0.0) -> Rival |
     Rival or None
         As good as a walk is what has the same AIC.
     """
-    taken = [x for x in fit.regressors if x.kind in ("step", "restart")]
-    steps = tuple(x for x in restarts(ordinates) if not any(beside(one, x) for one in taken))
+    steps_before = [x for x in fit.regressors if x.kind in ("step", "restart")]
+    steps = tuple(
+        x for x in restarts(ordinates) if not any(beside(step, x) for step in steps_before)
+    )
     if not steps:
         return None
     tried = ordinates.fit((*fit.regressors, *steps), fit.density, fit.noise.terms)
@@ -191,18 +193,18 @@ def search(ordinates: Ordinates) -> Searched:
     fit = without
     rival: Rival | None = None
     while len(fit.regressors) < MOST:
-        taken = _next(ordinates, fit)
-        if taken is None:
+        extended = _next(ordinates, fit)
+        if extended is None:
             # Steps at the pauses that hide in a slow process together, none being large.
             together = anew_at_pauses(ordinates, fit)
             if together is not None and together.better:
-                taken = together.fit
-        if taken is None:
+                extended = together.fit
+        if extended is None:
             rival = rival_of_walk(ordinates, fit)
             if rival is None or not rival.better:
                 break
-            taken = ordinates.fit(rival.fit.regressors, rival.fit.density)
-        fit = taken
+            extended = ordinates.fit(rival.fit.regressors, rival.fit.density)
+        fit = extended
     if len(fit.regressors) >= MOST:
         return Searched(fit, without, (), True)
     if len(fit.regressors) > 1:

@@ -234,12 +234,12 @@ def at_jumps(read: Readings) -> Readings:
     places: list[slice] = []
     done = 0
     for part, jumps in zip(read.parts, parts, strict=True):
-        found, cuts = _cut(read, part, jumps)
-        columns.append(found)
-        ends = [0, *cuts, found.shape[1]]
-        places.append(slice(done, done + found.shape[1]))
+        blocks, cuts = _cut(read, part, jumps)
+        columns.append(blocks)
+        ends = [0, *cuts, blocks.shape[1]]
+        places.append(slice(done, done + blocks.shape[1]))
         pieces += [slice(done + a, done + b) for a, b in pairwise(ends)]
-        done += found.shape[1]
+        done += blocks.shape[1]
     begin, end, count, mean, low, high = np.concatenate(columns, axis=1)
     return replace(
         read,
