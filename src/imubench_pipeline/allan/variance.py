@@ -257,8 +257,8 @@ def of_blocks(
             return first.theta[::n], None if first.present is None else first.present[::n], n
         # The noise type is the same at the nearest multiple of the stride.
         step = round(n / DECIMATION)
-        held = longest.present
-        return longest.theta[::step], None if held is None else held[::step], step * DECIMATION
+        counts = longest.present
+        return longest.theta[::step], None if counts is None else counts[::step], step * DECIMATION
 
     return _curve(rate, wanted, samples, spans, sums, edges)
 
@@ -274,10 +274,10 @@ def of_phase(
     start, stop = max(phase.segments, key=lambda segment: segment[1] - segment[0])
 
     def edges(n: int) -> tuple[NDArray[np.float64], NDArray[Any] | None, int]:
-        held = phase.present
+        counts = phase.present
         return (
             phase.theta[start : stop + 1 : n],
-            None if held is None else held[start : stop + 1 : n],
+            None if counts is None else counts[start : stop + 1 : n],
             n,
         )
 
@@ -343,14 +343,14 @@ def _exponents(edges: Edges, sizes: NDArray[np.int64]) -> list[int]:
     """
     exponents: list[int] = []
     for n in sizes:
-        theta, held, size = edges(int(n))
-        found = noise_exponent(theta, held, size)
+        theta, present, size = edges(int(n))
+        exponent = noise_exponent(theta, present, size)
         before = exponents[-1] if exponents else 0
-        if found is None:
-            found = before
+        if exponent is None:
+            exponent = before
         elif len(theta) <= _MANY_CLUSTERS:
-            found = min(found, max(before, 0))
-        exponents.append(found)
+            exponent = min(exponent, max(before, 0))
+        exponents.append(exponent)
     return exponents
 
 

@@ -156,10 +156,10 @@ class _Shared:
 
         def true(start: int, stop: int) -> Array:
             here = slice(start - self._start, stop - self._start)
-            found = np.zeros(stop - start)
+            signal = np.zeros(stop - start)
             for name, part in parts.items():
-                found += part * self._motion[name][here]
-            return found
+                signal += part * self._motion[name][here]
+            return signal
 
         return true
 

@@ -60,13 +60,13 @@ def whitened(model: NoiseModel, blocks: Blocks, columns: Array) -> Array:
     ValueError
         If a mean has no noise, given those before it.
     """
-    known = block_states(model, blocks, turn_on_bias=0.0)
+    states = block_states(model, blocks, turn_on_bias=0.0)
     innovations = _innovations(
-        np.stack([step.transition for step in known.steps]),
-        np.stack([step.factor @ step.factor.T for step in known.steps]),
-        known.which,
-        known.initial @ known.initial.T,
-        known.white**2,
+        np.stack([step.transition for step in states.steps]),
+        np.stack([step.factor @ step.factor.T for step in states.steps]),
+        states.which,
+        states.initial @ states.initial.T,
+        states.white**2,
         np.ascontiguousarray(columns),
     )
     if not np.isfinite(innovations).all():

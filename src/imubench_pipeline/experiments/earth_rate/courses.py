@@ -137,20 +137,22 @@ def estimated(
     measured = block_means([log], experiment, longest)
     blocks, means = measured.blocks, measured.means
     first = blocks.start[0] / blocks.rate
-    one = RateFilter(blocks, model, turn_on_bias=WIDE if turn_on_bias is None else turn_on_bias)
-    filtered = one.run(means)
-    smoothed = one.smooth(filtered)
+    rate_filter = RateFilter(
+        blocks, model, turn_on_bias=WIDE if turn_on_bias is None else turn_on_bias
+    )
+    filtered = rate_filter.run(means)
+    smoothed = rate_filter.smooth(filtered)
     # Before the second position is seen the rate is not told from the bias.
-    known = slice(int(np.argmax(blocks.sense != blocks.sense[0])), None)
+    from_second = slice(int(np.argmax(blocks.sense != blocks.sense[0])), None)
     whole = np.array([first, first + blocks.duration])
     courses = (
         _differences("pairs", blocks, lambda: by_pairs(means, blocks, model)),
         _differences("triples", blocks, lambda: by_triples(means, blocks, model)),
         Course(
             "filter",
-            first + filtered.time[known],
-            filtered.rate[0, known],
-            filtered.rate_sigma[known],
+            first + filtered.time[from_second],
+            filtered.rate[0, from_second],
+            filtered.rate_sigma[from_second],
         ),
         Course(
             "smoother",
@@ -229,12 +231,12 @@ def sigma_ranges(
     nothing = np.zeros((1, len(blocks)))
     bias = math.inf if turn_on_bias is None else turn_on_bias
 
-    def filtered(one: NoiseModel) -> float:
-        return bound(blocks, one, bias)
+    def filtered(drawn_model: NoiseModel) -> float:
+        return bound(blocks, drawn_model, bias)
 
     methods: dict[str, Callable[[NoiseModel], float]] = {
-        "pairs": lambda one: float(by_pairs(nothing, blocks, one).sigma[-1]),
-        "triples": lambda one: float(by_triples(nothing, blocks, one).sigma[-1]),
+        "pairs": lambda drawn_model: float(by_pairs(nothing, blocks, drawn_model).sigma[-1]),
+        "triples": lambda drawn_model: float(by_triples(nothing, blocks, drawn_model).sigma[-1]),
         "filter": filtered,
     }
     ranges: dict[str, Range] = {}

@@ -185,7 +185,9 @@ def _filled(
 def _hole(blocks: LevelBlocks, time: float, schedule: TurnSchedule) -> bool:
     """Tell whether the samples are missing where a turn would be."""
     first = max(0, int((time - 0.5 * schedule.turning) / blocks.length))
-    return not blocks.there[first : int((time + 0.5 * schedule.turning) / blocks.length) + 1].any()
+    return not blocks.present[
+        first : int((time + 0.5 * schedule.turning) / blocks.length) + 1
+    ].any()
 
 
 def _silent(time: float, schedule: TurnSchedule) -> Turn:
@@ -282,7 +284,9 @@ def without(blocks: LevelBlocks, knocks: Sequence[tuple[float, float]]) -> Level
     knocks : sequence of (float, float)
         Start and stop, s.
     """
-    there = blocks.there.copy()
+    present = blocks.present.copy()
     for start, stop in knocks:
-        there[max(0, int(start / blocks.length)) : max(0, math.ceil(stop / blocks.length))] = False
-    return replace(blocks, there=there)
+        present[max(0, int(start / blocks.length)) : max(0, math.ceil(stop / blocks.length))] = (
+            False
+        )
+    return replace(blocks, present=present)
