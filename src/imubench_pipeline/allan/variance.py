@@ -24,6 +24,7 @@ from imubench_pipeline.allan.full_overlap import full_sums
 from imubench_pipeline.allan.octave import DECIMATION, SHORTEST, OctaveSums, octave_sizes
 from imubench_pipeline.allan.phase import Phase, integrate, split
 from imubench_pipeline.allan.threads import read_ahead
+from imubench_pipeline.typing import Array
 
 _MANY_CLUSTERS = 100
 _FEW_STEPS = 2  # strides in a cluster: for shorter ones the noise type needs every sample
@@ -32,7 +33,7 @@ POWER_LAW = "power law"
 FITTED = "fitted spectrum"
 """What degrees of freedom come from."""
 
-Edges = Callable[[int], tuple[NDArray[np.float64], NDArray[Any] | None, int]]
+Edges = Callable[[int], tuple[Array, NDArray[Any] | None, int]]
 """Cumulative sums and counts at the edges of adjacent clusters of about a size, and the size."""
 
 
@@ -66,16 +67,16 @@ class AllanCurve:
         Part of the differences that missing samples leave. By default 1.
     """
 
-    tau: NDArray[np.float64]
+    tau: Array
     cluster_size: NDArray[np.int64]
-    variance: NDArray[np.float64]
-    edf: NDArray[np.float64]
+    variance: Array
+    edf: Array
     samples: int = 0
     exponent: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    averaged: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
-    edf_upper: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    averaged: Array = field(default_factory=lambda: np.empty(0))
+    edf_upper: Array = field(default_factory=lambda: np.empty(0))
     edf_source: Sequence[str] = ()
-    share: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    share: Array = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
         # The class is frozen: defaults that follow from other fields go this way.
@@ -93,15 +94,15 @@ class AllanCurve:
             object.__setattr__(self, "share", np.ones(len(self.tau)))
 
     @property
-    def deviation(self) -> NDArray[np.float64]:
+    def deviation(self) -> Array:
         """Allan deviation in the unit of the samples, shape (m,)."""
         return np.sqrt(self.variance)
 
-    def up_to(self, part: float) -> NDArray[np.float64]:
+    def up_to(self, part: float) -> Array:
         """Return the tau up to a part of the log, s."""
         return self.tau[self.cluster_size <= part * self.samples]
 
-    def limits(self, confidence: float = 0.95) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def limits(self, confidence: float = 0.95) -> tuple[Array, Array]:
         """Return the lower and upper confidence limits of the deviation, shapes (m,)."""
         return deviation_limits(self.deviation, self.edf, confidence, self.edf_upper)
 
@@ -252,7 +253,7 @@ def of_blocks(
         raise ValueError(f"the blocks end before sample {spans[done][1]}")
     first = longest.first
 
-    def edges(n: int) -> tuple[NDArray[np.float64], NDArray[Any] | None, int]:
+    def edges(n: int) -> tuple[Array, NDArray[Any] | None, int]:
         if n < _FEW_STEPS * DECIMATION:
             return first.theta[::n], None if first.present is None else first.present[::n], n
         # The noise type is the same at the nearest multiple of the stride.
@@ -273,7 +274,7 @@ def of_phase(
     wanted = _checked(rate, sizes, phase.samples, phase.segments)
     start, stop = max(phase.segments, key=lambda segment: segment[1] - segment[0])
 
-    def edges(n: int) -> tuple[NDArray[np.float64], NDArray[Any] | None, int]:
+    def edges(n: int) -> tuple[Array, NDArray[Any] | None, int]:
         counts = phase.present
         return (
             phase.theta[start : stop + 1 : n],

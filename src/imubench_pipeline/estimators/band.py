@@ -120,11 +120,7 @@ def _unbent(spectrum: Spectrum, clear: NDArray[np.bool_], cap: float) -> float |
 
 
 def _departure(
-    spectrum: Spectrum,
-    clear: NDArray[np.bool_],
-    below: NDArray[np.bool_],
-    cap: float,
-    terms: Terms,
+    spectrum: Spectrum, clear: NDArray[np.bool_], below: NDArray[np.bool_], cap: float, terms: Terms
 ) -> tuple[float, float] | None:
     """Return frequency and relative size of the first departure beyond some bins, if any."""
     chosen = spectrum.select(below)

@@ -223,7 +223,7 @@ def find_cutoff(
         return Cutoff(absent, None, Parameter(fits.unfiltered()[0]), 0.0, 0.0)
     rounding = resolution**2 / (12.0 * spectrum.rate)
     settled = _settled(spectrum, used, fits, filters, rounding)
-    fits, tried, used = settled.fits, settled.tried, settled.used
+    fits, tried = settled.fits, settled.tried
     N_alone, without, cost_alone, rising = fits.unfiltered()
     behind = fits.behind(tried[0]) if tried else math.inf
     gained = 2.0 * (without - behind)
@@ -231,68 +231,8 @@ def find_cutoff(
     doubt = _process_or_filter(fits, tried, cost_alone, gained, stated)
     if doubt is not None or gained < _BEYOND_BIC or beside_rounding < -_BEYOND_BIC:
         return _without_filter(N_alone, gained, doubt)
-    best = tried[0]
-    # A floor is taken to be there where it shows only: with it a high cut-off is never told.
-    alike = [
-        trial
-        for trial in tried
-        if trial.floor <= best.floor
-        and trial.cost + trial.floor < best.cost + best.floor + RULED_OUT
-    ]
-    limits = [fits.limits(trial) for trial in alike]
-    lower, upper = min(low for low, _ in limits), max(high for _, high in limits)
-    N, after = fits.density(best)
-    highest = upper >= 0.999 * fits.highest(best.kind, best.order)
-    shown, lower, upper = (
-        replace(best, cutoff=cutoff).low_pass.half_power(spectrum.rate)
-        for cutoff in (best.cutoff, lower, upper)
-    )
-    readings = _readings(fits, alike, limits)
-    if gained < _BEYOND_DOUBT and N_alone > 0.0:
-        # Of so many filters one may be there by chance.
-        alone = math.log(N_alone / N)
-        readings.append(Reading(_WITHOUT, alone, alone, alone))
-    error = SIGMAS / math.sqrt(2.0 * float(spectrum.ordinates[used].sum()))
-    ends = [end for reading in readings for end in (reading.below, reading.above)]
-    density = Parameter(
-        N, lower=N * math.exp(min(0.0, *ends) - error), upper=N * math.exp(max(0.0, *ends) + error)
-    )
-    reason = ""
-    if beside_rounding < _BEYOND_BIC:
-        reason = (
-            "the spectrum rises towards Nyquist, by quantization noise as well as by a low-pass "
-            f"with a cut-off from {lower:.4g} to {upper:.4g} Hz"
-        )
-    elif upper > WIDEST * lower or highest:
-        reason = f"the log allows cut-offs from {lower:.4g} to {upper:.4g} Hz"
-    elif not fits.explains(best):
-        reason = NOT_AS_BEHIND.format(len(filters))
-    if reason:
-        frequency = Parameter(None, "not_identified", reason, lower, upper, fitted=shown)
-        density = replace(
-            density, value=None, status="not_identified", reason=reason, fitted=density.value
-        )
-    else:
-        frequency = Parameter(shown, lower=lower, upper=upper)
-    whole = FilterFits(spectrum)
-    whole.rounded = fits.rounded
-    white, *slow = whole.gains(best)
-    return Cutoff(
-        frequency,
-        best.order,
-        density,
-        math.hypot(after, math.sqrt(rounding)),
-        gained,
-        beside_rounding < _BEYOND_BIC,
-        best.kind,
-        behind=Behind(white + (after / N) ** 2, *slow),
-        ruled=settled.ruled,
-        readings=readings,
-        allowed=[
-            Allowed(trial, max(0.5 * math.log(high / low), _LEAST_WIDTH))
-            for trial, (low, high) in zip(alike, limits, strict=True)
-        ],
-        rounded=fits.rounded,
+    return _with_filter(
+        spectrum, settled, rounding, len(filters), (N_alone, gained, beside_rounding)
     )
 
 
@@ -331,6 +271,84 @@ def _settled(
         if not tried:
             break
     return _Settled(fits, tried, used, ruled)
+
+
+def _with_filter(
+    spectrum: Spectrum,
+    settled: _Settled,
+    rounding: float,
+    number: int,
+    against: tuple[float, float, float],
+) -> Cutoff:
+    """Describe the best of ``number`` filters and the others that the log allows.
+
+    ``against``: N of the noise alone, and what BIC gains over it, and over that with rounding.
+    """
+    fits, tried, used = settled.fits, settled.tried, settled.used
+    N_alone, gained, beside_rounding = against
+    best = tried[0]
+    # A floor is taken to be there where it shows only: with it a high cut-off is never told.
+    alike = [
+        trial
+        for trial in tried
+        if trial.floor <= best.floor
+        and trial.cost + trial.floor < best.cost + best.floor + RULED_OUT
+    ]
+    limits = [fits.limits(trial) for trial in alike]
+    lower, upper = min(low for low, _ in limits), max(high for _, high in limits)
+    N, after = fits.density(best)
+    highest = upper >= 0.999 * fits.highest(best.kind, best.order)
+    shown, lower, upper = (
+        replace(best, cutoff=cutoff).low_pass.half_power(spectrum.rate)
+        for cutoff in (best.cutoff, lower, upper)
+    )
+    readings = _readings(fits, alike, limits)
+    if gained < _BEYOND_DOUBT and N_alone > 0.0:
+        # Of so many filters one may be there by chance.
+        alone = math.log(N_alone / N)
+        readings.append(Reading(_WITHOUT, alone, alone, alone))
+    error = SIGMAS / math.sqrt(2.0 * float(spectrum.ordinates[used].sum()))
+    ends = [end for reading in readings for end in (reading.below, reading.above)]
+    density = Parameter(
+        N, lower=N * math.exp(min(0.0, *ends) - error), upper=N * math.exp(max(0.0, *ends) + error)
+    )
+    reason = ""
+    if beside_rounding < _BEYOND_BIC:
+        reason = (
+            "the spectrum rises towards Nyquist, by quantization noise as well as by a low-pass "
+            f"with a cut-off from {lower:.4g} to {upper:.4g} Hz"
+        )
+    elif upper > WIDEST * lower or highest:
+        reason = f"the log allows cut-offs from {lower:.4g} to {upper:.4g} Hz"
+    elif not fits.explains(best):
+        reason = NOT_AS_BEHIND.format(number)
+    if reason:
+        frequency = Parameter(None, "not_identified", reason, lower, upper, fitted=shown)
+        density = replace(
+            density, value=None, status="not_identified", reason=reason, fitted=density.value
+        )
+    else:
+        frequency = Parameter(shown, lower=lower, upper=upper)
+    whole = FilterFits(spectrum)
+    whole.rounded = fits.rounded
+    white, *slow = whole.gains(best)
+    return Cutoff(
+        frequency,
+        best.order,
+        density,
+        math.hypot(after, math.sqrt(rounding)),
+        gained,
+        beside_rounding < _BEYOND_BIC,
+        best.kind,
+        behind=Behind(white + (after / N) ** 2, *slow),
+        ruled=settled.ruled,
+        readings=readings,
+        allowed=[
+            Allowed(trial, max(0.5 * math.log(high / low), _LEAST_WIDTH))
+            for trial, (low, high) in zip(alike, limits, strict=True)
+        ],
+        rounded=fits.rounded,
+    )
 
 
 def _without_filter(N_alone: float, gained: float, doubt: tuple[str, float] | None) -> Cutoff:

@@ -13,7 +13,6 @@ from imubench_pipeline.estimators.estimate import CURVE, Estimate, Parameter, St
 from imubench_pipeline.estimators.frame import Frame
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.spectrum import Spectrum
-from imubench_pipeline.typing import Array
 
 _WORSE = 6.0
 """BIC by which the papers' model must be the worse for the data to be against it."""
@@ -65,7 +64,6 @@ def doubted(
     frame: Frame,
     candidates: Sequence[Candidate],
     papers_candidate: Candidate,
-    fitted: Array,
     drift: str | None = None,
 ) -> tuple[Estimate, Estimate]:
     """Return the two estimates of a likelihood with their doubts.
@@ -81,13 +79,11 @@ def doubted(
         The best first.
     papers_candidate : Candidate
         The papers' model among them.
-    fitted : ndarray, shape (b,)
-        Density of the chosen model in every bin.
     drift : str, optional
         Why the random walk may be a smooth drift.
     """
     chosen = candidates[0]
-    doubt = _of_white_noise(spectrum, frame, chosen, fitted)
+    doubt = _of_white_noise(spectrum, frame, chosen)
     if doubt is not None:
         estimate, papers = (_with_unknown_white_noise(each, *doubt) for each in (estimate, papers))
     if frame.cut:
@@ -263,7 +259,7 @@ def doubting(
 
 
 def _of_white_noise(
-    spectrum: Spectrum, frame: Frame, chosen: Candidate, fitted: Array
+    spectrum: Spectrum, frame: Frame, chosen: Candidate
 ) -> tuple[str, float, float] | None:
     """Return why N is not told, and between which values it lies; None where it is."""
     maximum = chosen.maximum
@@ -375,12 +371,6 @@ def _with_unknown_white_noise(
     old = estimate.parameters["N"]
     ends = [end for end in (old.lower, old.upper, lower, upper) if end is not None]
     N = Parameter(
-        None,
-        "not_identified",
-        reason,
-        min(ends),
-        max(ends),
-        old.duration_needed,
-        old.in_model,
+        None, "not_identified", reason, min(ends), max(ends), old.duration_needed, old.in_model
     )
     return replace(estimate, parameters={**estimate.parameters, "N": N})

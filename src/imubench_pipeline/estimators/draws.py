@@ -14,12 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from imubench_pipeline.estimators.estimate import FAMILY, JointDraws
-from imubench_pipeline.estimators.model_choice import (
-    LIKE_A_WALK,
-    UNIT_ROOT,
-    UNLIKELY,
-    Candidate,
-)
+from imubench_pipeline.estimators.model_choice import LIKE_A_WALK, UNIT_ROOT, UNLIKELY, Candidate
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.whittle import Terms
 from imubench_pipeline.typing import Array

@@ -29,6 +29,7 @@ from imubench_pipeline.estimators.whittle import (
     model_of,
     whittle_of,
 )
+from imubench_pipeline.typing import Array
 
 Mask = NDArray[np.bool_]
 
@@ -98,7 +99,7 @@ class Frame:
             behind=behind.select(bins) if behind is not None else None,
         )
 
-    def has_a_bend_of_each_model(self, spectrum: Spectrum, times: NDArray[np.float64]) -> bool:
+    def has_a_bend_of_each_model(self, spectrum: Spectrum, times: Array) -> bool:
         """Return whether each model of the noise has a cut-off of its own.
 
         So it is where the low-pass bends the spectrum well below Nyquist; higher up, what folds
@@ -191,7 +192,7 @@ class Frame:
         return Frame(self.lines, self.clear, used, band, _none(self.low_pass), cut=cut)
 
 
-def _scaled(posterior: Posterior, terms: Terms, factors: NDArray[np.float64]) -> Posterior:
+def _scaled(posterior: Posterior, terms: Terms, factors: Array) -> Posterior:
     if "N" not in terms.linear:
         return posterior
     parameters = posterior.parameters.copy()

@@ -110,13 +110,7 @@ def bounds_of(model: NoiseModel, rate: float, duration: float, highest: float) -
     """
     maximum = _as_maximum(model)
     spectrum = ideal_spectrum(rate, duration, highest)
-    return dict(
-        zip(
-            parameter_names(maximum.terms),
-            _errors(spectrum, maximum),
-            strict=True,
-        )
-    )
+    return dict(zip(parameter_names(maximum.terms), _errors(spectrum, maximum), strict=True))
 
 
 def parameter_names(terms: Terms) -> list[str]:

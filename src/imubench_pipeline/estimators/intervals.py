@@ -227,10 +227,7 @@ def _parameter(
 
 
 def _interval(
-    name: str,
-    chosen: Candidate,
-    alike: Sequence[Candidate],
-    draws: dict[Terms, Posterior],
+    name: str, chosen: Candidate, alike: Sequence[Candidate], draws: dict[Terms, Posterior]
 ) -> tuple[float, float]:
     """Return the 95 % interval of a parameter, over the models that have it, by their AIC.
 
@@ -246,10 +243,7 @@ def _interval(
 
 
 def _over_models(
-    name: str,
-    chosen: Candidate,
-    alike: Sequence[Candidate],
-    draws: dict[Terms, Posterior],
+    name: str, chosen: Candidate, alike: Sequence[Candidate], draws: dict[Terms, Posterior]
 ) -> list[tuple[Array, float]]:
     """Return the draws of a parameter in each model that has it, with the weight of the model."""
     terms = chosen.maximum.terms

@@ -34,14 +34,7 @@ from imubench_pipeline.estimators.filter_readings import (
 )
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.spectrum import Spectrum
-from imubench_pipeline.estimators.whittle import (
-    COARSE,
-    Behind,
-    Maximum,
-    Terms,
-    Whittle,
-    whittle_of,
-)
+from imubench_pipeline.estimators.whittle import COARSE, Behind, Maximum, Terms, Whittle, whittle_of
 
 _REFINED_WITHIN = math.log(2.0)
 """Distance in log f_c that a joint fit with the noise may move the cut-off."""
@@ -86,10 +79,7 @@ def joined(candidates: Sequence[Candidate], always: Terms) -> list[Candidate]:
 
 
 def refined(
-    low_pass: Cutoff,
-    spectrum: Spectrum,
-    clear: NDArray[np.bool_],
-    candidates: Sequence[Candidate],
+    low_pass: Cutoff, spectrum: Spectrum, clear: NDArray[np.bool_], candidates: Sequence[Candidate]
 ) -> Cutoff:
     """Return a low-pass whose cut-off is fitted together with all parameters of a model.
 

@@ -47,10 +47,7 @@ class UnfitCurveError(ValueError):
 
 
 def fit(
-    curve: AllanCurve,
-    *,
-    method: Literal["weighted", "paper"] = "weighted",
-    longest: float = 1 / 9,
+    curve: AllanCurve, *, method: Literal["weighted", "paper"] = "weighted", longest: float = 1 / 9
 ) -> Estimate:
     """Fit N, B, T_B and K to an Allan variance.
 

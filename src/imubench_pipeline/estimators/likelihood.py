@@ -227,28 +227,7 @@ def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) 
     rng : numpy.random.Generator
     """
     if frame.used.sum() < FEWEST_BINS:
-        reason = (
-            f"{frame.used.sum()} bins of the spectrum are left up to {frame.band.highest:.4g} Hz, "
-            f"{FEWEST_BINS} are needed: too short a log"
-        )
-        if not frame.clear.all():
-            reason += f", or lines that hide too much of it ({(~frame.clear).sum()} bins)"
-        nothing = {name: Parameter(None, "not_shown", reason) for name in FAMILY}
-        of_curve = {name: nothing["B"] for name in CURVE}
-        return Likelihood(
-            (
-                Estimate("likelihood", nothing, curve=of_curve),
-                Estimate("likelihood_gm", papers_only(nothing), curve=of_curve),
-            ),
-            (),
-            frame.lines,
-            None,
-            spectrum,
-            frame.clear,
-            frame.used,
-            np.full(len(frame.used), np.nan),
-            frame,
-        )
+        return _too_short(spectrum, frame)
     frame, whittle, candidates = explaining(spectrum, frame)
     sinusoids = carried(frame.lines)
     chosen = candidates[0]
@@ -277,7 +256,7 @@ def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) 
     fitted = frame.whole(spectrum).density(chosen.maximum) + chosen.maximum.ramp**2 * spectrum.ramp
     drift = instead_of_walk(whittle, chosen.maximum)
     estimate, gauss_markov = doubted(
-        estimate, gauss_markov, spectrum, frame, candidates, papers, fitted, drift
+        estimate, gauss_markov, spectrum, frame, candidates, papers, drift
     )
     estimate, gauss_markov = (_with_folds(each, frame) for each in (estimate, gauss_markov))
     return Likelihood(
@@ -313,6 +292,32 @@ def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) 
         frame.clear,
         frame.used,
         fitted,
+        frame,
+    )
+
+
+def _too_short(spectrum: Spectrum, frame: Frame) -> Likelihood:
+    """Return what is left to say of a log with too few bins to fit."""
+    reason = (
+        f"{frame.used.sum()} bins of the spectrum are left up to {frame.band.highest:.4g} Hz, "
+        f"{FEWEST_BINS} are needed: too short a log"
+    )
+    if not frame.clear.all():
+        reason += f", or lines that hide too much of it ({(~frame.clear).sum()} bins)"
+    nothing = {name: Parameter(None, "not_shown", reason) for name in FAMILY}
+    of_curve = {name: nothing["B"] for name in CURVE}
+    return Likelihood(
+        (
+            Estimate("likelihood", nothing, curve=of_curve),
+            Estimate("likelihood_gm", papers_only(nothing), curve=of_curve),
+        ),
+        (),
+        frame.lines,
+        None,
+        spectrum,
+        frame.clear,
+        frame.used,
+        np.full(len(frame.used), np.nan),
         frame,
     )
 

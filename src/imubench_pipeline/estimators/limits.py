@@ -174,9 +174,7 @@ def _derivatives(
     return expected, derivatives
 
 
-def _relative_covariance(
-    curve: AllanCurve, used: NDArray[np.bool_], model: NoiseModel
-) -> NDArray[np.float64]:
+def _relative_covariance(curve: AllanCurve, used: NDArray[np.bool_], model: NoiseModel) -> Array:
     """Return the covariance of the Allan variances over the model's, shape (m, m)."""
     sizes, rate = curve.cluster_size[used], _rate(curve)
     expected = model.allan_variance(curve.tau[used], rate)

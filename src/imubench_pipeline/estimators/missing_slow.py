@@ -12,13 +12,11 @@ chi-squared with nu degrees of freedom: a sum far below that is none of chance.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtr
 
 from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.tables.findings import Finding
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _HIGHEST = 0.05
 """Part of the rate up to which it is looked for."""

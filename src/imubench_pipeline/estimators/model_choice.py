@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.goodness import Goodness, goodness
 from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
+from imubench_pipeline.typing import Array
 
 PAPERS = Terms("NK", 1)
 """N, B, T_B and K: the model of the papers."""
@@ -169,7 +169,7 @@ def rescored(candidates: Sequence[Candidate], gained: Mapping[Terms, float]) -> 
     ]
 
 
-def _relative(scores: NDArray[np.float64]) -> NDArray[np.float64]:
+def _relative(scores: Array) -> Array:
     weights = np.exp(-0.5 * (scores - scores.min()))
     return np.asarray(weights / weights.sum())
 

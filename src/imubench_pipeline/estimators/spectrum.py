@@ -274,9 +274,7 @@ def _transform(values: Array, interval: float) -> tuple[Array, Array, Array, Arr
     half = np.pi * k / (2.0 * n)
     # sum of (i + 1/2) cos(2 half (i + 1/2)) in closed form: only odd ordinates have a ramp.
     ramp = np.where(
-        k % 2 == 1,
-        -math.sqrt(2.0 / n) * interval * np.cos(half) / (2.0 * np.sin(half) ** 2),
-        0.0,
+        k % 2 == 1, -math.sqrt(2.0 / n) * interval * np.cos(half) / (2.0 * np.sin(half) ** 2), 0.0
     )
     return (
         k / (2.0 * n * interval),

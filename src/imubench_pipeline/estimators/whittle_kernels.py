@@ -225,12 +225,7 @@ def _best_powers(
 
 @njit(cache=True)
 def _cost_at(
-    places: Array,
-    fixed: Array,
-    bins: Bins,
-    with_ramp: bool,
-    table: ShapeTable,
-    tolerance: float,
+    places: Array, fixed: Array, bins: Bins, with_ramp: bool, table: ShapeTable, tolerance: float
 ) -> float:
     """Return the cost at logarithms of correlation times, profiled over everything else."""
     b, p = fixed.shape
@@ -300,12 +295,7 @@ def _scanned(
 
 
 @njit(cache=True)
-def one_process(
-    fixed: Array,
-    bins: Bins,
-    with_ramp: bool,
-    table: ShapeTable,
-) -> Array:
+def one_process(fixed: Array, bins: Bins, with_ramp: bool, table: ShapeTable) -> Array:
     """Scan the correlation time, then polish the best."""
     first, step, logarithms = table
     last = first + step * (logarithms.shape[0] - 1)
@@ -314,26 +304,14 @@ def one_process(
     reach = _SCAN_STEP * step
     place[0] = best
     polished, cost = _polished(
-        place,
-        0,
-        max(first, best - reach),
-        min(last, best + reach),
-        fixed,
-        bins,
-        with_ramp,
-        table,
+        place, 0, max(first, best - reach), min(last, best + reach), fixed, bins, with_ramp, table
     )
     place[0] = polished if cost < lowest else best
     return place
 
 
 @njit(cache=True)
-def two_processes(
-    fixed: Array,
-    bins: Bins,
-    with_ramp: bool,
-    table: ShapeTable,
-) -> Array:
+def two_processes(fixed: Array, bins: Bins, with_ramp: bool, table: ShapeTable) -> Array:
     """Begin with the best pair of a coarse grid and with the best single process; take the better.
 
     A strong process has a sharp correlation time, beside which no pair of a coarse grid shows that
@@ -373,12 +351,7 @@ def two_processes(
 
 @njit(cache=True)
 def _descended(
-    pair: Array,
-    lowest: float,
-    fixed: Array,
-    bins: Bins,
-    with_ramp: bool,
-    table: ShapeTable,
+    pair: Array, lowest: float, fixed: Array, bins: Bins, with_ramp: bool, table: ShapeTable
 ) -> tuple[Array, float]:
     """Polish each of two correlation times in turn."""
     first, step, logarithms = table

@@ -88,11 +88,7 @@ def sigma_range(
 
 
 def drawn_from_covariance(
-    model: NoiseModel,
-    names: Sequence[str],
-    covariance: Array,
-    draws: int,
-    rng: np.random.Generator,
+    model: NoiseModel, names: Sequence[str], covariance: Array, draws: int, rng: np.random.Generator
 ) -> list[NoiseModel]:
     """Return noise models whose parameters are log-normal about those of a model, together.
 

@@ -235,8 +235,7 @@ class FileSeries:
                     yield from file.iter_batches(_ROWS, columns=headings, use_threads=False)
             else:
                 chosen = pacsv.ConvertOptions(
-                    include_columns=headings,
-                    column_types=dict.fromkeys(headings, pa.float64()),
+                    include_columns=headings, column_types=dict.fromkeys(headings, pa.float64())
                 )
                 with pacsv.open_csv(self.path, convert_options=chosen) as reader:
                     yield from reader

@@ -310,11 +310,7 @@ def _limits(ordinates: Ordinates, fit: Fit, regressor: Regressor) -> tuple[float
 
 
 def _spread(
-    ordinates: Ordinates,
-    fit: Fit,
-    regressor: Regressor,
-    here: slice,
-    limits: tuple[float, float],
+    ordinates: Ordinates, fit: Fit, regressor: Regressor, here: slice, limits: tuple[float, float]
 ) -> float:
     """Return half the range of a size over the limits of its place."""
     sizes = []

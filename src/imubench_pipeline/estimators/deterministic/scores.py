@@ -165,6 +165,11 @@ def _gains(columns: Array, w: Array, r: Array, basis: Array) -> Array:
     above = weighted @ r
     whole = np.einsum("ck,ck->c", weighted, columns)
     left = whole - np.sum((weighted @ basis.T) ** 2, axis=1)
+    return _filtered(above, whole, left)
+
+
+def _filtered(above: Array, whole: Array, left: Array) -> Array:
+    """Return the squared output of the filter over what others leave of each regressor's power."""
     return np.asarray(np.where(left > _KNOWN * whole, above**2 / np.maximum(left, 1e-300), 0.0))
 
 
@@ -181,7 +186,7 @@ def _steps_and_pulses(
     left = whole.copy()
     for row in basis:
         left -= _sines(slope * w * row) ** 2
-    gains = np.where(left > _KNOWN * whole, above**2 / np.maximum(left, 1e-300), 0.0)
+    gains = _filtered(above, whole, left)
     gains[: _EDGE - 1] = 0.0
     gains[n - _EDGE :] = 0.0
     place = int(np.argmax(gains))
@@ -200,7 +205,7 @@ def _steps_and_pulses(
     left = whole.copy()
     for row in basis:
         left -= scipy.fft.idct(np.concatenate(([0.0], w * row)), type=2, norm="ortho") ** 2
-    gains = np.where(left > _KNOWN * whole, above**2 / np.maximum(left, 1e-300), 0.0)
+    gains = _filtered(above, whole, left)
     place = int(np.argmax(gains))
     yield Score(
         Regressor("pulse", number, float(place)),

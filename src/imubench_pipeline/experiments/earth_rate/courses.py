@@ -154,21 +154,11 @@ def estimated(
             filtered.rate[0, from_second],
             filtered.rate_sigma[from_second],
         ),
-        Course(
-            "smoother",
-            whole,
-            np.full(2, smoothed.rate[0]),
-            np.full(2, smoothed.rate_sigma),
-        ),
+        Course("smoother", whole, np.full(2, smoothed.rate[0]), np.full(2, smoothed.rate_sigma)),
         _tracked(log, experiment, papers),
     )
     return Courses(
-        courses,
-        measured,
-        longest,
-        first + blocks.middle,
-        smoothed.drift[0],
-        smoothed.drift_sigma,
+        courses, measured, longest, first + blocks.middle, smoothed.drift[0], smoothed.drift_sigma
     )
 
 

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 
 from imubench_pipeline.experiments.earth_rate.covariance import longest
 from imubench_pipeline.experiments.earth_rate.experiment import Blocks
@@ -102,7 +101,7 @@ def block_states(model: NoiseModel, blocks: Blocks, turn_on_bias: float = WIDE) 
         names += _names(term, names)
     spaces.append(StateSpace.scalar(1.0, drive, turn_on_bias**2))
     names.append("z_K")
-    whole = _together(spaces)
+    whole = StateSpace.together(spaces)
     gaps = np.diff(blocks.start, prepend=blocks.start[0])
     gaps[1:] -= (blocks.stop - blocks.start)[:-1]
     kinds, which = np.unique(
@@ -124,17 +123,6 @@ def _names(term: Term, before: list[str]) -> list[str]:
         return list(term.states)
     (name,) = term.states
     return [f"{name}{sum(other.startswith(name) for other in before) + 1}"]
-
-
-def _together(spaces: list[StateSpace]) -> StateSpace:
-    return StateSpace(
-        np.asarray(block_diag(*(space.transition for space in spaces))),
-        np.asarray(block_diag(*(space.process_noise for space in spaces))),
-        np.concatenate([space.output for space in spaces]),
-        0.0,
-        np.concatenate([space.initial_mean for space in spaces]),
-        np.asarray(block_diag(*(space.initial_variance for space in spaces))),
-    )
 
 
 def _step(space: StateSpace, gap: int, size: int) -> Step:
