@@ -98,6 +98,11 @@ class AllanCurve:
         """Allan deviation in the unit of the samples, shape (m,)."""
         return np.sqrt(self.variance)
 
+    @property
+    def rate(self) -> float:
+        """Sampling rate, Hz."""
+        return float(self.cluster_size[0] / self.tau[0])
+
     def up_to(self, part: float) -> Array:
         """Return the tau up to a part of the log, s."""
         return self.tau[self.cluster_size <= part * self.samples]

@@ -60,7 +60,7 @@ def with_fitted_limits(
     if not likelihood.candidates or likelihood.band is None:
         return curve
     chosen = likelihood.candidates[0]
-    rate = float(curve.cluster_size[0] / curve.tau[0])
+    rate = curve.rate
     model = with_lines(model_of(chosen.maximum), likelihood)
 
     def degrees_at(model: NoiseModel, points: NDArray[np.bool_]) -> Degrees:

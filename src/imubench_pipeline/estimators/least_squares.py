@@ -142,7 +142,7 @@ def _predicted(
     curve: AllanCurve, used: NDArray[np.bool_], model: NoiseModel
 ) -> tuple[Array, Array]:
     """Return what a model fitted to some tau says of all, and the relative error of that."""
-    rate = curve.cluster_size[0] / curve.tau[0]
+    rate = curve.rate
     expected = model.allan_variance(curve.tau, rate)
     # White noise is averaged over the samples present, fewer than n where some are missing.
     expected = expected + model.N**2 * (rate / curve.averaged - 1.0 / curve.tau)
@@ -175,7 +175,7 @@ def _sampling_shows(curve: AllanCurve, used: NDArray[np.bool_], model: NoiseMode
     """
     tau = curve.tau[used]
     continuous = model.allan_variance(tau)
-    difference = model.allan_variance(tau, curve.cluster_size[0] / curve.tau[0]) - continuous
+    difference = model.allan_variance(tau, curve.rate) - continuous
     error = 2.0 * np.sqrt(curve.cluster_size[used] / (2.0 * curve.samples)) * continuous
     return bool((np.abs(difference) > _SAMPLING_SIGMAS * error).any())
 

@@ -153,7 +153,7 @@ def _derivatives(
     curve: AllanCurve, used: NDArray[np.bool_], model: NoiseModel
 ) -> tuple[Array, dict[str, Array]]:
     """Return the model's Allan variances, and their relative derivatives by log parameters."""
-    tau, rate = curve.tau[used], _rate(curve)
+    tau, rate = curve.tau[used], curve.rate
     parts: dict[str, Array] = {}
     if model.N > 0:
         # White noise is averaged over the samples present, fewer than n where some are missing.
@@ -176,7 +176,7 @@ def _derivatives(
 
 def _relative_covariance(curve: AllanCurve, used: NDArray[np.bool_], model: NoiseModel) -> Array:
     """Return the covariance of the Allan variances over the model's, shape (m, m)."""
-    sizes, rate = curve.cluster_size[used], _rate(curve)
+    sizes, rate = curve.cluster_size[used], curve.rate
     expected = model.allan_variance(curve.tau[used], rate)
     covariance = variance_covariance(model, rate, curve.samples, sizes)
     # Holes and segments leave fewer differences, which the degrees of freedom know.
@@ -186,10 +186,6 @@ def _relative_covariance(curve: AllanCurve, used: NDArray[np.bool_], model: Nois
     ]
     scale = np.sqrt(np.maximum(np.array(whole) / curve.edf[used], 1.0)) / expected
     return np.asarray(covariance * np.outer(scale, scale))
-
-
-def _rate(curve: AllanCurve) -> float:
-    return float(curve.cluster_size[0] / curve.tau[0])
 
 
 def with_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) -> Estimate:
@@ -262,7 +258,7 @@ def with_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) 
 
 def _lowest_point(model: NoiseModel, errors: Errors, curve: AllanCurve) -> dict[str, Parameter]:
     """Return the lowest point of the fitted curve, with limits from the errors of the fit."""
-    tau = averaging_times(_rate(curve), curve.samples / _rate(curve))
+    tau = averaging_times(curve.rate, curve.samples / curve.rate)
     best = models_of(model)
     at = [getattr(model, name) for name in errors.names]
     lowest = lowest_parameters([best], [], tau)

@@ -78,9 +78,8 @@ class BlockSeries:
     def centres(self) -> list[Array]:
         """Middle of each block of those parts, samples."""
         return [
-            np.asarray(start + (np.arange(len(sums)) + 0.5) * self.block - 0.5, dtype=np.float64)
-            for sums, (start, _) in zip(self._sums, self.segments, strict=True)
-            if len(sums) >= 2
+            np.asarray(first + (np.arange(count) + 0.5) * block - 0.5, dtype=np.float64)
+            for first, block, count in self.places
         ]
 
 
