@@ -83,7 +83,7 @@ def of_log(case: Case, others: int, number: int) -> tuple[Found, str, float]:
         for peer in PEERS:
             printed = peer.estimate(log, case.rate)
             found[peer.name] = {name: Parameter(printed[name]) for name in PARAMETERS}
-    return found, result.candidates[0].maximum.terms.name, highest(result, case.rate)
+    return found, result.candidates[0].terms.name, highest(result, case.rate)
 
 
 def table(case: Case, found: list[tuple[Found, str, float]]) -> Iterator[str]:

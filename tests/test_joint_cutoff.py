@@ -57,7 +57,7 @@ def test_each_model_of_the_noise_has_a_cutoff_of_its_own():
     found = behind_a_filter(0)
     models = found.low_pass.models
     assert PAPERS in models and len(models) > 1
-    chosen = found.candidates[0].maximum.terms
+    chosen = found.candidates[0].terms
     for terms, of_model in models.items():
         assert of_model.gained >= -1e-3
         best = max(of_model.readings, key=lambda one: one.weight)

@@ -126,7 +126,7 @@ def draws_of(*candidates: Candidate, spread: float = 0.05) -> dict[Terms, Poster
     found = {}
     for one in candidates:
         factor = np.exp(spread * rng.standard_normal((4000, 1)))
-        found[one.maximum.terms] = Posterior(
+        found[one.terms] = Posterior(
             np.sqrt(one.maximum.powers) * factor,
             np.tile(one.maximum.times, (4000, 1)),
             np.zeros(4000),

@@ -51,11 +51,11 @@ def flicker(B: float, samples: int, rng: np.random.Generator) -> np.ndarray:
 
 def chosen(make: Callable[[], np.ndarray], logs: int) -> Counter[str]:
     """How often each model is the best."""
-    return Counter(candidates_of(make())[0].maximum.terms.name for _ in range(logs))
+    return Counter(candidates_of(make())[0].terms.name for _ in range(logs))
 
 
 def by_name(candidates: list[Candidate]) -> dict[str, Candidate]:
-    return {candidate.maximum.terms.name: candidate for candidate in candidates}
+    return {candidate.terms.name: candidate for candidate in candidates}
 
 
 def transform(samples: int) -> np.ndarray:
@@ -263,7 +263,7 @@ def test_all_three_of_the_papers_are_told_where_they_are_strong(rng) -> None:
     times, levels, names = [], [], Counter[str]()
     for _ in range(10):
         candidates = candidates_of(simulate(model, RATE, 100_000, rng))
-        names[candidates[0].maximum.terms.name] += 1
+        names[candidates[0].terms.name] += 1
         found = by_name(candidates)[PAPERS.name].maximum
         times.append(float(found.times[0]))
         levels.append(float(found.biases[0]))
@@ -279,7 +279,7 @@ def test_flicker_noise_is_flicker_noise_and_no_process(rng) -> None:
     for _ in range(10):
         log = N * np.sqrt(RATE) * rng.standard_normal(samples) + flicker(B, samples, rng)
         candidates = candidates_of(log)
-        names[candidates[0].maximum.terms.name] += 1
+        names[candidates[0].terms.name] += 1
         candidate = by_name(candidates)
         levels.append(candidate["N+F"].maximum.parameter("F"))
         lead.append(candidate["N+GM"].bic - candidate["N+F"].bic)
@@ -320,10 +320,10 @@ def test_a_ramp_is_tried_beside_a_random_walk_only(rng) -> None:
         NoiseModel(N=N, B=3e-3),
     ):
         candidates = candidates_of(simulate(model, RATE, 50_000, rng))
-        ramps = [c.maximum.terms for c in candidates if c.maximum.terms.ramp]
+        ramps = [c.terms for c in candidates if c.terms.ramp]
         assert len(ramps) == 1
         assert "K" in ramps[0].linear
-        assert all(c.maximum.ramp == 0 for c in candidates if not c.maximum.terms.ramp)
+        assert all(c.maximum.ramp == 0 for c in candidates if not c.terms.ramp)
 
 
 def test_a_ramp_far_beyond_the_random_walk_is_found(rng) -> None:
@@ -353,13 +353,13 @@ def test_quantization_is_tried_where_it_is_asked_for_only(rng) -> None:
     assert best.terms.name == "Q+N"
     assert best.parameter("Q") == pytest.approx(1e-4, rel=0.02)
     assert best.parameter("N") == pytest.approx(N, rel=0.02)
-    assert not any("Q" in c.maximum.terms.linear for c in candidates_of(log, quantization=False))
+    assert not any("Q" in c.terms.linear for c in candidates_of(log, quantization=False))
 
 
 @pytest.mark.parametrize(("part", "tried"), [(0.09, False), (0.11, True), (0.5, True)])
 def test_quantization_is_tried_where_the_band_shows_it(rng, part: float, tried: bool) -> None:
     log = simulate(NoiseModel(Q=2e-5, N=N), RATE, 20_000, rng)
-    names = [c.maximum.terms.name for c in fit(log, RATE, band=part * RATE).candidates]
+    names = [c.terms.name for c in fit(log, RATE, band=part * RATE).candidates]
     assert any(name.startswith("Q+") for name in names) == tried
 
 
@@ -367,11 +367,11 @@ def test_quantization_is_tried_where_the_band_shows_it(rng, part: float, tried: 
 def test_models_of_more_parameters_than_a_quarter_of_the_bins_are_left_out(rng, bins: int) -> None:
     log = simulate(NoiseModel(N=N, K=1e-2), RATE, bins + 1, rng)
     candidates = candidates_of(log)
-    assert len(candidates[0].maximum.terms.name) > 0
+    assert len(candidates[0].terms.name) > 0
     for terms in CANDIDATES:
-        there = any(c.maximum.terms == terms for c in candidates)
+        there = any(c.terms == terms for c in candidates)
         assert there == (terms.parameters < bins // 4)
-    assert max(c.maximum.terms.parameters for c in candidates) < bins // 4
+    assert max(c.terms.parameters for c in candidates) < bins // 4
     assert sum(c.weight for c in candidates) == pytest.approx(1.0)
 
 
@@ -410,7 +410,7 @@ def test_what_models_gain_counts_for_their_scores_and_their_order(rng: np.random
     candidates = candidates_of(simulate(NoiseModel(N=N), RATE, 4_000, rng), quantization=False)
     second = candidates[1]
     gain = 0.5 * (second.bic - candidates[0].bic) + 1.0
-    found = rescored(candidates, {second.maximum.terms: gain})
+    found = rescored(candidates, {second.terms: gain})
     assert found[0].maximum is second.maximum
     assert found[0].bic == pytest.approx(candidates[0].bic - 2.0)
     assert found[0].aic == pytest.approx(second.aic - 2.0 * gain)
@@ -422,8 +422,8 @@ def test_what_models_gain_counts_for_their_scores_and_their_order(rng: np.random
 
 def test_a_model_with_a_ramp_gains_what_it_gains_without(rng: np.random.Generator) -> None:
     candidates = candidates_of(simulate(NoiseModel(N=N), RATE, 4_000, rng), quantization=False)
-    ramped = next(one for one in candidates if one.maximum.terms.ramp)
-    plain = replace(ramped.maximum.terms, ramp=False)
+    ramped = next(one for one in candidates if one.terms.ramp)
+    plain = replace(ramped.terms, ramp=False)
     found = rescored(candidates, {plain: 3.0})
     again = next(one for one in found if one.maximum is ramped.maximum)
     assert again.bic == pytest.approx(ramped.bic - 6.0)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.estimate import CURVE, Estimate, Parameter
 from imubench_pipeline.estimators.identifiability import NOT_IDENTIFIED
-from imubench_pipeline.estimators.intervals import as_good, mixture_quantile
+from imubench_pipeline.estimators.intervals import as_good, mixture_limits
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.whittle import Terms
@@ -350,11 +350,8 @@ def _time_of_lowest(
 
 def _limits(parts: Sequence[tuple[Array, float]], value: float) -> tuple[float, float]:
     """Return the 95 % limits of draws of several models; those of the first lie inside."""
-    own = [(parts[0][0], 1.0)]
-    return (
-        min(mixture_quantile(parts, 0.025), mixture_quantile(own, 0.025), value),
-        max(mixture_quantile(parts, 0.975), mixture_quantile(own, 0.975), value),
-    )
+    lower, upper = mixture_limits(parts, [(parts[0][0], 1.0)])
+    return min(lower, value), max(upper, value)
 
 
 def _mean(values: Sequence[float], weights: Sequence[float]) -> float:
@@ -376,11 +373,8 @@ def _best(candidate: Candidate) -> Models:
 
 
 def _drawn(candidate: Candidate, draws: Mapping[Terms, Posterior]) -> Models:
-    posterior = draws[candidate.maximum.terms]
+    posterior = draws[candidate.terms]
     every = max(1, len(posterior.parameters) // _DRAWS)
     return Models(
-        candidate.maximum.terms,
-        posterior.parameters[::every],
-        posterior.times[::every],
-        candidate.weight,
+        candidate.terms, posterior.parameters[::every], posterior.times[::every], candidate.weight
     )

@@ -98,11 +98,8 @@ def with_fitted_limits(
 
 def _with_more_walk(model: NoiseModel, likelihood: Likelihood) -> NoiseModel | None:
     """Return a model with a random walk half way to its upper 95 % limit; None: no limit."""
-    upper = (
-        likelihood.estimates[0].parameters["K"].upper
-        if likelihood.estimates[0].parameters
-        else None
-    )
+    parameters = likelihood.estimates[0].parameters
+    upper = parameters["K"].upper if parameters else None
     if upper is None or upper <= model.K:
         return None
     return replace(model, K=(model.K + upper) / 2.0)

@@ -108,8 +108,8 @@ def doubted(
     against = papers_candidate.bic - chosen.bic
     if against > _WORSE:
         reason = (
-            f"the data favour {chosen.maximum.terms.name} over "
-            f"{papers_candidate.maximum.terms.name} by {against:.1f} in BIC"
+            f"the data favour {chosen.terms.name} over "
+            f"{papers_candidate.terms.name} by {against:.1f} in BIC"
         )
         papers = doubting(papers, ("B", "T_B", "K"), reason)
     return estimate, papers
@@ -120,29 +120,29 @@ def _without_a_walk(chosen: Candidate, candidates: Sequence[Candidate]) -> str |
 
     A slow process passes for a walk: BIC with what is asked of such a process takes the walk.
     """
-    if "K" not in chosen.maximum.terms.linear:
+    if "K" not in chosen.terms.linear:
         return None
     without = [
         candidate
         for candidate in candidates
-        if "K" not in candidate.maximum.terms.linear and not candidate.maximum.terms.ramp
+        if "K" not in candidate.terms.linear and not candidate.terms.ramp
     ]
     best = min(without, key=lambda candidate: candidate.aic, default=chosen)
     if best.aic > chosen.aic - _CLEARLY:
         return None
     return (
-        f"{best.maximum.terms.name}, which has no random walk, is better by "
+        f"{best.terms.name}, which has no random walk, is better by "
         f"{chosen.aic - best.aic:.1f} in AIC: a process as slow as the log passes for a random walk"
     )
 
 
 def _beside_a_ramp(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
     """Say so where AIC prefers a ramp beside the random walk, which leaves little of the walk."""
-    terms = chosen.maximum.terms
+    terms = chosen.terms
     if "K" not in terms.linear or terms.ramp:
         return None
     beside = replace(terms, ramp=True)
-    best = next((candidate for candidate in candidates if candidate.maximum.terms == beside), None)
+    best = next((candidate for candidate in candidates if candidate.terms == beside), None)
     if best is None or best.aic > chosen.aic - _CLEARLY:
         return None
     K, least = chosen.maximum.parameter("K"), best.maximum.parameter("K")
@@ -156,14 +156,14 @@ def _beside_a_ramp(chosen: Candidate, candidates: Sequence[Candidate]) -> str | 
 
 def _with_fewer_terms(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
     """Say so where two terms of bias instability are hardly better than one, or one than none."""
-    terms, biases = chosen.maximum.terms, _biases(chosen)
+    terms, biases = chosen.terms, _biases(chosen)
     if biases == 0:
         return None
     fewer = [candidate for candidate in candidates if _biases(candidate) < min(biases, 2)]
     best = min(fewer, key=lambda candidate: candidate.bic, default=None)
     if best is None or best.bic > chosen.bic + (_HARDLY if biases > 1 else _AS_GOOD):
         return None
-    worse = f"{best.maximum.terms.name} is hardly worse than {terms.name}, by "
+    worse = f"{best.terms.name} is hardly worse than {terms.name}, by "
     worse += f"{best.bic - chosen.bic:.1f} in BIC, and has "
     return worse + ("another B; B_curve is that of both" if biases > 1 else "no B")
 
@@ -174,7 +174,7 @@ def _with_other_terms(chosen: Candidate, candidates: Sequence[Candidate]) -> str
     BIC asks more of processes that are as slow as a walk, and may so join one to another process.
     """
     best = min(candidates, key=lambda candidate: candidate.aic)
-    terms = chosen.maximum.terms
+    terms = chosen.terms
     if terms.gauss_markov == 0 or "K" in terms.linear:
         return None
     if _kinds_of_bias(best) == _kinds_of_bias(chosen):
@@ -182,17 +182,15 @@ def _with_other_terms(chosen: Candidate, candidates: Sequence[Candidate]) -> str
     better = chosen.aic - best.aic
     if better < _OTHERWISE:
         return None
-    name = best.maximum.terms.name
+    name = best.terms.name
     return f"{name}, with other terms of bias instability, is better by {better:.1f} in AIC"
 
 
 def _hardly_needed(name: str, chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
     """Say so where a model without its quantization noise (Q) or ramp (R) is hardly worse."""
-    terms = chosen.maximum.terms
+    terms = chosen.terms
     without = replace(terms, linear=terms.linear.replace(name, ""), ramp=terms.ramp and name != "R")
-    other = next(
-        (candidate for candidate in candidates if candidate.maximum.terms == without), None
-    )
+    other = next((candidate for candidate in candidates if candidate.terms == without), None)
     if without == terms or other is None or other.bic > chosen.bic + _NEEDLESS:
         return None
     worse = f"{other.bic - chosen.bic:.1f} in BIC"
@@ -200,11 +198,11 @@ def _hardly_needed(name: str, chosen: Candidate, candidates: Sequence[Candidate]
 
 
 def _kinds_of_bias(candidate: Candidate) -> tuple[bool, int]:
-    return "F" in candidate.maximum.terms.linear, candidate.maximum.terms.gauss_markov
+    return "F" in candidate.terms.linear, candidate.terms.gauss_markov
 
 
 def _biases(candidate: Candidate) -> int:
-    return ("F" in candidate.maximum.terms.linear) + candidate.maximum.terms.gauss_markov
+    return ("F" in candidate.terms.linear) + candidate.terms.gauss_markov
 
 
 def _with_one_bias(estimate: Estimate) -> Estimate:
@@ -241,10 +239,12 @@ def doubting(
         With B go the figures of the curve.
     """
 
-    def doubted_in(group: Mapping[str, Parameter], these: Container[str]) -> dict[str, Parameter]:
+    def doubted_in(
+        group: Mapping[str, Parameter], doubted_names: Container[str]
+    ) -> dict[str, Parameter]:
         return {
             name: replace(parameter, status="doubtful", reason=reason)
-            if name in these and parameter.status == "ok"
+            if name in doubted_names and parameter.status == "ok"
             else parameter
             for name, parameter in group.items()
         }
@@ -368,9 +368,15 @@ def _with_unknown_white_noise(
     estimate: Estimate, reason: str, lower: float, upper: float
 ) -> Estimate:
     """Return an estimate whose N is only known to lie between two values."""
-    old = estimate.parameters["N"]
-    ends = [end for end in (old.lower, old.upper, lower, upper) if end is not None]
+    known_N = estimate.parameters["N"]
+    ends = [end for end in (known_N.lower, known_N.upper, lower, upper) if end is not None]
     N = Parameter(
-        None, "not_identified", reason, min(ends), max(ends), old.duration_needed, old.in_model
+        None,
+        "not_identified",
+        reason,
+        min(ends),
+        max(ends),
+        known_N.duration_needed,
+        known_N.in_model,
     )
     return replace(estimate, parameters={**estimate.parameters, "N": N})

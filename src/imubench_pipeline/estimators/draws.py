@@ -38,7 +38,7 @@ def drawn_share(candidate: Candidate, bins: int) -> float:
     bins : int
         Bins of the spectrum that it was fitted to.
     """
-    terms = candidate.maximum.terms
+    terms = candidate.terms
     of_times = terms.gauss_markov * (0.5 * math.log(bins) - 1.0)
     of_unlikely = 0.5 * UNLIKELY * (terms.ramp + ("Q" in terms.linear))
     return candidate.share * math.exp(-of_times - of_unlikely)

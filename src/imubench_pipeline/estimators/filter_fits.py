@@ -218,12 +218,8 @@ class FilterFits:
         """
 
         def score(terms: Terms) -> tuple[float, float, float]:
-            maximum = self.whittle.maximum(terms)
-            return (
-                maximum.cost + self.penalty * terms.parameters,
-                maximum.cost,
-                maximum.parameter("N"),
-            )
+            fit = self.whittle.maximum(terms)
+            return fit.cost + self.penalty * terms.parameters, fit.cost, fit.parameter("N")
 
         plain = min(score(Terms(*model)) for model in _ALONE)
         rounded = min(score(Terms("Q" + terms.linear, terms.gauss_markov)) for terms in _WITH_Q)

@@ -259,16 +259,16 @@ def _lines(
     spectrum: Spectrum, line_spectra: Sequence[LineSpectrum], band: float | None
 ) -> tuple[list[Line], Mask]:
     """Return the lines, and the bins clear of them."""
-    everything = np.ones(len(spectrum.frequency), dtype=np.bool_)
+    all_bins = np.ones(len(spectrum.frequency), dtype=np.bool_)
     start = min(band or np.inf, _FOR_LINES * spectrum.rate)
     below = spectrum.upper <= start
     if below.sum() < FEWEST_BINS:
-        below = everything
+        below = all_bins
     maximum = whittle_of(spectrum.select(below), start, COARSE).maximum(Terms("NFK", 1))
     low = spectrum.block > 1
     crossover = float(spectrum.upper[low].max()) if low.any() else 0.0
     lines = find(line_spectra, model_of(maximum), spectrum.rate, crossover)
     if not lines:
-        return lines, everything
+        return lines, all_bins
     density = whittle_of(spectrum, 0.5 * spectrum.rate, COARSE).density(maximum)
     return lines, without_lines(spectrum, lines, density)

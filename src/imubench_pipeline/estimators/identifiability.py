@@ -45,7 +45,7 @@ def relative_errors(whittle: Whittle, maximum: Maximum) -> Array:
 
 def _bounds(sensitivity: Array) -> Array:
     """Return the square roots of the diagonal of the inverse of the information."""
-    result = np.full(len(sensitivity), np.inf)
+    bounds = np.full(len(sensitivity), np.inf)
     size = np.linalg.norm(sensitivity, axis=1)
     sensitive = size > 1e-9
     if sensitive.any():
@@ -53,8 +53,8 @@ def _bounds(sensitivity: Array) -> Array:
         root = np.linalg.qr((sensitivity[sensitive] / size[sensitive, None]).T, mode="r")
         if np.abs(np.diag(root)).min() > 0.0:
             inverse = np.linalg.inv(root)
-            result[sensitive] = np.linalg.norm(inverse, axis=1) / size[sensitive]
-    return result
+            bounds[sensitive] = np.linalg.norm(inverse, axis=1) / size[sensitive]
+    return bounds
 
 
 def ideal_spectrum(rate: float, duration: float, highest: float) -> Spectrum:

@@ -167,11 +167,11 @@ def adapted(
         learnt = points[weighted.clipped(_CLIPPED).drawn(_LEARNT, rng)]
         for _ in range(_FITS):
             mixture = mixture.fitted(learnt)
-        new = mixture.beside(first, _KEPT)
-        added = new.draw(size, rng)
-        proposed = proposed + new.densities(points).sum(axis=1)
-        mixtures.append(new)
-        everywhere = [proposal.densities(added).sum(axis=1) for proposal in mixtures]
+        proposal = mixture.beside(first, _KEPT)
+        added = proposal.draw(size, rng)
+        proposed = proposed + proposal.densities(points).sum(axis=1)
+        mixtures.append(proposal)
+        everywhere = [earlier.densities(added).sum(axis=1) for earlier in mixtures]
         points = np.concatenate([points, added])
         values = np.concatenate([values, log_density(added)])
         proposed = np.concatenate([proposed, np.sum(everywhere, axis=0)])

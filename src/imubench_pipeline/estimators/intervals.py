@@ -64,13 +64,11 @@ def with_upper_limits(
     for name in ("K", "B"):
         if parameters[name].status != "absent":
             continue
-        having = [
-            candidate for candidate in (*wider, *alike) if _has(name, candidate.maximum.terms)
-        ]
+        having = [candidate for candidate in (*wider, *alike) if _has(name, candidate.terms)]
         if not having:
             continue
         limits = [
-            float(np.quantile(_draws_of(name, candidate.maximum.terms, draws), 0.975))
+            float(np.quantile(_draws_of(name, candidate.terms, draws), 0.975))
             for candidate in having
         ]
         good = [
@@ -81,14 +79,12 @@ def with_upper_limits(
         if not good:
             parameters[name] = Parameter(None, "absent", _ABSENT_BELOW, 0.0, max(limits))
             continue
-        names = " and ".join(candidate.maximum.terms.name for candidate in good)
+        names = " and ".join(candidate.terms.name for candidate in good)
         verb = "is" if len(good) == 1 else "are"
         reason = f"{names}, which {'has' if len(good) == 1 else 'have'} it, {verb} about as good"
-        reason += f" as {alike[0].maximum.terms.name}; only its interval is given"
+        reason += f" as {alike[0].terms.name}; only its interval is given"
         parameters[name] = Parameter(None, "not_identified", reason, 0.0, max(limits))
-        timed = [
-            candidate.maximum.terms for candidate in good if _has("T_B", candidate.maximum.terms)
-        ]
+        timed = [candidate.terms for candidate in good if _has("T_B", candidate.terms)]
         times = [_draws_of("T_B", terms, draws) for terms in timed]
         if name == "B" and times:
             ends = [np.quantile(drawn_times, (0.025, 0.975)) for drawn_times in times]
@@ -234,26 +230,19 @@ def _interval(
     That of the chosen model lies inside: of models that the log hardly tells apart, AIC likes a
     process that is as slow as a walk better than the walk.
     """
-    weighted_draws = _over_models(name, chosen, alike, draws)
-    own = [(_draws_of(name, chosen.maximum.terms, draws), 1.0)]
-    return (
-        min(mixture_quantile(weighted_draws, 0.025), mixture_quantile(own, 0.025)),
-        max(mixture_quantile(weighted_draws, 0.975), mixture_quantile(own, 0.975)),
-    )
+    own = [(_draws_of(name, chosen.terms, draws), 1.0)]
+    return mixture_limits(_over_models(name, chosen, alike, draws), own)
 
 
 def _over_models(
     name: str, chosen: Candidate, alike: Sequence[Candidate], draws: dict[Terms, Posterior]
 ) -> list[tuple[Array, float]]:
     """Return the draws of a parameter in each model that has it, with the weight of the model."""
-    terms = chosen.maximum.terms
+    terms = chosen.terms
     return [
-        (
-            _draws_of(name, candidate.maximum.terms, draws),
-            math.exp(0.5 * (chosen.aic - candidate.aic)),
-        )
+        (_draws_of(name, candidate.terms, draws), math.exp(0.5 * (chosen.aic - candidate.aic)))
         for candidate in alike
-        if candidate.maximum.terms == terms or _comparable(name, terms, candidate.maximum.terms)
+        if candidate.terms == terms or _comparable(name, terms, candidate.terms)
     ]
 
 
@@ -275,11 +264,21 @@ def mixture_quantile(parts: Sequence[tuple[Array, float]], level: float) -> floa
     return float(values[order][min(int(place), len(values) - 1)])
 
 
+def mixture_limits(
+    parts: Sequence[tuple[Array, float]], own: Sequence[tuple[Array, float]]
+) -> tuple[float, float]:
+    """Return the 95 % limits of draws of several models; those of one of them lie inside."""
+    return (
+        min(mixture_quantile(parts, 0.025), mixture_quantile(own, 0.025)),
+        max(mixture_quantile(parts, 0.975), mixture_quantile(own, 0.975)),
+    )
+
+
 def _draws_of(name: str, terms: Terms, draws: dict[Terms, Posterior]) -> Array:
     """Return the draws of a parameter of a model."""
     posterior = draws[terms]
-    everything = np.column_stack([posterior.parameters, posterior.times, posterior.ramps])
-    return np.asarray(everything[:, parameter_names(terms).index(name)])
+    columns = np.column_stack([posterior.parameters, posterior.times, posterior.ramps])
+    return np.asarray(columns[:, parameter_names(terms).index(name)])
 
 
 def _has(name: str, terms: Terms) -> bool:

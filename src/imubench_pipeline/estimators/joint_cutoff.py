@@ -74,7 +74,7 @@ def joined(candidates: Sequence[Candidate], always: Terms) -> list[Candidate]:
         for candidate in candidates
         if candidate.bic < best.bic + _WORTH_JOINING
         or candidate.share >= _LEAST_SHARE
-        or candidate.maximum.terms == always
+        or candidate.terms == always
     ]
 
 
@@ -102,7 +102,7 @@ def refined(
     bic: dict[Terms, float] = {}
     aic: dict[Terms, float] = {}
     for candidate in candidates:
-        terms = replace(candidate.maximum.terms, ramp=False)
+        terms = replace(candidate.terms, ramp=False)
         if terms not in tried:
             tried[terms] = joint.fits(terms)
             gained = joint.common(terms) - tried[terms][0].cost

@@ -235,12 +235,10 @@ def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) 
     shown: dict[Terms, Posterior] = {}
     draws: dict[Terms, Posterior] = {}
     # A ramp is no noise: it is believed or not, and does not widen intervals as a possibility.
-    alike = [chosen] + [
-        c for c in candidates[1:] if c.share >= _LEAST_SHARE and not c.maximum.terms.ramp
-    ]
-    wider = [c for c in candidates if c.maximum.terms in _with_one_more(chosen.maximum.terms)]
+    alike = [chosen] + [c for c in candidates[1:] if c.share >= _LEAST_SHARE and not c.terms.ramp]
+    wider = [c for c in candidates if c.terms in _with_one_more(chosen.terms)]
     for candidate in candidates:
-        terms = candidate.maximum.terms
+        terms = candidate.terms
         if candidate in alike or candidate in wider or terms == PAPERS:
             part = 1.0 if terms == PAPERS or candidate is chosen else candidate.share
             number = max(_FEWEST_DRAWS, round(part * DRAWS))
@@ -250,7 +248,7 @@ def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) 
     estimate = with_upper_limits(estimate, alike, wider, draws)
     tau = averaging_times(spectrum.rate, float(spectrum.length.max()))
     estimate = with_curve(estimate, alike, wider, draws, tau)
-    papers = next(c for c in candidates if c.maximum.terms == PAPERS)
+    papers = next(c for c in candidates if c.terms == PAPERS)
     gauss_markov = describe("likelihood_gm", whittle, papers, [papers], draws, frame.band)
     gauss_markov = with_curve(gauss_markov, [papers], (), draws, tau)
     fitted = frame.whole(spectrum).density(chosen.maximum) + chosen.maximum.ramp**2 * spectrum.ramp
@@ -267,8 +265,8 @@ def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) 
                 draws=joint_draws(
                     [
                         (
-                            c.maximum.terms,
-                            frame.in_the_log(shown[c.maximum.terms], c.maximum.terms),
+                            c.terms,
+                            frame.in_the_log(shown[c.terms], c.terms),
                             drawn_share(c, len(whittle.spectrum.density)),
                         )
                         for c in alike
@@ -362,7 +360,7 @@ def explaining(spectrum: Spectrum, frame: Frame) -> tuple[Frame, Whittle, list[C
     if frame.low_pass is None:
         return first
     if not _explains(first):
-        flexible = [candidate for candidate in first[2] if candidate.maximum.terms == _FLEXIBLE]
+        flexible = [candidate for candidate in first[2] if candidate.terms == _FLEXIBLE]
         first = fitted(frame.refined(spectrum, flexible))
     if _explains(first) and first[0].has_a_bend_of_each_model(spectrum, first[2][0].maximum.times):
         first = fitted(first[0].refined(spectrum, joined(first[2], PAPERS)))

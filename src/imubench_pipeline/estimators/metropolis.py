@@ -71,7 +71,7 @@ def _metropolis(
     model, shape = np.empty(fixed.shape[0]), np.empty(fixed.shape[0])
     arguments = (fixed, bins, processes, with_ramp, table, model, shape)
     x = start.copy()
-    here = log_posterior(x, *arguments)[0]
+    current = log_posterior(x, *arguments)[0]
     mean, covariance = x.copy(), root @ root.T * d / 5.76
     draws = np.empty((n - _BURN_IN, d))
     accepted, recent = 0, 0
@@ -79,8 +79,8 @@ def _metropolis(
     for k in range(n):
         proposal = x + scale * (root @ normals[k])
         proposed = log_posterior(proposal, *arguments)[0]
-        if log_uniforms[k] < proposed - here:
-            x, here = proposal, proposed
+        if log_uniforms[k] < proposed - current:
+            x, current = proposal, proposed
             recent += 1
             if k >= _BURN_IN:
                 accepted += 1

@@ -285,26 +285,26 @@ def _smoothed(
     innovations = np.empty((size, 2))
     for first in range(0, n, _WINDOW):
         last = min(n, first + _WINDOW + _AHEAD)
-        here, matrix = ahead, spread
+        state_mean, covariance = ahead, spread
         for k in range(first, last):
             i = k - first
             if k == first + _WINDOW:
-                ahead, spread = here.copy(), matrix.copy()
-            means[i] = here
-            spreads[i] = matrix
-            total = matrix.sum(axis=1)
+                ahead, spread = state_mean.copy(), covariance.copy()
+            means[i] = state_mean
+            spreads[i] = covariance
+            total = covariance.sum(axis=1)
             if present[k]:
                 variance = total.sum() + error[k]
                 gain = total / variance
-                wrong = difference[k] - here.sum()
+                wrong = difference[k] - state_mean.sum()
                 innovations[i, 0], innovations[i, 1] = wrong, variance
-                here = here + gain * wrong
-                matrix = matrix - np.outer(gain, total)
+                state_mean = state_mean + gain * wrong
+                covariance = covariance - np.outer(gain, total)
                 gains[i] = gain
-            here = here * decay
-            matrix = matrix * np.outer(decay, decay)
+            state_mean = state_mean * decay
+            covariance = covariance * np.outer(decay, decay)
             for a in range(s):
-                matrix[a, a] += drive[a]
+                covariance[a, a] += drive[a]
         back = np.zeros(s)
         for k in range(last - 1, first - 1, -1):
             i = k - first

@@ -71,6 +71,11 @@ class Candidate:
     share: float
     goodness: Goodness
 
+    @property
+    def terms(self) -> Terms:
+        """The terms of the model."""
+        return self.maximum.terms
+
 
 def compare(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
     """Fit all candidates and sort them, the best by BIC first.
@@ -151,11 +156,9 @@ def rescored(candidates: Sequence[Candidate], gained: Mapping[Terms, float]) -> 
     gained : mapping of Terms to float
         Log likelihood that models gain; with a ramp as without it.
     """
-    more = [
-        gained.get(replace(candidate.maximum.terms, ramp=False), 0.0) for candidate in candidates
-    ]
-    bics = np.array([candidate.bic for candidate in candidates]) - 2.0 * np.array(more)
-    aics = np.array([candidate.aic for candidate in candidates]) - 2.0 * np.array(more)
+    gains = [gained.get(replace(candidate.terms, ramp=False), 0.0) for candidate in candidates]
+    bics = np.array([candidate.bic for candidate in candidates]) - 2.0 * np.array(gains)
+    aics = np.array([candidate.aic for candidate in candidates]) - 2.0 * np.array(gains)
     weights, shares = _relative(bics), _relative(aics)
     return [
         replace(
@@ -181,6 +184,6 @@ def disagreement(candidates: Sequence[Candidate]) -> str | None:
     if by_aic is chosen:
         return None
     return (
-        f"AIC favours {by_aic.maximum.terms.name} by {chosen.aic - by_aic.aic:.1f}, "
-        f"BIC {chosen.maximum.terms.name} by {by_aic.bic - chosen.bic:.1f}"
+        f"AIC favours {by_aic.terms.name} by {chosen.aic - by_aic.aic:.1f}, "
+        f"BIC {chosen.terms.name} by {by_aic.bic - chosen.bic:.1f}"
     )

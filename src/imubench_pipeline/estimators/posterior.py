@@ -121,11 +121,6 @@ class _Target:
 
     They are log T_B, and z with amplitude = unit sinh z > 0: linear where an amplitude may be 0,
     its logarithm where it is known.
-
-    Parameters
-    ----------
-    whittle : Whittle
-    found : Maximum
     """
 
     def __init__(self, whittle: Whittle, maximum: Maximum) -> None:
@@ -184,10 +179,7 @@ class _Target:
         elif self.processes == 2:
             places += [np.array([a, b]) for i, a in enumerate(grid) for b in grid[i + 1 :]]
         widths = [_WIDEST] + [_WIDE * apart] * (len(places) - 1)
-        components = [
-            self._component(*place_and_width)
-            for place_and_width in zip(places, widths, strict=True)
-        ]
+        components = [self._component(at, width) for at, width in zip(places, widths, strict=True)]
         if self.terms > 1:
             components += [self._without(term) for term in self.weak]
         means, scales = (np.array(part) for part in zip(*components, strict=True))

@@ -28,10 +28,10 @@ from imubench_pipeline.typing import Row
 
 def allan_rows(key: Key, curve: AllanCurve) -> Iterator[Row]:
     """Yield the rows of the table ``allan``."""
-    for i, about in enumerate(limit_rows(curve)):
+    for i, limits in enumerate(limit_rows(curve)):
         yield (
             asdict(key)
-            | about
+            | limits
             | {
                 "cluster_size": int(curve.cluster_size[i]),
                 "averaged": float(curve.averaged[i]),
@@ -78,12 +78,12 @@ def draw_rows(key: Key, estimate: Estimate) -> Iterator[Row]:
     for number, (first, further) in enumerate(
         zip(estimate.draws.first.tolist(), estimate.draws.further.tolist(), strict=True)
     ):
-        about = asdict(key) | {"method": estimate.method, "draw": number}
+        key_columns = asdict(key) | {"method": estimate.method, "draw": number}
         nonzero = {name: value for name, value in zip(FAMILY, first, strict=True) if value}
-        yield about | {"component": 1} | nonzero
+        yield key_columns | {"component": 1} | nonzero
         for component, (B, T_B) in enumerate(further, start=2):
             if B:
-                yield about | {"component": component, "B": B, "T_B": T_B}
+                yield key_columns | {"component": component, "B": B, "T_B": T_B}
 
 
 def draws(path: Path) -> dict[tuple[str, str], JointDraws]:

@@ -250,24 +250,24 @@ def _polished(
     table: ShapeTable,
 ) -> tuple[float, float]:
     """Minimise the cost over one correlation time by golden section."""
-    here = places.copy()
+    tried = places.copy()
     a, d = low, high
     b, c = d - _GOLDEN * (d - a), a + _GOLDEN * (d - a)
-    here[which] = b
-    cost_b = _cost_at(here, fixed, bins, with_ramp, table, _POLISH_TOLERANCE)
-    here[which] = c
-    cost_c = _cost_at(here, fixed, bins, with_ramp, table, _POLISH_TOLERANCE)
+    tried[which] = b
+    cost_b = _cost_at(tried, fixed, bins, with_ramp, table, _POLISH_TOLERANCE)
+    tried[which] = c
+    cost_c = _cost_at(tried, fixed, bins, with_ramp, table, _POLISH_TOLERANCE)
     while d - a > 5e-4:
         if cost_b <= cost_c:
             d, c, cost_c = c, b, cost_b
             b = d - _GOLDEN * (d - a)
-            here[which] = b
-            cost_b = _cost_at(here, fixed, bins, with_ramp, table, _POLISH_TOLERANCE)
+            tried[which] = b
+            cost_b = _cost_at(tried, fixed, bins, with_ramp, table, _POLISH_TOLERANCE)
         else:
             a, b, cost_b = b, c, cost_c
             c = a + _GOLDEN * (d - a)
-            here[which] = c
-            cost_c = _cost_at(here, fixed, bins, with_ramp, table, _POLISH_TOLERANCE)
+            tried[which] = c
+            cost_c = _cost_at(tried, fixed, bins, with_ramp, table, _POLISH_TOLERANCE)
     return (b, cost_b) if cost_b <= cost_c else (c, cost_c)
 
 
@@ -283,14 +283,14 @@ def _scanned(
     table: ShapeTable,
 ) -> tuple[float, float]:
     """Return the best of one correlation time on a grid between limits, and its cost."""
-    here = places.copy()
+    tried = places.copy()
     best, lowest = places[which], np.inf
     for i in range(0, table.logarithms.shape[0], _SCAN_STEP):
-        here[which] = table.first + i * table.step
-        if low <= here[which] <= high:
-            cost = _cost_at(here, fixed, bins, with_ramp, table, _SCAN_TOLERANCE)
+        tried[which] = table.first + i * table.step
+        if low <= tried[which] <= high:
+            cost = _cost_at(tried, fixed, bins, with_ramp, table, _SCAN_TOLERANCE)
             if cost < lowest:
-                best, lowest = here[which], cost
+                best, lowest = tried[which], cost
     return best, lowest
 
 

@@ -118,20 +118,22 @@ def _degrees(
     mask = presence.differences(n) if presence is not None else None
     if mask is None:
         squares, products = zip(*(noise.sums(int(M)) for M in terms), strict=True)
-        done = share * float(terms.sum())
-        relative = sum(squares) / float(terms.sum()) / done
-        crossed = sum(products) / float(terms.sum()) / done
+        differences = share * float(terms.sum())
+        relative = sum(squares) / float(terms.sum()) / differences
+        crossed = sum(products) / float(terms.sum()) / differences
     else:
         present, stride = mask
         if not present.any():
             return 1.0, 1.0
-        counted, done = float(present.sum()) * stride, share * float(terms.sum())
+        counted, differences = float(present.sum()) * stride, share * float(terms.sum())
         square, product = noise.masked_sums(present, stride)
-        relative, crossed = square / counted / done, product / counted / done
+        relative, crossed = square / counted / differences, product / counted / differences
     # Variance over squared mean: 2 / edf.
     mean = noise.at_zero + noise.ramp**2 + noise.lines
     varied = 2.0 * noise.at_zero**2 * relative
-    varied += 4.0 * noise.ramp**2 * noise.at_zero * crossed + 4.0 * noise.line_products / done
+    varied += (
+        4.0 * noise.ramp**2 * noise.at_zero * crossed + 4.0 * noise.line_products / differences
+    )
     edf = max(2.0 * mean**2 / varied, 1.0)
     if edf > _MOST_WITH_TAIL:
         return edf, edf

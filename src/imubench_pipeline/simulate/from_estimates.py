@@ -52,8 +52,8 @@ def with_estimates(
         tables = {table: read(table, [folder / f"{table}.parquet"]) for table in _NEEDED}
     except (OSError, ValueError) as error:
         raise ConfigError(f"{folder}: not the tables of a run: {error}") from error
-    about = _recording(tables["recordings"], folder, name, recording)
-    chosen = about["recording"]
+    recorded = _recording(tables["recordings"], folder, name, recording)
+    chosen = recorded["recording"]
     of_log = {
         table: tables[table].filter(
             (pc.field("sensor") == name) & (pc.field("recording") == chosen)
@@ -70,7 +70,7 @@ def with_estimates(
         }
         if of_channel["parameters"]:
             axis = _Axis(printed, channel, of_channel, f"{name}/{chosen}")
-            axes[channel] = axis.model(float(about["rate"]))
+            axes[channel] = axis.model(float(recorded["rate"]))
             topics.append({remark.topic for remark in axis.remarks})
             of_datasheet = printed.figures.get(channel, [])
             figures[channel] = [
@@ -87,7 +87,7 @@ def with_estimates(
         [remark for remark in printed.assumed if remark.topic not in estimated],
         name,
     )
-    if about["simulated"]:
+    if recorded["simulated"]:
         origin.assume("log", f"{name}/{chosen} is itself simulated")
     if any(quantity_of(channel) == "accel" for channel in axes):
         text = "accel: the mean of a recording is mostly gravity, so it is no bias here"
@@ -99,8 +99,8 @@ def _recording(
     recordings: pa.Table, folder: Path, name: str, asked: str | None
 ) -> Mapping[str, Any]:
     """Return the row of the recording to take: that asked for, or the longest."""
-    mine = recordings.filter(pc.field("sensor") == name).to_pylist()
-    usable = {row["recording"]: row for row in mine if row["status"] == "ok"}
+    of_sensor = recordings.filter(pc.field("sensor") == name).to_pylist()
+    usable = {row["recording"]: row for row in of_sensor if row["status"] == "ok"}
     if not usable:
         sensors = ", ".join(sorted(set(recordings["sensor"].to_pylist()))) or "none"
         raise ConfigError(f"{folder}: no estimate of sensor {name!r}; there are: {sensors}")

@@ -155,10 +155,10 @@ class _Shared:
             return None
 
         def true(start: int, stop: int) -> Array:
-            here = slice(start - self._start, stop - self._start)
+            within_block = slice(start - self._start, stop - self._start)
             signal = np.zeros(stop - start)
             for name, part in parts.items():
-                signal += part * self._motion[name][here]
+                signal += part * self._motion[name][within_block]
             return signal
 
         return true

@@ -69,20 +69,22 @@ def write_log(
     known_sources |= {} if log.temperature is None else {TEMPERATURE: log.temperature}
     sources = {name: known_sources[name] for name in names}
     with replacing(path) as temporary:
-        done = 0
+        samples = 0
         if path.suffix == ".parquet":
             with LogWriter(temporary, dict.fromkeys(names, pa.float64())) as writer:
                 for block in blocks:
                     writer.write(block)
-                    done += len(next(iter(block.values())))
-                    progress(done)
-                writer.finish({**metadata, "rows": done, "grid": done, "segments": [[0, done]]})
+                    samples += len(next(iter(block.values())))
+                    progress(samples)
+                writer.finish(
+                    {**metadata, "rows": samples, "grid": samples, "segments": [[0, samples]]}
+                )
             return
         with TextLog(temporary, log, sources, log.rate_hz or 1.0, remarks) as text:
             for block in blocks:
                 text.write(block)
-                done += len(next(iter(block.values())))
-                progress(done)
+                samples += len(next(iter(block.values())))
+                progress(samples)
 
 
 def write_notes(path: Path, log: LogFormat, sensor: LogFormat | None, words: str) -> None:

@@ -246,7 +246,7 @@ _BEST_FIRST = ("likelihood", "likelihood_gm", "weighted", "paper", "curve")
 def _model_rows(key: Key, fit: Likelihood) -> Iterator[Row]:
     """Yield the rows of the table ``models``, the chosen model first."""
     for place, candidate in enumerate(fit.candidates):
-        terms = candidate.maximum.terms
+        terms = candidate.terms
         yield asdict(key) | {
             "model": terms.name,
             "chosen": place == 0,

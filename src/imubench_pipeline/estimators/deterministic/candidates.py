@@ -162,8 +162,8 @@ def _level_beside(ordinates: Ordinates, fit: Fit, sinusoid: Regressor) -> float:
 
     A process that swings is a broad hump of the spectrum, and no sinusoid.
     """
-    here = ordinates.part(sinusoid.part)
-    ratio = fit.residual[here] ** 2 * ordinates.weights(fit.density)[here]
+    of_part = ordinates.part(sinusoid.part)
+    ratio = fit.residual[of_part] ** 2 * ordinates.weights(fit.density)[of_part]
     centre = 2.0 * sinusoid.where * ordinates.sizes[sinusoid.part]
     away = np.abs(np.arange(1, len(ratio) + 1) - centre)
     beside = ratio[(away >= _BESIDE[0]) & (away <= _BESIDE[1])]

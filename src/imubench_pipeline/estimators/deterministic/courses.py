@@ -157,8 +157,8 @@ class Courses:
             return None
         rival = self.searched.rival
         if rival is not None:
-            what = _in_words(rival.courses, self.means)
-            return f"{what} would explain the log about as well as a random walk"
+            course = _in_words(rival.courses, self.means)
+            return f"{course} would explain the log about as well as a random walk"
         if self.courses and _leverage_on_walk(self.searched.fit) > _MOST_LEVERAGE:
             return (
                 "what is taken out as deterministic takes most of what the log tells of a random "
@@ -242,22 +242,22 @@ def _described(ordinates: Ordinates, searched: Searched) -> Iterator[Course]:
     covariance = covariance_of_sizes(ordinates, fit)
     column = 0
     for regressor, gain in zip(fit.regressors, searched.gains, strict=True):
-        here = slice(column, column + regressor.columns)
-        column = here.stop
+        own = slice(column, column + regressor.columns)
+        column = own.stop
         if regressor.kind not in _NAMES:
             continue
-        amplitudes = fit.sizes[here]
+        amplitudes = fit.sizes[own]
         part = means.parts[regressor.part]
         start = part.start / means.rate
         end = start + len(part.mean) * means.interval
         size = _size(amplitudes)
         along = amplitudes / size if len(amplitudes) > 1 else np.ones(1)
-        error = _LIMIT * math.sqrt(float(along @ covariance[here, here] @ along))
+        error = _LIMIT * math.sqrt(float(along @ covariance[own, own] @ along))
         low, high = _limits(ordinates, fit, regressor)
         if regressor.kind not in ("exponential", "restart"):
             # Where it is taken to be has been chosen to make it large; and of a swing that is
             # shorter than its period the size hangs on the period.
-            error = math.hypot(error, _spread(ordinates, fit, regressor, here, (low, high)))
+            error = math.hypot(error, _spread(ordinates, fit, regressor, own, (low, high)))
         place = start + regressor.where * means.interval
         period = regressor.kind == "sinusoid"
         step = regressor.kind in ("step", "restart")
@@ -310,14 +310,14 @@ def _limits(ordinates: Ordinates, fit: Fit, regressor: Regressor) -> tuple[float
 
 
 def _spread(
-    ordinates: Ordinates, fit: Fit, regressor: Regressor, here: slice, limits: tuple[float, float]
+    ordinates: Ordinates, fit: Fit, regressor: Regressor, own: slice, limits: tuple[float, float]
 ) -> float:
     """Return half the range of a size over the limits of its place."""
     sizes = []
     for where in limits:
         moved = tuple(replace(x, where=where) if x is regressor else x for x in fit.regressors)
-        sizes.append(ordinates.solved(moved, fit.density)[0][here])
-    return 0.5 * float(np.ptp([_size(amplitudes) for amplitudes in (fit.sizes[here], *sizes)]))
+        sizes.append(ordinates.solved(moved, fit.density)[0][own])
+    return 0.5 * float(np.ptp([_size(amplitudes) for amplitudes in (fit.sizes[own], *sizes)]))
 
 
 def _size(amplitudes: Array) -> float:

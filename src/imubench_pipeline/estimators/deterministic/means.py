@@ -187,17 +187,17 @@ def _parts(start: int, size: int, rows: Array, interval: float) -> list[Part]:
         covered[np.append(cuts, len(covered) - 1)],
         strict=True,
     ):
-        here = slice(int(first), int(last) + 1)
-        if here.stop - here.start < _SHORTEST_PART:
+        span = slice(int(first), int(last) + 1)
+        if span.stop - span.start < _SHORTEST_PART:
             continue
         parts.append(
             Part(
-                start + here.start * size,
-                _bridged(mean[here], share[here] >= 0.5),
-                np.where(share[here] >= 0.5, power[here], np.nan),
-                _kurtosis(power[here], fourth[here], share[here] >= 0.5),
-                float(share[here].mean()),
-                _pauses(share[here] < 0.5, interval),
+                start + span.start * size,
+                _bridged(mean[span], share[span] >= 0.5),
+                np.where(share[span] >= 0.5, power[span], np.nan),
+                _kurtosis(power[span], fourth[span], share[span] >= 0.5),
+                float(share[span].mean()),
+                _pauses(share[span] < 0.5, interval),
             )
         )
     return parts

@@ -92,8 +92,8 @@ def best_scores(
         residual = ordinates.solved(fit.regressors, density)[2]
     parts = len(ordinates.sizes)
     for number, n in enumerate(ordinates.sizes):
-        here = ordinates.part(number)
-        w, r = weight[here], residual[here]
+        of_part = ordinates.part(number)
+        w, r = weight[of_part], residual[of_part]
         others = [x for x in fit.regressors if x.part == number]
         basis = _orthonormal([row for x in others for row in ordinates.columns(x)], w)
         if not smooth:
@@ -122,11 +122,11 @@ class Gain:
         self, ordinates: Ordinates, regressors: Sequence[Regressor], density: Array, part: int
     ) -> None:
         self._ordinates = ordinates
-        here = ordinates.part(part)
-        self._weight = ordinates.weights(density)[here]
+        of_part = ordinates.part(part)
+        self._weight = ordinates.weights(density)[of_part]
         others = [row for x in regressors if x.part == part for row in ordinates.columns(x)]
         self._basis = _orthonormal(others, self._weight)
-        coefficient = ordinates.coefficient[here]
+        coefficient = ordinates.coefficient[of_part]
         self._residual = coefficient - (self._basis @ (self._weight * coefficient)) @ self._basis
 
     def of(self, regressor: Regressor) -> float:

@@ -252,9 +252,9 @@ def _unsteady(channel: str, steady: Steadiness) -> Finding:
 
 def _differ(channel: str, halves: Halves) -> Finding:
     name = "K_differs" if halves.of == "K" else "slow_noise_differs"
-    what = "K" if halves.of == "K" else "the slow noise"
+    noise = "K" if halves.of == "K" else "the slow noise"
     detail = (
-        f"{what} of {channel} up to {halves.middle:.5g} s is {halves.first:.3g} times, from there "
+        f"{noise} of {channel} up to {halves.middle:.5g} s is {halves.first:.3g} times, from there "
         f"on {halves.second:.3g} times that of the whole log, beyond chance: it is not one process"
     )
     return Finding(name, "warning", detail, halves.ratio, channel, halves.begin, halves.end)

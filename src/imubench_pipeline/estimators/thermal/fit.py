@@ -285,7 +285,7 @@ class _Fit:
             whittle = self.whittle.of(left)
             candidates = self._compared(whittle)
             weights = self._weights(whittle, candidates)
-            ramp = candidates[0].maximum.terms.ramp
+            ramp = candidates[0].terms.ramp
             if ramp != regressors.ramp:
                 regressors = regressors.also(ramp=ramp)
                 before = None
@@ -295,12 +295,7 @@ class _Fit:
                 if abs(regression.beta[0] - before.beta[0]) < _SETTLED * spread:
                     break
             before = regression
-        free = (
-            candidates[0].maximum.terms.parameters
-            + len(regression.beta)
-            - ramp
-            + (regression.lag > 0.0)
-        )
+        free = candidates[0].terms.parameters + len(regression.beta) - ramp + (regression.lag > 0.0)
         return _Settled(
             regressors, regression, whittle, candidates, self._cost(whittle, candidates, free)
         )
@@ -331,7 +326,7 @@ class _Fit:
     def plain(self) -> float:
         """Return half the BIC of the best noise without temperature."""
         candidates = self.of_the_log
-        return self._cost(self.whittle, candidates, candidates[0].maximum.terms.parameters)
+        return self._cost(self.whittle, candidates, candidates[0].terms.parameters)
 
     @cached_property
     def of_the_log(self) -> Sequence[Candidate]:
@@ -371,7 +366,7 @@ def _described(
             settled.candidates[0].maximum
         )
         left = regressors.without(fit.spectrum, settled.regression, weights)
-        terms = settled.candidates[0].maximum.terms
+        terms = settled.candidates[0].terms
         left = without_errors(left, fit.used, settled.whittle, terms, verdict.path_errors)
         effect = regressors.effect(settled.regression)
         without = likelihood.fit_spectrum(left, find_frame(left, lines), rng=rng)
@@ -380,7 +375,7 @@ def _described(
     candidates = settled.candidates if verdict.compensated else fit.of_the_log
     K = without.estimates[0].parameters["K"]
     noises = [
-        (with_likely_walk(model, K) if "K" in candidate.maximum.terms.linear else model, share)
+        (with_likely_walk(model, K) if "K" in candidate.terms.linear else model, share)
         for candidate, share in shares(candidates)
         for model in [model_of(candidate.maximum)]
     ]

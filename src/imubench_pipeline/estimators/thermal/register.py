@@ -232,14 +232,14 @@ def at_jumps(read: Readings) -> Readings:
     columns: list[Array] = []
     pieces: list[slice] = []
     places: list[slice] = []
-    done = 0
+    blocks_before = 0
     for part, jumps in zip(read.parts, parts, strict=True):
         blocks, cuts = _cut(read, part, jumps)
         columns.append(blocks)
         ends = [0, *cuts, blocks.shape[1]]
-        places.append(slice(done, done + blocks.shape[1]))
-        pieces += [slice(done + a, done + b) for a, b in pairwise(ends)]
-        done += blocks.shape[1]
+        places.append(slice(blocks_before, blocks_before + blocks.shape[1]))
+        pieces += [slice(blocks_before + a, blocks_before + b) for a, b in pairwise(ends)]
+        blocks_before += blocks.shape[1]
     begin, end, count, mean, low, high = np.concatenate(columns, axis=1)
     return replace(
         read,

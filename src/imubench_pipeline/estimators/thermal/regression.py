@@ -222,14 +222,14 @@ class Regressors:
         lags : sequence of float
             s.
         """
-        new = [float(lag) for lag in lags if self._key(float(lag)) not in self._full]
-        for first in range(0, len(new), _TOGETHER):
-            some = new[first : first + _TOGETHER]
-            terms = [term for lag in some for term in self._of(self.knots(lag))]
+        lags_to_do = [float(lag) for lag in lags if self._key(float(lag)) not in self._full]
+        for first in range(0, len(lags_to_do), _TOGETHER):
+            batch = lags_to_do[first : first + _TOGETHER]
+            terms = [term for lag in batch for term in self._of(self.knots(lag))]
             columns = self.coefficients.of_knots(self.path, terms).reshape(
-                len(some), self.thermal, -1
+                len(batch), self.thermal, -1
             )
-            for lag, own in zip(some, columns, strict=True):
+            for lag, own in zip(batch, columns, strict=True):
                 self._full[self._key(lag)] = self.coefficients.products([*own, self._time])
 
     def _key(self, lag: float) -> tuple[float, bool, float]:

@@ -264,12 +264,10 @@ def shares(candidates: Sequence[Candidate]) -> list[tuple[Candidate, float]]:
     alike = {
         place: c.share
         for place, c in enumerate(candidates)
-        if c is chosen or (c.share >= _LEAST_SHARE and not c.maximum.terms.ramp)
+        if c is chosen or (c.share >= _LEAST_SHARE and not c.terms.ramp)
     }
     walks = (
-        place
-        for place, c in enumerate(candidates)
-        if "K" in c.maximum.terms.linear and not c.maximum.terms.ramp
+        place for place, c in enumerate(candidates) if "K" in c.terms.linear and not c.terms.ramp
     )
     walk = next(walks, None)
     if walk is not None:
@@ -290,9 +288,9 @@ def _drawn(
     """Return draws of beta (d, p) and of the lag (d,)."""
     alike = shares(candidates)
     regressors.prepare(lags)
-    everything = [regressors.products(float(lag)) for lag in lags]
-    cross = np.array([products.cross for products in everything])
-    gram = np.array([products.gram for products in everything])
+    products_of_lags = [regressors.products(float(lag)) for lag in lags]
+    cross = np.array([products.cross for products in products_of_lags])
+    gram = np.array([products.gram for products in products_of_lags])
     betas, chosen_lags = [], []
     for candidate, share in alike:
         number = max(8, round(_NOISES * share))

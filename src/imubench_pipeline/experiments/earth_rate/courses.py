@@ -218,15 +218,15 @@ def sigma_ranges(
     """
     if not drawn:
         return {}
-    nothing = np.zeros((1, len(blocks)))
+    zero_means = np.zeros((1, len(blocks)))
     bias = math.inf if turn_on_bias is None else turn_on_bias
 
     def filtered(drawn_model: NoiseModel) -> float:
         return bound(blocks, drawn_model, bias)
 
     methods: dict[str, Callable[[NoiseModel], float]] = {
-        "pairs": lambda drawn_model: float(by_pairs(nothing, blocks, drawn_model).sigma[-1]),
-        "triples": lambda drawn_model: float(by_triples(nothing, blocks, drawn_model).sigma[-1]),
+        "pairs": lambda drawn_model: float(by_pairs(zero_means, blocks, drawn_model).sigma[-1]),
+        "triples": lambda drawn_model: float(by_triples(zero_means, blocks, drawn_model).sigma[-1]),
         "filter": filtered,
     }
     ranges: dict[str, Range] = {}

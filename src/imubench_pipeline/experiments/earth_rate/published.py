@@ -77,10 +77,10 @@ def allowed(run: RunDesign, duration: float, model: NoiseModel) -> Row:
     """
     design = run.experiment(duration)
     blocks = design.blocks(block_length(design, model))
-    nothing = np.zeros((1, len(blocks)))
+    zero_means = np.zeros((1, len(blocks)))
     return {
         "white": white_sigma(model, blocks),
-        "sigma": float(by_pairs(nothing, blocks, model).sigma[-1]),
+        "sigma": float(by_pairs(zero_means, blocks, model).sigma[-1]),
         "sigma_filter": float(RateFilter(blocks, model).rate_sigma[-1]),
     }
 

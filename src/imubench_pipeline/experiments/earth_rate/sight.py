@@ -185,9 +185,8 @@ def _filled(
 def _hole(blocks: LevelBlocks, time: float, schedule: TurnSchedule) -> bool:
     """Tell whether the samples are missing where a turn would be."""
     first = max(0, int((time - 0.5 * schedule.turning) / blocks.length))
-    return not blocks.present[
-        first : int((time + 0.5 * schedule.turning) / blocks.length) + 1
-    ].any()
+    last = int((time + 0.5 * schedule.turning) / blocks.length)
+    return not blocks.present[first : last + 1].any()
 
 
 def _silent(time: float, schedule: TurnSchedule) -> Turn:
@@ -286,7 +285,6 @@ def without(blocks: LevelBlocks, knocks: Sequence[tuple[float, float]]) -> Level
     """
     present = blocks.present.copy()
     for start, stop in knocks:
-        present[max(0, int(start / blocks.length)) : max(0, math.ceil(stop / blocks.length))] = (
-            False
-        )
+        first, last = int(start / blocks.length), math.ceil(stop / blocks.length)
+        present[max(0, first) : max(0, last)] = False
     return replace(blocks, present=present)

@@ -101,13 +101,13 @@ def simulate_runs(
     """
     block_model = block_states(model, blocks, turn_on_bias)
     m = len(block_model.names)
-    here = rng.standard_normal((runs, m)) @ block_model.initial.T
+    state = rng.standard_normal((runs, m)) @ block_model.initial.T
     states, drift = np.empty((runs, len(blocks), m)), np.empty((runs, len(blocks)))
     for k, which in enumerate(block_model.which):
         step = block_model.steps[which]
-        after = here @ step.transition.T + rng.standard_normal((runs, m + 1)) @ step.factor.T
-        here, drift[:, k] = after[:, :m], after[:, m]
-        states[:, k] = here
+        after = state @ step.transition.T + rng.standard_normal((runs, m + 1)) @ step.factor.T
+        state, drift[:, k] = after[:, :m], after[:, m]
+        states[:, k] = state
     white = block_model.white * rng.standard_normal(drift.shape)
     return Runs(earth_rate * blocks.seen + drift + white, drift, states)
 

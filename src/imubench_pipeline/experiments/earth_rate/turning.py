@@ -197,18 +197,18 @@ def find_turning(
         doubts.append("the noise of the log is not that of the model: the log's is used")
     column_sense = None
     if position is not None:
-        turns, knocks, column_sense, more = _by_column(position, log, rate, events, schedule)
+        turns, knocks, column_sense, more_doubts = _by_column(position, log, rate, events, schedule)
     else:
-        turns, knocks, more = by_sight(blocks, events, schedule, trust_schedule)
-    doubts += more
-    stretches, more = _stretches(turns, knocks, schedule)
-    doubts += more
+        turns, knocks, more_doubts = by_sight(blocks, events, schedule, trust_schedule)
+    doubts += more_doubts
+    stretches, more_doubts = _stretches(turns, knocks, schedule)
+    doubts += more_doubts
     knocks = sorted([*knocks, *_lone(outliers(blocks, log, rate), turns, knocks)])
     knocks = [(max(start, 0.0), min(stop, schedule.duration)) for start, stop in knocks]
     signs = without(blocks, knocks)
     size = alternation(signs, stretches)
-    first, more = _first_sense(first_sense, column_sense)
-    doubts += more
+    first, more_doubts = _first_sense(first_sense, column_sense)
+    doubts += more_doubts
     place = contradiction(signs, stretches)
     if place is not None:
         doubts.append(
