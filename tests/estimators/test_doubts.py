@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
-from imubench_pipeline.estimators.doubts import doubting
+from imubench_pipeline.estimators.doubts import cast_doubt
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.noise import NoiseModel
@@ -62,9 +62,9 @@ def test_a_process_joined_to_a_walk_is_doubted_where_aic_has_others(seeds: Itera
 def test_with_b_the_figures_of_the_curve_are_doubted() -> None:
     curve = {name: Parameter(1.0) for name in ("B_curve", "sigma_min")}
     estimate = Estimate("likelihood", {"B": Parameter(1.0), "K": Parameter(1.0)}, curve=curve)
-    found = doubting(estimate, ("B", "K"), "another model")
+    found = cast_doubt(estimate, ("B", "K"), "another model")
     assert {one.status for one in found.curve.values()} == {"doubtful"}
-    found = doubting(estimate, ("K",), "another model")
+    found = cast_doubt(estimate, ("K",), "another model")
     assert {one.status for one in found.curve.values()} == {"ok"}
 
 

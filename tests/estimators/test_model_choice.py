@@ -15,7 +15,7 @@ from imubench_pipeline.estimators.model_choice import (
     Candidate,
     compare,
     disagreement,
-    rescored,
+    rescore,
 )
 from imubench_pipeline.estimators.spectrum import Spectrum, spectra
 from imubench_pipeline.estimators.whittle import Maximum, Terms, whittle_of
@@ -410,20 +410,20 @@ def test_what_models_gain_counts_for_their_scores_and_their_order(rng: np.random
     candidates = candidates_of(simulate(NoiseModel(N=N), RATE, 4_000, rng), quantization=False)
     second = candidates[1]
     gain = 0.5 * (second.bic - candidates[0].bic) + 1.0
-    found = rescored(candidates, {second.terms: gain})
+    found = rescore(candidates, {second.terms: gain})
     assert found[0].maximum is second.maximum
     assert found[0].bic == pytest.approx(candidates[0].bic - 2.0)
     assert found[0].aic == pytest.approx(second.aic - 2.0 * gain)
     assert sum(one.share for one in found) == pytest.approx(1.0)
     ratio = found[0].weight / found[1].weight
     assert ratio == pytest.approx(np.exp(0.5 * (found[1].bic - found[0].bic)))
-    assert [one.maximum for one in rescored(candidates, {})] == [one.maximum for one in candidates]
+    assert [one.maximum for one in rescore(candidates, {})] == [one.maximum for one in candidates]
 
 
 def test_a_model_with_a_ramp_gains_what_it_gains_without(rng: np.random.Generator) -> None:
     candidates = candidates_of(simulate(NoiseModel(N=N), RATE, 4_000, rng), quantization=False)
     ramped = next(one for one in candidates if one.terms.ramp)
     plain = replace(ramped.terms, ramp=False)
-    found = rescored(candidates, {plain: 3.0})
+    found = rescore(candidates, {plain: 3.0})
     again = next(one for one in found if one.maximum is ramped.maximum)
     assert again.bic == pytest.approx(ramped.bic - 6.0)

@@ -20,7 +20,7 @@ _TWICE = 1.8
 """Ratio of two values beyond which they are not the same, whatever their limits."""
 
 
-def agreeing(estimate: Estimate, reference: Estimate) -> Estimate:
+def doubt_contradicted(estimate: Estimate, reference: Estimate) -> Estimate:
     """Return an estimate with its values doubtful that the likelihood rules out.
 
     Parameters
@@ -35,7 +35,7 @@ def agreeing(estimate: Estimate, reference: Estimate) -> Estimate:
         parameters: Mapping[str, Parameter], references: Mapping[str, Parameter]
     ) -> dict[str, Parameter]:
         return {
-            name: _doubted(name, parameter, references.get(name))
+            name: _doubt_if_contradicted(name, parameter, references.get(name))
             for name, parameter in parameters.items()
         }
 
@@ -50,7 +50,9 @@ def agreeing(estimate: Estimate, reference: Estimate) -> Estimate:
     )
 
 
-def _doubted(name: str, parameter: Parameter, reference: Parameter | None) -> Parameter:
+def _doubt_if_contradicted(
+    name: str, parameter: Parameter, reference: Parameter | None
+) -> Parameter:
     if parameter.value is None or parameter.status not in ("ok", "at_bound") or reference is None:
         return parameter
     reason = _contradiction(name, parameter, reference)

@@ -31,7 +31,7 @@ MOST = STRONGEST + GROUPS
 """So many lines are carried without being joined."""
 
 
-def carried(lines: Sequence[Line]) -> list[dict[str, Parameter]]:
+def carried_sinusoids(lines: Sequence[Line]) -> list[dict[str, Parameter]]:
     """Return amplitude and frequency of the sinusoids that a model carries on, by frequency.
 
     Parameters

@@ -25,8 +25,8 @@ from imubench_pipeline.estimators.filter_fits import (
     FEWEST_BINS,
     PROCESSES,
     FilterFits,
-    Tried,
-    inside,
+    FilterTrial,
+    frequencies_in_bins,
 )
 from imubench_pipeline.estimators.filter_readings import (
     SIGMAS,
@@ -34,7 +34,7 @@ from imubench_pipeline.estimators.filter_readings import (
     OfModel,
     Reading,
     also_after_sampling,
-    drawn,
+    draw_factors,
 )
 from imubench_pipeline.estimators.low_pass import Filter, Kind
 from imubench_pipeline.estimators.spectrum import Spectrum
@@ -174,7 +174,7 @@ class Cutoff:
         readings = self.readings if of_model is None else of_model.readings
         if not readings:
             return np.ones(number)
-        return drawn(readings, number, rng)
+        return draw_factors(readings, number, rng)
 
 
 def find_cutoff(
@@ -241,7 +241,7 @@ class _Settled:
     """Fits of filters to the bins that tell of them: ``used``, not those ``ruled`` by the ends."""
 
     fits: FilterFits
-    tried: Sequence[Tried]
+    tried: Sequence[FilterTrial]
     used: NDArray[np.bool_]
     ruled: NDArray[np.bool_]
 
@@ -254,7 +254,7 @@ def _settled(
     rounding: float,
 ) -> _Settled:
     """Fit the filters, and again where the best of them changes which bins tell of it."""
-    tried = fits.tried(filters, _COARSE)
+    tried = fits.try_filters(filters, _COARSE)
     used, ruled = usable, np.zeros(len(usable), dtype=np.bool_)
     for passed in range(_PASSES if tried else 0):
         earlier, ruled = ruled, _ruled_by_ends(spectrum, fits, tried[0], rounding)
@@ -267,7 +267,7 @@ def _settled(
         if rounding > 0.0:
             fits.rounded = rounding / fits.density(tried[0])[0] ** 2
         fits.choose_slow(tried[0])
-        tried = fits.tried(filters)
+        tried = fits.try_filters(filters)
         if not tried:
             break
     return _Settled(fits, tried, used, ruled)
@@ -364,7 +364,7 @@ def _without_filter(N_alone: float, gained: float, doubt: tuple[str, float] | No
 
 
 def _readings(
-    fits: FilterFits, alike: Sequence[Tried], limits: Sequence[tuple[float, float]]
+    fits: FilterFits, alike: Sequence[FilterTrial], limits: Sequence[tuple[float, float]]
 ) -> list[Reading]:
     """Return N before each filter that the log allows, over that of the best, and how likely."""
     best = alike[0]
@@ -388,7 +388,7 @@ def _readings(
 
 
 def _ruled_by_ends(
-    spectrum: Spectrum, fits: FilterFits, best: Tried, rounding: float
+    spectrum: Spectrum, fits: FilterFits, best: FilterTrial, rounding: float
 ) -> NDArray[np.bool_]:
     """Return the bins in which the ends of the transform rule, or the filter falls within the bin.
 
@@ -396,7 +396,7 @@ def _ruled_by_ends(
     """
     N = fits.density(best)[0]
     low_pass = best.low_pass
-    within = low_pass.white(inside(spectrum), spectrum.rate) + rounding / N**2
+    within = low_pass.white(frequencies_in_bins(spectrum), spectrum.rate) + rounding / N**2
     white = within.mean(axis=1)
     leak = low_pass.leak(spectrum.frequency, spectrum.length, spectrum.rate)
     leak = np.where(spectrum.block == 1, leak, 0.0)
@@ -405,7 +405,11 @@ def _ruled_by_ends(
 
 
 def _process_or_filter(
-    fits: FilterFits, tried: Sequence[Tried], cost_alone: float, gained: float, stated: float | None
+    fits: FilterFits,
+    tried: Sequence[FilterTrial],
+    cost_alone: float,
+    gained: float,
+    stated: float | None,
 ) -> tuple[str, float] | None:
     """Return why the log does not tell a process from a filter, and N before that; None if it does.
 

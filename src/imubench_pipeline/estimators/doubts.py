@@ -57,7 +57,7 @@ _BELOW = 0.7
 """Part of N^2 below which it is another density."""
 
 
-def doubted(
+def add_doubts(
     estimate: Estimate,
     papers: Estimate,
     spectrum: Spectrum,
@@ -96,14 +96,14 @@ def doubted(
         )
     rival = drift or _without_a_walk(chosen, candidates) or _beside_a_ramp(chosen, candidates)
     if rival is not None:
-        estimate, papers = (doubting(each, ("K",), rival) for each in (estimate, papers))
+        estimate, papers = (cast_doubt(each, ("K",), rival) for each in (estimate, papers))
     other = _with_fewer_terms(chosen, candidates) or _with_other_terms(chosen, candidates)
     if other is not None:
-        estimate = doubting(estimate, ("B", "T_B"), other, of_curve=False)
+        estimate = cast_doubt(estimate, ("B", "T_B"), other, of_curve=False)
     for name in ("Q", "R"):
         needless = _hardly_needed(name, chosen, candidates)
         if needless is not None:
-            estimate = doubting(estimate, (name,), needless)
+            estimate = cast_doubt(estimate, (name,), needless)
     estimate = _with_one_bias(estimate)
     against = papers_candidate.bic - chosen.bic
     if against > _WORSE:
@@ -111,7 +111,7 @@ def doubted(
             f"the data favour {chosen.terms.name} over "
             f"{papers_candidate.terms.name} by {against:.1f} in BIC"
         )
-        papers = doubting(papers, ("B", "T_B", "K"), reason)
+        papers = cast_doubt(papers, ("B", "T_B", "K"), reason)
     return estimate, papers
 
 
@@ -212,7 +212,7 @@ def _with_one_bias(estimate: Estimate) -> Estimate:
         return estimate
     if of_curve.status == "not_identified":
         reason = f"the bias instability of the curve is not told: {of_curve.reason}"
-        return doubting(estimate, ("B", "T_B"), reason, of_curve=False)
+        return cast_doubt(estimate, ("B", "T_B"), reason, of_curve=False)
     if of_curve.status != "ok":
         return estimate
     if B.status not in ("not_identified", "doubtful"):
@@ -224,7 +224,7 @@ def _with_one_bias(estimate: Estimate) -> Estimate:
     return replace(estimate, curve={**estimate.curve, "B_curve": unsure})
 
 
-def doubting(
+def cast_doubt(
     estimate: Estimate, names: Sequence[str], reason: str, *, of_curve: bool = True
 ) -> Estimate:
     """Return an estimate whose values of some parameters are doubtful.

@@ -86,7 +86,7 @@ _ABOVE_ENDS = 1.01
 FEWEST_BINS = 24
 
 
-def inside(spectrum: Spectrum) -> Array:
+def frequencies_in_bins(spectrum: Spectrum) -> Array:
     """Return frequencies within each bin, shape (b, 6), Hz."""
     within = (np.arange(_POINTS) + 0.5) / _POINTS
     width = (spectrum.upper - spectrum.lower)[:, None]
@@ -98,9 +98,9 @@ def highest_cutoff(kind: Kind, order: int, rate: float) -> float:
     return _HIGHEST[kind, order] * rate
 
 
-def gains(spectrum: Spectrum, trial: Tried) -> tuple[Array, Array, Array]:
+def gains(spectrum: Spectrum, trial: FilterTrial) -> tuple[Array, Array, Array]:
     """Return what a filter leaves of white noise, of flicker noise and of slow noise."""
-    low_pass, frequency = trial.low_pass, inside(spectrum)
+    low_pass, frequency = trial.low_pass, frequencies_in_bins(spectrum)
     white = low_pass.white(frequency, spectrum.rate).mean(axis=1)
     leak = low_pass.leak(spectrum.frequency, spectrum.length, spectrum.rate)
     flicker = low_pass.flicker(frequency, spectrum.rate).mean(axis=1)
@@ -109,7 +109,7 @@ def gains(spectrum: Spectrum, trial: Tried) -> tuple[Array, Array, Array]:
 
 
 @dataclass(frozen=True)
-class Tried:
+class FilterTrial:
     """A filter, where its likelihood has a maximum.
 
     Attributes
@@ -148,7 +148,7 @@ class Tried:
         return rate / (2.0 * math.pi * self.cutoff)
 
 
-def explained(spectrum: Spectrum, fitted: Array, trial: Tried) -> bool:
+def explains_bend(spectrum: Spectrum, fitted: Array, trial: FilterTrial) -> bool:
     """Return whether a fit behind a filter gives the spectrum where that bends it.
 
     Parameters
@@ -189,7 +189,7 @@ class FilterFits:
         self.penalty = 0.5 * math.log(len(spectrum.frequency))
         self.rounded = 0.0  # density of rounding, parts of N^2
 
-    def choose_slow(self, trial: Tried) -> None:
+    def choose_slow(self, trial: FilterTrial) -> None:
         """Keep the terms of slow noise that the spectrum asks for behind a filter, by BIC.
 
         A term that is not there can only add to a fit: together they would pull the cut-off.
@@ -225,7 +225,7 @@ class FilterFits:
         rounded = min(score(Terms("Q" + terms.linear, terms.gauss_markov)) for terms in _WITH_Q)
         return (plain if plain[0] < rounded[0] else rounded)[2], plain[0], plain[1], rounded[0]
 
-    def behind(self, trial: Tried) -> float:
+    def behind(self, trial: FilterTrial) -> float:
         """Return half the BIC of the best model behind a filter."""
         white, *slow = self.gains(trial)
         N, after = self.density(trial)
@@ -239,11 +239,11 @@ class FilterFits:
             whittle.maximum(each).cost + self.penalty * (each.parameters + own) for each in terms
         )
 
-    def cost(self, trial: Tried) -> float:
+    def cost(self, trial: FilterTrial) -> float:
         """Return -log L at a cut-off."""
         return self._powers(self._columns(trial))[1]
 
-    def density(self, trial: Tried) -> tuple[float, float]:
+    def density(self, trial: FilterTrial) -> tuple[float, float]:
         """Return N before the filter, and the density after it."""
         powers = self._powers(self._columns(trial))[0]
         return math.sqrt(powers[0]), math.sqrt(powers[-1]) if trial.floor else 0.0
@@ -260,13 +260,15 @@ class FilterFits:
         )
         alone = min(alone, self._powers(flat)[1])
         least = min(
-            self.cost(Tried(0.0, 0.0, kind, order, float(cutoff), False))
+            self.cost(FilterTrial(0.0, 0.0, kind, order, float(cutoff), False))
             for kind, order in filters
             for cutoff in self._cutoffs(kind, order, 2.0 * self.lowest, _COARSE_SCAN)
         )
         return least < alone - _WORTH_TRYING
 
-    def tried(self, filters: Sequence[tuple[Kind, int]], within: float = 1e-5) -> list[Tried]:
+    def try_filters(
+        self, filters: Sequence[tuple[Kind, int]], within: float = 1e-5
+    ) -> list[FilterTrial]:
         """Return the maxima of the likelihood, the best by BIC first.
 
         Parameters
@@ -283,12 +285,12 @@ class FilterFits:
             maxima, key=lambda trial: trial.score + trial.floor + _SAME * (trial.kind != "analogue")
         )
 
-    def _of(self, kind: Kind, order: int, within: float) -> Iterator[Tried]:
+    def _of(self, kind: Kind, order: int, within: float) -> Iterator[FilterTrial]:
         """Yield the maxima of the likelihood over the cut-off, without and with a floor."""
         scan = np.log(self._cutoffs(kind, order, self.lowest, _SCAN))
-        start = Tried(0.0, 0.0, kind, order, 1.0, True)
+        start = FilterTrial(0.0, 0.0, kind, order, 1.0, True)
 
-        def at(x: float, floor: bool) -> Tried:
+        def at(x: float, floor: bool) -> FilterTrial:
             return replace(start, cutoff=math.exp(x), floor=floor)
 
         columns = [self._columns(at(float(x), True)) for x in scan]
@@ -326,13 +328,13 @@ class FilterFits:
         lengths = np.arange(_WHOLE, 2, -1)
         return np.unique(np.concatenate([scan, BOXCAR * self.rate / lengths]))
 
-    def explains(self, trial: Tried) -> bool:
+    def explains(self, trial: FilterTrial) -> bool:
         """Return whether the filter gives the spectrum where it bends."""
         columns = self._columns(trial)
         fitted = columns @ self._powers(columns)[0]
-        return explained(self.whittle.spectrum, fitted, trial)
+        return explains_bend(self.whittle.spectrum, fitted, trial)
 
-    def limits(self, trial: Tried) -> tuple[float, float]:
+    def limits(self, trial: FilterTrial) -> tuple[float, float]:
         """Return the ends of the 95 % interval, by the profile of the likelihood.
 
         Above Nyquist the profile may have several hollows: the ends are the outermost.
@@ -365,15 +367,17 @@ class FilterFits:
             ends.append(math.exp(edge))
         return ends[0], ends[1]
 
-    def gains(self, trial: Tried) -> tuple[Array, Array, Array]:
+    def gains(self, trial: FilterTrial) -> tuple[Array, Array, Array]:
         """Return what a filter leaves of white noise, with rounding, of flicker and slow noise."""
         white, flicker, slow = gains(self.whittle.spectrum, trial)
         return white + self.rounded, flicker, slow
 
-    def _columns(self, trial: Tried) -> Array:
+    def _columns(self, trial: FilterTrial) -> Array:
         return self._behind(trial, self.gains(trial), self.slow)
 
-    def _behind(self, trial: Tried, left: tuple[Array, Array, Array], slow: Sequence[int]) -> Array:
+    def _behind(
+        self, trial: FilterTrial, left: tuple[Array, Array, Array], slow: Sequence[int]
+    ) -> Array:
         """Return the terms behind a filter, as columns."""
         white, flicker, gain = left
         indices = np.array(slow, dtype=np.int64)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from imubench_pipeline.estimators.filter_fits import Tried
+from imubench_pipeline.estimators.filter_fits import FilterTrial
 from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.typing import Array
 
@@ -50,10 +50,10 @@ class Allowed:
         Half of the 95 % interval of the logarithm of its cut-off.
     """
 
-    filter: Tried
+    filter: FilterTrial
     half_width: float
 
-    def at(self, x: float) -> Tried:
+    def at(self, x: float) -> FilterTrial:
         """Return it at a logarithm of the cut-off, Hz."""
         return replace(self.filter, cutoff=math.exp(x))
 
@@ -74,7 +74,7 @@ class OfModel:
     gained: float
 
 
-def also_after_sampling(reading: Reading, trial: Tried, rate: float) -> Reading:
+def also_after_sampling(reading: Reading, trial: FilterTrial, rate: float) -> Reading:
     """Return the reading of the same first-order filter applied to the samples.
 
     Its shape is the same, and it folds nothing into N.
@@ -93,7 +93,7 @@ def also_after_sampling(reading: Reading, trial: Tried, rate: float) -> Reading:
     )
 
 
-def drawn(readings: Sequence[Reading], number: int, rng: np.random.Generator) -> Array:
+def draw_factors(readings: Sequence[Reading], number: int, rng: np.random.Generator) -> Array:
     """Return draws of N over its value for the filter that was chosen, shape (number,).
 
     Parameters

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from imubench_pipeline.estimators.band import Band, find_band
 from imubench_pipeline.estimators.cutoff import Cutoff, find_cutoff
 from imubench_pipeline.estimators.filter_fits import PROCESSES, UNFOLDED
-from imubench_pipeline.estimators.joint_cutoff import refined
+from imubench_pipeline.estimators.joint_cutoff import refine_cutoff
 from imubench_pipeline.estimators.lines import Line, find, without_lines
-from imubench_pipeline.estimators.model_choice import Candidate, rescored
+from imubench_pipeline.estimators.model_choice import Candidate, rescore
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.spectrum import LineSpectrum, Spectrum
 from imubench_pipeline.estimators.whittle import (
@@ -117,19 +117,19 @@ class Frame:
         shared = len(times) > 0 and times.min() < _APART / (2.0 * np.pi * cutoffs[0])
         return bool(shared or max(cutoffs) < UNFOLDED * spectrum.rate)
 
-    def refined(self, spectrum: Spectrum, candidates: Sequence[Candidate]) -> Frame:
+    def refine(self, spectrum: Spectrum, candidates: Sequence[Candidate]) -> Frame:
         """Return the same behind a low-pass that is fitted together with the best of models."""
         if self.low_pass is None:
             return self
-        low_pass = refined(self.low_pass, spectrum, self.used, candidates)
+        low_pass = refine_cutoff(self.low_pass, spectrum, self.used, candidates)
         source = self.band.source.replace(self.low_pass.words, low_pass.words)
         return replace(self, low_pass=low_pass, band=replace(self.band, source=source))
 
-    def rescored(self, candidates: Sequence[Candidate]) -> list[Candidate]:
+    def rescore(self, candidates: Sequence[Candidate]) -> list[Candidate]:
         """Return models by what they explain with a cut-off of their own, the best first."""
         models = self.low_pass.models if self.low_pass is not None else {}
         gained = {terms: model.gained for terms, model in models.items()}
-        return rescored(candidates, gained)
+        return rescore(candidates, gained)
 
     @property
     def folding(self) -> float:

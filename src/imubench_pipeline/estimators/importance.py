@@ -123,7 +123,7 @@ class Weighted:
         return rng.permutation(which)
 
 
-def adapted(
+def sample_adaptively(
     log_density: Callable[[Array], Array],
     first: Mixture,
     rng: np.random.Generator,

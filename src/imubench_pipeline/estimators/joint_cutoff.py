@@ -21,8 +21,8 @@ from imubench_pipeline.estimators.filter_fits import (
     FAMILY,
     HALF_CHI_SQUARED,
     PROCESSES,
-    Tried,
-    explained,
+    FilterTrial,
+    explains_bend,
     gains,
     highest_cutoff,
 )
@@ -58,7 +58,7 @@ _SHARE = 0.05
 """Share by AIC, with its own cut-off, from which a model has a part in the interval of that."""
 
 
-def joined(candidates: Sequence[Candidate], always: Terms) -> list[Candidate]:
+def worth_joining(candidates: Sequence[Candidate], always: Terms) -> list[Candidate]:
     """Return the models for which the cut-off of a filter is fitted, the best first.
 
     Parameters
@@ -78,7 +78,7 @@ def joined(candidates: Sequence[Candidate], always: Terms) -> list[Candidate]:
     ]
 
 
-def refined(
+def refine_cutoff(
     low_pass: Cutoff, spectrum: Spectrum, clear: NDArray[np.bool_], candidates: Sequence[Candidate]
 ) -> Cutoff:
     """Return a low-pass whose cut-off is fitted together with all parameters of a model.
@@ -174,9 +174,9 @@ class _Joint:
         self._spectrum = spectrum.select(clear)
         shortest = PROCESSES / spectrum.rate
         self._plain = whittle_of(self._spectrum, 0.5 * spectrum.rate, COARSE, shortest=shortest)
-        self._states: dict[tuple[Tried, float, Terms], _State] = {}
+        self._states: dict[tuple[FilterTrial, float, Terms], _State] = {}
 
-    def behind(self, spectrum: Spectrum, trial: Tried, floor: float = 0.0) -> Behind:
+    def behind(self, spectrum: Spectrum, trial: FilterTrial, floor: float = 0.0) -> Behind:
         """Return what a filter leaves, with what stands behind it in parts of N^2."""
         white, flicker, slow = gains(spectrum, trial)
         return Behind(white + self._low_pass.rounded + floor, flicker, slow)
@@ -211,7 +211,7 @@ class _Joint:
     def explains(self, fit: _Fit) -> bool:
         """Return whether a fit gives the spectrum where it bends."""
         whittle, maximum = self._maximum(fit.allowed, fit.x, fit.terms)
-        return explained(self._spectrum, whittle.density(maximum), fit.allowed.at(fit.x))
+        return explains_bend(self._spectrum, whittle.density(maximum), fit.allowed.at(fit.x))
 
     def at(self, allowed: Allowed, x: float, terms: Terms) -> _State:
         """Return the best fit of a model at a logarithm of the cut-off."""

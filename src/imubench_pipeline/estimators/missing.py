@@ -132,7 +132,9 @@ def samples_present(
         reached += len(values)
 
 
-def divided(means: BlockMeans, segments: Sequence[tuple[int, int]]) -> tuple[tuple[int, int], ...]:
+def divide_at_holes(
+    means: BlockMeans, segments: Sequence[tuple[int, int]]
+) -> tuple[tuple[int, int], ...]:
     """Divide segments at the holes that are too long to be filled, and trim their ends.
 
     Parameters
@@ -172,7 +174,7 @@ def slow_part(
     ----------
     means : BlockMeans
     parts : sequence of (int, int)
-        First and one-past-last sample of each part of the log (`divided`).
+        First and one-past-last sample of each part of the log (`divide_at_holes`).
     model : NoiseModel
     rate : float
         Hz.
@@ -218,7 +220,7 @@ def slow_part(
     return SlowPath(np.concatenate(places), np.concatenate(values))
 
 
-def filled(
+def fill_missing(
     blocks: Iterable[Array],
     path: SlowPath,
     model: NoiseModel,

@@ -147,7 +147,7 @@ def compare(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
     ]
 
 
-def rescored(candidates: Sequence[Candidate], gained: Mapping[Terms, float]) -> list[Candidate]:
+def rescore(candidates: Sequence[Candidate], gained: Mapping[Terms, float]) -> list[Candidate]:
     """Return candidates with more explained, sorted anew.
 
     Parameters

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imubench_pipeline.estimators.importance import Mixture, adapted
+from imubench_pipeline.estimators.importance import Mixture, sample_adaptively
 from imubench_pipeline.estimators.metropolis import chain
 from imubench_pipeline.estimators.posterior_kernels import log_posteriors, mode_at
 from imubench_pipeline.estimators.whittle import Maximum, Whittle
@@ -102,7 +102,7 @@ def sample(
     target = _Target(whittle, maximum)
     wanted = draws / _WORTH
     size = 1 << max(9, math.ceil(math.log2(wanted)))
-    points = adapted(
+    points = sample_adaptively(
         target.log_density, target.first(), rng, size=size, wanted=wanted, most=_ROUNDS * size
     )
     effective = points.effective

@@ -137,7 +137,8 @@ def spectra(
     Parameters
     ----------
     blocks : iterable of ndarray
-        The log in order, in SI, without missing samples inside the segments (`missing.filled`).
+        The log in order, in SI, without missing samples inside the segments
+        (`missing.fill_missing`).
     samples : int
         L, the length of all blocks together.
     rate : float

@@ -239,7 +239,7 @@ def _cost_at(
 
 
 @njit(cache=True)
-def _polished(
+def _polish(
     places: Array,
     which: int,
     low: float,
@@ -272,7 +272,7 @@ def _polished(
 
 
 @njit(cache=True)
-def _scanned(
+def _scan(
     places: Array,
     which: int,
     low: float,
@@ -300,10 +300,10 @@ def one_process(fixed: Array, bins: Bins, with_ramp: bool, table: ShapeTable) ->
     first, step, logarithms = table
     last = first + step * (logarithms.shape[0] - 1)
     place = np.array([first])
-    best, lowest = _scanned(place, 0, first, last, fixed, bins, with_ramp, table)
+    best, lowest = _scan(place, 0, first, last, fixed, bins, with_ramp, table)
     reach = _SCAN_STEP * step
     place[0] = best
-    polished, cost = _polished(
+    polished, cost = _polish(
         place, 0, max(first, best - reach), min(last, best + reach), fixed, bins, with_ramp, table
     )
     place[0] = polished if cost < lowest else best
@@ -332,7 +332,7 @@ def two_processes(fixed: Array, bins: Bins, with_ramp: bool, table: ShapeTable) 
             if cost < lowest:
                 lowest = cost
                 pair = places.copy()
-    pair, lowest = _descended(pair, lowest, fixed, bins, with_ramp, table)
+    pair, lowest = _descend(pair, lowest, fixed, bins, with_ramp, table)
     single = one_process(fixed, bins, with_ramp, table)[0]
     for slower in range(2):
         beside = np.array([single, single])
@@ -340,17 +340,17 @@ def two_processes(fixed: Array, bins: Bins, with_ramp: bool, table: ShapeTable) 
         if high <= low:
             continue
         which = 1 if slower == 0 else 0
-        beside[which], cost = _scanned(beside, which, low, high, fixed, bins, with_ramp, table)
+        beside[which], cost = _scan(beside, which, low, high, fixed, bins, with_ramp, table)
         if cost == np.inf:
             continue
-        beside, cost = _descended(beside, cost, fixed, bins, with_ramp, table)
+        beside, cost = _descend(beside, cost, fixed, bins, with_ramp, table)
         if cost < lowest:
             pair, lowest = beside, cost
     return pair
 
 
 @njit(cache=True)
-def _descended(
+def _descend(
     pair: Array, lowest: float, fixed: Array, bins: Bins, with_ramp: bool, table: ShapeTable
 ) -> tuple[Array, float]:
     """Polish each of two correlation times in turn."""
@@ -369,7 +369,7 @@ def _descended(
                 low = max(low, best[0] + apart)
             if high <= low:
                 continue
-            polished, cost = _polished(best, g, low, high, fixed, bins, with_ramp, table)
+            polished, cost = _polish(best, g, low, high, fixed, bins, with_ramp, table)
             if cost < lowest:
                 lowest = cost
                 best[g] = polished

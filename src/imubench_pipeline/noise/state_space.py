@@ -120,7 +120,7 @@ def root_of(covariance: Array) -> Array:
     return root
 
 
-def repeated(transition: Array, noise: Array, times: int) -> tuple[Array, Array]:
+def repeat_step(transition: Array, noise: Array, times: int) -> tuple[Array, Array]:
     """Return what a step does when it is done several times, by powers of two.
 
     Parameters

@@ -182,7 +182,7 @@ def _origin(given: argparse.Namespace) -> tuple[Origin, Any]:
         if given.results:
             origin = with_estimates(origin, given.results, given.sensor, given.recording)
     if asked:
-        origin = sources.only(origin, asked)
+        origin = sources.select_channels(origin, asked)
     return origin, sensor
 
 

@@ -74,7 +74,7 @@ def from_file(path: Path) -> Origin:
     return Origin(model, f"the model file {named}", figures, [], settings.sensor)
 
 
-def only(origin: Origin, channels: Sequence[str]) -> Origin:
+def select_channels(origin: Origin, channels: Sequence[str]) -> Origin:
     """Return a model with some of its channels.
 
     Raises

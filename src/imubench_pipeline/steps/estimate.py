@@ -14,7 +14,7 @@ from imubench_pipeline.allan import AllanCurve, of_blocks
 from imubench_pipeline.allan.presence import presence
 from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators import least_squares, likelihood
-from imubench_pipeline.estimators.agreement import agreeing, disagreements
+from imubench_pipeline.estimators.agreement import disagreements, doubt_contradicted
 from imubench_pipeline.estimators.curve_limits import with_fitted_limits
 from imubench_pipeline.estimators.deterministic.courses import find_courses
 from imubench_pipeline.estimators.deterministic.verdict import deterministic_rows, verdict_of
@@ -108,7 +108,7 @@ def estimate_channel(
     into.add_findings(key, disagreements(key.channel, estimates))
     if "likelihood" in estimates:
         estimates |= {
-            method: agreeing(estimates[method], estimates["likelihood"])
+            method: doubt_contradicted(estimates[method], estimates["likelihood"])
             for method in _BY_CURVE
             if method in estimates
         }

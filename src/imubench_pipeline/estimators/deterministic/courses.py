@@ -13,7 +13,7 @@ from imubench_pipeline.estimators.deterministic.means import Means, means_of
 from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates, covariance_of_sizes
 from imubench_pipeline.estimators.deterministic.regressors import Regressor
 from imubench_pipeline.estimators.deterministic.scores import FEWEST_CYCLES, Gain
-from imubench_pipeline.estimators.deterministic.search import Searched, again, search
+from imubench_pipeline.estimators.deterministic.search import Searched, move_regressors, search
 from imubench_pipeline.typing import Array
 
 Kind = Literal["bias_step", "warm_up_drift", "periodic_drift"]
@@ -230,13 +230,13 @@ def find_courses(
         # Bursts of noise look like pulses, and are another finding.
         return Courses((), means, searched, telegraph=steps > _MOST_STEPS)
     if any(x.kind == "step" for x in searched.fit.regressors):
-        placed = _placed(blocks, means, searched.fit)
+        placed = _place_steps(blocks, means, searched.fit)
         if placed != searched.fit.regressors:
-            searched = again(ordinates, searched, placed)
-    return Courses(tuple(_described(ordinates, searched)), means, searched)
+            searched = move_regressors(ordinates, searched, placed)
+    return Courses(tuple(_describe(ordinates, searched)), means, searched)
 
 
-def _described(ordinates: Ordinates, searched: Searched) -> Iterator[Course]:
+def _describe(ordinates: Ordinates, searched: Searched) -> Iterator[Course]:
     """Yield the courses with their sizes and intervals."""
     fit, means = searched.fit, ordinates.means
     covariance = covariance_of_sizes(ordinates, fit)
@@ -325,7 +325,9 @@ def _size(amplitudes: Array) -> float:
     return float(np.hypot(*amplitudes)) if len(amplitudes) > 1 else float(amplitudes[0])
 
 
-def _placed(blocks: Callable[[], Iterable[Array]], means: Means, fit: Fit) -> tuple[Regressor, ...]:
+def _place_steps(
+    blocks: Callable[[], Iterable[Array]], means: Means, fit: Fit
+) -> tuple[Regressor, ...]:
     """Return the regressors with large steps placed to the sample, in one pass over the log.
 
     Around a step that is many times the noise of a block the place is where the squares of the

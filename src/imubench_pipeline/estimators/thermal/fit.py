@@ -19,7 +19,7 @@ from imubench_pipeline.estimators import likelihood
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.frame import Frame, frame_of
 from imubench_pipeline.estimators.likelihood import Likelihood
-from imubench_pipeline.estimators.missing import block_means, divided
+from imubench_pipeline.estimators.missing import block_means, divide_at_holes
 from imubench_pipeline.estimators.model_choice import Candidate, compare
 from imubench_pipeline.estimators.spectrum import LineSpectrum, Spectrum, block_of, spectra
 from imubench_pipeline.estimators.thermal.path import TemperaturePath
@@ -27,7 +27,7 @@ from imubench_pipeline.estimators.thermal.path_errors import without_errors
 from imubench_pipeline.estimators.thermal.products import BlockSeries, Coefficients
 from imubench_pipeline.estimators.thermal.register import Span
 from imubench_pipeline.estimators.thermal.regression import Regression, Regressors
-from imubench_pipeline.estimators.thermal.result import ThermalFit, complete, shifted
+from imubench_pipeline.estimators.thermal.result import ThermalFit, complete_log, shift_by_effect
 from imubench_pipeline.estimators.thermal.uncertainty import (
     Verdict,
     judge,
@@ -119,7 +119,7 @@ def fit_temperature(
     varies = path.range > 0.0 and path.range >= 2.0 * float(np.median(path.deviation))
     if holes:
         means = block_means(blocks(), spans)
-        spans = divided(means, spans)
+        spans = divide_at_holes(means, spans)
         plain = plain or likelihood.fit_blocks(
             blocks,
             samples,
@@ -133,7 +133,7 @@ def fit_temperature(
         )
         model, effect = plain.estimates[0].model, np.zeros(len(path.value))
         for _ in range(2):
-            log = complete(blocks, spans, model, path, effect, rate, rng)
+            log = complete_log(blocks, spans, model, path, effect, rate, rng)
             fit = _Fit(log, samples, rate, spans, path, frame, longest_lag)
             if not (fit.possible and varies):
                 break
@@ -157,8 +157,8 @@ def fit_temperature(
     def spectra_left() -> tuple[Spectrum, list[LineSpectrum]]:
         effect, log = settled.regressors.effect(settled.regression), blocks()
         if holes:
-            log = complete(blocks, spans, _model_of(settled), path, effect, rate, rng)
-        return spectra(shifted(log, path, effect, -1.0), samples, rate, spans)
+            log = complete_log(blocks, spans, _model_of(settled), path, effect, rate, rng)
+        return spectra(shift_by_effect(log, path, effect, -1.0), samples, rate, spans)
 
     lines = fit.lines
     if verdict.compensated:

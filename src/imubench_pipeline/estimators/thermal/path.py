@@ -25,8 +25,14 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import ndtri
 
-from imubench_pipeline.estimators.thermal.path_kernels import drawn, propagate
-from imubench_pipeline.estimators.thermal.register import Readings, Span, at_jumps, dwells, readings
+from imubench_pipeline.estimators.thermal.path_kernels import draw_paths, propagate
+from imubench_pipeline.estimators.thermal.register import (
+    Readings,
+    Span,
+    cut_at_jumps,
+    dwells,
+    readings,
+)
 from imubench_pipeline.typing import Array
 
 DRAWS = 24
@@ -162,7 +168,7 @@ def temperature_path(
     spread = max(float(np.nanmax(read.high) - np.nanmin(read.low)), read.step, 1e-6)
     evidence = _Evidence(read, level, spread)
     q, noise, height = evidence.best()
-    cut = at_jumps(read)
+    cut = cut_at_jumps(read)
     if cut is not read:
         jumping = _Evidence(cut, level, spread)
         *best, higher = jumping.best()
@@ -179,7 +185,7 @@ def temperature_path(
             continue
         value[part], variance[part], _, precision, shift = evidence.part(part, q, noise)
         normals = rng.standard_normal((DRAWS, part.stop - part.start, 2))
-        draws[:, part] = drawn(evidence.steps(part), q, spread, precision, shift, normals)
+        draws[:, part] = draw_paths(evidence.steps(part), q, spread, precision, shift, normals)
         draws[:, part] += evidence.dwelling(part, q, noise, variance[part], rng)
     value, draws = value + level, draws + level
     if noise < _COARSE * read.step:

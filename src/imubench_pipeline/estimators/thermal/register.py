@@ -3,10 +3,10 @@
 A temperature varies slowly. It is kept in blocks, at most `KNOTS` in a log: blocks of one sample
 where the log is no longer, else of ceil(L / KNOTS) samples.
 
-Where a temperature jumps the smooth path of its readings begins anew (`at_jumps`). A chamber that
-is set to another temperature, or a sensor that is carried out, changes within a few samples by far
-more than in the minutes around. One smooth path through that would have to be rough everywhere, and
-would say of the levels between the jumps that they are known all too well.
+Where a temperature jumps the smooth path of its readings begins anew (`cut_at_jumps`). A chamber
+that is set to another temperature, or a sensor that is carried out, changes within a few samples by
+far more than in the minutes around. One smooth path through that would have to be rough everywhere,
+and would say of the levels between the jumps that they are known all too well.
 
 Long times in one cell of the register leave more open than others (`dwells`). A path that wanders
 as it does elsewhere would have left the cell: while it stays there, it moves less, and may as well
@@ -215,7 +215,7 @@ def _common_divisor(gaps: Array) -> float:
     )
 
 
-def at_jumps(read: Readings) -> Readings:
+def cut_at_jumps(read: Readings) -> Readings:
     """Return readings with the blocks cut where the temperature jumps, and a piece between jumps.
 
     The sample of a jump follows from the mean of the block that it falls into. A single sample

@@ -106,7 +106,7 @@ def rotation(vector: ArrayLike) -> Array:
     return np.asarray(np.eye(3) + sine_part * across + cosine_part * across @ across)
 
 
-def corrected(attitude: Array, psi: Array) -> Array:
+def correct(attitude: Array, psi: Array) -> Array:
     """Return an attitude from which an error is taken off.
 
     Parameters

@@ -101,7 +101,7 @@ def white_sigma(model: NoiseModel, blocks: Blocks) -> float:
     return model.N / math.sqrt(blocks.time_in_blocks) / math.cos(blocks.latitude)
 
 
-def estimated(
+def estimate_courses(
     log: Array,
     experiment: Experiment,
     model: NoiseModel,
@@ -179,7 +179,7 @@ def _tracked(log: Array, experiment: Experiment, papers: NoiseModel) -> Course:
     return Course("known_rate", tracked.sample / experiment.rate, tracked.mean, None)
 
 
-def thinned(points: int) -> Iterator[int]:
+def thin(points: int) -> Iterator[int]:
     """Yield places of a course that show it: as many at its begin as later, and its end.
 
     Parameters

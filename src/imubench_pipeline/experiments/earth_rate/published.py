@@ -60,7 +60,7 @@ class RunDesign:
         )
 
 
-def allowed(run: RunDesign, duration: float, model: NoiseModel) -> Row:
+def allowed_sigmas(run: RunDesign, duration: float, model: NoiseModel) -> Row:
     """Return the standard deviations that noise gives the estimates of a run, rad/s.
 
     Parameters
@@ -98,7 +98,7 @@ def published_row(value: float, run: RunDesign, duration: float, model: NoiseMod
     model : NoiseModel
         As published.
     """
-    noise = allowed(run, duration, model)
+    noise = allowed_sigmas(run, duration, model)
     off = (value - EARTH_RATE) / noise["sigma"]
     verdict = "within the noise" if abs(off) <= _WITHIN else "beyond the noise"
     return noise | {

@@ -210,7 +210,7 @@ def _scheduled(
     slots = slots[(slots > half) & (slots < longest)]
     if len(slots) == 0:
         raise ValueError("the schedule has no turn within the log")
-    calm = without(blocks, disturbances([e for e in events if e.kind == "transient"]))
+    calm = leave_out_knocks(blocks, disturbances([e for e in events if e.kind == "transient"]))
     longest_shift = min(schedule.dwell / 3.0, 3.0 * schedule.tolerance)
     shift, z, unshifted = best_shift(
         calm, slots, 0.5 * schedule.turning, longest_shift, schedule.duration
@@ -274,7 +274,7 @@ def disturbances(events: Sequence[Event]) -> list[tuple[float, float]]:
     ]
 
 
-def without(blocks: LevelBlocks, knocks: Sequence[tuple[float, float]]) -> LevelBlocks:
+def leave_out_knocks(blocks: LevelBlocks, knocks: Sequence[tuple[float, float]]) -> LevelBlocks:
     """Return the blocks without those of knocks.
 
     Parameters

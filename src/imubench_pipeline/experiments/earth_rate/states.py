@@ -17,7 +17,7 @@ from imubench_pipeline.experiments.earth_rate.covariance import longest
 from imubench_pipeline.experiments.earth_rate.experiment import Blocks
 from imubench_pipeline.noise import NoiseModel, Role, Term
 from imubench_pipeline.noise.block_means import of_block_means
-from imubench_pipeline.noise.state_space import StateSpace, repeated, root_of
+from imubench_pipeline.noise.state_space import StateSpace, repeat_step, root_of
 from imubench_pipeline.typing import Array
 
 WIDE = 1.0
@@ -134,7 +134,7 @@ def _step(space: StateSpace, gap: int, size: int) -> Step:
     else:
         means = of_block_means(space, size)
         transition[:], noise[:] = means.transition[:, :m], means.process_noise
-    over, added = repeated(space.transition, space.process_noise, gap)
+    over, added = repeat_step(space.transition, space.process_noise, gap)
     return Step(transition @ over, _root(noise + transition @ added @ transition.T))
 
 

@@ -21,7 +21,7 @@ from imubench_pipeline.experiments.earth_rate.sight import (
     TurnSchedule,
     by_sight,
     disturbances,
-    without,
+    leave_out_knocks,
 )
 from imubench_pipeline.experiments.earth_rate.transients import (
     CLEAR,
@@ -205,7 +205,7 @@ def find_turning(
     doubts += more_doubts
     knocks = sorted([*knocks, *_lone(outliers(blocks, log, rate), turns, knocks)])
     knocks = [(max(start, 0.0), min(stop, schedule.duration)) for start, stop in knocks]
-    signs = without(blocks, knocks)
+    signs = leave_out_knocks(blocks, knocks)
     size = alternation(signs, stretches)
     first, more_doubts = _first_sense(first_sense, column_sense)
     doubts += more_doubts

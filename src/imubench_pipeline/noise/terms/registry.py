@@ -12,7 +12,7 @@ _STATED = ("symbol", "label", "standard_name", "word", "role", "parameters", "st
 """Class variables that every kind gives a value."""
 
 
-def registered(*kinds: type[Term]) -> tuple[type[Term], ...]:
+def register_terms(*kinds: type[Term]) -> tuple[type[Term], ...]:
     """Return the kinds of terms, each of which lacks nothing.
 
     Parameters
