@@ -30,35 +30,29 @@ def doubt_contradicted(estimate: Estimate, reference: Estimate) -> Estimate:
     reference : Estimate
         By the likelihood, of the same channel.
     """
-
-    def of(
-        parameters: Mapping[str, Parameter], references: Mapping[str, Parameter]
-    ) -> dict[str, Parameter]:
-        return {
-            name: _doubt_if_contradicted(name, parameter, references.get(name))
-            for name, parameter in parameters.items()
-        }
-
     references = dict(reference.parameters)
     if reference.further and "B_curve" in reference.curve:
         # Of several terms each has its own B; one alone stands for all of them.
         references["B"] = reference.curve["B_curve"]
     return replace(
         estimate,
-        parameters=of(estimate.parameters, references),
-        curve=of(estimate.curve, reference.curve),
+        parameters=_judged(estimate.parameters, references),
+        curve=_judged(estimate.curve, reference.curve),
     )
 
 
-def _doubt_if_contradicted(
-    name: str, parameter: Parameter, reference: Parameter | None
-) -> Parameter:
-    if parameter.value is None or parameter.status not in ("ok", "at_bound") or reference is None:
-        return parameter
-    reason = _contradiction(name, parameter, reference)
-    if reason is None:
-        return parameter
-    return replace(parameter, status="doubtful", reason=reason)
+def _judged(
+    parameters: Mapping[str, Parameter], references: Mapping[str, Parameter]
+) -> dict[str, Parameter]:
+    judged = dict(parameters)
+    for name, parameter in parameters.items():
+        reference = references.get(name)
+        if parameter.value is None or parameter.status not in ("ok", "at_bound") or not reference:
+            continue
+        reason = _contradiction(name, parameter, reference)
+        if reason is not None:
+            judged[name] = replace(parameter, status="doubtful", reason=reason)
+    return judged
 
 
 def _contradiction(name: str, parameter: Parameter, reference: Parameter) -> str | None:

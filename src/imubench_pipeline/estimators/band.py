@@ -141,7 +141,7 @@ def _looks_like_a_filter(whittle: Whittle, maximum: Maximum) -> bool:
     """
     if not len(maximum.times) or maximum.times[0] > _AS_A_FILTER / whittle.spectrum.rate:
         return False
-    process = maximum.powers[-1] * whittle.gauss_markov(float(maximum.times[0]))[-1]
+    process = maximum.process_powers[-1] * whittle.gauss_markov(float(maximum.times[0]))[-1]
     white = maximum.powers[maximum.terms.linear.index("N")] * whittle.column("N")[-1]
     return bool(process > _SHOWS_BESIDE * white)
 

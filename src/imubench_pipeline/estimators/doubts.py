@@ -270,11 +270,9 @@ def _of_white_noise(
         return frame.low_pass.or_process, *_range(N, frame.low_pass.N_behind)
     fast = maximum.times < _AS_FAST / spectrum.rate
     if fast.any() and frame.low_pass.behind is None:
-        power = maximum.powers[len(maximum.terms.linear) :][fast]
-        shapes = [
-            frame.whole(spectrum).gauss_markov(float(time))[0] for time in maximum.times[fast]
-        ]
-        before = math.sqrt(N**2 + float(power @ np.array(shapes)))
+        whole = frame.whole(spectrum)
+        shapes = [whole.gauss_markov(float(time))[0] for time in maximum.times[fast]]
+        before = math.sqrt(N**2 + float(maximum.process_powers[fast] @ np.array(shapes)))
         time = float(maximum.times[fast].max())
         reason = (
             f"a process of T_B = {time:.3g} s, a few samples, may be the sensor's low-pass with "

@@ -30,7 +30,6 @@ CANDIDATES = (
 """Models that are always tried; then a ramp and quantization noise are added to the best, the
 latter to all of them where it is favoured."""
 
-
 LIKE_A_WALK = 1 / 10
 """Part of the longest correlation time beyond which a process looks like a random walk."""
 

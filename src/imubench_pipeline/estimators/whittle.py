@@ -86,9 +86,14 @@ class Maximum:
         return float(np.sqrt(self.powers[self.terms.linear.index(letter)]))
 
     @property
+    def process_powers(self) -> Array:
+        """B^2 of each Gauss-Markov process."""
+        return self.powers[len(self.terms.linear) :]
+
+    @property
     def biases(self) -> Array:
         """B of each Gauss-Markov process."""
-        return np.asarray(np.sqrt(self.powers[len(self.terms.linear) :]))
+        return np.asarray(np.sqrt(self.process_powers))
 
 
 @dataclass(frozen=True)
@@ -276,9 +281,7 @@ class Whittle:
             for power, column in zip(maximum.powers, matrix.T, strict=True)
         ]
         step = 0.05
-        for power, time in zip(
-            maximum.powers[len(maximum.terms.linear) :], maximum.times, strict=True
-        ):
+        for power, time in zip(maximum.process_powers, maximum.times, strict=True):
             low, high = (
                 max(time / (1 + step), self.times[0]),
                 min(time * (1 + step), self.times[-1]),

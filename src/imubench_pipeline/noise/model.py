@@ -26,7 +26,6 @@ from imubench_pipeline.typing import Array
 _LONGEST_FLICKER = 1e5
 """Tau in s up to which a state space follows flicker noise, where nothing else is asked."""
 
-
 _OWN_PLACE = (Quantization, WhiteNoise, Flicker, RandomWalk, Deterministic)
 """Kinds of terms that a model has in a parameter of their own."""
 

@@ -34,7 +34,6 @@ _ROUNDS = 2
 _LEAST_WEIGHT = 0.05
 """Of an ordinate that regressors explain nearly whole."""
 
-
 _WALKS = np.concatenate(([0.0], np.geomspace(0.03, 100.0, 18)))
 """K that are tried, as deviation at the lowest frequency over that of the other noise."""
 

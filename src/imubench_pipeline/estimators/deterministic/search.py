@@ -50,7 +50,6 @@ _AS_GOOD = 0.5
 
 _WITHOUT_WALK = Terms("NF", NOISE.gauss_markov)
 
-
 MOST = 16
 """Regressors that are taken; a log with more steps is one of telegraph noise."""
 

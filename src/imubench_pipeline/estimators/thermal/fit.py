@@ -362,12 +362,10 @@ def _described(
     if verdict.compensated:
         regressors = settled.regressors.also(used=np.ones(len(fit.used), dtype=np.bool_))
         weights = np.zeros(len(fit.used))
-        weights[fit.used] = fit.chosen.ordinates / settled.whittle.density(
-            settled.candidates[0].maximum
-        )
+        best = settled.candidates[0].maximum
+        weights[fit.used] = fit.chosen.ordinates / settled.whittle.density(best)
         left = regressors.without(fit.spectrum, settled.regression, weights)
-        terms = settled.candidates[0].terms
-        left = without_errors(left, fit.used, settled.whittle, terms, verdict.path_errors)
+        left = without_errors(left, fit.used, settled.whittle, best.terms, verdict.path_errors)
         effect = regressors.effect(settled.regression)
         without = likelihood.fit_spectrum(left, find_frame(left, lines), rng=rng)
     added = [path.means(*place, effect) for place in fit.series.places]

@@ -47,7 +47,6 @@ _BY_CHANCE = 1e-3
 _ROUNDED = 0.2
 """Part of a step by which readings in decimals may miss its multiples."""
 
-
 _STEPS = 1.5
 """Least significant bits that a jump is at least."""
 

@@ -50,7 +50,6 @@ _AS_SHORT = 1.02
 """Width of the interval from 0 over that of the shortest, up to which it is that from 0: draws are
 uneven."""
 
-
 _UPPER_OF_RMS = 2.24
 """The 97.5 % limit of the size of a normal variate, over its standard deviation."""
 

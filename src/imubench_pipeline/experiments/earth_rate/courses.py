@@ -36,7 +36,6 @@ METHODS = ("pairs", "triples", "filter", "smoother", "known_rate")
 
 _KEPT = 400
 
-
 Range = dict[str, float]
 
 
