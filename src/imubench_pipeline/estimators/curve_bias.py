@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.estimators.estimate import CURVE, Estimate, Parameter
+from imubench_pipeline.estimators.estimate import CURVE, SIGMAS, Estimate, Parameter
 from imubench_pipeline.estimators.identifiability import NOT_IDENTIFIED
 from imubench_pipeline.estimators.intervals import as_good, mixture_limits
 from imubench_pipeline.estimators.model_choice import Candidate
@@ -42,7 +42,6 @@ _BETWEEN = 49
 _DRAWS = 1000
 """Draws of each model that are used."""
 
-_WIDTH_OF_INTERVAL = 3.92
 _PEAK_SHAPE = float(gauss_markov_shape(np.array([PEAK_TAU]), 1.0)[0])
 
 
@@ -243,7 +242,7 @@ def _bias(best: Sequence[Models], drawn: Sequence[Models], longest: float) -> Pa
     if first[0] == 0.0:
         return Parameter(None, "absent", "the data do not ask for it", 0.0, upper)
     reason = None
-    error = math.log(upper / lower) / _WIDTH_OF_INTERVAL if lower > 0.0 else math.inf
+    error = math.log(upper / lower) / (2.0 * SIGMAS) if lower > 0.0 else math.inf
     if best[having[0]].terms.gauss_markov and at[0] >= longest * (1.0 - 1e-9):
         reason = f"its processes still rise at {longest:.4g} s, a ninth of the log"
     elif error > NOT_IDENTIFIED:
@@ -341,7 +340,7 @@ def _time_of_lowest(
         reason = "models that the log does not rule out have no minimum within a ninth of it"
         return Parameter(None, "not_identified", reason, limits[0], None, fitted=value)
     lower, upper = limits
-    if lower and upper and math.log(upper / lower) > NOT_IDENTIFIED * _WIDTH_OF_INTERVAL:
+    if lower and upper and math.log(upper / lower) > NOT_IDENTIFIED * (2.0 * SIGMAS):
         # Such as a curve with two minima, of which either may be the lower one.
         reason = "a log of this length does not tell it to 50 %; only its interval is given"
         return Parameter(None, "not_identified", reason, lower, upper, fitted=value)

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.estimators.estimate import Parameter
+from imubench_pipeline.estimators.estimate import SIGMAS, Parameter
 from imubench_pipeline.estimators.filter_fits import (
     FAMILY,
     FEWEST_BINS,
@@ -29,7 +29,6 @@ from imubench_pipeline.estimators.filter_fits import (
     frequencies_in_bins,
 )
 from imubench_pipeline.estimators.filter_readings import (
-    SIGMAS,
     Allowed,
     OfModel,
     Reading,

@@ -8,11 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from imubench_pipeline.estimators.estimate import SIGMAS
 from imubench_pipeline.estimators.filter_fits import FilterTrial
 from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.typing import Array
-
-SIGMAS = 1.96
 
 _TWIN = 0.1
 """Weight of the same first-order filter applied to the samples: it looks like that before the

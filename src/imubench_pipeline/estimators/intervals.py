@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from imubench_pipeline.estimators.band import Band
-from imubench_pipeline.estimators.estimate import FAMILY, Estimate, Parameter
+from imubench_pipeline.estimators.estimate import FAMILY, SIGMAS, Estimate, Parameter
 from imubench_pipeline.estimators.identifiability import (
     NOT_IDENTIFIED,
     NOT_IDENTIFIED_LEVEL,
@@ -25,7 +25,6 @@ from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
 from imubench_pipeline.typing import Array
 
 _AT_BOUND = 0.985
-_WIDTH_OF_INTERVAL = 3.92
 _ABOUT_AS_GOOD = 2.0
 _MOST_ABOVE = 2.3
 """Ratio of the upper limit to a value beyond which it is no number to quote. Below, limits go far
@@ -204,7 +203,7 @@ def _parameter(
     most = NOT_IDENTIFIED_WALK if name == "K" else NOT_IDENTIFIED_LEVEL
     if name.startswith(("B", "T_B")) and lower > 0.0:
         # B and T_B trade off along a ridge that the bound, which is local, does not see.
-        error = max(error, math.log(upper / lower) / _WIDTH_OF_INTERVAL)
+        error = max(error, math.log(upper / lower) / (2.0 * SIGMAS))
         most = NOT_IDENTIFIED_TIME if name.startswith("T_B") else NOT_IDENTIFIED
     if name == "R" and lower < 0.0 < upper:
         reason = "its interval contains 0; only that is given"

@@ -24,13 +24,10 @@ from imubench_pipeline.estimators.curve_bias import (
     lowest_point,
     models_of,
 )
-from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.estimators.estimate import SIGMAS, Estimate, Parameter
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.variance_covariance import variance_covariance
 from imubench_pipeline.typing import Array
-
-_SIGMAS = 1.96
-"""Half the width of a 95 % interval."""
 
 _MOST_ERROR = 0.5
 """Relative standard error beyond which a parameter is not identified."""
@@ -88,7 +85,7 @@ class Errors:
         than 1.96 standard errors may be 0.
         """
         error = self.of(name) if held is None else held
-        low, high = -_SIGMAS * error, _SIGMAS * error
+        low, high = -SIGMAS * error, SIGMAS * error
         for term in doubtful:
             if term == name or not self.of(term) < _NOTHING_KNOWN:
                 continue
@@ -98,10 +95,10 @@ class Errors:
             rest = error
             if held is None:
                 rest = math.sqrt(max(error**2 - slope * self._at(name, term), 0.0))
-            low = min(low, moved - _SIGMAS * rest)
-            high = max(high, moved + _SIGMAS * rest)
-        most = _SIGMAS * _NOTHING_KNOWN
-        may_be_zero = name != "T_B" and 2.0 * error > 1.0 / _SIGMAS
+            low = min(low, moved - SIGMAS * rest)
+            high = max(high, moved + SIGMAS * rest)
+        most = SIGMAS * _NOTHING_KNOWN
+        may_be_zero = name != "T_B" and 2.0 * error > 1.0 / SIGMAS
         return 0.0 if may_be_zero else math.exp(max(low, -most)), math.exp(min(high, most))
 
     def _at(self, first: str, second: str) -> float:
@@ -280,7 +277,7 @@ def _lowest_point(model: NoiseModel, errors: Errors, curve: AllanCurve) -> dict[
             reason = f"its relative standard error is {_percent(error)}, above 50 %"
             described[name] = Parameter(None, "not_identified", reason, fitted=parameter.value)
             continue
-        factor = math.exp(_SIGMAS * error)
+        factor = math.exp(SIGMAS * error)
         assert parameter.value is not None
         described[name] = replace(
             parameter, lower=parameter.value / factor, upper=parameter.value * factor
@@ -329,4 +326,4 @@ def _wide_limits(name: str, value: float, errors: Errors) -> tuple[float | None,
     if name == "T_B":
         low, high = errors.factors(name, [])
         return (value * low, value * high) if known else (None, None)
-    return 0.0, value * (1.0 + _SIGMAS * error) if known else None
+    return 0.0, value * (1.0 + SIGMAS * error) if known else None

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.special import betainc, gammainccinv
 
+from imubench_pipeline.estimators.estimate import SIGMAS
 from imubench_pipeline.estimators.spectrum import LineSpectrum, Spectrum
 from imubench_pipeline.noise import NoiseModel, Sinusoid
 from imubench_pipeline.typing import Array
@@ -283,11 +284,11 @@ def _line(
         place_error = math.hypot(place_error, step * across / math.sqrt(12.0 * n))
     # A line of amplitude A has the power A^2 / 4 at +f; block means see it damped.
     amplitude = 2.0 * math.sqrt(power * step) / _gain(place, spectrum.block, rate)
-    low, high = (math.sqrt(max(0.0, 1.0 + sign * 1.96 * power_error)) for sign in (-1, 1))
+    low, high = (math.sqrt(max(0.0, 1.0 + sign * SIGMAS * power_error)) for sign in (-1, 1))
     return Line(
         frequency=place,
-        frequency_lower=place - 1.96 * place_error,
-        frequency_upper=place + 1.96 * place_error,
+        frequency_lower=place - SIGMAS * place_error,
+        frequency_upper=place + SIGMAS * place_error,
         amplitude=amplitude,
         amplitude_lower=amplitude * low,
         amplitude_upper=amplitude * high,

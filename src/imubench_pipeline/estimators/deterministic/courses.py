@@ -14,6 +14,7 @@ from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates,
 from imubench_pipeline.estimators.deterministic.regressors import Regressor
 from imubench_pipeline.estimators.deterministic.scores import FEWEST_CYCLES, Gain
 from imubench_pipeline.estimators.deterministic.search import Searched, move_regressors, search
+from imubench_pipeline.estimators.estimate import SIGMAS
 from imubench_pipeline.typing import Array
 
 Kind = Literal["bias_step", "warm_up_drift", "periodic_drift"]
@@ -32,7 +33,6 @@ _LARGE = 8.0
 _MOST_STEPS = 8
 """More, among as many regressors as are taken, are telegraph noise."""
 
-_LIMIT = 1.96
 _HALF_LOG_LIKELIHOOD = 1.92
 _MOST_LEVERAGE = 0.5
 """Part of what a log tells of its random walk that may go to what is taken out."""
@@ -252,7 +252,7 @@ def _describe(ordinates: Ordinates, searched: Searched) -> Iterator[Course]:
         end = start + len(part.mean) * means.interval
         size = _size(amplitudes)
         along = amplitudes / size if len(amplitudes) > 1 else np.ones(1)
-        error = _LIMIT * math.sqrt(float(along @ covariance[own, own] @ along))
+        error = SIGMAS * math.sqrt(float(along @ covariance[own, own] @ along))
         low, high = _limits(ordinates, fit, regressor)
         if regressor.kind not in ("exponential", "restart"):
             # Where it is taken to be has been chosen to make it large; and of a swing that is

@@ -16,7 +16,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from imubench_pipeline.estimators import likelihood
-from imubench_pipeline.estimators.estimate import Parameter
+from imubench_pipeline.estimators.estimate import SIGMAS, Parameter
 from imubench_pipeline.estimators.frame import Frame, frame_of
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.missing import block_means, divide_at_holes
@@ -385,7 +385,7 @@ def _described(
         of_reference if verdict.compensated else 0.0,
     )
     bias = Parameter(
-        mean - shift, lower=mean - shift - 1.96 * spread, upper=mean - shift + 1.96 * spread
+        mean - shift, lower=mean - shift - SIGMAS * spread, upper=mean - shift + SIGMAS * spread
     )
     return ThermalFit(
         path.mean,
@@ -410,7 +410,7 @@ def _nothing(plain: Likelihood, path: TemperaturePath, fit: _Fit, reason: str) -
         unknown,
         unknown,
         unknown,
-        Parameter(mean, lower=mean - 1.96 * spread, upper=mean + 1.96 * spread),
+        Parameter(mean, lower=mean - SIGMAS * spread, upper=mean + SIGMAS * spread),
         False,
         reason,
         plain,

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from imubench_pipeline.estimators.estimate import Parameter
+from imubench_pipeline.estimators.estimate import SIGMAS, Parameter
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.posterior import sample
 from imubench_pipeline.estimators.spectrum import Spectrum
@@ -212,7 +212,7 @@ def _confused(
     value = regressors.path.value
     if abs(value[-1] - value[0]) > _MONOTONE * regressors.path.range:
         z = both.beta[0] / math.sqrt(both.covariance[0, 0])
-        if excluded and abs(z) < 1.96:
+        if excluded and abs(z) < SIGMAS:
             return "the temperature only rises or falls, and a drift with time explains as much"
     if not excluded and _explained(regressors, regression) > _EXPLAINED:
         return (

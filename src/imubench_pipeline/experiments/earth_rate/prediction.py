@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ from imubench_pipeline.experiments.earth_rate.bound import (
 )
 from imubench_pipeline.experiments.earth_rate.experiment import Experiment
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.typing import Array, Row
+from imubench_pipeline.typing import Array
 
 _SUMMED = 64
 """Dwells that are computed; the information of more grows by what the latter half of them add."""
@@ -41,6 +42,8 @@ _CURVE = 40
 
 _BETWEEN = 15
 """Numbers of dwells about the best of these."""
+
+Row = dict[str, Any]
 
 _POINTS = 60
 """Numbers of turns on the curve over time."""
@@ -316,22 +319,20 @@ def _rows(outlook: Outlook, dwell: float, goals: Sequence[float], run_time: floa
         time = (turns + 1) * dwell + turns * outlook.turning
         # What is reached: the last turn that is needed may give far more than was asked for.
         sigma = outlook.sigma_after(dwell, turns)
-        yield {"of": "goal", "goal": goal, **_row(dwell, turns, time, sigma)}
+        yield {"of": "goal", "goal": goal} | _row(dwell, turns, time, sigma)
     course = outlook.against_time(dwell, min(max(most, 2), _MOST_TURNS))
     shown = np.unique(np.rint(np.geomspace(1, len(course.turns), _POINTS)).astype(np.int64)) - 1
     for k in shown.tolist():
         point = int(course.turns[k]), float(course.time[k]), float(course.sigma[k])
-        yield {"of": "time", **_row(dwell, *point)}
+        yield {"of": "time"} | _row(dwell, *point)
     curve = outlook.over_dwell(run_time)
     low, high = curve.nearly_best()
     for k, number in enumerate(curve.dwells.tolist()):
         length = float(curve.dwell[k])
-        yield {
-            "of": "dwell",
-            "best": k == curve.best,
-            "nearly_best": low <= length <= high,
-            **_row(length, number - 1, run_time, float(curve.sigma[k])),
-        }
+        yield (
+            {"of": "dwell", "best": k == curve.best, "nearly_best": low <= length <= high}
+            | _row(length, number - 1, run_time, float(curve.sigma[k]))
+        )
 
 
 def _row(dwell: float, turns: int, time: float, sigma: float) -> Row:

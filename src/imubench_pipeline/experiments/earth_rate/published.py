@@ -10,6 +10,7 @@ into the mean, or a sense that is wrong.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,8 @@ from imubench_pipeline.experiments.earth_rate.experiment import Experiment
 from imubench_pipeline.experiments.earth_rate.kalman import RateFilter
 from imubench_pipeline.experiments.earth_rate.pairs import by_pairs
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.typing import Row
+
+Row = dict[str, Any]
 
 _WITHIN = 1.96
 """Standard deviations, of either sign, within which 95 % of the estimates lie."""
@@ -99,8 +101,7 @@ def published_row(value: float, run: RunDesign, duration: float, model: NoiseMod
     noise = allowed_sigmas(run, duration, model)
     off = (value - EARTH_RATE) / noise["sigma"]
     verdict = "within the noise" if abs(off) <= _WITHIN else "beyond the noise"
-    return {
-        **noise,
+    return noise | {
         "duration": duration,
         "published": value,
         "truth": EARTH_RATE,
