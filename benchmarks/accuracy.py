@@ -67,7 +67,7 @@ def of_log(case: Case, others: int, number: int) -> tuple[Found, str, float]:
     found: Found = {estimate.method: dict(estimate.parameters) for estimate in result.estimates}
     if number < others:
         limit = _LIMITED * case.rate
-        whittle = whittle_of(spectrum.taken(spectrum.upper <= limit), limit)
+        whittle = whittle_of(spectrum.select(spectrum.upper <= limit), limit)
         best = whittle.maximum(PAPERS)
         values = [best.parameter("N"), float(best.biases[0]), float(best.times[0])]
         values.append(best.parameter("K"))
@@ -83,7 +83,7 @@ def of_log(case: Case, others: int, number: int) -> tuple[Found, str, float]:
         for peer in PEERS:
             printed = peer.estimate(log, case.rate)
             found[peer.name] = {name: Parameter(printed[name]) for name in PARAMETERS}
-    return found, result.candidates[0].found.terms.name, highest(result, case.rate)
+    return found, result.candidates[0].terms.name, highest(result, case.rate)
 
 
 def table(case: Case, found: list[tuple[Found, str, float]]) -> Iterator[str]:

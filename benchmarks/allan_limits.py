@@ -217,9 +217,7 @@ def of_log(case: Case, number: int) -> Held:
         rows.append(np.array([(low <= true) & (true <= high) for low, high in limits]))
     chosen = found.candidates[0]
     explained = chosen.goodness.verdict == "explained"
-    return Held(
-        curve.cluster_size / case.rate, rows[0], rows[1], explained, chosen.found.terms.name
-    )
+    return Held(curve.cluster_size / case.rate, rows[0], rows[1], explained, chosen.terms.name)
 
 
 _KNOWN: dict[tuple[str, tuple[int, ...]], Array] = {}

@@ -78,7 +78,7 @@ def of_log(case: Case, number: int) -> Found:
     spectrum, lines = spectra([log], samples, case.rate)
     result = fit_spectrum(spectrum, frame_of(spectrum, lines), rng=rng)
     figures = {one.method: {**one.parameters, **one.curve} for one in result.estimates}
-    return Found(figures, result.candidates[0].found.terms.name, highest(result, case.rate))
+    return Found(figures, result.candidates[0].terms.name, highest(result, case.rate))
 
 
 def table(case: Case, found: Sequence[Found]) -> Iterator[str]:

@@ -94,7 +94,7 @@ def of_log(case: Case, number: int) -> Found:
     rng = np.random.default_rng([number, CASES.index(case)])
     found = fit(log_of(case.model, rng), RATE, rng=rng)
     return (
-        found.candidates[0].found.terms.name,
+        found.candidates[0].terms.name,
         dict(found.estimates[0].parameters),
         _flickers(found),
         found.candidates[0].goodness.verdict,
@@ -104,7 +104,7 @@ def of_log(case: Case, number: int) -> Found:
 
 def _flickers(found: Likelihood) -> bool:
     """Tell whether the best model with flicker beats the best with one Gauss-Markov process."""
-    terms = [candidate.found.terms for candidate in found.candidates]
+    terms = [candidate.terms for candidate in found.candidates]
     flicker = next(i for i, t in enumerate(terms) if "F" in t.linear and not t.gauss_markov)
     process = next(i for i, t in enumerate(terms) if "F" not in t.linear and t.gauss_markov == 1)
     return flicker < process

@@ -196,7 +196,7 @@ def found(logs: int, first: int) -> None:
                 place = rng.uniform(0.05, 0.95) * hours * 3600.0
                 log[round(place * rate) :] += size * sigma
                 near = 0
-                for course in searched(log, rate).found:
+                for course in searched(log, rate).courses:
                     away = abs(course.start - place) < 2.0 * noise.processes[0][1]
                     if course.kind == "bias_step" and away and not near:
                         near = 1
@@ -268,7 +268,7 @@ def false(logs: int, first: int) -> None:
                 verdict = verdict_of("gyro_x", "rad/s", courses)
                 spent += time.perf_counter() - start
                 counts["logs"] += 1
-                counts["with a course"] += bool(courses.found) or courses.telegraph
+                counts["with a course"] += bool(courses.courses) or courses.telegraph
                 counts["with a finding"] += bool(verdict.findings)
                 for finding in verdict.findings:
                     counts[finding.finding] += 1

@@ -8,7 +8,7 @@ from scipy.signal import butter, lfilter, sosfilt
 
 from imubench_pipeline.estimators.filter_fits import highest_cutoff
 from imubench_pipeline.estimators.frame import frame_of
-from imubench_pipeline.estimators.joint_cutoff import refined
+from imubench_pipeline.estimators.joint_cutoff import refine_cutoff
 from imubench_pipeline.estimators.likelihood import Likelihood, fit
 from imubench_pipeline.estimators.low_pass import Filter
 from imubench_pipeline.estimators.model_choice import PAPERS, compare
@@ -57,7 +57,7 @@ def test_each_model_of_the_noise_has_a_cutoff_of_its_own():
     found = behind_a_filter(0)
     models = found.low_pass.models
     assert PAPERS in models and len(models) > 1
-    chosen = found.candidates[0].found.terms
+    chosen = found.candidates[0].terms
     for terms, of_model in models.items():
         assert of_model.gained >= -1e-3
         best = max(of_model.readings, key=lambda one: one.weight)
@@ -111,7 +111,7 @@ def test_no_mean_is_shorter_than_of_two_samples(seed):
     means = [one for one in frame.low_pass.allowed if one.filter.kind == "boxcar"]
     assert means
     candidates = compare(frame.whittle(spectrum), quantization=False)
-    found = refined(
+    found = refine_cutoff(
         replace(frame.low_pass, allowed=means, kind="boxcar"), spectrum, frame.used, candidates[:2]
     )
     highest = Filter("boxcar", 1, highest_cutoff("boxcar", 1, rate)).half_power(rate)

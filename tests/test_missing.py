@@ -6,8 +6,8 @@ from imubench_pipeline.estimators.missing import (
     BLOCK,
     BlockMeans,
     block_means,
-    divided,
-    filled,
+    divide_at_holes,
+    fill_missing,
     slow_part,
 )
 from imubench_pipeline.estimators.spectral_shapes import Shapes
@@ -26,8 +26,8 @@ def complete(
 ) -> np.ndarray:
     spans = segments or ((0, len(log)),)
     means = block_means([log], spans)
-    path = slow_part(means, divided(means, spans), model, RATE, rng)
-    return np.concatenate(list(filled([log], path, model, RATE, rng)))
+    path = slow_part(means, divide_at_holes(means, spans), model, RATE, rng)
+    return np.concatenate(list(fill_missing([log], path, model, RATE, rng)))
 
 
 def of_blocks(mean: np.ndarray, count: np.ndarray) -> BlockMeans:
@@ -104,8 +104,8 @@ def test_a_filled_log_does_not_depend_on_how_it_is_cut(rng) -> None:
     np.testing.assert_array_equal(cut.count, whole.count)
     np.testing.assert_allclose(cut.mean, whole.mean, rtol=1e-9)
     path = slow_part(whole, [(0, 5000)], MODEL, RATE, np.random.default_rng(1))
-    one = filled([log], path, MODEL, RATE, np.random.default_rng(2))
-    other = filled(pieces, path, MODEL, RATE, np.random.default_rng(2))
+    one = fill_missing([log], path, MODEL, RATE, np.random.default_rng(2))
+    other = fill_missing(pieces, path, MODEL, RATE, np.random.default_rng(2))
     np.testing.assert_array_equal(np.concatenate(list(one)), np.concatenate(list(other)))
 
 
@@ -129,7 +129,7 @@ def test_a_long_hole_divides_and_a_shorter_one_does_not() -> None:
         log = np.zeros(200_000)
         log[64_000 : 64_000 + hole] = np.nan
         spans = segments or ((0, 200_000),)
-        return divided(block_means([log], spans), spans)
+        return divide_at_holes(block_means([log], spans), spans)
 
     assert parts(60_000) == ((0, 200_000),)
     # A hole of more than 1024 whole blocks; the ends go to the ends of blocks.
@@ -240,7 +240,7 @@ def test_a_model_without_slow_noise_is_filled_with_its_level(rng) -> None:
 def test_the_ends_of_a_long_hole_stay_at_the_level_of_the_log(rng) -> None:
     log = 9.81 + simulate(MODEL, RATE, 200_000, rng)
     log[50_010:130_030] = np.nan
-    parts = divided(block_means([log], [(0, len(log))]), [(0, len(log))])
+    parts = divide_at_holes(block_means([log], [(0, len(log))]), [(0, len(log))])
     result = complete(log, MODEL, rng)
     for start, stop in parts:
         assert np.abs(result[start:stop] - 9.81).max() < 0.5

@@ -198,7 +198,7 @@ def test_a_log_of_a_few_samples_is_refused(rng) -> None:
 def test_chosen_bins_stay_together(rng) -> None:
     spectrum = spectrum_of(rng.standard_normal(3000))
     chosen = spectrum.frequency < 1.0
-    taken = spectrum.taken(chosen)
+    taken = spectrum.select(chosen)
     np.testing.assert_array_equal(taken.density, spectrum.density[chosen])
     np.testing.assert_array_equal(taken.cross, spectrum.cross[chosen])
     assert (taken.rate, taken.mean) == (spectrum.rate, spectrum.mean)

@@ -19,7 +19,7 @@ def courses_of(log: Array, segments: tuple[tuple[int, int], ...] | None = None) 
 def test_a_log_of_noise_alone_has_none(walk: float) -> None:
     log = static_log(3, walk=walk)
     found = courses_of(log)
-    assert found.found == ()
+    assert found.courses == ()
     assert not found.telegraph
     assert np.concatenate(list(found.less([log]))) == pytest.approx(log, abs=0.0)
 
@@ -31,7 +31,7 @@ def test_flicker_noise_has_none() -> None:
     normal = rng.standard_normal((2, len(frequency)))
     scale = np.sqrt(0.5 * density * 400_000 * RATE)
     log = np.fft.irfft(scale * (normal[0] + 1j * normal[1]))[:200_000]
-    assert courses_of(log + 1e-5 * rng.standard_normal(len(log))).found == ()
+    assert courses_of(log + 1e-5 * rng.standard_normal(len(log))).courses == ()
 
 
 def test_steps_are_found_with_their_sizes_and_places() -> None:
@@ -39,9 +39,9 @@ def test_steps_are_found_with_their_sizes_and_places() -> None:
     truth = [(2500.0, 4.0 * SIGMA), (6000.0, -5.0 * SIGMA)]
     stepped = log + sum(size * (times(log) >= place) for place, size in truth)
     found = courses_of(stepped)
-    assert [course.kind for course in found.found] == ["bias_step"] * 2
+    assert [course.kind for course in found.courses] == ["bias_step"] * 2
     for course, (place, size) in zip(
-        sorted(found.found, key=lambda one: one.start), truth, strict=True
+        sorted(found.courses, key=lambda one: one.start), truth, strict=True
     ):
         assert course.size_lower < size < course.size_upper
         assert course.start == pytest.approx(place, abs=10.0)
@@ -52,7 +52,7 @@ def test_steps_are_found_with_their_sizes_and_places() -> None:
 def test_a_step_far_beyond_the_noise_is_placed_to_the_sample() -> None:
     log = static_log(6)
     found = courses_of(log + 0.1 * (times(log) >= 4000.35))
-    (step,) = found.found
+    (step,) = found.courses
     assert step.size == pytest.approx(0.1, rel=0.01)
     left = np.concatenate(list(found.less([log + 0.1 * (times(log) >= 4000.35)]))) - log
     assert np.ptp(left) < 3.0 * SIGMA
@@ -60,7 +60,7 @@ def test_a_step_far_beyond_the_noise_is_placed_to_the_sample() -> None:
 
 def test_a_warm_up_is_found_with_its_time_constant() -> None:
     log = static_log(7)
-    (warm,) = courses_of(log + 20.0 * SIGMA * np.exp(-times(log) / 600.0)).found
+    (warm,) = courses_of(log + 20.0 * SIGMA * np.exp(-times(log) / 600.0)).courses
     assert warm.kind == "warm_up_drift"
     assert warm.size_lower < 20.0 * SIGMA < warm.size_upper
     assert warm.time_lower is not None
@@ -70,7 +70,9 @@ def test_a_warm_up_is_found_with_its_time_constant() -> None:
 
 def test_periodic_drift_is_found_with_its_period() -> None:
     log = static_log(8)
-    (drift,) = courses_of(log + 3.0 * SIGMA * np.sin(2.0 * np.pi * times(log) / 1200.0 + 1.0)).found
+    (drift,) = courses_of(
+        log + 3.0 * SIGMA * np.sin(2.0 * np.pi * times(log) / 1200.0 + 1.0)
+    ).courses
     assert drift.kind == "periodic_drift"
     assert drift.size_lower < 3.0 * SIGMA < drift.size_upper
     assert drift.time == pytest.approx(1200.0, rel=0.01)
@@ -81,7 +83,7 @@ def test_telegraph_noise_is_named_and_left() -> None:
     flips = np.cumsum(np.random.default_rng(1).random(len(log)) < 1.0 / 300.0 / RATE) % 2
     found = courses_of(log + 8.0 * SIGMA * flips)
     assert found.telegraph
-    assert found.found == ()
+    assert found.courses == ()
 
 
 def test_a_step_between_segments_is_none_and_one_inside_is_found() -> None:
@@ -89,7 +91,7 @@ def test_a_step_between_segments_is_none_and_one_inside_is_found() -> None:
     half = len(log) // 2
     log[half:] += 1.0
     log += 5.0 * SIGMA * (times(log) >= 3000.0)
-    (step,) = courses_of(log, ((0, half), (half, len(log)))).found
+    (step,) = courses_of(log, ((0, half), (half, len(log)))).courses
     assert step.start == pytest.approx(3000.0, abs=10.0)
     assert step.size_lower < 5.0 * SIGMA < step.size_upper
 
@@ -100,17 +102,17 @@ def test_steps_are_found_among_missing_samples() -> None:
     rng = np.random.default_rng(2)
     log[rng.random(len(log)) < 0.05] = np.nan
     log[90_000:110_000] = np.nan
-    (step,) = courses_of(log).found
+    (step,) = courses_of(log).courses
     assert step.size_lower < 5.0 * SIGMA < step.size_upper
 
 
 def test_a_log_too_short_to_be_searched_has_none() -> None:
-    assert courses_of(np.random.default_rng(3).standard_normal(100)).found == ()
+    assert courses_of(np.random.default_rng(3).standard_normal(100)).courses == ()
 
 
 def test_a_part_of_a_cycle_is_found_though_a_walk_would_hide_it() -> None:
     log = static_log(12, walk=0.0)
-    (drift,) = courses_of(log + 40.0 * SIGMA * np.sin(2.0 * np.pi * times(log) / 15_000.0)).found
+    (drift,) = courses_of(log + 40.0 * SIGMA * np.sin(2.0 * np.pi * times(log) / 15_000.0)).courses
     assert drift.kind == "periodic_drift"
     assert drift.time_lower is not None
     assert drift.time_upper is not None
@@ -121,7 +123,7 @@ def test_a_part_of_a_cycle_is_found_though_a_walk_would_hide_it() -> None:
 def test_a_weak_part_of_a_cycle_rivals_the_walk_that_it_looks_like() -> None:
     log = static_log(12, walk=0.0)
     found = courses_of(log + 3.0 * SIGMA * np.sin(2.0 * np.pi * times(log) / 15_000.0))
-    assert found.found == ()
+    assert found.courses == ()
     assert "periodic drift" in (found.against_random_walk or "")
 
 
@@ -147,8 +149,8 @@ def test_another_bias_after_each_pause_is_no_random_walk(seed: int, size: float)
     told = "pauses" in (found.against_random_walk or "")
     assert told or K_left < 2.0 * alone.fit.noise.parameter("K") + 2e-6
     if size >= 20.0:
-        assert {course.kind for course in found.found} == {"bias_step"}
-        inside = [round((course.start / 10_800 - 0.1) / 0.16, 1) % 1 for course in found.found]
+        assert {course.kind for course in found.courses} == {"bias_step"}
+        inside = [round((course.start / 10_800 - 0.1) / 0.16, 1) % 1 for course in found.courses]
         assert inside == [0.0] * len(inside)
 
 

@@ -4,8 +4,12 @@ import math
 
 import pytest
 
-from imubench_pipeline.experiments.earth_rate.courses import thinned
-from imubench_pipeline.experiments.earth_rate.published import RunDesign, allowed, published_row
+from imubench_pipeline.experiments.earth_rate.courses import thin
+from imubench_pipeline.experiments.earth_rate.published import (
+    RunDesign,
+    allowed_sigmas,
+    published_row,
+)
 from imubench_pipeline.experiments.earth_rate.simulation import (
     ASSUMED_LATITUDE,
     ASSUMED_TURNING,
@@ -30,7 +34,7 @@ def test_the_runs_of_the_paper(minutes: float, published: float, off: float) -> 
 
 
 def test_white_noise_is_the_least() -> None:
-    found = allowed(PAPER, 720.0, PAPER_MODEL)
+    found = allowed_sigmas(PAPER, 720.0, PAPER_MODEL)
     # 24 dwells of 28 s.
     white = math.radians(0.0122) / math.sqrt(24 * 28.0) / math.cos(ASSUMED_LATITUDE)
     assert found["white"] == pytest.approx(white)
@@ -47,7 +51,7 @@ def test_the_demonstration_has_the_runs_of_the_paper() -> None:
 
 
 def test_a_course_is_shown_on_few_points_with_both_ends() -> None:
-    assert list(thinned(5)) == [0, 1, 2, 3, 4]
-    some = list(thinned(100_000))
+    assert list(thin(5)) == [0, 1, 2, 3, 4]
+    some = list(thin(100_000))
     assert some[0] == 0 and some[-1] == 99_999 and 300 < len(some) <= 400
     assert some == sorted(set(some)) and some[1] <= 2

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import cholesky, solve_triangular
 
-from imubench_pipeline.experiments.earth_rate.bound import whitened
+from imubench_pipeline.experiments.earth_rate.bound import whiten
 from imubench_pipeline.experiments.earth_rate.covariance import of_means
 from imubench_pipeline.experiments.earth_rate.simulation import PAPER_MODEL, paper_run
 from imubench_pipeline.noise import NoiseModel
@@ -20,7 +20,7 @@ def test_it_is_the_root_of_the_covariance_of_the_samples(name, experiment, longe
     columns = np.random.default_rng(seed).standard_normal((len(blocks), 3))
     root = cholesky(of_blocks(MODELS[name], blocks), lower=True)
     np.testing.assert_allclose(
-        whitened(MODELS[name], blocks, columns),
+        whiten(MODELS[name], blocks, columns),
         solve_triangular(root, columns, lower=True),
         rtol=1e-6,
         atol=1e-6,
@@ -38,7 +38,7 @@ def test_many_blocks_lose_no_digits(model):
     columns = np.column_stack([blocks.seen, np.ones(len(blocks))])
     root = cholesky(of_means(model, blocks), lower=True)
     wanted = solve_triangular(root, columns, lower=True)
-    found = whitened(model, blocks, columns)
+    found = whiten(model, blocks, columns)
     np.testing.assert_allclose(found, wanted, rtol=1e-6, atol=1e-7 * np.abs(wanted).max())
 
 
@@ -46,4 +46,4 @@ def test_a_mean_without_noise_is_refused():
     # The random walk is 0 at the first sample, and known from then on to the last that was seen.
     blocks = paper_run(1.0).blocks(1)
     with pytest.raises(ValueError, match="without noise"):
-        whitened(NoiseModel(K=1.0), blocks, np.ones((len(blocks), 1)))
+        whiten(NoiseModel(K=1.0), blocks, np.ones((len(blocks), 1)))

@@ -1,6 +1,6 @@
 import pytest
 
-from imubench_pipeline.estimators.agreement import agreeing, disagreements
+from imubench_pipeline.estimators.agreement import disagreements, doubt_contradicted
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 
 KNOWN = Estimate(
@@ -34,14 +34,14 @@ def other(method: str = "weighted", **parameters: Parameter) -> Estimate:
     ],
 )
 def test_a_value_that_the_likelihood_rules_out_is_doubtful(N: Parameter, status: str) -> None:
-    found = agreeing(other(N=N), KNOWN).parameters["N"]
+    found = doubt_contradicted(other(N=N), KNOWN).parameters["N"]
     assert (found.status, found.value) == (status, N.value)
     if status == "doubtful":
         assert found.reason is not None and "between 0.98 and 1.02" in found.reason
 
 
 def test_a_value_of_what_the_likelihood_does_not_tell_is_doubtful() -> None:
-    found = agreeing(
+    found = doubt_contradicted(
         other("curve", T_B=Parameter(30.0), K=Parameter(1.0, lower=0.5, upper=2.0)), KNOWN
     )
     assert {one.status for one in found.parameters.values()} == {"doubtful"}
@@ -52,7 +52,7 @@ def test_a_value_of_what_the_likelihood_does_not_tell_is_doubtful() -> None:
 def test_where_several_terms_make_the_bias_that_of_the_curve_is_compared() -> None:
     terms = {"B": Parameter(1.0, lower=0.9, upper=1.1), "T_B": Parameter(3.0, lower=2.0, upper=4.0)}
     several = Estimate("likelihood", KNOWN.parameters | terms, [terms], curve=KNOWN.curve)
-    assert agreeing(other(B=Parameter(2.1)), several).parameters["B"].status == "ok"
+    assert doubt_contradicted(other(B=Parameter(2.1)), several).parameters["B"].status == "ok"
 
 
 def test_two_n_that_differ_beyond_their_intervals_are_a_finding() -> None:

@@ -47,7 +47,7 @@ def lost_power(coefficients: Coefficients, highest: float) -> float:
 
 
 def fitted_n(spectrum: Spectrum, highest: float, terms: Terms) -> float:
-    used = spectrum.taken(spectrum.upper <= highest * (1 + 1e-9))
+    used = spectrum.select(spectrum.upper <= highest * (1 + 1e-9))
     return whittle_of(used, highest).maximum(terms).parameter("N")
 
 
@@ -139,7 +139,7 @@ def test_slow_noise_is_the_same_through_two_taps(rng) -> None:
         log = simulate(model, RATE, 400_000, rng)
         straight, bent = spectrum_of(log[1000:]), spectrum_of(filtered(log, TWO_TAPS))
         band = band_of(bent).highest
-        used = [s.taken(s.upper <= band) for s in (straight, bent)]
+        used = [s.select(s.upper <= band) for s in (straight, bent)]
         first, second = (whittle_of(s, band).maximum(terms) for s in used)
         assert second.parameter("K") == pytest.approx(first.parameter("K"), rel=0.02)
         assert second.parameter("N") == pytest.approx(first.parameter("N"), rel=0.01)

@@ -5,7 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from imubench_pipeline.estimators.carried_lines import MOST, STRONGEST, carried, joined_finding
+from imubench_pipeline.estimators.carried_lines import (
+    MOST,
+    STRONGEST,
+    carried_sinusoids,
+    joined_finding,
+)
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.lines import Line
 from imubench_pipeline.estimators.spectral_findings import line_findings
@@ -27,7 +32,7 @@ def model_of(lines: list[dict[str, Parameter]]) -> NoiseModel:
 
 def test_few_lines_are_carried_as_they_are() -> None:
     lines = [*comb(MOST), *comb(5, "band")]
-    found = carried(lines)
+    found = carried_sinusoids(lines)
     assert [one["frequency"].value for one in found] == [line.frequency for line in lines[:MOST]]
     assert line_findings([vars(line) | {"channel": "gyro_x"} for line in lines])[1:] == []
 
@@ -35,7 +40,7 @@ def test_few_lines_are_carried_as_they_are() -> None:
 @pytest.mark.parametrize("number", [MOST + 1, 363, 1000])
 def test_many_lines_keep_their_power_and_that_of_their_integral(number: int) -> None:
     lines = comb(number)
-    found = carried(lines)
+    found = carried_sinusoids(lines)
     assert len(found) == MOST
     model = model_of(found)
     amplitudes = np.array([line.amplitude for line in lines])

@@ -126,9 +126,9 @@ def draws_of(*candidates: Candidate, spread: float = 0.05) -> dict[Terms, Poster
     found = {}
     for one in candidates:
         factor = np.exp(spread * rng.standard_normal((4000, 1)))
-        found[one.found.terms] = Posterior(
-            np.sqrt(one.found.powers) * factor,
-            np.tile(one.found.times, (4000, 1)),
+        found[one.terms] = Posterior(
+            np.sqrt(one.maximum.powers) * factor,
+            np.tile(one.maximum.times, (4000, 1)),
             np.zeros(4000),
             0.3,
         )

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from imubench_pipeline.estimators.importance import Mixture, Weighted, adapted
+from imubench_pipeline.estimators.importance import Mixture, Weighted, sample_adaptively
 
 LEVELS = np.array([0.025, 0.5, 0.975])
 ERROR = np.array([0.008, 0.03, 0.008])
@@ -16,7 +16,7 @@ def quantiles(found: Weighted, rng: np.random.Generator) -> np.ndarray:
 def test_a_correlated_normal_distribution_far_from_the_first_mixture_is_found(rng) -> None:
     mean, covariance = np.array([3.0, -2.0]), np.array([[0.5, 0.45], [0.45, 0.5]])
     target = stats.multivariate_normal(mean, covariance)
-    found = adapted(target.logpdf, WIDE, rng, size=1024, wanted=2000, most=12_288)
+    found = sample_adaptively(target.logpdf, WIDE, rng, size=1024, wanted=2000, most=12_288)
     assert found.effective >= 2000
     chance = stats.norm(mean, np.sqrt(np.diag(covariance))).cdf(quantiles(found, rng))
     assert (np.abs(chance - LEVELS[:, None]) < ERROR[:, None]).all(), chance
@@ -35,7 +35,7 @@ def test_a_curved_ridge_and_an_end_keep_their_quantiles(rng) -> None:
         np.array([[0.0, 0.0], [-0.7, 0.5], [1.5, 2.0]]),
         np.array([np.eye(2), 0.3 * np.eye(2), np.eye(2)]),
     )
-    found = adapted(logarithm, first, rng, size=2048, wanted=4000, most=40_960)
+    found = sample_adaptively(logarithm, first, rng, size=2048, wanted=4000, most=40_960)
     assert found.effective >= 4000
     x = stats.truncnorm(-1.0, np.inf)
     chance = x.cdf(quantiles(found, rng)[:, 0])
@@ -54,7 +54,7 @@ def test_two_modes_keep_their_shares(rng) -> None:
     first = Mixture(
         np.array([0.5, 0.5]), np.array([[-2.0, 0.0], [2.0, 0.0]]), np.array([np.eye(2)] * 2)
     )
-    found = adapted(logarithm, first, rng, size=2048, wanted=2000, most=20_480)
+    found = sample_adaptively(logarithm, first, rng, size=2048, wanted=2000, most=20_480)
     assert found.effective >= 2000
     assert found.weights[found.points[:, 0] < 0].sum() == pytest.approx(0.2, abs=0.03)
 
@@ -75,7 +75,7 @@ def test_points_are_drawn_as_often_as_they_weigh(rng) -> None:
 
 def test_too_few_points_are_returned_as_they_are(rng) -> None:
     narrow = stats.multivariate_normal([40.0, 40.0], 1e-6 * np.eye(2))
-    found = adapted(narrow.logpdf, WIDE, rng, size=256, wanted=1000, most=512)
+    found = sample_adaptively(narrow.logpdf, WIDE, rng, size=256, wanted=1000, most=512)
     assert len(found.points) == 512
     assert found.effective < 100
 

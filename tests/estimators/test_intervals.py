@@ -21,7 +21,7 @@ def test_a_process_that_is_taken_for_a_walk_is_within_the_limits(seed: int) -> N
     # Two hours of a correlation time of five minutes: BIC with its unit root takes the walk.
     truth = NoiseModel(N=4.7e-4, B=7.8e-4, T_B=300.0)
     found = fitted(truth, seed)
-    assert found.candidates[0].found.terms.name == "N+K"
+    assert found.candidates[0].terms.name == "N+K"
     B, K = (found.estimates[0].parameters[name] for name in ("B", "K"))
     # The process is about as good, and BIC alone is no reason to say that it is not there.
     assert (B.status, B.value) == ("not_identified", None)

@@ -141,7 +141,7 @@ def assert_same(one: Likelihood, other: Likelihood, rel: float = 1e-5, **scale: 
             assert_close(twin.lower, parameter.lower, factor, noise)
             assert_close(twin.upper, parameter.upper, factor, noise)
     best, others = (found.candidates[0] for found in (one, other))
-    assert best.found.terms == others.found.terms
+    assert best.terms == others.terms
     assert others.goodness.deviance == pytest.approx(best.goodness.deviance, rel=1e-4)
 
 
@@ -185,7 +185,7 @@ def test_intervals_are_as_narrow_as_the_bound_allows(truth: dict[str, float], lo
     ("truth", "name", "logs"), [(MTI_7, "N+GM+K", 6), (FLICKER, "N+F", 3), ({"N": 1e-3}, "N", 2)]
 )
 def test_the_right_model_is_chosen(truth: dict[str, float], name: str, logs: int) -> None:
-    chosen = [found_in(NoiseModel(**truth), i).candidates[0].found.terms.name for i in range(logs)]
+    chosen = [found_in(NoiseModel(**truth), i).candidates[0].terms.name for i in range(logs)]
     assert chosen.count(name) >= logs - 1, chosen
 
 

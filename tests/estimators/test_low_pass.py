@@ -68,7 +68,7 @@ def test_the_ends_of_the_transform_are_what_is_left_in_a_deep_stopband() -> None
     log = np.fft.irfft((lines[0] + 1j * lines[1]) * np.sqrt(1 << 21), 1 << 21)
     spectrum, _ = spectra([log], len(log), RATE)
     deep = (spectrum.frequency > 17.0) & (spectrum.frequency < 21.0)
-    part = spectrum.taken(deep)
+    part = spectrum.select(deep)
     leak = one.leak(part.frequency, part.length, RATE)
     assert (one.white(part.frequency, RATE) < 0.2 * leak).all()
     assert np.average(part.density / leak) == pytest.approx(1.0, abs=0.3)

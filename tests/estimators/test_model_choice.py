@@ -15,7 +15,7 @@ from imubench_pipeline.estimators.model_choice import (
     Candidate,
     compare,
     disagreement,
-    rescored,
+    rescore,
 )
 from imubench_pipeline.estimators.spectrum import Spectrum, spectra
 from imubench_pipeline.estimators.whittle import Maximum, Terms, whittle_of
@@ -51,11 +51,11 @@ def flicker(B: float, samples: int, rng: np.random.Generator) -> np.ndarray:
 
 def chosen(make: Callable[[], np.ndarray], logs: int) -> Counter[str]:
     """How often each model is the best."""
-    return Counter(candidates_of(make())[0].found.terms.name for _ in range(logs))
+    return Counter(candidates_of(make())[0].terms.name for _ in range(logs))
 
 
 def by_name(candidates: list[Candidate]) -> dict[str, Candidate]:
-    return {candidate.found.terms.name: candidate for candidate in candidates}
+    return {candidate.terms.name: candidate for candidate in candidates}
 
 
 def transform(samples: int) -> np.ndarray:
@@ -107,7 +107,7 @@ def short_log(rng: np.random.Generator) -> np.ndarray:
 
 def in_place_of_a_walk(candidate: Candidate, duration: float) -> float:
     """What is added to the BIC: of a process that lasts for a fiftieth of the log, of R and Q."""
-    found = candidate.found
+    found = candidate.maximum
     added = 6.0 * (found.terms.ramp + ("Q" in found.terms.linear))
     if found.terms.ramp and found.parameter("K") == 0.0:
         return added + 4.0
@@ -128,7 +128,7 @@ def test_bic_and_aic_differ_as_by_hand(short_log: np.ndarray) -> None:
     }
     # Without a process the best fit is found anew; with one its density is.
     for name in ("N+GM", "N+GM+K"):
-        found = candidates[name].found
+        found = candidates[name].maximum
         density = found.parameter("N") ** 2 + process_density(
             float(found.biases[0]), float(found.times[0]), SHORT
         )
@@ -185,8 +185,8 @@ def test_scores_follow_from_the_costs(rng) -> None:
     for name, candidate in names.items():
         number = parameters.get(name, name.count("+") + 1 + name.count("GM"))
         added = in_place_of_a_walk(candidate, 30_000 / RATE)
-        assert candidate.bic == pytest.approx(2 * candidate.found.cost + number * penalty + added)
-        assert candidate.aic == pytest.approx(2 * candidate.found.cost + number * 2)
+        assert candidate.bic == pytest.approx(2 * candidate.maximum.cost + number * penalty + added)
+        assert candidate.aic == pytest.approx(2 * candidate.maximum.cost + number * 2)
     for scores, weights in (
         ([c.bic for c in candidates], [c.weight for c in candidates]),
         ([c.aic for c in candidates], [c.share for c in candidates]),
@@ -208,7 +208,7 @@ def test_each_candidate_is_judged_by_its_own_fit(rng) -> None:
     assert candidates["N"].goodness.verdict == "not explained"
     for name, candidate in candidates.items():
         number = name.count("+") + 1 + name.count("GM")
-        found = candidate.found
+        found = candidate.maximum
         # The ramp is taken out of the data, not added to the density.
         ramp = found.ramp * (np.arange(len(log)) / RATE) if "R" in name else 0.0
         data = spectrum_of(log - ramp).density
@@ -232,7 +232,7 @@ def test_a_model_with_more_terms_is_never_further_from_the_data(rng) -> None:
         NoiseModel(N=N, B=3e-3),
         NoiseModel(K=1e-3),
     ):
-        found = [c.found for c in candidates_of(simulate(model, RATE, 30_000, rng))]
+        found = [c.maximum for c in candidates_of(simulate(model, RATE, 30_000, rng))]
         for more in found:
             for fewer in found:
                 if contains(more.terms, fewer.terms):
@@ -263,8 +263,8 @@ def test_all_three_of_the_papers_are_told_where_they_are_strong(rng) -> None:
     times, levels, names = [], [], Counter[str]()
     for _ in range(10):
         candidates = candidates_of(simulate(model, RATE, 100_000, rng))
-        names[candidates[0].found.terms.name] += 1
-        found = by_name(candidates)[PAPERS.name].found
+        names[candidates[0].terms.name] += 1
+        found = by_name(candidates)[PAPERS.name].maximum
         times.append(float(found.times[0]))
         levels.append(float(found.biases[0]))
     assert names["N+GM+K"] >= 8
@@ -279,9 +279,9 @@ def test_flicker_noise_is_flicker_noise_and_no_process(rng) -> None:
     for _ in range(10):
         log = N * np.sqrt(RATE) * rng.standard_normal(samples) + flicker(B, samples, rng)
         candidates = candidates_of(log)
-        names[candidates[0].found.terms.name] += 1
+        names[candidates[0].terms.name] += 1
         candidate = by_name(candidates)
-        levels.append(candidate["N+F"].found.parameter("F"))
+        levels.append(candidate["N+F"].maximum.parameter("F"))
         lead.append(candidate["N+GM"].bic - candidate["N+F"].bic)
     assert names["N+F"] >= 8
     assert min(lead) > 6
@@ -307,7 +307,7 @@ def test_two_processes_far_apart_are_told(rng) -> None:
 
     candidates = candidates_of(two())
     pair = by_name(candidates)["N+GM+GM"]
-    np.testing.assert_allclose(pair.found.times, [1.0, 100.0], rtol=0.6)
+    np.testing.assert_allclose(pair.maximum.times, [1.0, 100.0], rtol=0.6)
     assert pair.bic < by_name(candidates)["N+GM"].bic - 10
     assert pair.bic < by_name(candidates)["N+F"].bic - 10
 
@@ -320,10 +320,10 @@ def test_a_ramp_is_tried_beside_a_random_walk_only(rng) -> None:
         NoiseModel(N=N, B=3e-3),
     ):
         candidates = candidates_of(simulate(model, RATE, 50_000, rng))
-        ramps = [c.found.terms for c in candidates if c.found.terms.ramp]
+        ramps = [c.terms for c in candidates if c.terms.ramp]
         assert len(ramps) == 1
         assert "K" in ramps[0].linear
-        assert all(c.found.ramp == 0 for c in candidates if not c.found.terms.ramp)
+        assert all(c.maximum.ramp == 0 for c in candidates if not c.terms.ramp)
 
 
 def test_a_ramp_far_beyond_the_random_walk_is_found(rng) -> None:
@@ -331,12 +331,12 @@ def test_a_ramp_far_beyond_the_random_walk_is_found(rng) -> None:
     with_ramp, without = [], []
     for _ in range(5):
         candidates = candidates_of(simulate(NoiseModel(N=N, K=K, R=R), RATE, 50_000, rng))
-        best = candidates[0].found
+        best = candidates[0].maximum
         assert best.terms.ramp
         # The slope of a walk between the ends of D s is known to K / sqrt(D).
         assert best.ramp == pytest.approx(R, abs=4 * K / np.sqrt(1000))
         with_ramp.append(best.parameter("K"))
-        without.append(by_name(candidates)["N+K"].found.parameter("K"))
+        without.append(by_name(candidates)["N+K"].maximum.parameter("K"))
     # Some twenty ordinates show K; a ramp that is not a term of the model makes it larger.
     assert np.mean(with_ramp) == pytest.approx(K, rel=0.3)
     assert np.mean(without) > 1.6 * np.mean(with_ramp)
@@ -349,17 +349,17 @@ def test_a_random_walk_is_no_ramp(rng) -> None:
 
 def test_quantization_is_tried_where_it_is_asked_for_only(rng) -> None:
     log = simulate(NoiseModel(Q=1e-4, N=N), RATE, 50_000, rng)
-    best = candidates_of(log)[0].found
+    best = candidates_of(log)[0].maximum
     assert best.terms.name == "Q+N"
     assert best.parameter("Q") == pytest.approx(1e-4, rel=0.02)
     assert best.parameter("N") == pytest.approx(N, rel=0.02)
-    assert not any("Q" in c.found.terms.linear for c in candidates_of(log, quantization=False))
+    assert not any("Q" in c.terms.linear for c in candidates_of(log, quantization=False))
 
 
 @pytest.mark.parametrize(("part", "tried"), [(0.09, False), (0.11, True), (0.5, True)])
 def test_quantization_is_tried_where_the_band_shows_it(rng, part: float, tried: bool) -> None:
     log = simulate(NoiseModel(Q=2e-5, N=N), RATE, 20_000, rng)
-    names = [c.found.terms.name for c in fit(log, RATE, band=part * RATE).candidates]
+    names = [c.terms.name for c in fit(log, RATE, band=part * RATE).candidates]
     assert any(name.startswith("Q+") for name in names) == tried
 
 
@@ -367,11 +367,11 @@ def test_quantization_is_tried_where_the_band_shows_it(rng, part: float, tried: 
 def test_models_of_more_parameters_than_a_quarter_of_the_bins_are_left_out(rng, bins: int) -> None:
     log = simulate(NoiseModel(N=N, K=1e-2), RATE, bins + 1, rng)
     candidates = candidates_of(log)
-    assert len(candidates[0].found.terms.name) > 0
+    assert len(candidates[0].terms.name) > 0
     for terms in CANDIDATES:
-        there = any(c.found.terms == terms for c in candidates)
+        there = any(c.terms == terms for c in candidates)
         assert there == (terms.parameters < bins // 4)
-    assert max(c.found.terms.parameters for c in candidates) < bins // 4
+    assert max(c.terms.parameters for c in candidates) < bins // 4
     assert sum(c.weight for c in candidates) == pytest.approx(1.0)
 
 
@@ -397,7 +397,7 @@ def test_a_ramp_must_be_the_better_and_more_so_in_place_of_a_walk() -> None:
         whittle = whittle_of(spectra([log], len(log), 5.0)[0], 2.5)
         penalty = np.log(len(whittle.spectrum.density))
         for candidate in compare(whittle, quantization=False):
-            found = candidate.found
+            found = candidate.maximum
             if found.terms.ramp:
                 alone = found.parameter("K") == 0.0
                 seen.add(alone)
@@ -410,20 +410,20 @@ def test_what_models_gain_counts_for_their_scores_and_their_order(rng: np.random
     candidates = candidates_of(simulate(NoiseModel(N=N), RATE, 4_000, rng), quantization=False)
     second = candidates[1]
     gain = 0.5 * (second.bic - candidates[0].bic) + 1.0
-    found = rescored(candidates, {second.found.terms: gain})
-    assert found[0].found is second.found
+    found = rescore(candidates, {second.terms: gain})
+    assert found[0].maximum is second.maximum
     assert found[0].bic == pytest.approx(candidates[0].bic - 2.0)
     assert found[0].aic == pytest.approx(second.aic - 2.0 * gain)
     assert sum(one.share for one in found) == pytest.approx(1.0)
     ratio = found[0].weight / found[1].weight
     assert ratio == pytest.approx(np.exp(0.5 * (found[1].bic - found[0].bic)))
-    assert [one.found for one in rescored(candidates, {})] == [one.found for one in candidates]
+    assert [one.maximum for one in rescore(candidates, {})] == [one.maximum for one in candidates]
 
 
 def test_a_model_with_a_ramp_gains_what_it_gains_without(rng: np.random.Generator) -> None:
     candidates = candidates_of(simulate(NoiseModel(N=N), RATE, 4_000, rng), quantization=False)
-    ramped = next(one for one in candidates if one.found.terms.ramp)
-    plain = replace(ramped.found.terms, ramp=False)
-    found = rescored(candidates, {plain: 3.0})
-    again = next(one for one in found if one.found is ramped.found)
+    ramped = next(one for one in candidates if one.terms.ramp)
+    plain = replace(ramped.terms, ramp=False)
+    found = rescore(candidates, {plain: 3.0})
+    again = next(one for one in found if one.maximum is ramped.maximum)
     assert again.bic == pytest.approx(ramped.bic - 6.0)

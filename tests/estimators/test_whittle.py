@@ -195,7 +195,7 @@ def test_the_exact_density_of_flicker_and_quantization_gives_them_back() -> None
     first = np.concatenate(([0.0], np.cumsum(spectrum.ordinates)[:-1])).astype(int)
     density = np.add.reduceat(density, first) / spectrum.ordinates
     # The ends of the log bend flicker noise in the lowest ordinates.
-    later = replace(spectrum, density=density).taken(np.arange(len(density)) >= SINGLE)
+    later = replace(spectrum, density=density).select(np.arange(len(density)) >= SINGLE)
     found = whittle_to(later, 8).maximum(Terms("QNFK"))
     assert found.parameter("F") == pytest.approx(8e-3, rel=5e-3)
     assert found.parameter("N") == pytest.approx(1e-3, rel=5e-3)

@@ -25,7 +25,7 @@ from imubench_pipeline.noise import (
     WhiteNoise,
     terms,
 )
-from imubench_pipeline.noise.terms.registry import registered
+from imubench_pipeline.noise.terms.registry import register_terms
 from imubench_pipeline.recordings.fitness import SCALES
 from imubench_pipeline.report.practical import page_unit
 from imubench_pipeline.report.static_figures.names import SYMBOLS, TERM_NAMES
@@ -56,7 +56,7 @@ def test_a_term_without_a_part_cannot_be_made_nor_registered() -> None:
     with pytest.raises(TypeError, match="abstract"):
         Forgetful(1.0)  # type: ignore[abstract]  # wrong on purpose
     with pytest.raises(TypeError, match=r"Forgetful lacks block_covariance, .*state_space"):
-        registered(WhiteNoise, Forgetful)
+        register_terms(WhiteNoise, Forgetful)
 
 
 @pytest.mark.parametrize(
@@ -88,14 +88,14 @@ def test_a_term_without_a_part_cannot_be_made_nor_registered() -> None:
 )  # fmt: skip
 def test_a_term_that_says_it_wrong_is_refused(kinds: tuple[type[Term], ...], what: str) -> None:
     with pytest.raises(TypeError, match=what):
-        registered(*kinds)
+        register_terms(*kinds)
 
 
 @pytest.mark.parametrize("name", ["symbol", "label", "standard_name", "word", "role", "states"])
 def test_a_term_that_says_nothing_is_refused(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delattr(WhiteNoise, name)
     with pytest.raises(TypeError, match=f"WhiteNoise lacks the class variable {name}"):
-        registered(WhiteNoise)
+        register_terms(WhiteNoise)
 
 
 def test_every_kind_is_registered() -> None:

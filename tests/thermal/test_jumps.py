@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.estimators.thermal.path import temperature_path
-from imubench_pipeline.estimators.thermal.register import at_jumps, readings, step_of
+from imubench_pipeline.estimators.thermal.register import cut_at_jumps, readings, step_of
 
 SAMPLES = 120_000
 LEVELS = np.array([21.3, 17.8, 33.1, 24.6, 38.9, 12.2])
@@ -25,7 +25,7 @@ def test_the_sample_of_each_jump_is_found(step):
     # On the edge of a block of 15, at its first and last sample, and within it.
     jumps = np.array([15_000, 30_001, 45_014, 70_007, 90_008])
     read = readings([np.round(stepping(jumps) / step) * step], [(0, SAMPLES)])
-    cut = at_jumps(read)
+    cut = cut_at_jumps(read)
     assert jumps_of(cut) == jumps.tolist()
     # The blocks still follow each other, and hold as many readings.
     assert np.array_equal(cut.end[:-1], cut.begin[1:])
@@ -37,7 +37,7 @@ def test_the_sample_of_each_jump_is_found(step):
 def test_jumps_belong_to_their_segments():
     segments = [(0, 50_000), (60_000, SAMPLES)]
     truth = stepping(np.array([20_000, 55_000, 80_000]), LEVELS[:4])
-    cut = at_jumps(readings([truth], segments))
+    cut = cut_at_jumps(readings([truth], segments))
     assert jumps_of(cut) == [20_000, 60_000, 80_000]
     assert [cut.begin[part.start] for part in cut.parts] == [0, 60_000]
 
@@ -56,7 +56,7 @@ def test_a_temperature_that_does_not_jump_is_left_as_it_is(kind):
         "end": np.where(np.arange(SAMPLES) < SAMPLES - 20, 20.0, 30.0),
     }[kind]
     read = readings([np.round(truth * 16.0) / 16.0], [(0, SAMPLES)])
-    assert at_jumps(read) is read
+    assert cut_at_jumps(read) is read
 
 
 def test_a_path_jumps_within_a_sample():

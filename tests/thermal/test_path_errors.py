@@ -48,7 +48,7 @@ def test_errors_far_below_the_noise_leave_it_as_it_is(whittle):
 def test_bins_that_are_not_fitted_are_left_as_they_are(whittle):
     errors, used = errors_of(whittle), whittle.spectrum.frequency < 0.1
     both = replace(whittle.spectrum, density=whittle.spectrum.density + errors)
-    below = whittle.taken(both, used)
+    below = whittle.select(both, used)
     left = without_errors(both, used, below, Terms("NK"), errors)
     np.testing.assert_array_equal(left.density[~used], both.density[~used])
     assert (left.density[:3] < both.density[:3]).all()

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.special import gammaincinv, ndtri
 
 from imubench_pipeline.allan.quadratic_forms import LOWER_TAIL
+from imubench_pipeline.typing import Array
 
 _FEWEST_CLUSTERS = 30
 _MOST_CLUSTERS = 1 << 12
@@ -17,9 +18,7 @@ _ALL_LAGS = 2048
 _TOWARDS_TAIL = 1.4
 
 
-def noise_exponent(
-    theta: NDArray[np.float64], present: NDArray[np.integer[Any]] | None, n: int
-) -> int | None:
+def noise_exponent(theta: Array, present: NDArray[np.integer[Any]] | None, n: int) -> int | None:
     """Tell the noise type from the lag-1 autocorrelation of adjacent cluster means.
 
     Parameters
@@ -67,7 +66,7 @@ def noise_exponent(
     raise AssertionError("the loop returns at its last turn")
 
 
-def _without_line(values: NDArray[np.float64], good: NDArray[np.bool_]) -> NDArray[np.float64]:
+def _without_line(values: Array, good: NDArray[np.bool_]) -> Array:
     time = np.arange(len(values), dtype=np.float64)
     time -= time[good].mean()
     level = values[good].mean()
@@ -75,7 +74,7 @@ def _without_line(values: NDArray[np.float64], good: NDArray[np.bool_]) -> NDArr
     return np.asarray(values - level - slope * time)
 
 
-def _lag_one(values: NDArray[np.float64], good: NDArray[np.bool_]) -> float | None:
+def _lag_one(values: Array, good: NDArray[np.bool_]) -> float | None:
     pairs = int(np.count_nonzero(good[1:] & good[:-1]))
     number = int(np.count_nonzero(good))
     if pairs < _FEWEST_CLUSTERS - 3:
@@ -127,13 +126,13 @@ def _lags(n: int, longest: int) -> NDArray[np.int64]:
     return np.union1d(lags[(lags >= 1) & (lags <= longest)], [longest])
 
 
-def _sum_of_all(lags: NDArray[np.int64], values: NDArray[np.float64]) -> float:
+def _sum_of_all(lags: NDArray[np.int64], values: Array) -> float:
     """Sum over every whole lag of a function given at some, linear in between."""
     between = np.diff(lags) * (values[1:] + values[:-1]) / 2.0
     return float(between.sum() + (values[0] + values[-1]) / 2.0)
 
 
-def _second_difference(lags: NDArray[np.float64], exponent: int, n: int) -> NDArray[np.float64]:
+def _second_difference(lags: Array, exponent: int, n: int) -> Array:
     """Return the autocovariance of theta_{i+2n} - 2 theta_{i+n} + theta_i, to a factor."""
     total = np.zeros(len(lags))
     for shift, weight in ((-2, 1.0), (-1, -4.0), (0, 6.0), (1, -4.0), (2, 1.0)):
@@ -141,7 +140,7 @@ def _second_difference(lags: NDArray[np.float64], exponent: int, n: int) -> NDAr
     return total
 
 
-def _phase_covariance(lags: NDArray[np.float64], exponent: int, n: int) -> NDArray[np.float64]:
+def _phase_covariance(lags: Array, exponent: int, n: int) -> Array:
     """Return the generalised autocovariance of the phase of power-law noise, to a factor."""
     t = lags / n
     if exponent == 2:  # white phase
@@ -158,17 +157,14 @@ def _phase_covariance(lags: NDArray[np.float64], exponent: int, n: int) -> NDArr
     return np.asarray(t**3)
 
 
-def _square_log(t: NDArray[np.float64]) -> NDArray[np.float64]:
+def _square_log(t: Array) -> Array:
     """Return t^2 ln t, 0 at 0."""
     return np.asarray(t**2 * np.log(np.where(t > 0, t, 1.0)))
 
 
 def deviation_limits(
-    deviation: NDArray[np.float64],
-    edf: NDArray[np.float64],
-    confidence: float,
-    edf_upper: NDArray[np.float64] | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    deviation: Array, edf: Array, confidence: float, edf_upper: Array | None = None
+) -> tuple[Array, Array]:
     """Return the chi-squared limits of an Allan deviation.
 
     Parameters

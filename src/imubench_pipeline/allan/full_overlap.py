@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.allan.phase import Phase, sum_present, sum_sizes
 from imubench_pipeline.allan.threads import in_threads
+from imubench_pipeline.typing import Array
 
 BLOCK = 1 << 14
 """Differences summed together: three blocks of float64 stay in the L2 cache."""
@@ -26,7 +27,7 @@ def enough_present(sizes: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def full_sums(
     phase: Phase, sizes: NDArray[np.int64], threads: int, *, stride: int = 1
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+) -> tuple[Array, Array, NDArray[np.int64], NDArray[np.int64]]:
     """Sum over the differences of means, by size.
 
     Parameters
@@ -74,9 +75,7 @@ def full_sums(
 
 
 @njit(cache=True, nogil=True)
-def _full(
-    theta: NDArray[np.float64], sizes: NDArray[np.int64], low: int, high: int
-) -> tuple[NDArray[np.float64]]:
+def _full(theta: Array, sizes: NDArray[np.int64], low: int, high: int) -> tuple[Array]:
     """Return the sum of squared second differences of each block and size."""
     sums = np.zeros((high - low, sizes.size))
     for block in range(high - low):
@@ -87,13 +86,13 @@ def _full(
 
 @njit(cache=True, nogil=True)
 def _full_with_holes(
-    theta: NDArray[np.float64],
+    theta: Array,
     present: NDArray[np.integer[Any]],
     sizes: NDArray[np.int64],
     enough: NDArray[np.int64],
     low: int,
     high: int,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+) -> tuple[Array, Array, NDArray[np.int64]]:
     """Return, by block and size, what `full_sums` adds up, over the samples present."""
     points = theta.size
     sums = np.zeros((high - low, sizes.size))

@@ -182,8 +182,8 @@ class OctaveSums:
         for row in sums:
             self._sums += row  # one by one: the order must not depend on the blocks
         # What begins in the last section may be less than a section, at the end of the log.
-        kept = len(head) if heads == sections else sections * SECTION
-        points = -(-min(sections * SECTION, kept) // DECIMATION)
+        samples = len(head) if heads == sections else sections * SECTION
+        points = -(-min(sections * SECTION, samples) // DECIMATION)
         filled = slice(self._filled, self._filled + points)
         before = np.cumsum(np.concatenate(([self._at], totals)))
         edges += before[:-1, None]
@@ -249,7 +249,7 @@ def _sections(
             source = body
         samples = source[begin : min(begin + SECTION + _AHEAD, source.size)]
         own = min(SECTION, samples.size)
-        kept = (own + DECIMATION - 1) // DECIMATION
+        own_points = (own + DECIMATION - 1) // DECIMATION
         if samples.size == SECTION + _AHEAD:
             offsets = _phase_in_lanes(samples, bias, theta, tail)
             totals[section] = offsets[-1]
@@ -263,7 +263,7 @@ def _sections(
             whole = np.isfinite(theta[samples.size])
             if whole:
                 _one_lane(own, samples.size + 1, theta, grid, sums[section])
-                edges[section, :kept] = theta[:kept]
+                edges[section, :own_points] = theta[:own_points]
         if holes and whole:
             counts[section] = np.arange(points + 1) * DECIMATION
             counts[section, points] = own
@@ -274,8 +274,8 @@ def _sections(
             totals[section] = theta[own]
             counts[section, points] = present[own]
             _with_holes(own, samples.size + 1, theta, present, grid, sums[section])
-            edges[section, :kept] = theta[:kept]
-            counts[section, :kept] = present[:kept]
+            edges[section, :own_points] = theta[:own_points]
+            counts[section, :own_points] = present[:own_points]
     return sums, totals, edges, counts
 
 
@@ -372,8 +372,8 @@ def _with_holes(
             if levels[j] == level:
                 m = sizes[j] >> level
                 most = max(0, min(starts, points - 2 * m))
-                found = sum_present(theta, present, m, enough[j], 0, most)
-                sums[0, j], sums[1, j], sums[2, j] = found[0], found[1], float(found[2])
+                of_size = sum_present(theta, present, m, enough[j], 0, most)
+                sums[0, j], sums[1, j], sums[2, j] = of_size[0], of_size[1], float(of_size[2])
                 sums[3, j] = most
         points = (points + 1) // 2
         for i in range(points):

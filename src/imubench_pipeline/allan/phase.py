@@ -10,6 +10,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from imubench_pipeline.typing import Array
+
 
 @dataclass(frozen=True)
 class Phase:
@@ -25,7 +27,7 @@ class Phase:
         Grid points that begin and end each segment.
     """
 
-    theta: NDArray[np.float64]
+    theta: Array
     present: NDArray[np.integer[Any]] | None
     segments: tuple[tuple[int, int], ...]
 
@@ -121,7 +123,7 @@ def finite_mean(samples: NDArray[np.floating[Any]]) -> float:
 
 
 @njit(cache=True, nogil=True)
-def accumulate(values: NDArray[np.floating[Any]], level: float, theta: NDArray[np.float64]) -> None:
+def accumulate(values: NDArray[np.floating[Any]], level: float, theta: Array) -> None:
     """Sum samples less a level, from the first entry on."""
     total = theta[0]
     for i in range(values.size):
@@ -131,10 +133,7 @@ def accumulate(values: NDArray[np.floating[Any]], level: float, theta: NDArray[n
 
 @njit(cache=True, nogil=True)
 def accumulate_present(
-    values: NDArray[np.floating[Any]],
-    level: float,
-    theta: NDArray[np.float64],
-    present: NDArray[Any],
+    values: NDArray[np.floating[Any]], level: float, theta: Array, present: NDArray[Any]
 ) -> None:
     """Sum samples less a level and count them, from the first entries on; NaN adds nothing."""
     total, number = theta[0], present[0]
@@ -147,9 +146,7 @@ def accumulate_present(
 
 
 @njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})
-def _sum_squares(
-    first: NDArray[np.float64], middle: NDArray[np.float64], last: NDArray[np.float64]
-) -> float:
+def _sum_squares(first: Array, middle: Array, last: Array) -> float:
     """Return the sum of (last - 2 middle + first)^2 over arrays of one length."""
     total = 0.0
     for i in range(first.size):
@@ -160,11 +157,7 @@ def _sum_squares(
 
 @njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})
 def _sum_squares_twice(
-    first: NDArray[np.float64],
-    middle: NDArray[np.float64],
-    last: NDArray[np.float64],
-    longer_middle: NDArray[np.float64],
-    longer_last: NDArray[np.float64],
+    first: Array, middle: Array, last: Array, longer_middle: Array, longer_last: Array
 ) -> tuple[float, float]:
     """Return what `_sum_squares` does, for two sizes at once: the loads are what takes the time."""
     total = 0.0
@@ -179,13 +172,7 @@ def _sum_squares_twice(
 
 
 @njit(cache=True, nogil=True)
-def sum_sizes(
-    theta: NDArray[np.float64],
-    start: int,
-    stop: int,
-    sizes: NDArray[np.int64],
-    sums: NDArray[np.float64],
-) -> None:
+def sum_sizes(theta: Array, start: int, stop: int, sizes: NDArray[np.int64], sums: Array) -> None:
     """Add the squared second differences that begin at points ``start`` to ``stop``, by size.
 
     Parameters
@@ -226,12 +213,7 @@ def sum_sizes(
 
 @njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})
 def sum_present(
-    theta: NDArray[np.float64],
-    present: NDArray[Any],
-    m: int,
-    enough: int,
-    start: int,
-    stop: int,
+    theta: Array, present: NDArray[Any], m: int, enough: int, start: int, stop: int
 ) -> tuple[float, float, int]:
     """Sum squared differences of adjacent means over the samples present.
 

@@ -65,16 +65,16 @@ class Presence:
         if not len(begin):
             return np.zeros(0, dtype=np.bool_), base
         enough = PRESENT * size * base - 1e-9
-        there = np.ones(len(begin), dtype=np.bool_)
+        complete = np.ones(len(begin), dtype=np.bool_)
         for cluster in (begin, begin + size):
-            there &= counts[cluster + size] - counts[cluster] >= enough
+            complete &= counts[cluster + size] - counts[cluster] >= enough
         if len(self.segments) > 1:
             ends = np.array([stop for _, stop in self.segments])
             starts = np.array([start for start, _ in self.segments])
             points = begin * base
             which = np.minimum(np.searchsorted(ends, points, side="right"), len(ends) - 1)
-            there &= (points >= starts[which]) & (points + 2 * size * base <= ends[which])
-        return there, base * max(1, size // _STEPS)
+            complete &= (points >= starts[which]) & (points + 2 * size * base <= ends[which])
+        return complete, base * max(1, size // _STEPS)
 
 
 def presence(

@@ -24,6 +24,7 @@ from imubench_pipeline.allan.full_overlap import full_sums
 from imubench_pipeline.allan.octave import DECIMATION, SHORTEST, OctaveSums, octave_sizes
 from imubench_pipeline.allan.phase import Phase, integrate, split
 from imubench_pipeline.allan.threads import read_ahead
+from imubench_pipeline.typing import Array
 
 _MANY_CLUSTERS = 100
 _FEW_STEPS = 2  # strides in a cluster: for shorter ones the noise type needs every sample
@@ -32,7 +33,7 @@ POWER_LAW = "power law"
 FITTED = "fitted spectrum"
 """What degrees of freedom come from."""
 
-Edges = Callable[[int], tuple[NDArray[np.float64], NDArray[Any] | None, int]]
+Edges = Callable[[int], tuple[Array, NDArray[Any] | None, int]]
 """Cumulative sums and counts at the edges of adjacent clusters of about a size, and the size."""
 
 
@@ -66,16 +67,16 @@ class AllanCurve:
         Part of the differences that missing samples leave. By default 1.
     """
 
-    tau: NDArray[np.float64]
+    tau: Array
     cluster_size: NDArray[np.int64]
-    variance: NDArray[np.float64]
-    edf: NDArray[np.float64]
+    variance: Array
+    edf: Array
     samples: int = 0
     exponent: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    averaged: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
-    edf_upper: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    averaged: Array = field(default_factory=lambda: np.empty(0))
+    edf_upper: Array = field(default_factory=lambda: np.empty(0))
     edf_source: Sequence[str] = ()
-    share: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    share: Array = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
         # The class is frozen: defaults that follow from other fields go this way.
@@ -93,15 +94,20 @@ class AllanCurve:
             object.__setattr__(self, "share", np.ones(len(self.tau)))
 
     @property
-    def deviation(self) -> NDArray[np.float64]:
+    def deviation(self) -> Array:
         """Allan deviation in the unit of the samples, shape (m,)."""
         return np.sqrt(self.variance)
 
-    def up_to(self, part: float) -> NDArray[np.float64]:
+    @property
+    def rate(self) -> float:
+        """Sampling rate, Hz."""
+        return float(self.cluster_size[0] / self.tau[0])
+
+    def up_to(self, part: float) -> Array:
         """Return the tau up to a part of the log, s."""
         return self.tau[self.cluster_size <= part * self.samples]
 
-    def limits(self, confidence: float = 0.95) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def limits(self, confidence: float = 0.95) -> tuple[Array, Array]:
         """Return the lower and upper confidence limits of the deviation, shapes (m,)."""
         return deviation_limits(self.deviation, self.edf, confidence, self.edf_upper)
 
@@ -252,13 +258,13 @@ def of_blocks(
         raise ValueError(f"the blocks end before sample {spans[done][1]}")
     first = longest.first
 
-    def edges(n: int) -> tuple[NDArray[np.float64], NDArray[Any] | None, int]:
+    def edges(n: int) -> tuple[Array, NDArray[Any] | None, int]:
         if n < _FEW_STEPS * DECIMATION:
             return first.theta[::n], None if first.present is None else first.present[::n], n
         # The noise type is the same at the nearest multiple of the stride.
         step = round(n / DECIMATION)
-        held = longest.present
-        return longest.theta[::step], None if held is None else held[::step], step * DECIMATION
+        counts = longest.present
+        return longest.theta[::step], None if counts is None else counts[::step], step * DECIMATION
 
     return _curve(rate, wanted, samples, spans, sums, edges)
 
@@ -273,11 +279,11 @@ def of_phase(
     wanted = _checked(rate, sizes, phase.samples, phase.segments)
     start, stop = max(phase.segments, key=lambda segment: segment[1] - segment[0])
 
-    def edges(n: int) -> tuple[NDArray[np.float64], NDArray[Any] | None, int]:
-        held = phase.present
+    def edges(n: int) -> tuple[Array, NDArray[Any] | None, int]:
+        counts = phase.present
         return (
             phase.theta[start : stop + 1 : n],
-            None if held is None else held[start : stop + 1 : n],
+            None if counts is None else counts[start : stop + 1 : n],
             n,
         )
 
@@ -343,14 +349,14 @@ def _exponents(edges: Edges, sizes: NDArray[np.int64]) -> list[int]:
     """
     exponents: list[int] = []
     for n in sizes:
-        theta, held, size = edges(int(n))
-        found = noise_exponent(theta, held, size)
+        theta, present, size = edges(int(n))
+        exponent = noise_exponent(theta, present, size)
         before = exponents[-1] if exponents else 0
-        if found is None:
-            found = before
+        if exponent is None:
+            exponent = before
         elif len(theta) <= _MANY_CLUSTERS:
-            found = min(found, max(before, 0))
-        exponents.append(found)
+            exponent = min(exponent, max(before, 0))
+        exponents.append(exponent)
     return exponents
 
 

@@ -20,7 +20,7 @@ _TWICE = 1.8
 """Ratio of two values beyond which they are not the same, whatever their limits."""
 
 
-def agreeing(estimate: Estimate, reference: Estimate) -> Estimate:
+def doubt_contradicted(estimate: Estimate, reference: Estimate) -> Estimate:
     """Return an estimate with its values doubtful that the likelihood rules out.
 
     Parameters
@@ -30,45 +30,46 @@ def agreeing(estimate: Estimate, reference: Estimate) -> Estimate:
     reference : Estimate
         By the likelihood, of the same channel.
     """
-
-    def of(given: Mapping[str, Parameter], known: Mapping[str, Parameter]) -> dict[str, Parameter]:
-        return {name: _doubted(name, one, known.get(name)) for name, one in given.items()}
-
-    known = dict(reference.parameters)
+    references = dict(reference.parameters)
     if reference.further and "B_curve" in reference.curve:
         # Of several terms each has its own B; one alone stands for all of them.
-        known["B"] = reference.curve["B_curve"]
+        references["B"] = reference.curve["B_curve"]
     return replace(
         estimate,
-        parameters=of(estimate.parameters, known),
-        curve=of(estimate.curve, reference.curve),
+        parameters=_judged(estimate.parameters, references),
+        curve=_judged(estimate.curve, reference.curve),
     )
 
 
-def _doubted(name: str, one: Parameter, known: Parameter | None) -> Parameter:
-    if one.value is None or one.status not in ("ok", "at_bound") or known is None:
-        return one
-    reason = _contradiction(name, one, known)
-    if reason is None:
-        return one
-    return replace(one, status="doubtful", reason=reason)
+def _judged(
+    parameters: Mapping[str, Parameter], references: Mapping[str, Parameter]
+) -> dict[str, Parameter]:
+    judged = dict(parameters)
+    for name, parameter in parameters.items():
+        reference = references.get(name)
+        if parameter.value is None or parameter.status not in ("ok", "at_bound") or not reference:
+            continue
+        reason = _contradiction(name, parameter, reference)
+        if reason is not None:
+            judged[name] = replace(parameter, status="doubtful", reason=reason)
+    return judged
 
 
-def _contradiction(name: str, one: Parameter, known: Parameter) -> str | None:
+def _contradiction(name: str, parameter: Parameter, reference: Parameter) -> str | None:
     """Return how the likelihood contradicts a value; None where it does not."""
-    value = one.value or 0.0
-    if known.value is None:
-        return f"the likelihood gives no {name}: {known.reason or known.status}"
-    lower, upper = known.lower, known.upper
+    value = parameter.value or 0.0
+    if reference.value is None:
+        return f"the likelihood gives no {name}: {reference.reason or reference.status}"
+    lower, upper = reference.lower, reference.upper
     if lower is None or upper is None:
         return None
     between = f"the likelihood has {name} between {lower:.3g} and {upper:.3g} (SI)"
-    if one.lower is None or one.upper is None:
+    if parameter.lower is None or parameter.upper is None:
         apart = value < lower / _READ or value > upper * _READ
     else:
-        apart = one.upper < lower or one.lower > upper
+        apart = parameter.upper < lower or parameter.lower > upper
         apart |= value < lower / _TWICE or value > upper * _TWICE
-    apart |= not 1.0 / _TWICE < value / known.value < _TWICE
+    apart |= not 1.0 / _TWICE < value / reference.value < _TWICE
     return between if apart else None
 
 
@@ -83,13 +84,20 @@ def disagreements(channel: str, estimates: Mapping[str, Estimate]) -> Iterator[F
     """
     if not {"weighted", "likelihood"} <= estimates.keys():
         return
-    one, known = (estimates[method].parameters["N"] for method in ("weighted", "likelihood"))
-    if one.value is None or known.value is None or one.lower is None or one.upper is None:
+    weighted, likelihood = (
+        estimates[method].parameters["N"] for method in ("weighted", "likelihood")
+    )
+    if (
+        weighted.value is None
+        or likelihood.value is None
+        or weighted.lower is None
+        or weighted.upper is None
+    ):
         return
-    if known.lower is None or known.upper is None:
+    if likelihood.lower is None or likelihood.upper is None:
         return
-    if one.upper < known.lower or one.lower > known.upper:
-        ratio = one.value / known.value
+    if weighted.upper < likelihood.lower or weighted.lower > likelihood.upper:
+        ratio = weighted.value / likelihood.value
         detail = (
             f"{channel}: the fit of the Allan variance gives an N {ratio:.3g} times that of the "
             "likelihood, beyond the intervals of both; a low-pass, lines or quantization noise "

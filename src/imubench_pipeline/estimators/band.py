@@ -120,56 +120,52 @@ def _unbent(spectrum: Spectrum, clear: NDArray[np.bool_], cap: float) -> float |
 
 
 def _departure(
-    spectrum: Spectrum,
-    clear: NDArray[np.bool_],
-    below: NDArray[np.bool_],
-    cap: float,
-    terms: Terms,
+    spectrum: Spectrum, clear: NDArray[np.bool_], below: NDArray[np.bool_], cap: float, terms: Terms
 ) -> tuple[float, float] | None:
     """Return frequency and relative size of the first departure beyond some bins, if any."""
-    chosen = spectrum.taken(below)
+    chosen = spectrum.select(below)
     whittle = _whittle(chosen)
-    found = whittle.maximum(terms)
-    if _looks_like_a_filter(whittle, found):
-        found = whittle.maximum(replace(terms, gauss_markov=0))
+    maximum = whittle.maximum(terms)
+    if _looks_like_a_filter(whittle, maximum):
+        maximum = whittle.maximum(replace(terms, gauss_markov=0))
     beyond = clear & ~below & (spectrum.upper <= cap * (1 + 1e-9))
     if not beyond.any():
         return None
-    return _first_departure(spectrum.taken(beyond), whittle, found)
+    return _first_departure(spectrum.select(beyond), whittle, maximum)
 
 
-def _looks_like_a_filter(whittle: Whittle, found: Maximum) -> bool:
+def _looks_like_a_filter(whittle: Whittle, maximum: Maximum) -> bool:
     """Tell whether a short correlation leaves no white noise to be seen beyond its corner.
 
     White noise behind a first-order filter is a Gauss-Markov process.
     """
-    if not len(found.times) or found.times[0] > _AS_A_FILTER / whittle.spectrum.rate:
+    if not len(maximum.times) or maximum.times[0] > _AS_A_FILTER / whittle.spectrum.rate:
         return False
-    process = found.powers[-1] * whittle.gauss_markov(float(found.times[0]))[-1]
-    white = found.powers[found.terms.linear.index("N")] * whittle.column("N")[-1]
+    process = maximum.process_powers[-1] * whittle.gauss_markov(float(maximum.times[0]))[-1]
+    white = maximum.powers[maximum.terms.linear.index("N")] * whittle.column("N")[-1]
     return bool(process > _SHOWS_BESIDE * white)
 
 
 def _first_departure(
-    rest: Spectrum, whittle: Whittle, found: Maximum
+    rest: Spectrum, whittle: Whittle, maximum: Maximum
 ) -> tuple[float, float] | None:
     """Return frequency and relative size of the first departure from a fit, if any.
 
     A departure is measured by the errors of the bins, and of the fit carried on to them.
     """
-    there = whittle.sensitivity(found)
-    _, strength, directions = np.linalg.svd(there.T, full_matrices=False)
+    sensitivity = whittle.sensitivity(maximum)
+    _, strength, directions = np.linalg.svd(sensitivity.T, full_matrices=False)
     carried = Whittle(rest, whittle.shortest, whittle.longest, len(whittle.times))
-    ratio = rest.density / carried.density(found) - 1.0
-    slopes = carried.sensitivity(found) / np.sqrt(rest.ordinates / 2.0)
-    kept = strength > 1e-9 * strength[0]
-    errors = (directions[kept] / strength[kept, None]) @ slopes
+    ratio = rest.density / carried.density(maximum) - 1.0
+    slopes = carried.sensitivity(maximum) / np.sqrt(rest.ordinates / 2.0)
+    determined = strength > 1e-9 * strength[0]
+    errors = (directions[determined] / strength[determined, None]) @ slopes
     for i in range(0, len(ratio), _GROUP):
         nu = rest.ordinates[i : i + _GROUP]
         share = nu / nu.sum()
         mean = float(ratio[i : i + _GROUP] @ share)
-        known = float(np.sum((errors[:, i : i + _GROUP] @ share) ** 2))
-        if abs(mean) > _BENT_SIGMAS * math.sqrt(2.0 / nu.sum() + known):
+        fit_variance = float(np.sum((errors[:, i : i + _GROUP] @ share) ** 2))
+        if abs(mean) > _BENT_SIGMAS * math.sqrt(2.0 / nu.sum() + fit_variance):
             return float(rest.frequency[i : i + _GROUP] @ share), abs(mean)
     return None
 
@@ -177,13 +173,13 @@ def _first_departure(
 def _quantized(spectrum: Spectrum, clear: NDArray[np.bool_], cap: float) -> bool:
     """Tell whether quantization noise explains the spectrum up to Nyquist."""
     inside = clear & (spectrum.upper <= cap * (1 + 1e-9))
-    chosen = spectrum.taken(inside)
+    chosen = spectrum.select(inside)
     whittle = _whittle(chosen)
-    found = whittle.maximum(Terms("QNFK"))
-    if found.parameter("Q") == 0.0:
+    maximum = whittle.maximum(Terms("QNFK"))
+    if maximum.parameter("Q") == 0.0:
         return False
-    high = chosen.taken(chosen.frequency > _DEFAULT * spectrum.rate)
-    return _first_departure(high, whittle, found) is None
+    high = chosen.select(chosen.frequency > _DEFAULT * spectrum.rate)
+    return _first_departure(high, whittle, maximum) is None
 
 
 def _whittle(spectrum: Spectrum) -> Whittle:

@@ -31,7 +31,7 @@ MOST = STRONGEST + GROUPS
 """So many lines are carried without being joined."""
 
 
-def carried(lines: Sequence[Line]) -> list[dict[str, Parameter]]:
+def carried_sinusoids(lines: Sequence[Line]) -> list[dict[str, Parameter]]:
     """Return amplitude and frequency of the sinusoids that a model carries on, by frequency.
 
     Parameters
@@ -41,12 +41,12 @@ def carried(lines: Sequence[Line]) -> list[dict[str, Parameter]]:
     """
     narrow = [line for line in lines if line.narrow]
     if len(narrow) <= MOST:
-        return [_one(line) for line in narrow]
-    kept = set(strongest([line.amplitude for line in narrow]))
-    weaker = [line for place, line in enumerate(narrow) if place not in kept]
-    found = [_one(narrow[place]) for place in kept]
-    found += [_joined([weaker[i] for i in group]) for group in _groups(len(weaker))]
-    return sorted(found, key=lambda one: one["frequency"].value or 0.0)
+        return [_line_parameters(line) for line in narrow]
+    single = set(strongest([line.amplitude for line in narrow]))
+    weaker = [line for place, line in enumerate(narrow) if place not in single]
+    sinusoids = [_line_parameters(narrow[place]) for place in single]
+    sinusoids += [_joined([weaker[i] for i in group]) for group in _groups(len(weaker))]
+    return sorted(sinusoids, key=lambda sinusoid: sinusoid["frequency"].value or 0.0)
 
 
 def strongest(amplitudes: Sequence[float]) -> list[int]:
@@ -66,13 +66,13 @@ def joined_finding(channel: str, quantity: str, sinusoids: Sequence[Mapping[str,
     sinusoids : sequence of mapping
         With ``amplitude``, SI; more than `MOST`.
     """
-    kept = set(strongest([one["amplitude"] for one in sinusoids]))
-    powers = [0.5 * one["amplitude"] ** 2 for one in sinusoids]
-    rest = math.fsum(power for place, power in enumerate(powers) if place not in kept)
+    single = set(strongest([sinusoid["amplitude"] for sinusoid in sinusoids]))
+    powers = [0.5 * sinusoid["amplitude"] ** 2 for sinusoid in sinusoids]
+    rest = math.fsum(power for place, power in enumerate(powers) if place not in single)
     share = rest / math.fsum(powers)
-    number = len(sinusoids) - len(kept)
+    number = len(sinusoids) - len(single)
     detail = (
-        f"{channel} has {len(sinusoids)} sinusoids: the {len(kept)} strongest go into error "
+        f"{channel} has {len(sinusoids)} sinusoids: the {len(single)} strongest go into error "
         f"budgets, simulations and filters as they are, the other {number} as {GROUPS} of their "
         f"power, {100 * share:.3g} % of that of all lines ({math.sqrt(rest):.3g} "
         f"{SI_UNITS[quantity]['amplitude']} rms)"
@@ -84,7 +84,7 @@ def _groups(number: int) -> list[list[int]]:
     return [part.tolist() for part in np.array_split(np.arange(number), GROUPS)]
 
 
-def _one(line: Line) -> dict[str, Parameter]:
+def _line_parameters(line: Line) -> dict[str, Parameter]:
     return {
         "amplitude": Parameter(
             line.amplitude, lower=line.amplitude_lower, upper=line.amplitude_upper

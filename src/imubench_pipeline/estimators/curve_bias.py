@@ -20,9 +20,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.estimators.estimate import CURVE, Estimate, Parameter
+from imubench_pipeline.estimators.estimate import CURVE, SIGMAS, Estimate, Parameter
 from imubench_pipeline.estimators.identifiability import NOT_IDENTIFIED
-from imubench_pipeline.estimators.intervals import as_good, mixture_quantile
+from imubench_pipeline.estimators.intervals import as_good, mixture_limits
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.whittle import Terms
@@ -42,7 +42,6 @@ _BETWEEN = 49
 _DRAWS = 1000
 """Draws of each model that are used."""
 
-_WIDTH_OF_INTERVAL = 3.92
 _PEAK_SHAPE = float(gauss_markov_shape(np.array([PEAK_TAU]), 1.0)[0])
 
 
@@ -91,11 +90,11 @@ def models_of(model: NoiseModel) -> Models:
         letters["F"] = model.B
     elif model.B > 0.0:
         processes.append(GaussMarkov(model.B, model.T_B))
-    there = "".join(letter for letter, value in letters.items() if value > 0.0)
-    values = [letters[letter] for letter in there] + [one.B for one in processes]
-    times = [one.T_B for one in processes]
+    linear = "".join(letter for letter, value in letters.items() if value > 0.0)
+    values = [letters[letter] for letter in linear] + [process.B for process in processes]
+    times = [process.T_B for process in processes]
     return Models(
-        Terms(there, len(processes)),
+        Terms(linear, len(processes)),
         np.array([values], dtype=np.float64),
         np.array([times], dtype=np.float64).reshape(1, len(times)),
     )
@@ -216,12 +215,18 @@ def with_curve(
         As `averaging_times` gives them.
     """
     chosen = alike[0]
-    best = [_best(one) for one in alike]
-    drawn = [_drawn(one, draws) for one in alike]
+    best = [_best(candidate) for candidate in alike]
+    drawn = [_drawn(candidate, draws) for candidate in alike]
     if not best[0].has_bias:
-        having = [one for one in alike if as_good(one, chosen) and _best(one).has_bias]
-        every = [*(one for one in wider if _best(one).has_bias), *having]
-        bias = _weak_bias([_drawn(one, draws) for one in every], bool(having), float(tau[-1]))
+        having = [
+            candidate
+            for candidate in alike
+            if as_good(candidate, chosen) and _best(candidate).has_bias
+        ]
+        every = [*(candidate for candidate in wider if _best(candidate).has_bias), *having]
+        bias = _weak_bias(
+            [_drawn(candidate, draws) for candidate in every], bool(having), float(tau[-1])
+        )
     else:
         bias = _bias(best, drawn, float(tau[-1]))
     return replace(estimate, curve={"B_curve": bias} | lowest_parameters(best, drawn, tau))
@@ -237,7 +242,7 @@ def _bias(best: Sequence[Models], drawn: Sequence[Models], longest: float) -> Pa
     if first[0] == 0.0:
         return Parameter(None, "absent", "the data do not ask for it", 0.0, upper)
     reason = None
-    error = math.log(upper / lower) / _WIDTH_OF_INTERVAL if lower > 0.0 else math.inf
+    error = math.log(upper / lower) / (2.0 * SIGMAS) if lower > 0.0 else math.inf
     if best[having[0]].terms.gauss_markov and at[0] >= longest * (1.0 - 1e-9):
         reason = f"its processes still rise at {longest:.4g} s, a ninth of the log"
     elif error > NOT_IDENTIFIED:
@@ -252,7 +257,7 @@ def _weak_bias(drawn: Sequence[Models], as_good: bool, longest: float) -> Parame
     """Return what is said where the chosen model has no bias instability."""
     if not drawn:
         return Parameter(None, "absent", "the data do not ask for it")
-    upper = max(float(np.quantile(bias_of_curve(one, longest)[0], 0.975)) for one in drawn)
+    upper = max(float(np.quantile(bias_of_curve(models, longest)[0], 0.975)) for models in drawn)
     if as_good:
         reason = "models with a bias instability are about as good; only its interval is given"
         return Parameter(None, "not_identified", reason, 0.0, upper)
@@ -293,15 +298,15 @@ def lowest_parameters(
     tau : ndarray, shape (m,)
         As `averaging_times` gives them.
     """
-    points = [lowest_point(one, tau) for one in best]
-    weights = [one.weight for one in best]
+    points = [lowest_point(models, tau) for models in best]
+    weights = [models.weight for models in best]
     values = [_mean([float(point[i][0]) for point in points], weights) for i in (0, 1)]
-    found = [lowest_point(one, tau) for one in drawn]
+    drawn_points = [lowest_point(models, tau) for models in drawn]
     limits: list[tuple[float | None, float | None]] = [(None, None), (None, None)]
     if drawn:
-        sizes = [one.weight for one in drawn]
-        lows = list(zip([point[0] for point in found], sizes, strict=True))
-        times = list(zip([point[1] for point in found], sizes, strict=True))
+        sizes = [models.weight for models in drawn]
+        lows = list(zip([point[0] for point in drawn_points], sizes, strict=True))
+        times = list(zip([point[1] for point in drawn_points], sizes, strict=True))
         limits = [_limits(lows, values[0]), _limits(times, values[1])]
     if not points[0][2][0]:
         falls = points[0][1][0] > tau[0]
@@ -316,25 +321,26 @@ def lowest_parameters(
         }
     return {
         "sigma_min": Parameter(values[0], "ok", None, *limits[0]),
-        "tau_min": _time_of_lowest(values[1], limits[1], found, drawn),
+        "tau_min": _time_of_lowest(values[1], limits[1], drawn_points, drawn),
     }
 
 
 def _time_of_lowest(
     value: float,
     limits: tuple[float | None, float | None],
-    found: Sequence[tuple[Array, Array, NDArray[np.bool_]]],
+    points: Sequence[tuple[Array, Array, NDArray[np.bool_]]],
     drawn: Sequence[Models],
 ) -> Parameter:
-    weight = sum(one.weight for one in drawn)
+    weight = sum(models.weight for models in drawn)
     outside = sum(
-        one.weight * float(np.mean(~point[2])) for one, point in zip(drawn, found, strict=True)
+        models.weight * float(np.mean(~point[2]))
+        for models, point in zip(drawn, points, strict=True)
     )
     if outside > 0.025 * weight:
         reason = "models that the log does not rule out have no minimum within a ninth of it"
         return Parameter(None, "not_identified", reason, limits[0], None, fitted=value)
     lower, upper = limits
-    if lower and upper and math.log(upper / lower) > NOT_IDENTIFIED * _WIDTH_OF_INTERVAL:
+    if lower and upper and math.log(upper / lower) > NOT_IDENTIFIED * (2.0 * SIGMAS):
         # Such as a curve with two minima, of which either may be the lower one.
         reason = "a log of this length does not tell it to 50 %; only its interval is given"
         return Parameter(None, "not_identified", reason, lower, upper, fitted=value)
@@ -343,33 +349,31 @@ def _time_of_lowest(
 
 def _limits(parts: Sequence[tuple[Array, float]], value: float) -> tuple[float, float]:
     """Return the 95 % limits of draws of several models; those of the first lie inside."""
-    own = [(parts[0][0], 1.0)]
-    return (
-        min(mixture_quantile(parts, 0.025), mixture_quantile(own, 0.025), value),
-        max(mixture_quantile(parts, 0.975), mixture_quantile(own, 0.975), value),
-    )
+    lower, upper = mixture_limits(parts, [(parts[0][0], 1.0)])
+    return min(lower, value), max(upper, value)
 
 
 def _mean(values: Sequence[float], weights: Sequence[float]) -> float:
     """Return the weighted geometric mean; the first value where it or all weight is 0."""
-    there = [(value, weight) for value, weight in zip(values, weights, strict=True) if value > 0.0]
-    total = sum(weight for _, weight in there)
+    positive = [
+        (value, weight) for value, weight in zip(values, weights, strict=True) if value > 0.0
+    ]
+    total = sum(weight for _, weight in positive)
     if values[0] == 0.0 or total == 0.0:
         return values[0]
-    return math.exp(sum(weight * math.log(value) for value, weight in there) / total)
+    return math.exp(sum(weight * math.log(value) for value, weight in positive) / total)
 
 
 def _best(candidate: Candidate) -> Models:
-    found = candidate.found
-    return Models(found.terms, np.sqrt(found.powers)[None], found.times[None], candidate.weight)
+    maximum = candidate.maximum
+    return Models(
+        maximum.terms, np.sqrt(maximum.powers)[None], maximum.times[None], candidate.weight
+    )
 
 
 def _drawn(candidate: Candidate, draws: Mapping[Terms, Posterior]) -> Models:
-    posterior = draws[candidate.found.terms]
+    posterior = draws[candidate.terms]
     every = max(1, len(posterior.parameters) // _DRAWS)
     return Models(
-        candidate.found.terms,
-        posterior.parameters[::every],
-        posterior.times[::every],
-        candidate.weight,
+        candidate.terms, posterior.parameters[::every], posterior.times[::every], candidate.weight
     )

@@ -32,7 +32,7 @@ _BEYOND_BAND = 1.0
 
 def with_fitted_limits(
     curve: AllanCurve,
-    found: Likelihood,
+    likelihood: Likelihood,
     segments: tuple[Span, ...] | None = None,
     presence: Presence | None = None,
 ) -> AllanCurve:
@@ -45,7 +45,7 @@ def with_fitted_limits(
     ----------
     curve : AllanCurve
         With the degrees of freedom of the identified power law.
-    found : Likelihood
+    likelihood : Likelihood
         Of the same log.
     segments : tuple of (int, int), optional
         First and one-past-last sample of each.
@@ -57,33 +57,33 @@ def with_fitted_limits(
     AllanCurve
         The same where nothing was fitted.
     """
-    if not found.candidates or found.band is None:
+    if not likelihood.candidates or likelihood.band is None:
         return curve
-    chosen = found.candidates[0]
-    rate = float(curve.cluster_size[0] / curve.tau[0])
-    model = with_lines(model_of(chosen.found), found)
+    chosen = likelihood.candidates[0]
+    rate = curve.rate
+    model = with_lines(model_of(chosen.maximum), likelihood)
 
-    def degrees_at(model: NoiseModel, those: NDArray[np.bool_]) -> Degrees:
+    def degrees_at(model: NoiseModel, points: NDArray[np.bool_]) -> Degrees:
         return degrees_of_model(
             model,
             rate,
-            curve.cluster_size[those],
+            curve.cluster_size[points],
             curve.samples,
             segments,
             presence,
-            curve.share[those],
+            curve.share[points],
         )
 
     degrees = degrees_at(model, np.ones(len(curve.tau), dtype=np.bool_))
     upper = degrees.upper
-    walking = _with_more_walk(model, found)
+    walking = _with_more_walk(model, likelihood)
     few = curve.cluster_size * _FEW_CLUSTERS > curve.samples
     if walking is not None and few.any():
         upper[few] = np.minimum(upper[few], degrees_at(walking, few).upper)
     doubtful = np.full(len(curve.tau), chosen.goodness.verdict != "explained")
-    if found.band.highest < 0.5 * rate * (1.0 - 1e-9):
-        doubtful |= curve.tau * found.band.highest < _BEYOND_BAND
-    filtered = found.low_pass
+    if likelihood.band.highest < 0.5 * rate * (1.0 - 1e-9):
+        doubtful |= curve.tau * likelihood.band.highest < _BEYOND_BAND
+    filtered = likelihood.low_pass
     if filtered is not None and filtered.behind is not None:
         # The model has the noise before the sensor's low-pass.
         doubtful |= curve.tau * (filtered.frequency.in_model or np.inf) < _BEYOND_BAND
@@ -92,19 +92,20 @@ def with_fitted_limits(
         curve,
         edf=np.where(fitted, degrees.edf, curve.edf),
         edf_upper=np.where(fitted, upper, curve.edf_upper),
-        edf_source=tuple(FITTED if one else POWER_LAW for one in fitted),
+        edf_source=tuple(FITTED if is_fitted else POWER_LAW for is_fitted in fitted),
     )
 
 
-def _with_more_walk(model: NoiseModel, found: Likelihood) -> NoiseModel | None:
+def _with_more_walk(model: NoiseModel, likelihood: Likelihood) -> NoiseModel | None:
     """Return a model with a random walk half way to its upper 95 % limit; None: no limit."""
-    upper = found.estimates[0].parameters["K"].upper if found.estimates[0].parameters else None
+    parameters = likelihood.estimates[0].parameters
+    upper = parameters["K"].upper if parameters else None
     if upper is None or upper <= model.K:
         return None
     return replace(model, K=(model.K + upper) / 2.0)
 
 
-def with_lines(model: NoiseModel, found: Likelihood) -> NoiseModel:
+def with_lines(model: NoiseModel, likelihood: Likelihood) -> NoiseModel:
     """Return a model with the narrow lines that were found beside it."""
-    lines = [Sinusoid(line.amplitude, line.frequency) for line in found.lines if line.narrow]
+    lines = [Sinusoid(line.amplitude, line.frequency) for line in likelihood.lines if line.narrow]
     return replace(model, sinusoids=lines)

@@ -19,22 +19,21 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.estimators.estimate import Parameter
+from imubench_pipeline.estimators.estimate import SIGMAS, Parameter
 from imubench_pipeline.estimators.filter_fits import (
     FAMILY,
     FEWEST_BINS,
     PROCESSES,
     FilterFits,
-    Tried,
-    inside,
+    FilterTrial,
+    frequencies_in_bins,
 )
 from imubench_pipeline.estimators.filter_readings import (
-    SIGMAS,
     Allowed,
     OfModel,
     Reading,
     also_after_sampling,
-    drawn,
+    draw_factors,
 )
 from imubench_pipeline.estimators.low_pass import Filter, Kind
 from imubench_pipeline.estimators.spectrum import Spectrum
@@ -174,7 +173,7 @@ class Cutoff:
         readings = self.readings if of_model is None else of_model.readings
         if not readings:
             return np.ones(number)
-        return drawn(readings, number, rng)
+        return draw_factors(readings, number, rng)
 
 
 def find_cutoff(
@@ -217,13 +216,13 @@ def find_cutoff(
     if used.sum() < FEWEST_BINS:
         unknown = Parameter(None, "not_shown", f"the spectrum has {used.sum()} bins only")
         return Cutoff(unknown, None, unknown, 0.0, 0.0)
-    fits = FilterFits(spectrum.taken(used))
+    fits = FilterFits(spectrum.select(used))
     if not fits.may_bend(filters):
         absent = Parameter(None, "absent", "the spectrum shows no low-pass")
         return Cutoff(absent, None, Parameter(fits.unfiltered()[0]), 0.0, 0.0)
     rounding = resolution**2 / (12.0 * spectrum.rate)
     settled = _settled(spectrum, used, fits, filters, rounding)
-    fits, tried, used = settled.fits, settled.tried, settled.used
+    fits, tried = settled.fits, settled.tried
     N_alone, without, cost_alone, rising = fits.unfiltered()
     behind = fits.behind(tried[0]) if tried else math.inf
     gained = 2.0 * (without - behind)
@@ -231,14 +230,70 @@ def find_cutoff(
     doubt = _process_or_filter(fits, tried, cost_alone, gained, stated)
     if doubt is not None or gained < _BEYOND_BIC or beside_rounding < -_BEYOND_BIC:
         return _without_filter(N_alone, gained, doubt)
+    return _with_filter(
+        spectrum, settled, rounding, len(filters), (N_alone, gained, beside_rounding)
+    )
+
+
+@dataclass(frozen=True)
+class _Settled:
+    """Fits of filters to the bins that tell of them: ``used``, not those ``ruled`` by the ends."""
+
+    fits: FilterFits
+    tried: Sequence[FilterTrial]
+    used: NDArray[np.bool_]
+    ruled: NDArray[np.bool_]
+
+
+def _settled(
+    spectrum: Spectrum,
+    usable: NDArray[np.bool_],
+    fits: FilterFits,
+    filters: Sequence[tuple[Kind, int]],
+    rounding: float,
+) -> _Settled:
+    """Fit the filters, and again where the best of them changes which bins tell of it."""
+    tried = fits.try_filters(filters, _COARSE)
+    used, ruled = usable, np.zeros(len(usable), dtype=np.bool_)
+    for passed in range(_PASSES if tried else 0):
+        earlier, ruled = ruled, _ruled_by_ends(spectrum, fits, tried[0], rounding)
+        if passed and bool((ruled == earlier).all()):
+            break
+        near = usable & ~ruled & (spectrum.frequency > _NEAR * tried[0].cutoff)
+        if near.sum() >= FEWEST_BINS:
+            used = near
+            fits = FilterFits(spectrum.select(used))
+        if rounding > 0.0:
+            fits.rounded = rounding / fits.density(tried[0])[0] ** 2
+        fits.choose_slow(tried[0])
+        tried = fits.try_filters(filters)
+        if not tried:
+            break
+    return _Settled(fits, tried, used, ruled)
+
+
+def _with_filter(
+    spectrum: Spectrum,
+    settled: _Settled,
+    rounding: float,
+    number: int,
+    against: tuple[float, float, float],
+) -> Cutoff:
+    """Describe the best of ``number`` filters and the others that the log allows.
+
+    ``against``: N of the noise alone, and what BIC gains over it, and over that with rounding.
+    """
+    fits, tried, used = settled.fits, settled.tried, settled.used
+    N_alone, gained, beside_rounding = against
     best = tried[0]
     # A floor is taken to be there where it shows only: with it a high cut-off is never told.
     alike = [
-        one
-        for one in tried
-        if one.floor <= best.floor and one.cost + one.floor < best.cost + best.floor + RULED_OUT
+        trial
+        for trial in tried
+        if trial.floor <= best.floor
+        and trial.cost + trial.floor < best.cost + best.floor + RULED_OUT
     ]
-    limits = [fits.limits(one) for one in alike]
+    limits = [fits.limits(trial) for trial in alike]
     lower, upper = min(low for low, _ in limits), max(high for _, high in limits)
     N, after = fits.density(best)
     highest = upper >= 0.999 * fits.highest(best.kind, best.order)
@@ -252,7 +307,7 @@ def find_cutoff(
         alone = math.log(N_alone / N)
         readings.append(Reading(_WITHOUT, alone, alone, alone))
     error = SIGMAS / math.sqrt(2.0 * float(spectrum.ordinates[used].sum()))
-    ends = [end for one in readings for end in (one.below, one.above)]
+    ends = [end for reading in readings for end in (reading.below, reading.above)]
     density = Parameter(
         N, lower=N * math.exp(min(0.0, *ends) - error), upper=N * math.exp(max(0.0, *ends) + error)
     )
@@ -265,19 +320,19 @@ def find_cutoff(
     elif upper > WIDEST * lower or highest:
         reason = f"the log allows cut-offs from {lower:.4g} to {upper:.4g} Hz"
     elif not fits.explains(best):
-        reason = NOT_AS_BEHIND.format(len(filters))
+        reason = NOT_AS_BEHIND.format(number)
     if reason:
-        found = Parameter(None, "not_identified", reason, lower, upper, fitted=shown)
+        frequency = Parameter(None, "not_identified", reason, lower, upper, fitted=shown)
         density = replace(
             density, value=None, status="not_identified", reason=reason, fitted=density.value
         )
     else:
-        found = Parameter(shown, lower=lower, upper=upper)
+        frequency = Parameter(shown, lower=lower, upper=upper)
     whole = FilterFits(spectrum)
     whole.rounded = fits.rounded
     white, *slow = whole.gains(best)
     return Cutoff(
-        found,
+        frequency,
         best.order,
         density,
         math.hypot(after, math.sqrt(rounding)),
@@ -288,48 +343,11 @@ def find_cutoff(
         ruled=settled.ruled,
         readings=readings,
         allowed=[
-            Allowed(one, max(0.5 * math.log(high / low), _LEAST_WIDTH))
-            for one, (low, high) in zip(alike, limits, strict=True)
+            Allowed(trial, max(0.5 * math.log(high / low), _LEAST_WIDTH))
+            for trial, (low, high) in zip(alike, limits, strict=True)
         ],
         rounded=fits.rounded,
     )
-
-
-@dataclass(frozen=True)
-class _Settled:
-    """Fits of filters to the bins that tell of them: ``used``, not those ``ruled`` by the ends."""
-
-    fits: FilterFits
-    tried: Sequence[Tried]
-    used: NDArray[np.bool_]
-    ruled: NDArray[np.bool_]
-
-
-def _settled(
-    spectrum: Spectrum,
-    usable: NDArray[np.bool_],
-    fits: FilterFits,
-    filters: Sequence[tuple[Kind, int]],
-    rounding: float,
-) -> _Settled:
-    """Fit the filters, and again where the best of them changes which bins tell of it."""
-    tried = fits.tried(filters, _COARSE)
-    used, ruled = usable, np.zeros(len(usable), dtype=np.bool_)
-    for passed in range(_PASSES if tried else 0):
-        earlier, ruled = ruled, _ruled_by_ends(spectrum, fits, tried[0], rounding)
-        if passed and bool((ruled == earlier).all()):
-            break
-        near = usable & ~ruled & (spectrum.frequency > _NEAR * tried[0].cutoff)
-        if near.sum() >= FEWEST_BINS:
-            used = near
-            fits = FilterFits(spectrum.taken(used))
-        if rounding > 0.0:
-            fits.rounded = rounding / fits.density(tried[0])[0] ** 2
-        fits.choose_slow(tried[0])
-        tried = fits.tried(filters)
-        if not tried:
-            break
-    return _Settled(fits, tried, used, ruled)
 
 
 def _without_filter(N_alone: float, gained: float, doubt: tuple[str, float] | None) -> Cutoff:
@@ -340,60 +358,66 @@ def _without_filter(N_alone: float, gained: float, doubt: tuple[str, float] | No
     reason, before = doubt
     low, high = sorted((N_alone, before))
     unknown = Parameter(None, "not_identified", reason, low, high, fitted=N_alone)
-    told = replace(absent, status="not_identified", reason=reason)
-    return Cutoff(told, None, unknown, 0.0, gained, or_process=reason, N_behind=before)
+    frequency = replace(absent, status="not_identified", reason=reason)
+    return Cutoff(frequency, None, unknown, 0.0, gained, or_process=reason, N_behind=before)
 
 
 def _readings(
-    fits: FilterFits, alike: Sequence[Tried], limits: Sequence[tuple[float, float]]
+    fits: FilterFits, alike: Sequence[FilterTrial], limits: Sequence[tuple[float, float]]
 ) -> list[Reading]:
     """Return N before each filter that the log allows, over that of the best, and how likely."""
     best = alike[0]
     N = fits.density(best)[0]
     readings = [
         Reading(
-            math.exp(best.cost - one.cost),
+            math.exp(best.cost - trial.cost),
             *(
-                math.log(max(fits.density(replace(one, cutoff=cutoff))[0] / N, _LEAST_N))
-                for cutoff in (low, one.cutoff, high)
+                math.log(max(fits.density(replace(trial, cutoff=cutoff))[0] / N, _LEAST_N))
+                for cutoff in (low, trial.cutoff, high)
             ),
         )
-        for one, (low, high) in zip(alike, limits, strict=True)
+        for trial, (low, high) in zip(alike, limits, strict=True)
     ]
     readings += [
-        also_after_sampling(reading, one, fits.rate)
-        for reading, one in zip(readings, alike, strict=True)
-        if one.is_first_order_analogue
+        also_after_sampling(reading, trial, fits.rate)
+        for reading, trial in zip(readings, alike, strict=True)
+        if trial.is_first_order_analogue
     ]
     return readings
 
 
 def _ruled_by_ends(
-    spectrum: Spectrum, fits: FilterFits, best: Tried, rounding: float
+    spectrum: Spectrum, fits: FilterFits, best: FilterTrial, rounding: float
 ) -> NDArray[np.bool_]:
     """Return the bins in which the ends of the transform rule, or the filter falls within the bin.
 
     Those in which something else stands are none of them.
     """
     N = fits.density(best)[0]
-    one = best.low_pass
-    within = one.white(inside(spectrum), spectrum.rate) + rounding / N**2
+    low_pass = best.low_pass
+    within = low_pass.white(frequencies_in_bins(spectrum), spectrum.rate) + rounding / N**2
     white = within.mean(axis=1)
-    leak = one.leak(spectrum.frequency, spectrum.length, spectrum.rate)
+    leak = low_pass.leak(spectrum.frequency, spectrum.length, spectrum.rate)
     leak = np.where(spectrum.block == 1, leak, 0.0)
     rules = (leak > _ENDS_RULE * white) | (within.min(axis=1) < _STEEP * within.max(axis=1))
     return np.asarray(rules & (spectrum.density < _SOMETHING_ELSE * N**2 * (white + leak)))
 
 
 def _process_or_filter(
-    fits: FilterFits, tried: Sequence[Tried], cost_alone: float, gained: float, stated: float | None
+    fits: FilterFits,
+    tried: Sequence[FilterTrial],
+    cost_alone: float,
+    gained: float,
+    stated: float | None,
 ) -> tuple[str, float] | None:
     """Return why the log does not tell a process from a filter, and N before that; None if it does.
 
     Only a filter of first order looks like a process, and only where no white noise shows beside
     it up to Nyquist.
     """
-    first = next((one for one in tried if one.is_first_order_analogue and not one.floor), None)
+    first = next(
+        (trial for trial in tried if trial.is_first_order_analogue and not trial.floor), None
+    )
     if first is None or first.correlation(fits.rate) < PROCESSES:
         return None
     if stated is not None and 1.0 / _AS_STATED < first.cutoff / stated < _AS_STATED:

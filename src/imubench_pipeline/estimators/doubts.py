@@ -13,7 +13,6 @@ from imubench_pipeline.estimators.estimate import CURVE, Estimate, Parameter, St
 from imubench_pipeline.estimators.frame import Frame
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.spectrum import Spectrum
-from imubench_pipeline.typing import Array
 
 _WORSE = 6.0
 """BIC by which the papers' model must be the worse for the data to be against it."""
@@ -58,14 +57,13 @@ _BELOW = 0.7
 """Part of N^2 below which it is another density."""
 
 
-def doubted(
+def add_doubts(
     estimate: Estimate,
     papers: Estimate,
     spectrum: Spectrum,
     frame: Frame,
     candidates: Sequence[Candidate],
     papers_candidate: Candidate,
-    fitted: Array,
     drift: str | None = None,
 ) -> tuple[Estimate, Estimate]:
     """Return the two estimates of a likelihood with their doubts.
@@ -81,41 +79,39 @@ def doubted(
         The best first.
     papers_candidate : Candidate
         The papers' model among them.
-    fitted : ndarray, shape (b,)
-        Density of the chosen model in every bin.
     drift : str, optional
         Why the random walk may be a smooth drift.
     """
     chosen = candidates[0]
-    doubt = _of_white_noise(spectrum, frame, chosen, fitted)
+    doubt = _of_white_noise(spectrum, frame, chosen)
     if doubt is not None:
-        estimate, papers = (_with_unknown_white_noise(one, *doubt) for one in (estimate, papers))
+        estimate, papers = (_with_unknown_white_noise(each, *doubt) for each in (estimate, papers))
     if frame.cut:
         estimate, papers = (
-            _with_doubt_of_the_cut(one, spectrum, frame) for one in (estimate, papers)
+            _with_doubt_of_the_cut(each, spectrum, frame) for each in (estimate, papers)
         )
     if frame.low_pass is not None:
         estimate, papers = (
-            _with_doubt_of_the_floor(one, frame.low_pass) for one in (estimate, papers)
+            _with_doubt_of_the_floor(each, frame.low_pass) for each in (estimate, papers)
         )
     rival = drift or _without_a_walk(chosen, candidates) or _beside_a_ramp(chosen, candidates)
     if rival is not None:
-        estimate, papers = (doubting(one, ("K",), rival) for one in (estimate, papers))
+        estimate, papers = (cast_doubt(each, ("K",), rival) for each in (estimate, papers))
     other = _with_fewer_terms(chosen, candidates) or _with_other_terms(chosen, candidates)
     if other is not None:
-        estimate = doubting(estimate, ("B", "T_B"), other, of_curve=False)
+        estimate = cast_doubt(estimate, ("B", "T_B"), other, of_curve=False)
     for name in ("Q", "R"):
         needless = _hardly_needed(name, chosen, candidates)
         if needless is not None:
-            estimate = doubting(estimate, (name,), needless)
+            estimate = cast_doubt(estimate, (name,), needless)
     estimate = _with_one_bias(estimate)
     against = papers_candidate.bic - chosen.bic
     if against > _WORSE:
         reason = (
-            f"the data favour {chosen.found.terms.name} over {papers_candidate.found.terms.name} "
-            f"by {against:.1f} in BIC"
+            f"the data favour {chosen.terms.name} over "
+            f"{papers_candidate.terms.name} by {against:.1f} in BIC"
         )
-        papers = doubting(papers, ("B", "T_B", "K"), reason)
+        papers = cast_doubt(papers, ("B", "T_B", "K"), reason)
     return estimate, papers
 
 
@@ -124,30 +120,32 @@ def _without_a_walk(chosen: Candidate, candidates: Sequence[Candidate]) -> str |
 
     A slow process passes for a walk: BIC with what is asked of such a process takes the walk.
     """
-    if "K" not in chosen.found.terms.linear:
+    if "K" not in chosen.terms.linear:
         return None
     without = [
-        one for one in candidates if "K" not in one.found.terms.linear and not one.found.terms.ramp
+        candidate
+        for candidate in candidates
+        if "K" not in candidate.terms.linear and not candidate.terms.ramp
     ]
-    best = min(without, key=lambda one: one.aic, default=chosen)
+    best = min(without, key=lambda candidate: candidate.aic, default=chosen)
     if best.aic > chosen.aic - _CLEARLY:
         return None
     return (
-        f"{best.found.terms.name}, which has no random walk, is better by "
+        f"{best.terms.name}, which has no random walk, is better by "
         f"{chosen.aic - best.aic:.1f} in AIC: a process as slow as the log passes for a random walk"
     )
 
 
 def _beside_a_ramp(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
     """Say so where AIC prefers a ramp beside the random walk, which leaves little of the walk."""
-    terms = chosen.found.terms
+    terms = chosen.terms
     if "K" not in terms.linear or terms.ramp:
         return None
     beside = replace(terms, ramp=True)
-    best = next((one for one in candidates if one.found.terms == beside), None)
+    best = next((candidate for candidate in candidates if candidate.terms == beside), None)
     if best is None or best.aic > chosen.aic - _CLEARLY:
         return None
-    K, least = chosen.found.parameter("K"), best.found.parameter("K")
+    K, least = chosen.maximum.parameter("K"), best.maximum.parameter("K")
     if least > _LITTLE * K:
         return None
     return (
@@ -158,14 +156,14 @@ def _beside_a_ramp(chosen: Candidate, candidates: Sequence[Candidate]) -> str | 
 
 def _with_fewer_terms(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
     """Say so where two terms of bias instability are hardly better than one, or one than none."""
-    terms, biases = chosen.found.terms, _biases(chosen)
+    terms, biases = chosen.terms, _biases(chosen)
     if biases == 0:
         return None
-    fewer = [one for one in candidates if _biases(one) < min(biases, 2)]
-    best = min(fewer, key=lambda one: one.bic, default=None)
+    fewer = [candidate for candidate in candidates if _biases(candidate) < min(biases, 2)]
+    best = min(fewer, key=lambda candidate: candidate.bic, default=None)
     if best is None or best.bic > chosen.bic + (_HARDLY if biases > 1 else _AS_GOOD):
         return None
-    worse = f"{best.found.terms.name} is hardly worse than {terms.name}, by "
+    worse = f"{best.terms.name} is hardly worse than {terms.name}, by "
     worse += f"{best.bic - chosen.bic:.1f} in BIC, and has "
     return worse + ("another B; B_curve is that of both" if biases > 1 else "no B")
 
@@ -175,8 +173,8 @@ def _with_other_terms(chosen: Candidate, candidates: Sequence[Candidate]) -> str
 
     BIC asks more of processes that are as slow as a walk, and may so join one to another process.
     """
-    best = min(candidates, key=lambda one: one.aic)
-    terms = chosen.found.terms
+    best = min(candidates, key=lambda candidate: candidate.aic)
+    terms = chosen.terms
     if terms.gauss_markov == 0 or "K" in terms.linear:
         return None
     if _kinds_of_bias(best) == _kinds_of_bias(chosen):
@@ -184,27 +182,27 @@ def _with_other_terms(chosen: Candidate, candidates: Sequence[Candidate]) -> str
     better = chosen.aic - best.aic
     if better < _OTHERWISE:
         return None
-    name = best.found.terms.name
+    name = best.terms.name
     return f"{name}, with other terms of bias instability, is better by {better:.1f} in AIC"
 
 
 def _hardly_needed(name: str, chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
     """Say so where a model without its quantization noise (Q) or ramp (R) is hardly worse."""
-    terms = chosen.found.terms
+    terms = chosen.terms
     without = replace(terms, linear=terms.linear.replace(name, ""), ramp=terms.ramp and name != "R")
-    other = next((one for one in candidates if one.found.terms == without), None)
+    other = next((candidate for candidate in candidates if candidate.terms == without), None)
     if without == terms or other is None or other.bic > chosen.bic + _NEEDLESS:
         return None
     worse = f"{other.bic - chosen.bic:.1f} in BIC"
     return f"{without.name}, which has none, is hardly worse than {terms.name}, by {worse}"
 
 
-def _kinds_of_bias(one: Candidate) -> tuple[bool, int]:
-    return "F" in one.found.terms.linear, one.found.terms.gauss_markov
+def _kinds_of_bias(candidate: Candidate) -> tuple[bool, int]:
+    return "F" in candidate.terms.linear, candidate.terms.gauss_markov
 
 
-def _biases(one: Candidate) -> int:
-    return ("F" in one.found.terms.linear) + one.found.terms.gauss_markov
+def _biases(candidate: Candidate) -> int:
+    return ("F" in candidate.terms.linear) + candidate.terms.gauss_markov
 
 
 def _with_one_bias(estimate: Estimate) -> Estimate:
@@ -214,7 +212,7 @@ def _with_one_bias(estimate: Estimate) -> Estimate:
         return estimate
     if of_curve.status == "not_identified":
         reason = f"the bias instability of the curve is not told: {of_curve.reason}"
-        return doubting(estimate, ("B", "T_B"), reason, of_curve=False)
+        return cast_doubt(estimate, ("B", "T_B"), reason, of_curve=False)
     if of_curve.status != "ok":
         return estimate
     if B.status not in ("not_identified", "doubtful"):
@@ -226,7 +224,7 @@ def _with_one_bias(estimate: Estimate) -> Estimate:
     return replace(estimate, curve={**estimate.curve, "B_curve": unsure})
 
 
-def doubting(
+def cast_doubt(
     estimate: Estimate, names: Sequence[str], reason: str, *, of_curve: bool = True
 ) -> Estimate:
     """Return an estimate whose values of some parameters are doubtful.
@@ -241,12 +239,14 @@ def doubting(
         With B go the figures of the curve.
     """
 
-    def doubted_in(group: Mapping[str, Parameter], these: Container[str]) -> dict[str, Parameter]:
+    def doubted_in(
+        group: Mapping[str, Parameter], doubted_names: Container[str]
+    ) -> dict[str, Parameter]:
         return {
-            name: replace(one, status="doubtful", reason=reason)
-            if name in these and one.status == "ok"
-            else one
-            for name, one in group.items()
+            name: replace(parameter, status="doubtful", reason=reason)
+            if name in doubted_names and parameter.status == "ok"
+            else parameter
+            for name, parameter in group.items()
         }
 
     figures = CURVE if of_curve and "B" in names else ()
@@ -259,21 +259,21 @@ def doubting(
 
 
 def _of_white_noise(
-    spectrum: Spectrum, frame: Frame, chosen: Candidate, fitted: Array
+    spectrum: Spectrum, frame: Frame, chosen: Candidate
 ) -> tuple[str, float, float] | None:
     """Return why N is not told, and between which values it lies; None where it is."""
-    found = chosen.found
-    if "N" not in found.terms.linear or frame.low_pass is None:
+    maximum = chosen.maximum
+    if "N" not in maximum.terms.linear or frame.low_pass is None:
         return None
-    N = found.parameter("N")
+    N = maximum.parameter("N")
     if frame.low_pass.or_process is not None and frame.low_pass.N_behind is not None:
         return frame.low_pass.or_process, *_range(N, frame.low_pass.N_behind)
-    fast = found.times < _AS_FAST / spectrum.rate
+    fast = maximum.times < _AS_FAST / spectrum.rate
     if fast.any() and frame.low_pass.behind is None:
-        power = found.powers[len(found.terms.linear) :][fast]
-        shapes = [frame.whole(spectrum).gauss_markov(float(time))[0] for time in found.times[fast]]
-        before = math.sqrt(N**2 + float(power @ np.array(shapes)))
-        time = float(found.times[fast].max())
+        whole = frame.whole(spectrum)
+        shapes = [whole.gauss_markov(float(time))[0] for time in maximum.times[fast]]
+        before = math.sqrt(N**2 + float(maximum.process_powers[fast] @ np.array(shapes)))
+        time = float(maximum.times[fast].max())
         reason = (
             f"a process of T_B = {time:.3g} s, a few samples, may be the sensor's low-pass with "
             "white noise behind it; bandwidth in the sensor file would tell"
@@ -300,10 +300,10 @@ def _with_doubt_of_the_cut(estimate: Estimate, spectrum: Spectrum, frame: Frame)
     N, B = estimate.parameters["N"], estimate.parameters["B"]
     least = _least_beyond(spectrum, frame)
     if N.value is not None and N.lower is not None and least is not None:
-        told = f"{reason}, and the density falls to {(least / N.value) ** 2:.2g} of that below"
+        falls = f"{reason}, and the density falls to {(least / N.value) ** 2:.2g} of that below"
         lower = min(N.lower, least)
         status: Status = "ok" if least > _AT_LEAST * N.value else "doubtful"
-        N = replace(N, lower=lower, status=status, reason=told)
+        N = replace(N, lower=lower, status=status, reason=falls)
     if B.status == "absent":
         unseen = f"{reason}: a process that is faster would not be seen"
         B = replace(B, status="not_identified", reason=unseen, lower=None, upper=None)
@@ -330,7 +330,7 @@ def _with_doubt_of_the_floor(estimate: Estimate, low_pass: Cutoff) -> Estimate:
 
 def _least_beyond(spectrum: Spectrum, frame: Frame) -> float | None:
     """Return the root of the least density beyond the band, over a few bins."""
-    part = spectrum.taken(frame.clear & (spectrum.lower >= frame.band.highest * (1.0 - 1e-9)))
+    part = spectrum.select(frame.clear & (spectrum.lower >= frame.band.highest * (1.0 - 1e-9)))
     if len(part.density) < _GROUP:
         return None
     ones = np.ones(_GROUP)
@@ -349,13 +349,13 @@ def _other_level(spectrum: Spectrum, frame: Frame, N: float) -> float | None:
     beyond = frame.clear & (spectrum.lower > frame.band.highest)
     if beyond.sum() < 4 or N == 0.0:
         return None
-    part = spectrum.taken(beyond)
-    top = part.taken(part.frequency > part.frequency[-1] / _PLATEAU)
+    part = spectrum.select(beyond)
+    top = part.select(part.frequency > part.frequency[-1] / _PLATEAU)
     low = top.frequency < math.sqrt(top.frequency[0] * top.frequency[-1])
     if not low.any() or low.all():
         return None
     halves = [
-        float(np.average(top.density[one], weights=top.ordinates[one])) for one in (low, ~low)
+        float(np.average(top.density[half], weights=top.ordinates[half])) for half in (low, ~low)
     ]
     level = float(np.average(top.density, weights=top.ordinates))
     flat = abs(halves[0] / halves[1] - 1.0) < 0.1
@@ -366,15 +366,15 @@ def _with_unknown_white_noise(
     estimate: Estimate, reason: str, lower: float, upper: float
 ) -> Estimate:
     """Return an estimate whose N is only known to lie between two values."""
-    old = estimate.parameters["N"]
-    ends = [end for end in (old.lower, old.upper, lower, upper) if end is not None]
+    known_N = estimate.parameters["N"]
+    ends = [end for end in (known_N.lower, known_N.upper, lower, upper) if end is not None]
     N = Parameter(
         None,
         "not_identified",
         reason,
         min(ends),
         max(ends),
-        old.duration_needed,
-        old.in_model,
+        known_N.duration_needed,
+        known_N.in_model,
     )
     return replace(estimate, parameters={**estimate.parameters, "N": N})

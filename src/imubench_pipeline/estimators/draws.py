@@ -14,12 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from imubench_pipeline.estimators.estimate import FAMILY, JointDraws
-from imubench_pipeline.estimators.model_choice import (
-    LIKE_A_WALK,
-    UNIT_ROOT,
-    UNLIKELY,
-    Candidate,
-)
+from imubench_pipeline.estimators.model_choice import LIKE_A_WALK, UNIT_ROOT, UNLIKELY, Candidate
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.whittle import Terms
 from imubench_pipeline.typing import Array
@@ -43,7 +38,7 @@ def drawn_share(candidate: Candidate, bins: int) -> float:
     bins : int
         Bins of the spectrum that it was fitted to.
     """
-    terms = candidate.found.terms
+    terms = candidate.terms
     of_times = terms.gauss_markov * (0.5 * math.log(bins) - 1.0)
     of_unlikely = 0.5 * UNLIKELY * (terms.ramp + ("Q" in terms.linear))
     return candidate.share * math.exp(-of_times - of_unlikely)
@@ -80,8 +75,8 @@ def joint_draws(
         raise ValueError("expected models with shares above 0")
     most = max(terms.gauss_markov for terms, _, _ in parts)
     drawn = [_of_model(terms, posterior, most) for terms, posterior, _ in parts]
-    first = np.concatenate([one for one, _ in drawn])
-    further = np.concatenate([one for _, one in drawn])
+    first = np.concatenate([first_components for first_components, _ in drawn])
+    further = np.concatenate([processes for _, processes in drawn])
     counts = [len(posterior.parameters) for _, posterior, _ in parts]
     mass = np.repeat([share / n for (_, _, share), n in zip(parts, counts, strict=True)], counts)
     times = np.column_stack((first[:, FAMILY.index("T_B")], further[:, :, 1]))

@@ -28,6 +28,9 @@ SHOWN = ("Q", "N", "B_curve", "sigma_min", "tau_min", "B", "T_B", "K", "R")
 COMPARED = ("N", "B_curve", "sigma_min", "K")
 """What is the same quantity of all models, and compared between sensors."""
 
+SIGMAS = 1.96
+"""Standard errors on either side of a value in a 95 % interval."""
+
 SI_UNITS: dict[str, dict[str, str]] = {
     quantity: {symbol: units.SI_UNITS[dimension] for symbol, dimension in dimensions.items()}
     for quantity, dimensions in DIMENSIONS.items()

@@ -86,7 +86,7 @@ _ABOVE_ENDS = 1.01
 FEWEST_BINS = 24
 
 
-def inside(spectrum: Spectrum) -> Array:
+def frequencies_in_bins(spectrum: Spectrum) -> Array:
     """Return frequencies within each bin, shape (b, 6), Hz."""
     within = (np.arange(_POINTS) + 0.5) / _POINTS
     width = (spectrum.upper - spectrum.lower)[:, None]
@@ -98,9 +98,9 @@ def highest_cutoff(kind: Kind, order: int, rate: float) -> float:
     return _HIGHEST[kind, order] * rate
 
 
-def gains(spectrum: Spectrum, one: Tried) -> tuple[Array, Array, Array]:
+def gains(spectrum: Spectrum, trial: FilterTrial) -> tuple[Array, Array, Array]:
     """Return what a filter leaves of white noise, of flicker noise and of slow noise."""
-    low_pass, frequency = one.low_pass, inside(spectrum)
+    low_pass, frequency = trial.low_pass, frequencies_in_bins(spectrum)
     white = low_pass.white(frequency, spectrum.rate).mean(axis=1)
     leak = low_pass.leak(spectrum.frequency, spectrum.length, spectrum.rate)
     flicker = low_pass.flicker(frequency, spectrum.rate).mean(axis=1)
@@ -109,7 +109,7 @@ def gains(spectrum: Spectrum, one: Tried) -> tuple[Array, Array, Array]:
 
 
 @dataclass(frozen=True)
-class Tried:
+class FilterTrial:
     """A filter, where its likelihood has a maximum.
 
     Attributes
@@ -148,7 +148,7 @@ class Tried:
         return rate / (2.0 * math.pi * self.cutoff)
 
 
-def explained(spectrum: Spectrum, fitted: Array, one: Tried) -> bool:
+def explains_bend(spectrum: Spectrum, fitted: Array, trial: FilterTrial) -> bool:
     """Return whether a fit behind a filter gives the spectrum where that bends it.
 
     Parameters
@@ -156,12 +156,14 @@ def explained(spectrum: Spectrum, fitted: Array, one: Tried) -> bool:
     spectrum : Spectrum
     fitted : ndarray, shape (b,)
         Density of the fit in each bin.
-    one : Tried
+    trial : Tried
         The filter.
     """
-    bent = spectrum.frequency > min(0.1 * one.cutoff, spectrum.frequency[-FEWEST_BINS])
-    shown = spectrum.taken(bent)
-    judged = goodness(shown.ordinates, shown.density, fitted[bent], shown.frequency, 2 + one.floor)
+    bent = spectrum.frequency > min(0.1 * trial.cutoff, spectrum.frequency[-FEWEST_BINS])
+    shown = spectrum.select(bent)
+    judged = goodness(
+        shown.ordinates, shown.density, fitted[bent], shown.frequency, 2 + trial.floor
+    )
     return judged.verdict == "explained"
 
 
@@ -187,18 +189,18 @@ class FilterFits:
         self.penalty = 0.5 * math.log(len(spectrum.frequency))
         self.rounded = 0.0  # density of rounding, parts of N^2
 
-    def choose_slow(self, one: Tried) -> None:
+    def choose_slow(self, trial: FilterTrial) -> None:
         """Keep the terms of slow noise that the spectrum asks for behind a filter, by BIC.
 
         A term that is not there can only add to a fit: together they would pull the cut-off.
         """
         slow: list[int] = []
         self.slow = slow
-        left = self.gains(one)
-        best = self.cost(one)
+        left = self.gains(trial)
+        best = self.cost(trial)
         while len(slow) < _MOST_SLOW:
             wider = [
-                (self._powers(self._behind(one, left, [*slow, k]))[1], k)
+                (self._powers(self._behind(trial, left, [*slow, k]))[1], k)
                 for k in range(self.everything_slow.shape[1])
                 if k not in slow
             ]
@@ -216,35 +218,35 @@ class FilterFits:
         """
 
         def score(terms: Terms) -> tuple[float, float, float]:
-            found = self.whittle.maximum(terms)
-            return found.cost + self.penalty * terms.parameters, found.cost, found.parameter("N")
+            fit = self.whittle.maximum(terms)
+            return fit.cost + self.penalty * terms.parameters, fit.cost, fit.parameter("N")
 
-        plain = min(score(Terms(*one)) for one in _ALONE)
-        rounded = min(score(Terms("Q" + one.linear, one.gauss_markov)) for one in _WITH_Q)
+        plain = min(score(Terms(*model)) for model in _ALONE)
+        rounded = min(score(Terms("Q" + terms.linear, terms.gauss_markov)) for terms in _WITH_Q)
         return (plain if plain[0] < rounded[0] else rounded)[2], plain[0], plain[1], rounded[0]
 
-    def behind(self, one: Tried) -> float:
+    def behind(self, trial: FilterTrial) -> float:
         """Return half the BIC of the best model behind a filter."""
-        white, *slow = self.gains(one)
-        N, after = self.density(one)
+        white, *slow = self.gains(trial)
+        N, after = self.density(trial)
         behind = Behind(white + (after / N) ** 2, *slow)
-        shortest = max(PROCESSES / self.rate, _SLOWER / (2.0 * math.pi * one.cutoff))
+        shortest = max(PROCESSES / self.rate, _SLOWER / (2.0 * math.pi * trial.cutoff))
         spectrum = self.whittle.spectrum
         whittle = whittle_of(spectrum, 0.5 * self.rate, COARSE, shortest=shortest, behind=behind)
-        own = 1 + one.floor
+        own = 1 + trial.floor
         terms = [Terms(*alone) for alone in _ALONE]
         return min(
             whittle.maximum(each).cost + self.penalty * (each.parameters + own) for each in terms
         )
 
-    def cost(self, one: Tried) -> float:
+    def cost(self, trial: FilterTrial) -> float:
         """Return -log L at a cut-off."""
-        return self._powers(self._columns(one))[1]
+        return self._powers(self._columns(trial))[1]
 
-    def density(self, one: Tried) -> tuple[float, float]:
+    def density(self, trial: FilterTrial) -> tuple[float, float]:
         """Return N before the filter, and the density after it."""
-        powers = self._powers(self._columns(one))[0]
-        return math.sqrt(powers[0]), math.sqrt(powers[-1]) if one.floor else 0.0
+        powers = self._powers(self._columns(trial))[0]
+        return math.sqrt(powers[0]), math.sqrt(powers[-1]) if trial.floor else 0.0
 
     def highest(self, kind: Kind, order: int) -> float:
         """Return the highest cut-off that is looked for, Hz."""
@@ -258,13 +260,15 @@ class FilterFits:
         )
         alone = min(alone, self._powers(flat)[1])
         least = min(
-            self.cost(Tried(0.0, 0.0, kind, order, float(cutoff), False))
+            self.cost(FilterTrial(0.0, 0.0, kind, order, float(cutoff), False))
             for kind, order in filters
             for cutoff in self._cutoffs(kind, order, 2.0 * self.lowest, _COARSE_SCAN)
         )
         return least < alone - _WORTH_TRYING
 
-    def tried(self, filters: Sequence[tuple[Kind, int]], within: float = 1e-5) -> list[Tried]:
+    def try_filters(
+        self, filters: Sequence[tuple[Kind, int]], within: float = 1e-5
+    ) -> list[FilterTrial]:
         """Return the maxima of the likelihood, the best by BIC first.
 
         Parameters
@@ -274,19 +278,19 @@ class FilterFits:
         within : float
             Error up to which a cut-off is found, parts of it.
         """
-        found = [one for kind, order in filters for one in self._of(kind, order, within)]
+        maxima = [trial for kind, order in filters for trial in self._of(kind, order, within)]
         # A floor that gains next to nothing is none. Of first order, with a floor, digital and
         # analogue filters are the same but for N.
         return sorted(
-            found, key=lambda one: one.score + one.floor + _SAME * (one.kind != "analogue")
+            maxima, key=lambda trial: trial.score + trial.floor + _SAME * (trial.kind != "analogue")
         )
 
-    def _of(self, kind: Kind, order: int, within: float) -> Iterator[Tried]:
+    def _of(self, kind: Kind, order: int, within: float) -> Iterator[FilterTrial]:
         """Yield the maxima of the likelihood over the cut-off, without and with a floor."""
         scan = np.log(self._cutoffs(kind, order, self.lowest, _SCAN))
-        start = Tried(0.0, 0.0, kind, order, 1.0, True)
+        start = FilterTrial(0.0, 0.0, kind, order, 1.0, True)
 
-        def at(x: float, floor: bool) -> Tried:
+        def at(x: float, floor: bool) -> FilterTrial:
             return replace(start, cutoff=math.exp(x), floor=floor)
 
         columns = [self._columns(at(float(x), True)) for x in scan]
@@ -303,18 +307,18 @@ class FilterFits:
                     method="bounded",
                     options={"xatol": within},
                 )
-                one = replace(at(best.x, floor), cost=float(best.fun))
+                trial = replace(at(best.x, floor), cost=float(best.fun))
                 if (
                     floor
                     and order == 1
                     and kind != "boxcar"
-                    and one.correlation(self.rate) > _FILTERS
+                    and trial.correlation(self.rate) > _FILTERS
                 ):
                     continue  # white noise beside a process
-                before, after = self.density(one)
+                before, after = self.density(trial)
                 # Where what is behind the filter is the greater, it is a process of slow noise.
-                if before > after and one.cutoff > _ABOVE_ENDS * self.lowest:
-                    yield replace(one, score=one.cost + self.penalty * (1 + floor))
+                if before > after and trial.cutoff > _ABOVE_ENDS * self.lowest:
+                    yield replace(trial, score=trial.cost + self.penalty * (1 + floor))
 
     def _cutoffs(self, kind: Kind, order: int, lowest: float, number: int) -> Array:
         """Return the cut-offs from which a search starts, rising, Hz."""
@@ -324,24 +328,24 @@ class FilterFits:
         lengths = np.arange(_WHOLE, 2, -1)
         return np.unique(np.concatenate([scan, BOXCAR * self.rate / lengths]))
 
-    def explains(self, one: Tried) -> bool:
+    def explains(self, trial: FilterTrial) -> bool:
         """Return whether the filter gives the spectrum where it bends."""
-        columns = self._columns(one)
+        columns = self._columns(trial)
         fitted = columns @ self._powers(columns)[0]
-        return explained(self.whittle.spectrum, fitted, one)
+        return explains_bend(self.whittle.spectrum, fitted, trial)
 
-    def limits(self, one: Tried) -> tuple[float, float]:
+    def limits(self, trial: FilterTrial) -> tuple[float, float]:
         """Return the ends of the 95 % interval, by the profile of the likelihood.
 
         Above Nyquist the profile may have several hollows: the ends are the outermost.
         """
-        most = self.cost(one) + HALF_CHI_SQUARED
+        most = self.cost(trial) + HALF_CHI_SQUARED
 
         def beyond(x: float) -> float:
-            return self.cost(replace(one, cutoff=math.exp(x))) - most
+            return self.cost(replace(trial, cutoff=math.exp(x))) - most
 
         def end_of(sign: float, end: float) -> float:
-            inside = math.log(one.cutoff)
+            inside = math.log(trial.cutoff)
             step, outside = 1e-3, inside
             while sign * ((outside := inside + sign * step) - end) < 0.0:
                 if beyond(outside) > 0.0:
@@ -350,36 +354,38 @@ class FilterFits:
             return end
 
         ends = []
-        for sign, end in ((-1.0, self.lowest), (1.0, self.highest(one.kind, one.order))):
-            found = end_of(sign, math.log(end))
-            first = max(math.log(end), min(found, math.log(UNFOLDED * self.rate)))
-            number = _BETWEEN if first != found else 0
-            further = np.linspace(first, found, number, endpoint=False)
+        for sign, end in ((-1.0, self.lowest), (1.0, self.highest(trial.kind, trial.order))):
+            edge = end_of(sign, math.log(end))
+            first = max(math.log(end), min(edge, math.log(UNFOLDED * self.rate)))
+            number = _BETWEEN if first != edge else 0
+            further = np.linspace(first, edge, number, endpoint=False)
             allowed = next((k for k, x in enumerate(further) if beyond(float(x)) < 0.0), None)
             if allowed is not None:
                 inside = float(further[allowed])
                 outside = float(further[allowed - 1]) if allowed else inside
-                found = brentq(beyond, inside, outside, xtol=1e-6) if allowed else inside
-            ends.append(math.exp(found))
+                edge = brentq(beyond, inside, outside, xtol=1e-6) if allowed else inside
+            ends.append(math.exp(edge))
         return ends[0], ends[1]
 
-    def gains(self, one: Tried) -> tuple[Array, Array, Array]:
+    def gains(self, trial: FilterTrial) -> tuple[Array, Array, Array]:
         """Return what a filter leaves of white noise, with rounding, of flicker and slow noise."""
-        white, flicker, slow = gains(self.whittle.spectrum, one)
+        white, flicker, slow = gains(self.whittle.spectrum, trial)
         return white + self.rounded, flicker, slow
 
-    def _columns(self, one: Tried) -> Array:
-        return self._behind(one, self.gains(one), self.slow)
+    def _columns(self, trial: FilterTrial) -> Array:
+        return self._behind(trial, self.gains(trial), self.slow)
 
-    def _behind(self, one: Tried, left: tuple[Array, Array, Array], slow: Sequence[int]) -> Array:
+    def _behind(
+        self, trial: FilterTrial, left: tuple[Array, Array, Array], slow: Sequence[int]
+    ) -> Array:
         """Return the terms behind a filter, as columns."""
         white, flicker, gain = left
-        kept = np.array(slow, dtype=np.int64)
+        indices = np.array(slow, dtype=np.int64)
         # A process as fast as the filter is the filter.
-        kept = kept[self.times[kept] >= _SLOWER / (2.0 * math.pi * one.cutoff)]
-        gains = np.where(kept == 0, flicker[:, None], gain[:, None])
-        columns = np.column_stack([white, self.everything_slow[:, kept] * gains])
-        return np.column_stack([columns, np.ones(len(white))]) if one.floor else columns
+        indices = indices[self.times[indices] >= _SLOWER / (2.0 * math.pi * trial.cutoff)]
+        gains = np.where(indices == 0, flicker[:, None], gain[:, None])
+        columns = np.column_stack([white, self.everything_slow[:, indices] * gains])
+        return np.column_stack([columns, np.ones(len(white))]) if trial.floor else columns
 
     def _powers(self, columns: Array) -> tuple[Array, float]:
         norm = columns.mean(axis=0)

@@ -8,11 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from imubench_pipeline.estimators.filter_fits import Tried
+from imubench_pipeline.estimators.estimate import SIGMAS
+from imubench_pipeline.estimators.filter_fits import FilterTrial
 from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.typing import Array
-
-SIGMAS = 1.96
 
 _TWIN = 0.1
 """Weight of the same first-order filter applied to the samples: it looks like that before the
@@ -50,10 +49,10 @@ class Allowed:
         Half of the 95 % interval of the logarithm of its cut-off.
     """
 
-    filter: Tried
+    filter: FilterTrial
     half_width: float
 
-    def at(self, x: float) -> Tried:
+    def at(self, x: float) -> FilterTrial:
         """Return it at a logarithm of the cut-off, Hz."""
         return replace(self.filter, cutoff=math.exp(x))
 
@@ -74,7 +73,7 @@ class OfModel:
     gained: float
 
 
-def also_after_sampling(reading: Reading, one: Tried, rate: float) -> Reading:
+def also_after_sampling(reading: Reading, trial: FilterTrial, rate: float) -> Reading:
     """Return the reading of the same first-order filter applied to the samples.
 
     Its shape is the same, and it folds nothing into N.
@@ -82,18 +81,18 @@ def also_after_sampling(reading: Reading, one: Tried, rate: float) -> Reading:
     Parameters
     ----------
     reading : Reading
-    one : Tried
+    trial : Tried
         An analogue filter of first order.
     rate : float
         Hz.
     """
-    gain = 0.5 * math.log(float(LowPass(one.cutoff).folded_power(0.0, rate)))
+    gain = 0.5 * math.log(float(LowPass(trial.cutoff).folded_power(0.0, rate)))
     return Reading(
         _TWIN * reading.weight, reading.below + gain, reading.at + gain, reading.above + gain
     )
 
 
-def drawn(readings: Sequence[Reading], number: int, rng: np.random.Generator) -> Array:
+def draw_factors(readings: Sequence[Reading], number: int, rng: np.random.Generator) -> Array:
     """Return draws of N over its value for the filter that was chosen, shape (number,).
 
     Parameters
@@ -103,10 +102,10 @@ def drawn(readings: Sequence[Reading], number: int, rng: np.random.Generator) ->
     number : int
     rng : numpy.random.Generator
     """
-    weight = np.array([one.weight for one in readings])
+    weight = np.array([reading.weight for reading in readings])
     which = rng.choice(len(weight), number, p=weight / weight.sum())
     below, at, above = (
-        np.array([getattr(one, name) for one in readings])[which]
+        np.array([getattr(reading, name) for reading in readings])[which]
         for name in ("below", "at", "above")
     )
     normal = rng.standard_normal(number)

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from imubench_pipeline.estimators.band import Band, find_band
 from imubench_pipeline.estimators.cutoff import Cutoff, find_cutoff
 from imubench_pipeline.estimators.filter_fits import PROCESSES, UNFOLDED
-from imubench_pipeline.estimators.joint_cutoff import refined
+from imubench_pipeline.estimators.joint_cutoff import refine_cutoff
 from imubench_pipeline.estimators.lines import Line, find, without_lines
-from imubench_pipeline.estimators.model_choice import Candidate, rescored
+from imubench_pipeline.estimators.model_choice import Candidate, rescore
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.spectrum import LineSpectrum, Spectrum
 from imubench_pipeline.estimators.whittle import (
@@ -29,6 +29,7 @@ from imubench_pipeline.estimators.whittle import (
     model_of,
     whittle_of,
 )
+from imubench_pipeline.typing import Array
 
 Mask = NDArray[np.bool_]
 
@@ -91,14 +92,14 @@ class Frame:
     def _whittle(self, spectrum: Spectrum, bins: Mask, shapes: int) -> Whittle:
         behind = self.low_pass.behind if self.low_pass is not None else None
         return whittle_of(
-            spectrum.taken(bins),
+            spectrum.select(bins),
             self.band.highest,
             shapes,
             shortest=self.shortest,
-            behind=behind.taken(bins) if behind is not None else None,
+            behind=behind.select(bins) if behind is not None else None,
         )
 
-    def has_a_bend_of_each_model(self, spectrum: Spectrum, times: NDArray[np.float64]) -> bool:
+    def has_a_bend_of_each_model(self, spectrum: Spectrum, times: Array) -> bool:
         """Return whether each model of the noise has a cut-off of its own.
 
         So it is where the low-pass bends the spectrum well below Nyquist; higher up, what folds
@@ -112,23 +113,23 @@ class Frame:
         """
         if self.low_pass is None or self.low_pass.behind is None:
             return False
-        cutoffs = [one.filter.cutoff for one in self.low_pass.allowed]
+        cutoffs = [allowed.filter.cutoff for allowed in self.low_pass.allowed]
         shared = len(times) > 0 and times.min() < _APART / (2.0 * np.pi * cutoffs[0])
         return bool(shared or max(cutoffs) < UNFOLDED * spectrum.rate)
 
-    def refined(self, spectrum: Spectrum, candidates: Sequence[Candidate]) -> Frame:
+    def refine(self, spectrum: Spectrum, candidates: Sequence[Candidate]) -> Frame:
         """Return the same behind a low-pass that is fitted together with the best of models."""
         if self.low_pass is None:
             return self
-        low_pass = refined(self.low_pass, spectrum, self.used, candidates)
+        low_pass = refine_cutoff(self.low_pass, spectrum, self.used, candidates)
         source = self.band.source.replace(self.low_pass.words, low_pass.words)
         return replace(self, low_pass=low_pass, band=replace(self.band, source=source))
 
-    def rescored(self, candidates: Sequence[Candidate]) -> list[Candidate]:
+    def rescore(self, candidates: Sequence[Candidate]) -> list[Candidate]:
         """Return models by what they explain with a cut-off of their own, the best first."""
         models = self.low_pass.models if self.low_pass is not None else {}
-        gained = {terms: one.gained for terms, one in models.items()}
-        return rescored(candidates, gained)
+        gained = {terms: model.gained for terms, model in models.items()}
+        return rescore(candidates, gained)
 
     @property
     def folding(self) -> float:
@@ -191,7 +192,7 @@ class Frame:
         return Frame(self.lines, self.clear, used, band, _none(self.low_pass), cut=cut)
 
 
-def _scaled(posterior: Posterior, terms: Terms, factors: NDArray[np.float64]) -> Posterior:
+def _scaled(posterior: Posterior, terms: Terms, factors: Array) -> Posterior:
     if "N" not in terms.linear:
         return posterior
     parameters = posterior.parameters.copy()
@@ -258,16 +259,16 @@ def _lines(
     spectrum: Spectrum, line_spectra: Sequence[LineSpectrum], band: float | None
 ) -> tuple[list[Line], Mask]:
     """Return the lines, and the bins clear of them."""
-    everything = np.ones(len(spectrum.frequency), dtype=np.bool_)
+    all_bins = np.ones(len(spectrum.frequency), dtype=np.bool_)
     start = min(band or np.inf, _FOR_LINES * spectrum.rate)
     below = spectrum.upper <= start
     if below.sum() < FEWEST_BINS:
-        below = everything
-    found = whittle_of(spectrum.taken(below), start, COARSE).maximum(Terms("NFK", 1))
+        below = all_bins
+    maximum = whittle_of(spectrum.select(below), start, COARSE).maximum(Terms("NFK", 1))
     low = spectrum.block > 1
     crossover = float(spectrum.upper[low].max()) if low.any() else 0.0
-    lines = find(line_spectra, model_of(found), spectrum.rate, crossover)
+    lines = find(line_spectra, model_of(maximum), spectrum.rate, crossover)
     if not lines:
-        return lines, everything
-    density = whittle_of(spectrum, 0.5 * spectrum.rate, COARSE).density(found)
+        return lines, all_bins
+    density = whittle_of(spectrum, 0.5 * spectrum.rate, COARSE).density(maximum)
     return lines, without_lines(spectrum, lines, density)

@@ -31,30 +31,30 @@ _SHORTEST, _LONGEST = 1e-4, 1e4
 _A_DECADE = 6
 
 
-def relative_errors(whittle: Whittle, found: Maximum) -> Array:
+def relative_errors(whittle: Whittle, maximum: Maximum) -> Array:
     """Return the Cramér-Rao bound of each parameter of a fit, relative to it.
 
     Shape (m,): the parameters in the order of `Maximum.powers`, then T_B, then R; infinite for a
     term that is 0.
     """
-    sensitivity = whittle.sensitivity(found)
-    if found.terms.ramp:
-        sensitivity[-1] *= found.ramp
+    sensitivity = whittle.sensitivity(maximum)
+    if maximum.terms.ramp:
+        sensitivity[-1] *= maximum.ramp
     return _bounds(sensitivity)
 
 
 def _bounds(sensitivity: Array) -> Array:
     """Return the square roots of the diagonal of the inverse of the information."""
-    result = np.full(len(sensitivity), np.inf)
+    bounds = np.full(len(sensitivity), np.inf)
     size = np.linalg.norm(sensitivity, axis=1)
-    there = size > 1e-9
-    if there.any():
+    sensitive = size > 1e-9
+    if sensitive.any():
         # Not from the information itself: squared, what can hardly be told apart is lost.
-        root = np.linalg.qr((sensitivity[there] / size[there, None]).T, mode="r")
+        root = np.linalg.qr((sensitivity[sensitive] / size[sensitive, None]).T, mode="r")
         if np.abs(np.diag(root)).min() > 0.0:
             inverse = np.linalg.inv(root)
-            result[there] = np.linalg.norm(inverse, axis=1) / size[there]
-    return result
+            bounds[sensitive] = np.linalg.norm(inverse, axis=1) / size[sensitive]
+    return bounds
 
 
 def ideal_spectrum(rate: float, duration: float, highest: float) -> Spectrum:
@@ -108,15 +108,9 @@ def bounds_of(model: NoiseModel, rate: float, duration: float, highest: float) -
     dict
         By the names of `parameter_names`.
     """
-    found = _as_maximum(model)
+    maximum = _as_maximum(model)
     spectrum = ideal_spectrum(rate, duration, highest)
-    return dict(
-        zip(
-            parameter_names(found.terms),
-            _errors(spectrum, found),
-            strict=True,
-        )
-    )
+    return dict(zip(parameter_names(maximum.terms), _errors(spectrum, maximum), strict=True))
 
 
 def parameter_names(terms: Terms) -> list[str]:
@@ -129,13 +123,13 @@ def parameter_names(terms: Terms) -> list[str]:
 
 
 def durations_needed(
-    found: Maximum, rate: float, duration: float, highest: float
+    maximum: Maximum, rate: float, duration: float, highest: float
 ) -> list[float | None]:
     """Return how long a log would tell each parameter to `WANTED`, s.
 
     Parameters
     ----------
-    found : Maximum
+    maximum : Maximum
     rate, duration, highest : float
         Of the log: Hz, s, and the highest frequency used, Hz.
 
@@ -149,23 +143,23 @@ def durations_needed(
         duration * _LONGEST,
         1 + round(math.log10(_LONGEST / _SHORTEST) * _A_DECADE),
     )
-    lengths = lengths[lengths * 2.0 * min(highest, 0.5 * rate) > 4.0 * found.terms.parameters]
-    known: dict[int, Array] = {}
+    lengths = lengths[lengths * 2.0 * min(highest, 0.5 * rate) > 4.0 * maximum.terms.parameters]
+    excesses: dict[int, Array] = {}
 
     def excess(place: int) -> Array:
-        if place not in known:
-            errors = _errors(ideal_spectrum(rate, float(lengths[place]), highest), found)
-            known[place] = np.log(errors / WANTED)
-        return known[place]
+        if place not in excesses:
+            errors = _errors(ideal_spectrum(rate, float(lengths[place]), highest), maximum)
+            excesses[place] = np.log(errors / WANTED)
+        return excesses[place]
 
     return [
-        _crossing(np.log(lengths), excess, known, number)
-        for number in range(len(parameter_names(found.terms)))
+        _crossing(np.log(lengths), excess, excesses, number)
+        for number in range(len(parameter_names(maximum.terms)))
     ]
 
 
 def _crossing(
-    log_lengths: Array, excess: Callable[[int], Array], known: dict[int, Array], number: int
+    log_lengths: Array, excess: Callable[[int], Array], excesses: dict[int, Array], number: int
 ) -> float | None:
     """Return the length at which the error of a parameter, which falls with it, is `WANTED`.
 
@@ -173,7 +167,7 @@ def _crossing(
     begins between the places that are known already, and looks at few more.
     """
     low, high = -1, len(log_lengths)
-    for place, values in known.items():
+    for place, values in excesses.items():
         if values[number] > 0.0:
             low = max(low, place)
         else:
@@ -181,8 +175,8 @@ def _crossing(
     steps = 0
     while high - low > 1:
         place = (low + high) // 2
-        if steps % 3 < 2 and known:
-            place = _guess(log_lengths, known, number, low, high)
+        if steps % 3 < 2 and excesses:
+            place = _guess(log_lengths, excesses, number, low, high)
         if excess(place)[number] > 0.0:
             low = place
         else:
@@ -190,20 +184,20 @@ def _crossing(
         steps += 1
     if high == len(log_lengths):
         return None
-    if low < 0 or not np.isfinite(known[low][number]):
+    if low < 0 or not np.isfinite(excesses[low][number]):
         return float(np.exp(log_lengths[high]))
-    falling = known[low][number], known[high][number]
+    falling = excesses[low][number], excesses[high][number]
     part = falling[0] / (falling[0] - falling[1])
     return float(np.exp(log_lengths[low] + part * (log_lengths[high] - log_lengths[low])))
 
 
-def _guess(log_lengths: Array, known: dict[int, Array], number: int, low: int, high: int) -> int:
+def _guess(log_lengths: Array, excesses: dict[int, Array], number: int, low: int, high: int) -> int:
     """Return a place between two where the error may be `WANTED`.
 
     From what is known at both, or as an error falls with the square root of the length.
     """
-    left = known[low][number] if low >= 0 else np.inf
-    right = known[high][number] if high < len(log_lengths) else -np.inf
+    left = excesses[low][number] if low >= 0 else np.inf
+    right = excesses[high][number] if high < len(log_lengths) else -np.inf
     if np.isfinite(left) and np.isfinite(right):
         part = left / (left - right)
         where = log_lengths[low] + part * (log_lengths[high] - log_lengths[low])
@@ -218,10 +212,10 @@ def _guess(log_lengths: Array, known: dict[int, Array], number: int, low: int, h
     return min(max(place - (low < place - 1), low + 1), high - 1)
 
 
-def _errors(spectrum: Spectrum, found: Maximum) -> Array:
+def _errors(spectrum: Spectrum, maximum: Maximum) -> Array:
     """Return the relative bounds of a model in a spectrum's bins."""
-    times = found.times if len(found.times) else np.array([1.0])
-    return relative_errors(_Exact(spectrum, float(times[0]) / 2.0, float(times[-1]) * 2.0), found)
+    times = maximum.times if len(maximum.times) else np.array([1.0])
+    return relative_errors(_Exact(spectrum, float(times[0]) / 2.0, float(times[-1]) * 2.0), maximum)
 
 
 class _Exact(Whittle):

@@ -123,7 +123,7 @@ class Weighted:
         return rng.permutation(which)
 
 
-def adapted(
+def sample_adaptively(
     log_density: Callable[[Array], Array],
     first: Mixture,
     rng: np.random.Generator,
@@ -161,17 +161,17 @@ def adapted(
         with np.errstate(divide="ignore"):
             logarithm = values - np.log(proposed)
         weights = np.exp(logarithm - logarithm.max())
-        found = Weighted(points, weights / weights.sum())
-        if found.effective >= wanted or len(points) + size > most:
-            return found
-        learnt = points[found.clipped(_CLIPPED).drawn(_LEARNT, rng)]
+        weighted = Weighted(points, weights / weights.sum())
+        if weighted.effective >= wanted or len(points) + size > most:
+            return weighted
+        learnt = points[weighted.clipped(_CLIPPED).drawn(_LEARNT, rng)]
         for _ in range(_FITS):
             mixture = mixture.fitted(learnt)
-        new = mixture.beside(first, _KEPT)
-        added = new.draw(size, rng)
-        proposed = proposed + new.densities(points).sum(axis=1)
-        mixtures.append(new)
-        everywhere = [one.densities(added).sum(axis=1) for one in mixtures]
+        proposal = mixture.beside(first, _KEPT)
+        added = proposal.draw(size, rng)
+        proposed = proposed + proposal.densities(points).sum(axis=1)
+        mixtures.append(proposal)
+        everywhere = [earlier.densities(added).sum(axis=1) for earlier in mixtures]
         points = np.concatenate([points, added])
         values = np.concatenate([values, log_density(added)])
         proposed = np.concatenate([proposed, np.sum(everywhere, axis=0)])
@@ -222,7 +222,7 @@ def _fitted(
             parts[i, k] /= n * max(total, 1e-300)
     new_weights, new_means = np.empty(weights.size), np.empty((weights.size, d))
     new_scales = np.zeros((weights.size, d, d))
-    kept = 0
+    count = 0
     for k in range(weights.size):
         mass, squares = 0.0, 0.0
         for i in range(n):
@@ -230,7 +230,7 @@ def _fitted(
             squares += parts[i, k] ** 2
         if mass <= least or mass**2 <= (2 * d + 2) * squares:
             continue
-        mean, scale = new_means[kept], new_scales[kept]
+        mean, scale = new_means[count], new_scales[count]
         near = np.empty(n)
         for i in range(n):
             square = _square(points[i], means[k], inverses[k])
@@ -248,6 +248,6 @@ def _fitted(
         for a in range(d):
             # The covariance of few points is too narrow in some direction.
             scale[a, a] = scale[a, a] * (1.0 + d * squares / mass**2) + 1e-14
-        new_weights[kept] = mass
-        kept += 1
-    return new_weights[:kept], new_means[:kept], new_scales[:kept]
+        new_weights[count] = mass
+        count += 1
+    return new_weights[:count], new_means[:count], new_scales[:count]

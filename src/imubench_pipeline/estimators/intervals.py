@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from imubench_pipeline.estimators.band import Band
-from imubench_pipeline.estimators.estimate import FAMILY, Estimate, Parameter
+from imubench_pipeline.estimators.estimate import FAMILY, SIGMAS, Estimate, Parameter
 from imubench_pipeline.estimators.identifiability import (
     NOT_IDENTIFIED,
     NOT_IDENTIFIED_LEVEL,
@@ -25,7 +25,6 @@ from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
 from imubench_pipeline.typing import Array
 
 _AT_BOUND = 0.985
-_WIDTH_OF_INTERVAL = 3.92
 _ABOUT_AS_GOOD = 2.0
 _MOST_ABOVE = 2.3
 """Ratio of the upper limit to a value beyond which it is no number to quote. Below, limits go far
@@ -64,25 +63,30 @@ def with_upper_limits(
     for name in ("K", "B"):
         if parameters[name].status != "absent":
             continue
-        having = [one for one in (*wider, *alike) if _has(name, one.found.terms)]
+        having = [candidate for candidate in (*wider, *alike) if _has(name, candidate.terms)]
         if not having:
             continue
         limits = [
-            float(np.quantile(_draws_of(name, one.found.terms, draws), 0.975)) for one in having
+            float(np.quantile(_draws_of(name, candidate.terms, draws), 0.975))
+            for candidate in having
         ]
-        good = [one for one in alike[1:] if as_good(one, alike[0]) and _in_model(name, one.found)]
+        good = [
+            candidate
+            for candidate in alike[1:]
+            if as_good(candidate, alike[0]) and _in_model(name, candidate.maximum)
+        ]
         if not good:
             parameters[name] = Parameter(None, "absent", _ABSENT_BELOW, 0.0, max(limits))
             continue
-        names = " and ".join(one.found.terms.name for one in good)
+        names = " and ".join(candidate.terms.name for candidate in good)
         verb = "is" if len(good) == 1 else "are"
         reason = f"{names}, which {'has' if len(good) == 1 else 'have'} it, {verb} about as good"
-        reason += f" as {alike[0].found.terms.name}; only its interval is given"
+        reason += f" as {alike[0].terms.name}; only its interval is given"
         parameters[name] = Parameter(None, "not_identified", reason, 0.0, max(limits))
-        timed = [one.found.terms for one in good if _has("T_B", one.found.terms)]
+        timed = [candidate.terms for candidate in good if _has("T_B", candidate.terms)]
         times = [_draws_of("T_B", terms, draws) for terms in timed]
         if name == "B" and times:
-            ends = [np.quantile(one, (0.025, 0.975)) for one in times]
+            ends = [np.quantile(drawn_times, (0.025, 0.975)) for drawn_times in times]
             low, high = float(min(end[0] for end in ends)), float(max(end[1] for end in ends))
             parameters["T_B"] = Parameter(None, "not_identified", reason, low, high)
     return replace(estimate, parameters=parameters)
@@ -97,10 +101,10 @@ def as_good(other: Candidate, chosen: Candidate) -> bool:
     return other.aic <= chosen.aic or other.bic <= chosen.bic + _ABOUT_AS_GOOD
 
 
-def _in_model(name: str, found: Maximum) -> bool:
+def _in_model(name: str, maximum: Maximum) -> bool:
     """Tell whether a fit has a parameter above 0."""
-    names = parameter_names(found.terms)
-    return name in names and bool(found.powers[names.index(name)] > 0.0)
+    names = parameter_names(maximum.terms)
+    return name in names and bool(maximum.powers[names.index(name)] > 0.0)
 
 
 def papers_only(parameters: Mapping[str, Parameter]) -> dict[str, Parameter]:
@@ -141,24 +145,24 @@ def describe(
         than that of one of them where it is known badly. The model that stands beside it has its
         own.
     """
-    found = chosen.found
-    names = parameter_names(found.terms)
-    values = [*np.sqrt(found.powers), *found.times] + [found.ramp] * found.terms.ramp
-    errors = relative_errors(whittle, found)
+    maximum = chosen.maximum
+    names = parameter_names(maximum.terms)
+    values = [*np.sqrt(maximum.powers), *maximum.times] + [maximum.ramp] * maximum.terms.ramp
+    errors = relative_errors(whittle, maximum)
     needed = durations_needed(
-        found, whittle.spectrum.rate, float(whittle.spectrum.duration), band.highest
+        maximum, whittle.spectrum.rate, float(whittle.spectrum.duration), band.highest
     )
     described: dict[str, Parameter] = {}
     for i, (name, value) in enumerate(zip(names, values, strict=True)):
         lower, upper = _interval(name, chosen, alike, draws)
         error = float(errors[i])
         if name == "K" and value > 0.0:
-            error = max(error, _spread(_draws_of(name, found.terms, draws)))
+            error = max(error, _spread(_draws_of(name, maximum.terms, draws)))
         described[name] = _parameter(name, float(value), error, lower, upper, needed[i], whittle)
     if "K" in described and described["K"].status == "ok":
-        there = _over_models("K", chosen, alike, draws)
-        if len(there) > 1:
-            own, middle = described["K"], mixture_quantile(there, 0.5)
+        weighted_draws = _over_models("K", chosen, alike, draws)
+        if len(weighted_draws) > 1:
+            own, middle = described["K"], mixture_quantile(weighted_draws, 0.5)
             described["K"] = replace(own, value=middle, fitted=own.value)
     for number in ("", " 2"):
         if f"B{number}" in described and described[f"B{number}"].status == "absent":
@@ -199,7 +203,7 @@ def _parameter(
     most = NOT_IDENTIFIED_WALK if name == "K" else NOT_IDENTIFIED_LEVEL
     if name.startswith(("B", "T_B")) and lower > 0.0:
         # B and T_B trade off along a ridge that the bound, which is local, does not see.
-        error = max(error, math.log(upper / lower) / _WIDTH_OF_INTERVAL)
+        error = max(error, math.log(upper / lower) / (2.0 * SIGMAS))
         most = NOT_IDENTIFIED_TIME if name.startswith("T_B") else NOT_IDENTIFIED
     if name == "R" and lower < 0.0 < upper:
         reason = "its interval contains 0; only that is given"
@@ -218,36 +222,26 @@ def _parameter(
 
 
 def _interval(
-    name: str,
-    chosen: Candidate,
-    alike: Sequence[Candidate],
-    draws: dict[Terms, Posterior],
+    name: str, chosen: Candidate, alike: Sequence[Candidate], draws: dict[Terms, Posterior]
 ) -> tuple[float, float]:
     """Return the 95 % interval of a parameter, over the models that have it, by their AIC.
 
     That of the chosen model lies inside: of models that the log hardly tells apart, AIC likes a
     process that is as slow as a walk better than the walk.
     """
-    there = _over_models(name, chosen, alike, draws)
-    own = [(_draws_of(name, chosen.found.terms, draws), 1.0)]
-    return (
-        min(mixture_quantile(there, 0.025), mixture_quantile(own, 0.025)),
-        max(mixture_quantile(there, 0.975), mixture_quantile(own, 0.975)),
-    )
+    own = [(_draws_of(name, chosen.terms, draws), 1.0)]
+    return mixture_limits(_over_models(name, chosen, alike, draws), own)
 
 
 def _over_models(
-    name: str,
-    chosen: Candidate,
-    alike: Sequence[Candidate],
-    draws: dict[Terms, Posterior],
+    name: str, chosen: Candidate, alike: Sequence[Candidate], draws: dict[Terms, Posterior]
 ) -> list[tuple[Array, float]]:
     """Return the draws of a parameter in each model that has it, with the weight of the model."""
-    terms = chosen.found.terms
+    terms = chosen.terms
     return [
-        (_draws_of(name, one.found.terms, draws), math.exp(0.5 * (chosen.aic - one.aic)))
-        for one in alike
-        if one.found.terms == terms or _comparable(name, terms, one.found.terms)
+        (_draws_of(name, candidate.terms, draws), math.exp(0.5 * (chosen.aic - candidate.aic)))
+        for candidate in alike
+        if candidate.terms == terms or _comparable(name, terms, candidate.terms)
     ]
 
 
@@ -269,11 +263,21 @@ def mixture_quantile(parts: Sequence[tuple[Array, float]], level: float) -> floa
     return float(values[order][min(int(place), len(values) - 1)])
 
 
+def mixture_limits(
+    parts: Sequence[tuple[Array, float]], own: Sequence[tuple[Array, float]]
+) -> tuple[float, float]:
+    """Return the 95 % limits of draws of several models; those of one of them lie inside."""
+    return (
+        min(mixture_quantile(parts, 0.025), mixture_quantile(own, 0.025)),
+        max(mixture_quantile(parts, 0.975), mixture_quantile(own, 0.975)),
+    )
+
+
 def _draws_of(name: str, terms: Terms, draws: dict[Terms, Posterior]) -> Array:
     """Return the draws of a parameter of a model."""
     posterior = draws[terms]
-    everything = np.column_stack([posterior.parameters, posterior.times, posterior.ramps])
-    return np.asarray(everything[:, parameter_names(terms).index(name)])
+    columns = np.column_stack([posterior.parameters, posterior.times, posterior.ramps])
+    return np.asarray(columns[:, parameter_names(terms).index(name)])
 
 
 def _has(name: str, terms: Terms) -> bool:

@@ -21,8 +21,8 @@ from imubench_pipeline.estimators.filter_fits import (
     FAMILY,
     HALF_CHI_SQUARED,
     PROCESSES,
-    Tried,
-    explained,
+    FilterTrial,
+    explains_bend,
     gains,
     highest_cutoff,
 )
@@ -34,14 +34,7 @@ from imubench_pipeline.estimators.filter_readings import (
 )
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.spectrum import Spectrum
-from imubench_pipeline.estimators.whittle import (
-    COARSE,
-    Behind,
-    Maximum,
-    Terms,
-    Whittle,
-    whittle_of,
-)
+from imubench_pipeline.estimators.whittle import COARSE, Behind, Maximum, Terms, Whittle, whittle_of
 
 _REFINED_WITHIN = math.log(2.0)
 """Distance in log f_c that a joint fit with the noise may move the cut-off."""
@@ -65,7 +58,7 @@ _SHARE = 0.05
 """Share by AIC, with its own cut-off, from which a model has a part in the interval of that."""
 
 
-def joined(candidates: Sequence[Candidate], always: Terms) -> list[Candidate]:
+def worth_joining(candidates: Sequence[Candidate], always: Terms) -> list[Candidate]:
     """Return the models for which the cut-off of a filter is fitted, the best first.
 
     Parameters
@@ -77,19 +70,16 @@ def joined(candidates: Sequence[Candidate], always: Terms) -> list[Candidate]:
     """
     best = candidates[0]
     return [
-        one
-        for one in candidates
-        if one.bic < best.bic + _WORTH_JOINING
-        or one.share >= _LEAST_SHARE
-        or one.found.terms == always
+        candidate
+        for candidate in candidates
+        if candidate.bic < best.bic + _WORTH_JOINING
+        or candidate.share >= _LEAST_SHARE
+        or candidate.terms == always
     ]
 
 
-def refined(
-    found: Cutoff,
-    spectrum: Spectrum,
-    clear: NDArray[np.bool_],
-    candidates: Sequence[Candidate],
+def refine_cutoff(
+    low_pass: Cutoff, spectrum: Spectrum, clear: NDArray[np.bool_], candidates: Sequence[Candidate]
 ) -> Cutoff:
     """Return a low-pass whose cut-off is fitted together with all parameters of a model.
 
@@ -98,21 +88,21 @@ def refined(
 
     Parameters
     ----------
-    found : Cutoff
+    low_pass : Cutoff
     spectrum : Spectrum
     clear : ndarray of bool, shape (b,)
         Bins that no line touches, and in which the ends of the transform do not rule.
     candidates : sequence of Candidate
         The models, the best first, with the cut-off as it is; of a ramp nothing is taken.
     """
-    if found.kind is None or found.behind is None or not candidates:
-        return found
-    joint = _Joint(spectrum, clear, found)
+    if low_pass.kind is None or low_pass.behind is None or not candidates:
+        return low_pass
+    joint = _Joint(spectrum, clear, low_pass)
     tried: dict[Terms, list[_Fit]] = {}
     bic: dict[Terms, float] = {}
     aic: dict[Terms, float] = {}
     for candidate in candidates:
-        terms = replace(candidate.found.terms, ramp=False)
+        terms = replace(candidate.terms, ramp=False)
         if terms not in tried:
             tried[terms] = joint.fits(terms)
             gained = joint.common(terms) - tried[terms][0].cost
@@ -123,27 +113,29 @@ def refined(
     likely = {terms: math.exp(0.5 * (aic[chosen] - aic[terms])) for terms in aic}
     least = _SHARE * sum(likely.values())
     ends = [
-        one.allowed.at(x).low_pass.half_power(spectrum.rate)
+        each.allowed.at(x).low_pass.half_power(spectrum.rate)
         for terms, fits in tried.items()
         if likely[terms] >= least or terms == chosen
-        for one in fits
-        for x in joint.limits(one)
+        for each in fits
+        for x in joint.limits(each)
     ]
     best, state = fit.allowed.at(fit.x), joint.at(fit.allowed, fit.x, chosen)
     return replace(
-        found,
-        frequency=_told(best.low_pass.half_power(spectrum.rate), ends, joint.explains(fit)),
+        low_pass,
+        frequency=_as_parameter(best.low_pass.half_power(spectrum.rate), ends, joint.explains(fit)),
         kind=best.kind,
         order=best.order,
-        floor=math.sqrt(state.floor + found.rounded * state.N**2),
+        floor=math.sqrt(state.floor + low_pass.rounded * state.N**2),
         behind=joint.behind(spectrum, best, state.floor / state.N**2),
         readings=models[chosen].readings,
-        allowed=[Allowed(one.allowed.at(one.x), one.allowed.half_width) for one in tried[chosen]],
+        allowed=[
+            Allowed(each.allowed.at(each.x), each.allowed.half_width) for each in tried[chosen]
+        ],
         models=models,
     )
 
 
-def _told(shown: float, ends: Sequence[float], explains: bool) -> Parameter:
+def _as_parameter(shown: float, ends: Sequence[float], explains: bool) -> Parameter:
     """Return a cut-off with its limits, or why it is not told."""
     lower, upper = min(ends), max(ends)
     if upper > WIDEST * lower:
@@ -177,27 +169,27 @@ class _Fit:
 class _Joint:
     """Fits of models behind filters, over their cut-offs."""
 
-    def __init__(self, spectrum: Spectrum, clear: NDArray[np.bool_], found: Cutoff) -> None:
-        self._found = found
-        self._taken = spectrum.taken(clear)
+    def __init__(self, spectrum: Spectrum, clear: NDArray[np.bool_], low_pass: Cutoff) -> None:
+        self._low_pass = low_pass
+        self._spectrum = spectrum.select(clear)
         shortest = PROCESSES / spectrum.rate
-        self._plain = whittle_of(self._taken, 0.5 * spectrum.rate, COARSE, shortest=shortest)
-        self._known: dict[tuple[Tried, float, Terms], _State] = {}
+        self._plain = whittle_of(self._spectrum, 0.5 * spectrum.rate, COARSE, shortest=shortest)
+        self._states: dict[tuple[FilterTrial, float, Terms], _State] = {}
 
-    def behind(self, spectrum: Spectrum, one: Tried, floor: float = 0.0) -> Behind:
+    def behind(self, spectrum: Spectrum, trial: FilterTrial, floor: float = 0.0) -> Behind:
         """Return what a filter leaves, with what stands behind it in parts of N^2."""
-        white, flicker, slow = gains(spectrum, one)
-        return Behind(white + self._found.rounded + floor, flicker, slow)
+        white, flicker, slow = gains(spectrum, trial)
+        return Behind(white + self._low_pass.rounded + floor, flicker, slow)
 
     def fits(self, terms: Terms) -> list[_Fit]:
         """Return the fits of a model behind the filters that the log allows, the best first."""
-        found = [self._best(one, terms) for one in self._found.allowed]
-        found.sort(key=lambda fit: fit.cost + fit.allowed.filter.floor)
-        return [fit for fit in found if fit.cost < found[0].cost + RULED_OUT]
+        fits = [self._best(allowed, terms) for allowed in self._low_pass.allowed]
+        fits.sort(key=lambda fit: fit.cost + fit.allowed.filter.floor)
+        return [fit for fit in fits if fit.cost < fits[0].cost + RULED_OUT]
 
     def common(self, terms: Terms) -> float:
         """Return -log L of a model at the cut-off that is common to all so far."""
-        chosen = self._found.allowed[0]
+        chosen = self._low_pass.allowed[0]
         return self.at(chosen, math.log(chosen.filter.cutoff), terms).cost
 
     def of_model(self, fits: Sequence[_Fit], chosen: _Fit) -> OfModel:
@@ -205,37 +197,37 @@ class _Joint:
         terms = fits[0].terms
         common = self.at(chosen.allowed, chosen.x, terms)
         readings = []
-        for one in fits:
-            low, high = self.limits(one)
+        for fit in fits:
+            low, high = self.limits(fit)
             below, at, above = (
-                math.log(self.at(one.allowed, x, terms).N / common.N) for x in (low, one.x, high)
+                math.log(self.at(fit.allowed, x, terms).N / common.N) for x in (low, fit.x, high)
             )
-            readings.append(Reading(math.exp(fits[0].cost - one.cost), below, at, above))
-            best = one.allowed.at(one.x)
+            readings.append(Reading(math.exp(fits[0].cost - fit.cost), below, at, above))
+            best = fit.allowed.at(fit.x)
             if best.is_first_order_analogue:
-                readings.append(also_after_sampling(readings[-1], best, self._taken.rate))
+                readings.append(also_after_sampling(readings[-1], best, self._spectrum.rate))
         return OfModel(readings, common.cost - fits[0].cost)
 
     def explains(self, fit: _Fit) -> bool:
         """Return whether a fit gives the spectrum where it bends."""
-        whittle, found = self._maximum(fit.allowed, fit.x, fit.terms)
-        return explained(self._taken, whittle.density(found), fit.allowed.at(fit.x))
+        whittle, maximum = self._maximum(fit.allowed, fit.x, fit.terms)
+        return explains_bend(self._spectrum, whittle.density(maximum), fit.allowed.at(fit.x))
 
     def at(self, allowed: Allowed, x: float, terms: Terms) -> _State:
         """Return the best fit of a model at a logarithm of the cut-off."""
         key = allowed.filter, x, terms
-        if key not in self._known:
-            found = self._maximum(allowed, x, terms)[1]
-            floor = found.parameter("Q") ** 2 if allowed.filter.floor else 0.0
-            N = max(found.parameter("N"), _LEAST_N * math.sqrt(self._plain.scale))
-            self._known[key] = _State(found.cost, N, floor)
-        return self._known[key]
+        if key not in self._states:
+            maximum = self._maximum(allowed, x, terms)[1]
+            floor = maximum.parameter("Q") ** 2 if allowed.filter.floor else 0.0
+            N = max(maximum.parameter("N"), _LEAST_N * math.sqrt(self._plain.scale))
+            self._states[key] = _State(maximum.cost, N, floor)
+        return self._states[key]
 
     def _maximum(self, allowed: Allowed, x: float, terms: Terms) -> tuple[Whittle, Maximum]:
-        whittle = self._plain.standing(self.behind(self._taken, allowed.at(x)))
+        whittle = self._plain.standing(self.behind(self._spectrum, allowed.at(x)))
         if allowed.filter.floor:
             # White noise behind the filter stands where quantization noise would.
-            whittle = whittle.with_column("Q", np.ones(len(self._taken.density)))
+            whittle = whittle.with_column("Q", np.ones(len(self._spectrum.density)))
             terms = replace(terms, linear="Q" + terms.linear)
         return whittle, whittle.maximum(terms)
 
@@ -262,8 +254,8 @@ class _Joint:
         return end(-1.0), end(1.0)
 
     def _highest(self, allowed: Allowed) -> float:
-        one = allowed.filter
-        return math.log(highest_cutoff(one.kind, one.order, self._taken.rate))
+        trial = allowed.filter
+        return math.log(highest_cutoff(trial.kind, trial.order, self._spectrum.rate))
 
     def _best(self, allowed: Allowed, terms: Terms) -> _Fit:
         around = math.log(allowed.filter.cutoff)

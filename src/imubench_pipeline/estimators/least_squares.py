@@ -47,10 +47,7 @@ class UnfitCurveError(ValueError):
 
 
 def fit(
-    curve: AllanCurve,
-    *,
-    method: Literal["weighted", "paper"] = "weighted",
-    longest: float = 1 / 9,
+    curve: AllanCurve, *, method: Literal["weighted", "paper"] = "weighted", longest: float = 1 / 9
 ) -> Estimate:
     """Fit N, B, T_B and K to an Allan variance.
 
@@ -145,7 +142,7 @@ def _predicted(
     curve: AllanCurve, used: NDArray[np.bool_], model: NoiseModel
 ) -> tuple[Array, Array]:
     """Return what a model fitted to some tau says of all, and the relative error of that."""
-    rate = curve.cluster_size[0] / curve.tau[0]
+    rate = curve.rate
     expected = model.allan_variance(curve.tau, rate)
     # White noise is averaged over the samples present, fewer than n where some are missing.
     expected = expected + model.N**2 * (rate / curve.averaged - 1.0 / curve.tau)
@@ -178,7 +175,7 @@ def _sampling_shows(curve: AllanCurve, used: NDArray[np.bool_], model: NoiseMode
     """
     tau = curve.tau[used]
     continuous = model.allan_variance(tau)
-    difference = model.allan_variance(tau, curve.cluster_size[0] / curve.tau[0]) - continuous
+    difference = model.allan_variance(tau, curve.rate) - continuous
     error = 2.0 * np.sqrt(curve.cluster_size[used] / (2.0 * curve.samples)) * continuous
     return bool((np.abs(difference) > _SAMPLING_SIGMAS * error).any())
 
@@ -229,35 +226,35 @@ class _Search:
         costs = [self.densities(T_B)[1] for T_B in scan]
         best = int(np.argmin(costs))
         low, high = scan[max(best - 1, 0)], scan[min(best + 1, _SCAN - 1)]
-        found = minimize_scalar(
+        minimum = minimize_scalar(
             lambda u: self.densities(math.exp(u))[1],
             bounds=(math.log(low), math.log(high)),
             method="bounded",
             options={"xatol": 1e-10},
         )
-        T_B = math.exp(found.x) if found.fun < costs[best] else float(scan[best])
+        T_B = math.exp(minimum.x) if minimum.fun < costs[best] else float(scan[best])
         return self._described(T_B)
 
     def _described(self, T_B: float) -> Estimate:
         (white, drive, walk), _ = self.densities(T_B)
         parts = {"N": white * self._white, "B": drive * self._shape(T_B), "K": walk * self._walk}
-        there = {
+        present = {
             name: bool((part > _ABSENT * self._variance).any()) for name, part in parts.items()
         }
         absent = Parameter(None, "absent", "the fit is best without this term")
         at_end = self._at_end(T_B)
-        bias = Parameter(bias_instability(drive, T_B)) if there["B"] else absent
-        time = Parameter(T_B) if there["B"] else absent
-        if there["B"] and at_end:
+        bias = Parameter(bias_instability(drive, T_B)) if present["B"] else absent
+        time = Parameter(T_B) if present["B"] else absent
+        if present["B"] and at_end:
             bias = Parameter(bias.value, "at_bound", at_end)
             time = Parameter(T_B, "at_bound", at_end)
         return Estimate(
             self._method,
             {
-                "N": Parameter(math.sqrt(white)) if there["N"] else absent,
+                "N": Parameter(math.sqrt(white)) if present["N"] else absent,
                 "B": bias,
                 "T_B": time,
-                "K": Parameter(math.sqrt(walk)) if there["K"] else absent,
+                "K": Parameter(math.sqrt(walk)) if present["K"] else absent,
             },
         )
 

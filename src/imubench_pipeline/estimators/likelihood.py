@@ -15,17 +15,22 @@ from numpy.typing import ArrayLike, NDArray
 from imubench_pipeline.allan import of_blocks
 from imubench_pipeline.estimators import least_squares
 from imubench_pipeline.estimators.band import Band
-from imubench_pipeline.estimators.carried_lines import carried
+from imubench_pipeline.estimators.carried_lines import carried_sinusoids
 from imubench_pipeline.estimators.curve_bias import averaging_times, with_curve
 from imubench_pipeline.estimators.cutoff import Cutoff
-from imubench_pipeline.estimators.doubts import doubted
+from imubench_pipeline.estimators.doubts import add_doubts
 from imubench_pipeline.estimators.draws import drawn_share, joint_draws
 from imubench_pipeline.estimators.estimate import CURVE, FAMILY, Estimate, Parameter
 from imubench_pipeline.estimators.frame import FEWEST_BINS, Frame, frame_of
 from imubench_pipeline.estimators.intervals import describe, papers_only, with_upper_limits
-from imubench_pipeline.estimators.joint_cutoff import joined
+from imubench_pipeline.estimators.joint_cutoff import worth_joining
 from imubench_pipeline.estimators.lines import Line
-from imubench_pipeline.estimators.missing import block_means, divided, filled, slow_part
+from imubench_pipeline.estimators.missing import (
+    block_means,
+    divide_at_holes,
+    fill_missing,
+    slow_part,
+)
 from imubench_pipeline.estimators.model_choice import PAPERS, Candidate, compare
 from imubench_pipeline.estimators.posterior import DRAWS, Posterior, sample
 from imubench_pipeline.estimators.smooth_drift import instead_of_walk
@@ -179,7 +184,7 @@ def fit_blocks(
         frame = frame_of(spectrum, lines, band=band, bandwidth=bandwidth, resolution=resolution)
         return fit_spectrum(spectrum, frame, rng=rng)
     means = block_means(blocks(), spans)
-    parts = divided(means, spans)
+    parts = divide_at_holes(means, spans)
     if not parts:
         raise ValueError(f"none of the {samples} samples is present")
     present = float(means.count.sum()) / sum(stop - start for start, stop in parts)
@@ -187,14 +192,14 @@ def fit_blocks(
     rounds = _rounds(1.0 - present)
     for number in range(1, rounds + 1):
         path = slow_part(means, parts, model, rate, rng)
-        complete = filled(blocks(), path, model, rate, rng)
+        complete = fill_missing(blocks(), path, model, rate, rng)
         spectrum, lines = spectra(complete, samples, rate, parts)
         spectrum = replace(spectrum, ordinates=spectrum.ordinates * present)
         frame = frame_of(spectrum, lines, band=band, bandwidth=bandwidth, resolution=resolution)
         if frame.used.sum() < FEWEST_BINS:
             break
         if number < rounds:
-            model = model_of(compare(frame.whittle(spectrum), quantization=False)[0].found)
+            model = model_of(compare(frame.whittle(spectrum), quantization=False)[0].maximum)
     return fit_spectrum(spectrum, frame, rng=rng)
 
 
@@ -212,8 +217,8 @@ def _first_model(
     try:
         return least_squares.fit(curve).model
     except ValueError:
-        there = np.concatenate([part[np.isfinite(part)] for part in blocks()])
-        return NoiseModel(N=float(np.std(there)) / math.sqrt(rate))
+        present = np.concatenate([part[np.isfinite(part)] for part in blocks()])
+        return NoiseModel(N=float(np.std(present)) / math.sqrt(rate))
 
 
 def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) -> Likelihood:
@@ -227,59 +232,36 @@ def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) 
     rng : numpy.random.Generator
     """
     if frame.used.sum() < FEWEST_BINS:
-        reason = (
-            f"{frame.used.sum()} bins of the spectrum are left up to {frame.band.highest:.4g} Hz, "
-            f"{FEWEST_BINS} are needed: too short a log"
-        )
-        if not frame.clear.all():
-            reason += f", or lines that hide too much of it ({(~frame.clear).sum()} bins)"
-        nothing = {name: Parameter(None, "not_shown", reason) for name in FAMILY}
-        of_curve = {name: nothing["B"] for name in CURVE}
-        return Likelihood(
-            (
-                Estimate("likelihood", nothing, curve=of_curve),
-                Estimate("likelihood_gm", papers_only(nothing), curve=of_curve),
-            ),
-            (),
-            frame.lines,
-            None,
-            spectrum,
-            frame.clear,
-            frame.used,
-            np.full(len(frame.used), np.nan),
-            frame,
-        )
-    frame, whittle, candidates = explaining(spectrum, frame)
-    sinusoids = carried(frame.lines)
+        return _too_short(spectrum, frame)
+    frame, whittle, candidates = fit_models(spectrum, frame)
+    sinusoids = carried_sinusoids(frame.lines)
     chosen = candidates[0]
     # As the log shows them, and with N before the sensor's low-pass.
     shown: dict[Terms, Posterior] = {}
     draws: dict[Terms, Posterior] = {}
     # A ramp is no noise: it is believed or not, and does not widen intervals as a possibility.
-    alike = [chosen] + [
-        c for c in candidates[1:] if c.share >= _LEAST_SHARE and not c.found.terms.ramp
-    ]
-    wider = [c for c in candidates if c.found.terms in _with_one_more(chosen.found.terms)]
+    alike = [chosen] + [c for c in candidates[1:] if c.share >= _LEAST_SHARE and not c.terms.ramp]
+    wider = [c for c in candidates if c.terms in _with_one_more(chosen.terms)]
     for candidate in candidates:
-        terms = candidate.found.terms
+        terms = candidate.terms
         if candidate in alike or candidate in wider or terms == PAPERS:
             part = 1.0 if terms == PAPERS or candidate is chosen else candidate.share
             number = max(_FEWEST_DRAWS, round(part * DRAWS))
-            shown[terms] = sample(whittle, candidate.found, rng, number)
+            shown[terms] = sample(whittle, candidate.maximum, rng, number)
             draws[terms] = frame.before_the_filter(shown[terms], terms, rng)
     estimate = describe("likelihood", whittle, chosen, alike, draws, frame.band)
     estimate = with_upper_limits(estimate, alike, wider, draws)
     tau = averaging_times(spectrum.rate, float(spectrum.length.max()))
     estimate = with_curve(estimate, alike, wider, draws, tau)
-    papers = next(c for c in candidates if c.found.terms == PAPERS)
+    papers = next(c for c in candidates if c.terms == PAPERS)
     gauss_markov = describe("likelihood_gm", whittle, papers, [papers], draws, frame.band)
     gauss_markov = with_curve(gauss_markov, [papers], (), draws, tau)
-    fitted = frame.whole(spectrum).density(chosen.found) + chosen.found.ramp**2 * spectrum.ramp
-    drift = instead_of_walk(whittle, chosen.found)
-    estimate, gauss_markov = doubted(
-        estimate, gauss_markov, spectrum, frame, candidates, papers, fitted, drift
+    fitted = frame.whole(spectrum).density(chosen.maximum) + chosen.maximum.ramp**2 * spectrum.ramp
+    drift = instead_of_walk(whittle, chosen.maximum)
+    estimate, gauss_markov = add_doubts(
+        estimate, gauss_markov, spectrum, frame, candidates, papers, drift
     )
-    estimate, gauss_markov = (_with_folds(one, frame) for one in (estimate, gauss_markov))
+    estimate, gauss_markov = (_with_folds(each, frame) for each in (estimate, gauss_markov))
     return Likelihood(
         (
             replace(
@@ -288,8 +270,8 @@ def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) 
                 draws=joint_draws(
                     [
                         (
-                            c.found.terms,
-                            frame.in_the_log(shown[c.found.terms], c.found.terms),
+                            c.terms,
+                            frame.in_the_log(shown[c.terms], c.terms),
                             drawn_share(c, len(whittle.spectrum.density)),
                         )
                         for c in alike
@@ -317,6 +299,32 @@ def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) 
     )
 
 
+def _too_short(spectrum: Spectrum, frame: Frame) -> Likelihood:
+    """Return what is left to say of a log with too few bins to fit."""
+    reason = (
+        f"{frame.used.sum()} bins of the spectrum are left up to {frame.band.highest:.4g} Hz, "
+        f"{FEWEST_BINS} are needed: too short a log"
+    )
+    if not frame.clear.all():
+        reason += f", or lines that hide too much of it ({(~frame.clear).sum()} bins)"
+    nothing = {name: Parameter(None, "not_shown", reason) for name in FAMILY}
+    of_curve = {name: nothing["B"] for name in CURVE}
+    return Likelihood(
+        (
+            Estimate("likelihood", nothing, curve=of_curve),
+            Estimate("likelihood_gm", papers_only(nothing), curve=of_curve),
+        ),
+        (),
+        frame.lines,
+        None,
+        spectrum,
+        frame.clear,
+        frame.used,
+        np.full(len(frame.used), np.nan),
+        frame,
+    )
+
+
 def _with_folds(estimate: Estimate, frame: Frame) -> Estimate:
     """Return an estimate whose model has the white noise that the log shows."""
     N = estimate.parameters["N"]
@@ -326,7 +334,7 @@ def _with_folds(estimate: Estimate, frame: Frame) -> Estimate:
     return replace(estimate, parameters={**estimate.parameters, "N": N})
 
 
-def explaining(spectrum: Spectrum, frame: Frame) -> tuple[Frame, Whittle, list[Candidate]]:
+def fit_models(spectrum: Spectrum, frame: Frame) -> tuple[Frame, Whittle, list[Candidate]]:
     """Fit all models in a frame, and in another one where it explains more.
 
     Where noise up to Nyquist, behind the filter that shows, is not explained: with processes of a
@@ -351,16 +359,16 @@ def explaining(spectrum: Spectrum, frame: Frame) -> tuple[Frame, Whittle, list[C
         whittle = tried.whittle(spectrum)
         quantization = tried.shows_quantization(spectrum.rate)
         candidates = compare(whittle, quantization=quantization)
-        return tried, whittle, tried.rescored(candidates)
+        return tried, whittle, tried.rescore(candidates)
 
     first = fitted(frame)
     if frame.low_pass is None:
         return first
     if not _explains(first):
-        flexible = [one for one in first[2] if one.found.terms == _FLEXIBLE]
-        first = fitted(frame.refined(spectrum, flexible))
-    if _explains(first) and first[0].has_a_bend_of_each_model(spectrum, first[2][0].found.times):
-        first = fitted(first[0].refined(spectrum, joined(first[2], PAPERS)))
+        flexible = [candidate for candidate in first[2] if candidate.terms == _FLEXIBLE]
+        first = fitted(frame.refine(spectrum, flexible))
+    if _explains(first) and first[0].has_a_bend_of_each_model(spectrum, first[2][0].maximum.times):
+        first = fitted(first[0].refine(spectrum, worth_joining(first[2], PAPERS)))
     if _explains(first):
         return first
     faster = fitted(frame.with_fast_processes(spectrum.rate))

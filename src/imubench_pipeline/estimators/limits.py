@@ -24,13 +24,10 @@ from imubench_pipeline.estimators.curve_bias import (
     lowest_point,
     models_of,
 )
-from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.estimators.estimate import SIGMAS, Estimate, Parameter
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.variance_covariance import variance_covariance
 from imubench_pipeline.typing import Array
-
-_SIGMAS = 1.96
-"""Half the width of a 95 % interval."""
 
 _MOST_ERROR = 0.5
 """Relative standard error beyond which a parameter is not identified."""
@@ -88,7 +85,7 @@ class Errors:
         than 1.96 standard errors may be 0.
         """
         error = self.of(name) if held is None else held
-        low, high = -_SIGMAS * error, _SIGMAS * error
+        low, high = -SIGMAS * error, SIGMAS * error
         for term in doubtful:
             if term == name or not self.of(term) < _NOTHING_KNOWN:
                 continue
@@ -98,10 +95,10 @@ class Errors:
             rest = error
             if held is None:
                 rest = math.sqrt(max(error**2 - slope * self._at(name, term), 0.0))
-            low = min(low, moved - _SIGMAS * rest)
-            high = max(high, moved + _SIGMAS * rest)
-        most = _SIGMAS * _NOTHING_KNOWN
-        may_be_zero = name != "T_B" and 2.0 * error > 1.0 / _SIGMAS
+            low = min(low, moved - SIGMAS * rest)
+            high = max(high, moved + SIGMAS * rest)
+        most = SIGMAS * _NOTHING_KNOWN
+        may_be_zero = name != "T_B" and 2.0 * error > 1.0 / SIGMAS
         return 0.0 if may_be_zero else math.exp(max(low, -most)), math.exp(min(high, most))
 
     def _at(self, first: str, second: str) -> float:
@@ -153,7 +150,7 @@ def _derivatives(
     curve: AllanCurve, used: NDArray[np.bool_], model: NoiseModel
 ) -> tuple[Array, dict[str, Array]]:
     """Return the model's Allan variances, and their relative derivatives by log parameters."""
-    tau, rate = curve.tau[used], _rate(curve)
+    tau, rate = curve.tau[used], curve.rate
     parts: dict[str, Array] = {}
     if model.N > 0:
         # White noise is averaged over the samples present, fewer than n where some are missing.
@@ -174,11 +171,9 @@ def _derivatives(
     return expected, derivatives
 
 
-def _relative_covariance(
-    curve: AllanCurve, used: NDArray[np.bool_], model: NoiseModel
-) -> NDArray[np.float64]:
+def _relative_covariance(curve: AllanCurve, used: NDArray[np.bool_], model: NoiseModel) -> Array:
     """Return the covariance of the Allan variances over the model's, shape (m, m)."""
-    sizes, rate = curve.cluster_size[used], _rate(curve)
+    sizes, rate = curve.cluster_size[used], curve.rate
     expected = model.allan_variance(curve.tau[used], rate)
     covariance = variance_covariance(model, rate, curve.samples, sizes)
     # Holes and segments leave fewer differences, which the degrees of freedom know.
@@ -188,10 +183,6 @@ def _relative_covariance(
     ]
     scale = np.sqrt(np.maximum(np.array(whole) / curve.edf[used], 1.0)) / expected
     return np.asarray(covariance * np.outer(scale, scale))
-
-
-def _rate(curve: AllanCurve) -> float:
-    return float(curve.cluster_size[0] / curve.tau[0])
 
 
 def with_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) -> Estimate:
@@ -222,8 +213,8 @@ def with_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) 
     errors = fit_errors(curve, used, model, estimate.method)
     unknown: dict[str, str] = {}
     if estimate.parameters["T_B"].status == "at_bound":
-        there = fit_errors(curve, used, model, estimate.method, held=["T_B"])
-        unknown = _unknown_at_bound(there.of("B"))
+        errors_at_bound = fit_errors(curve, used, model, estimate.method, held=["T_B"])
+        unknown = _unknown_at_bound(errors_at_bound.of("B"))
     elif "B" in errors.names:
         unknown = _unknown_bias(errors.of("B"), errors.of("T_B"))
     apart = errors
@@ -238,22 +229,22 @@ def with_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) 
         unknown[name] = f"its relative standard error is {_percent(errors.of(name))}, above 50 %"
     doubtful = [name for name in ("B", "K") if name in unknown]
     parameters = dict(estimate.parameters)
-    for name, found in estimate.parameters.items():
-        if found.value is None:
+    for name, parameter in estimate.parameters.items():
+        if parameter.value is None:
             continue
-        parameters[name] = replace(found, fitted=found.value)
+        parameters[name] = replace(parameter, fitted=parameter.value)
         if name in unknown:
-            lower, upper = _wide_limits(name, found.value, errors)
-            reason = f"{found.reason}; {unknown[name]}" if found.reason else unknown[name]
+            lower, upper = _wide_limits(name, parameter.value, errors)
+            reason = f"{parameter.reason}; {unknown[name]}" if parameter.reason else unknown[name]
             parameters[name] = Parameter(
-                None, "not_identified", reason, lower, upper, fitted=found.value
+                None, "not_identified", reason, lower, upper, fitted=parameter.value
             )
-        elif found.status == "ok":
+        elif parameter.status == "ok":
             # Beyond a half it has a value only as what the curve shows beside a doubtful B.
-            held = apart.of(name) if errors.of(name) > _MOST_ERROR else None
-            low, high = errors.factors(name, doubtful, held)
+            error_beside_bias = apart.of(name) if errors.of(name) > _MOST_ERROR else None
+            low, high = errors.factors(name, doubtful, error_beside_bias)
             parameters[name] = replace(
-                parameters[name], lower=found.value * low, upper=found.value * high
+                parameters[name], lower=parameter.value * low, upper=parameter.value * high
             )
     return Estimate(
         estimate.method,
@@ -264,31 +255,33 @@ def with_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) 
 
 def _lowest_point(model: NoiseModel, errors: Errors, curve: AllanCurve) -> dict[str, Parameter]:
     """Return the lowest point of the fitted curve, with limits from the errors of the fit."""
-    tau = averaging_times(_rate(curve), curve.samples / _rate(curve))
+    tau = averaging_times(curve.rate, curve.samples / curve.rate)
     best = models_of(model)
     at = [getattr(model, name) for name in errors.names]
-    found = lowest_parameters([best], [], tau)
-    known = bool(np.isfinite(errors.covariance).all())
-    if not known or any(one.value is None for one in found.values()):
-        return found
+    lowest = lowest_parameters([best], [], tau)
+    finite = bool(np.isfinite(errors.covariance).all())
+    if not finite or any(parameter.value is None for parameter in lowest.values()):
+        return lowest
     ends = []
     for sign in (-1.0, 1.0):
         moved = [
             models_of(replace(model, **{name: value * math.exp(sign * _STEP_OF_LOWEST)}))
             for name, value in zip(errors.names, at, strict=True)
         ]
-        ends.append([lowest_point(one, tau)[:2] for one in moved])
+        ends.append([lowest_point(models, tau)[:2] for models in moved])
     slopes = np.log(np.array(ends[1]) / np.array(ends[0]))[:, :, 0].T / (2.0 * _STEP_OF_LOWEST)
     described = {}
-    for (name, one), slope in zip(found.items(), slopes, strict=True):
+    for (name, parameter), slope in zip(lowest.items(), slopes, strict=True):
         error = min(math.sqrt(max(float(slope @ errors.covariance @ slope), 0.0)), _NOTHING_KNOWN)
         if error > _MOST_ERROR:
             reason = f"its relative standard error is {_percent(error)}, above 50 %"
-            described[name] = Parameter(None, "not_identified", reason, fitted=one.value)
+            described[name] = Parameter(None, "not_identified", reason, fitted=parameter.value)
             continue
-        factor = math.exp(_SIGMAS * error)
-        assert one.value is not None
-        described[name] = replace(one, lower=one.value / factor, upper=one.value * factor)
+        factor = math.exp(SIGMAS * error)
+        assert parameter.value is not None
+        described[name] = replace(
+            parameter, lower=parameter.value / factor, upper=parameter.value * factor
+        )
     return described
 
 
@@ -333,4 +326,4 @@ def _wide_limits(name: str, value: float, errors: Errors) -> tuple[float | None,
     if name == "T_B":
         low, high = errors.factors(name, [])
         return (value * low, value * high) if known else (None, None)
-    return 0.0, value * (1.0 + _SIGMAS * error) if known else None
+    return 0.0, value * (1.0 + SIGMAS * error) if known else None

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.special import betainc, gammainccinv
 
+from imubench_pipeline.estimators.estimate import SIGMAS
 from imubench_pipeline.estimators.spectrum import LineSpectrum, Spectrum
 from imubench_pipeline.noise import NoiseModel, Sinusoid
 from imubench_pipeline.typing import Array
@@ -129,42 +130,42 @@ def find(
     divided = crossover if len(spectra) > 1 else 0.0
     searched = [_range(spectrum, divided) for spectrum in spectra]
     total = sum(max(0, high - low) for low, high in searched)
-    found: list[Line] = []
+    lines: list[Line] = []
     for spectrum, (low, high) in zip(spectra, searched, strict=True):
         if high > low:
             new = _lines(spectrum, model, rate, low, high, total)
             if len(new) > _MOST:
                 new = sorted(new, key=lambda line: -line.ratio)[:_MOST]
-            found = _joined(found, new)
-    found = [_without_alias(line, found, spectra[0].block, rate) for line in found]
-    return sorted(found, key=lambda line: line.frequency)
+            lines = _joined(lines, new)
+    lines = [_without_alias(line, lines, spectra[0].block, rate) for line in lines]
+    return sorted(lines, key=lambda line: line.frequency)
 
 
-def _joined(found: list[Line], new: list[Line]) -> list[Line]:
+def _joined(lines: list[Line], new: list[Line]) -> list[Line]:
     """Join the lines of two spectra: one near the crossover shows in both, sharper in the first.
 
     Of a strong line beyond the crossover the first has the skirt only.
     """
-    kept = list(found)
+    joined = list(lines)
     for line in new:
-        same = [other for other in kept if _same(line, other)]
+        same = [other for other in joined if _same(line, other)]
         if all(line.amplitude > _SHARPER * other.amplitude for other in same):
-            kept = [other for other in kept if other not in same] + [line]
-    return kept
+            joined = [other for other in joined if other not in same] + [line]
+    return joined
 
 
-def _without_alias(line: Line, found: list[Line], block: int, rate: float) -> Line:
+def _without_alias(line: Line, lines: list[Line], block: int, rate: float) -> Line:
     """Return a line of block means, named an alias if a faster line explains it."""
     blocks = rate / block
-    for other in found:
+    for other in lines:
         away = other.frequency - round(other.frequency / blocks) * blocks
         if block == 1 or other.frequency < 0.5 * blocks or line.frequency > 0.5 * blocks:
             continue
         # Both are seen through the mean of a block; the amplitude of a line is given without.
         seen = other.amplitude * _gain(other.frequency, block, rate)
-        there = line.amplitude * _gain(line.frequency, block, rate)
+        amplitude = line.amplitude * _gain(line.frequency, block, rate)
         close = abs(abs(away) - line.frequency) < _BESIDE * line.resolution + 0.5 * line.width
-        if close and there < 2.0 * seen:
+        if close and amplitude < 2.0 * seen:
             return replace(line, kind="alias")
     return line
 
@@ -283,11 +284,11 @@ def _line(
         place_error = math.hypot(place_error, step * across / math.sqrt(12.0 * n))
     # A line of amplitude A has the power A^2 / 4 at +f; block means see it damped.
     amplitude = 2.0 * math.sqrt(power * step) / _gain(place, spectrum.block, rate)
-    low, high = (math.sqrt(max(0.0, 1.0 + sign * 1.96 * power_error)) for sign in (-1, 1))
+    low, high = (math.sqrt(max(0.0, 1.0 + sign * SIGMAS * power_error)) for sign in (-1, 1))
     return Line(
         frequency=place,
-        frequency_lower=place - 1.96 * place_error,
-        frequency_upper=place + 1.96 * place_error,
+        frequency_lower=place - SIGMAS * place_error,
+        frequency_upper=place + SIGMAS * place_error,
         amplitude=amplitude,
         amplitude_lower=amplitude * low,
         amplitude_upper=amplitude * high,

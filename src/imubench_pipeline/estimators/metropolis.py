@@ -71,21 +71,21 @@ def _metropolis(
     model, shape = np.empty(fixed.shape[0]), np.empty(fixed.shape[0])
     arguments = (fixed, bins, processes, with_ramp, table, model, shape)
     x = start.copy()
-    here = log_posterior(x, *arguments)[0]
+    current = log_posterior(x, *arguments)[0]
     mean, covariance = x.copy(), root @ root.T * d / 5.76
-    kept = np.empty((n - _BURN_IN, d))
+    draws = np.empty((n - _BURN_IN, d))
     accepted, recent = 0, 0
     scale = 1.0
     for k in range(n):
         proposal = x + scale * (root @ normals[k])
-        there = log_posterior(proposal, *arguments)[0]
-        if log_uniforms[k] < there - here:
-            x, here = proposal, there
+        proposed = log_posterior(proposal, *arguments)[0]
+        if log_uniforms[k] < proposed - current:
+            x, current = proposal, proposed
             recent += 1
             if k >= _BURN_IN:
                 accepted += 1
         if k >= _BURN_IN:
-            kept[k - _BURN_IN] = x
+            draws[k - _BURN_IN] = x
             continue
         # Learn the covariance, and the scale, while burning in only.
         gain = 1.0 / (k / 2.0 + 50.0)
@@ -102,4 +102,4 @@ def _metropolis(
             for a in range(d):
                 stable[a, a] = stable[a, a] * (1.0 + 1e-6) + 1e-14
             root = np.linalg.cholesky(stable) * 2.4 / np.sqrt(d)
-    return kept, accepted / (n - _BURN_IN)
+    return draws, accepted / (n - _BURN_IN)

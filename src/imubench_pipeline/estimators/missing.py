@@ -124,15 +124,17 @@ def samples_present(
     """
     reached = 0
     for values in parts:
-        there = np.flatnonzero(np.isfinite(values))
-        place = np.searchsorted(begin, reached + there, side="right") - 1
-        inside = (place >= 0) & (reached + there < end[place])
+        finite = np.flatnonzero(np.isfinite(values))
+        place = np.searchsorted(begin, reached + finite, side="right") - 1
+        inside = (place >= 0) & (reached + finite < end[place])
         if inside.any():
-            yield place[inside], values[there[inside]]
+            yield place[inside], values[finite[inside]]
         reached += len(values)
 
 
-def divided(means: BlockMeans, segments: Sequence[tuple[int, int]]) -> tuple[tuple[int, int], ...]:
+def divide_at_holes(
+    means: BlockMeans, segments: Sequence[tuple[int, int]]
+) -> tuple[tuple[int, int], ...]:
     """Divide segments at the holes that are too long to be filled, and trim their ends.
 
     Parameters
@@ -149,12 +151,12 @@ def divided(means: BlockMeans, segments: Sequence[tuple[int, int]]) -> tuple[tup
     parts: list[tuple[int, int]] = []
     for start, stop in segments:
         chosen = means.within(start, stop)
-        there = np.flatnonzero(means.count[chosen] > 0) + chosen.start
-        if len(there) == 0:
+        occupied = np.flatnonzero(means.count[chosen] > 0) + chosen.start
+        if len(occupied) == 0:
             continue
-        cuts = np.flatnonzero(np.diff(there) > _AHEAD)
-        begins = means.begin[there[np.concatenate(([0], cuts + 1))]]
-        ends = means.end[there[np.append(cuts, len(there) - 1)]]
+        cuts = np.flatnonzero(np.diff(occupied) > _AHEAD)
+        begins = means.begin[occupied[np.concatenate(([0], cuts + 1))]]
+        ends = means.end[occupied[np.append(cuts, len(occupied) - 1)]]
         parts += zip(begins.tolist(), ends.tolist(), strict=True)
     return tuple(parts)
 
@@ -172,7 +174,7 @@ def slow_part(
     ----------
     means : BlockMeans
     parts : sequence of (int, int)
-        First and one-past-last sample of each part of the log (`divided`).
+        First and one-past-last sample of each part of the log (`divide_at_holes`).
     model : NoiseModel
     rate : float
         Hz.
@@ -218,7 +220,7 @@ def slow_part(
     return SlowPath(np.concatenate(places), np.concatenate(values))
 
 
-def filled(
+def fill_missing(
     blocks: Iterable[Array],
     path: SlowPath,
     model: NoiseModel,
@@ -253,7 +255,7 @@ def filled(
 @njit(cache=True)
 def _smoothed(
     mean: Array,
-    there: NDArray[np.bool_],
+    present: NDArray[np.bool_],
     error: Array,
     decay: Array,
     drive: Array,
@@ -271,7 +273,7 @@ def _smoothed(
     difference = np.zeros(n)
     for k in range(n):
         simulated[k] = state.sum()
-        if there[k]:
+        if present[k]:
             difference[k] = mean[k] - simulated[k] - np.sqrt(error[k]) * normals[k, s]
         for a in range(s):
             state[a] = decay[a] * state[a] + np.sqrt(drive[a]) * normals[k, a]
@@ -285,31 +287,31 @@ def _smoothed(
     innovations = np.empty((size, 2))
     for first in range(0, n, _WINDOW):
         last = min(n, first + _WINDOW + _AHEAD)
-        here, matrix = ahead, spread
+        state_mean, covariance = ahead, spread
         for k in range(first, last):
             i = k - first
             if k == first + _WINDOW:
-                ahead, spread = here.copy(), matrix.copy()
-            means[i] = here
-            spreads[i] = matrix
-            total = matrix.sum(axis=1)
-            if there[k]:
+                ahead, spread = state_mean.copy(), covariance.copy()
+            means[i] = state_mean
+            spreads[i] = covariance
+            total = covariance.sum(axis=1)
+            if present[k]:
                 variance = total.sum() + error[k]
                 gain = total / variance
-                wrong = difference[k] - here.sum()
+                wrong = difference[k] - state_mean.sum()
                 innovations[i, 0], innovations[i, 1] = wrong, variance
-                here = here + gain * wrong
-                matrix = matrix - np.outer(gain, total)
+                state_mean = state_mean + gain * wrong
+                covariance = covariance - np.outer(gain, total)
                 gains[i] = gain
-            here = here * decay
-            matrix = matrix * np.outer(decay, decay)
+            state_mean = state_mean * decay
+            covariance = covariance * np.outer(decay, decay)
             for a in range(s):
-                matrix[a, a] += drive[a]
+                covariance[a, a] += drive[a]
         back = np.zeros(s)
         for k in range(last - 1, first - 1, -1):
             i = k - first
             back = back * decay
-            if there[k]:
+            if present[k]:
                 # L = Phi (I - gain H): its transpose, and H / F times the innovation.
                 along = 0.0
                 for a in range(s):

@@ -12,13 +12,11 @@ chi-squared with nu degrees of freedom: a sum far below that is none of chance.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtr
 
 from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.tables.findings import Finding
-
-Array = NDArray[np.float64]
+from imubench_pipeline.typing import Array
 
 _HIGHEST = 0.05
 """Part of the rate up to which it is looked for."""
@@ -64,10 +62,10 @@ def slow_noise_missing(
     power = np.cumsum(spectrum.ordinates[order] * spectrum.density[order]) / level
     sums = np.floor(np.log(np.maximum(degrees, 1.0)) / np.log(_APART))
     looked = (degrees >= _FEWEST) & (np.diff(sums, prepend=-1.0) > 0.0)
-    told = looked & (power < _LESS * degrees)
-    if not told.any():
+    lacking = looked & (power < _LESS * degrees)
+    if not lacking.any():
         return None
-    chance = np.where(told, chdtr(degrees, power), 1.0) * looked.sum()
+    chance = np.where(lacking, chdtr(degrees, power), 1.0) * looked.sum()
     worst = int(np.argmin(chance))
     if chance[worst] > _CHANCE:
         return None

@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.goodness import Goodness, goodness
 from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
+from imubench_pipeline.typing import Array
 
 PAPERS = Terms("NK", 1)
 """N, B, T_B and K: the model of the papers."""
@@ -29,7 +29,6 @@ CANDIDATES = (
 )
 """Models that are always tried; then a ramp and quantization noise are added to the best, the
 latter to all of them where it is favoured."""
-
 
 LIKE_A_WALK = 1 / 10
 """Part of the longest correlation time beyond which a process looks like a random walk."""
@@ -51,7 +50,7 @@ class Candidate:
 
     Attributes
     ----------
-    found : Maximum
+    maximum : Maximum
     bic, aic : float
         2 (-log L) + p log(number of bins), and + 2 p. Where a Gauss-Markov process or a ramp
         stands for a random walk, 4 is added to the BIC; for a ramp and for quantization noise, 6
@@ -64,12 +63,17 @@ class Candidate:
     goodness : Goodness
     """
 
-    found: Maximum
+    maximum: Maximum
     bic: float
     aic: float
     weight: float
     share: float
     goodness: Goodness
+
+    @property
+    def terms(self) -> Terms:
+        """The terms of the model."""
+        return self.maximum.terms
 
 
 def compare(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
@@ -85,18 +89,18 @@ def compare(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
     penalty = math.log(bins)
     tried: dict[Terms, Maximum] = {}
 
-    def bic(found: Maximum) -> float:
+    def bic(maximum: Maximum) -> float:
         like_a_walk = (
-            "K" not in found.terms.linear
-            and len(found.times) > 0
-            and found.times[-1] > LIKE_A_WALK * whittle.longest
+            "K" not in maximum.terms.linear
+            and len(maximum.times) > 0
+            and maximum.times[-1] > LIKE_A_WALK * whittle.longest
         )
         # A ramp is tried beside a walk: it stands for the walk where none is left.
-        like_a_walk |= found.terms.ramp and found.parameter("K") == 0.0
-        unlikely = found.terms.ramp + ("Q" in found.terms.linear)
+        like_a_walk |= maximum.terms.ramp and maximum.parameter("K") == 0.0
+        unlikely = maximum.terms.ramp + ("Q" in maximum.terms.linear)
         return (
-            2.0 * found.cost
-            + found.terms.parameters * penalty
+            2.0 * maximum.cost
+            + maximum.terms.parameters * penalty
             + UNIT_ROOT * like_a_walk
             + UNLIKELY * unlikely
         )
@@ -108,10 +112,10 @@ def compare(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
     for terms in CANDIDATES:
         add(terms)
     if quantization:
-        found = min(tried.values(), key=bic)
-        rounded = Terms("Q" + found.terms.linear, found.terms.gauss_markov)
+        without_rounding = min(tried.values(), key=bic)
+        rounded = Terms("Q" + without_rounding.terms.linear, without_rounding.terms.gauss_markov)
         add(rounded)
-        if rounded in tried and bic(tried[rounded]) < bic(found):
+        if rounded in tried and bic(tried[rounded]) < bic(without_rounding):
             # Without quantization noise other terms had to stand for it.
             for terms in CANDIDATES:
                 add(Terms("Q" + terms.linear, terms.gauss_markov))
@@ -120,29 +124,29 @@ def compare(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
     linear = best.linear if "K" in best.linear else best.linear + "K"
     add(Terms(linear, best.gauss_markov, ramp=True))
     order = sorted(tried.values(), key=bic)
-    bics = np.array([bic(found) for found in order])
-    aics = np.array([2.0 * (found.cost + found.terms.parameters) for found in order])
+    bics = np.array([bic(maximum) for maximum in order])
+    aics = np.array([2.0 * (maximum.cost + maximum.terms.parameters) for maximum in order])
     weights, shares = _relative(bics), _relative(aics)
     return [
         Candidate(
-            found,
+            maximum,
             float(bics[i]),
             float(aics[i]),
             float(weights[i]),
             float(shares[i]),
             goodness(
                 whittle.spectrum.ordinates,
-                whittle.data(found),
-                whittle.density(found),
+                whittle.data(maximum),
+                whittle.density(maximum),
                 whittle.spectrum.frequency,
-                found.terms.parameters,
+                maximum.terms.parameters,
             ),
         )
-        for i, found in enumerate(order)
+        for i, maximum in enumerate(order)
     ]
 
 
-def rescored(candidates: Sequence[Candidate], gained: Mapping[Terms, float]) -> list[Candidate]:
+def rescore(candidates: Sequence[Candidate], gained: Mapping[Terms, float]) -> list[Candidate]:
     """Return candidates with more explained, sorted anew.
 
     Parameters
@@ -151,9 +155,9 @@ def rescored(candidates: Sequence[Candidate], gained: Mapping[Terms, float]) -> 
     gained : mapping of Terms to float
         Log likelihood that models gain; with a ramp as without it.
     """
-    more = [gained.get(replace(one.found.terms, ramp=False), 0.0) for one in candidates]
-    bics = np.array([one.bic for one in candidates]) - 2.0 * np.array(more)
-    aics = np.array([one.aic for one in candidates]) - 2.0 * np.array(more)
+    gains = [gained.get(replace(candidate.terms, ramp=False), 0.0) for candidate in candidates]
+    bics = np.array([candidate.bic for candidate in candidates]) - 2.0 * np.array(gains)
+    aics = np.array([candidate.aic for candidate in candidates]) - 2.0 * np.array(gains)
     weights, shares = _relative(bics), _relative(aics)
     return [
         replace(
@@ -167,7 +171,7 @@ def rescored(candidates: Sequence[Candidate], gained: Mapping[Terms, float]) -> 
     ]
 
 
-def _relative(scores: NDArray[np.float64]) -> NDArray[np.float64]:
+def _relative(scores: Array) -> Array:
     weights = np.exp(-0.5 * (scores - scores.min()))
     return np.asarray(weights / weights.sum())
 
@@ -179,6 +183,6 @@ def disagreement(candidates: Sequence[Candidate]) -> str | None:
     if by_aic is chosen:
         return None
     return (
-        f"AIC favours {by_aic.found.terms.name} by {chosen.aic - by_aic.aic:.1f}, "
-        f"BIC {chosen.found.terms.name} by {by_aic.bic - chosen.bic:.1f}"
+        f"AIC favours {by_aic.terms.name} by {chosen.aic - by_aic.aic:.1f}, "
+        f"BIC {chosen.terms.name} by {by_aic.bic - chosen.bic:.1f}"
     )

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imubench_pipeline.estimators.importance import Mixture, adapted
+from imubench_pipeline.estimators.importance import Mixture, sample_adaptively
 from imubench_pipeline.estimators.metropolis import chain
 from imubench_pipeline.estimators.posterior_kernels import log_posteriors, mode_at
 from imubench_pipeline.estimators.whittle import Maximum, Whittle
@@ -41,7 +41,7 @@ _WIDE = 0.7
 _WIDEST = 2.0
 """Largest one about the best fit."""
 
-_FOUND = 0.3
+_AT_BEST_FIT = 0.3
 """Least weight of the component at the best fit."""
 
 _LEAST, _FLOOR = 1e-6, 5e-3
@@ -82,14 +82,14 @@ class Posterior:
 
 
 def sample(
-    whittle: Whittle, found: Maximum, rng: np.random.Generator, draws: int = DRAWS
+    whittle: Whittle, maximum: Maximum, rng: np.random.Generator, draws: int = DRAWS
 ) -> Posterior:
     """Draw from the posterior of a model around its best fit.
 
     Parameters
     ----------
     whittle : Whittle
-    found : Maximum
+    maximum : Maximum
         The best fit of the model; a term that it has at 0 is drawn all the same.
     rng : numpy.random.Generator
     draws : int
@@ -99,21 +99,21 @@ def sample(
     -------
     Posterior
     """
-    target = _Target(whittle, found)
+    target = _Target(whittle, maximum)
     wanted = draws / _WORTH
     size = 1 << max(9, math.ceil(math.log2(wanted)))
-    points = adapted(
+    points = sample_adaptively(
         target.log_density, target.first(), rng, size=size, wanted=wanted, most=_ROUNDS * size
     )
     effective = points.effective
     if effective * _LEAST_WORTH >= wanted:
         which = points.drawn(draws, rng)
-        kept = target.amplitudes(points.points[which])
+        amplitudes = target.amplitudes(points.points[which])
     else:
         effective = math.nan
         start, covariance = target.start()
-        kept, _ = chain(start, covariance, rng, draws, *target.arguments)
-    return target.posterior(kept, effective, rng)
+        amplitudes, _ = chain(start, covariance, rng, draws, *target.arguments)
+    return target.posterior(amplitudes, effective, rng)
 
 
 class _Target:
@@ -121,37 +121,32 @@ class _Target:
 
     They are log T_B, and z with amplitude = unit sinh z > 0: linear where an amplitude may be 0,
     its logarithm where it is known.
-
-    Parameters
-    ----------
-    whittle : Whittle
-    found : Maximum
     """
 
-    def __init__(self, whittle: Whittle, found: Maximum) -> None:
-        terms = found.terms
-        self.found = found
+    def __init__(self, whittle: Whittle, maximum: Maximum) -> None:
+        terms = maximum.terms
+        self.maximum = maximum
         self.linear, self.processes = len(terms.linear), terms.gauss_markov
         self.terms = self.linear + self.processes
         fixed = np.column_stack([whittle.column(letter) for letter in terms.linear])
         self.fixed = np.ascontiguousarray(fixed / whittle.scale)
-        density = whittle.density(found)
+        density = whittle.density(maximum)
         spectrum = whittle.spectrum
-        known = float(np.sum(spectrum.ordinates * spectrum.ramp / density))
-        self.ramp_unit = 1.0 / math.sqrt(max(known, 1e-300))
+        ramp_information = float(np.sum(spectrum.ordinates * spectrum.ramp / density))
+        self.ramp_unit = 1.0 / math.sqrt(max(ramp_information, 1e-300))
         self.bins: Bins = whittle.bins(self.ramp_unit)
         self.table: ShapeTable = whittle.shape_table(whittle.scale)
         self.arguments = self.fixed, self.bins, self.processes, terms.ramp, self.table
         # How well the square of each amplitude is known: alone, and beside the other terms.
-        parts = whittle.matrix(terms, found.times) / density[:, None]
+        parts = whittle.matrix(terms, maximum.times) / density[:, None]
         parts *= np.sqrt(spectrum.ordinates / 2.0)[:, None]
         size = np.linalg.norm(parts, axis=0)
         parts /= size
         inverse = np.linalg.inv(parts.T @ parts + _ALIKE * np.eye(self.terms))
         error = np.sqrt(np.diag(inverse)) / size
         self.log_unit = 0.5 * np.log(0.25 * error)
-        self.weak = np.flatnonzero(error > _WEAK * found.powers).tolist()
-        self.log_found = 0.5 * np.log(np.maximum(found.powers, _LEAST_START / size))
+        self.weak = np.flatnonzero(error > _WEAK * maximum.powers).tolist()
+        self.log_fitted = 0.5 * np.log(np.maximum(maximum.powers, _LEAST_START / size))
 
     def log_density(self, points: Array) -> Array:
         """Return the logarithm of the posterior at points, up to a constant."""
@@ -178,13 +173,13 @@ class _Target:
         number = _GRID[self.processes]
         apart = (last - first) / max(number, 1)
         grid = first + apart * (np.arange(number) + 0.5)
-        places = [np.log(self.found.times)]
+        places = [np.log(self.maximum.times)]
         if self.processes == 1:
             places += [np.array([place]) for place in grid]
         elif self.processes == 2:
             places += [np.array([a, b]) for i, a in enumerate(grid) for b in grid[i + 1 :]]
         widths = [_WIDEST] + [_WIDE * apart] * (len(places) - 1)
-        components = [self._component(*one) for one in zip(places, widths, strict=True)]
+        components = [self._component(at, width) for at, width in zip(places, widths, strict=True)]
         if self.terms > 1:
             components += [self._without(term) for term in self.weak]
         means, scales = (np.array(part) for part in zip(*components, strict=True))
@@ -192,37 +187,37 @@ class _Target:
         mass = values + 0.5 * np.linalg.slogdet(scales)[1]
         weights = np.exp(mass - mass.max())
         weights /= weights.sum()
-        kept = weights > _LEAST
-        kept[0] = True
-        kept[len(places) :] = True
+        heavy = weights > _LEAST
+        heavy[0] = True
+        heavy[len(places) :] = True
         weights = np.maximum(weights, _FLOOR)
         weights[len(places) :] = np.maximum(weights[len(places) :], _GONE_WEIGHT)
-        weights[0] = max(weights[0], _FOUND)
+        weights[0] = max(weights[0], _AT_BEST_FIT)
         # From log amplitudes to z = asinh(amplitude / unit): dz = tanh z d log amplitude.
         slope = np.ones_like(means)
         z = np.arcsinh(np.exp(means[:, : self.terms] - self.log_unit))
         means[:, : self.terms], slope[:, : self.terms] = z, np.tanh(z)
         scales *= slope[:, :, None] * slope[:, None, :]
-        return Mixture(weights[kept] / weights[kept].sum(), means[kept], scales[kept])
+        return Mixture(weights[heavy] / weights[heavy].sum(), means[heavy], scales[heavy])
 
     def start(self) -> tuple[Array, Array]:
         """Return the mode of the amplitudes at the best T_B, and the covariance there."""
-        return self._component(np.log(self.found.times), 1.0)
+        return self._component(np.log(self.maximum.times), 1.0)
 
     def _component(self, places: Array, width: float) -> tuple[Array, Array]:
         """Return mean and covariance of a normal one about correlation times."""
-        return self._normal(self.log_found, places, width, self.fixed)
+        return self._normal(self.log_fitted, places, width, self.fixed)
 
     def _without(self, term: int) -> tuple[Array, Array]:
         """Return those of the posterior where one term is nearly gone."""
-        places, fixed = np.log(self.found.times), self.fixed
+        places, fixed = np.log(self.maximum.times), self.fixed
         new = [term]
         if term < self.linear:
             fixed = np.ascontiguousarray(np.delete(fixed, term, axis=1))
         else:
             places = np.delete(places, term - self.linear)
             new.append(self.terms + term - self.linear)
-        mean, covariance = self._normal(np.delete(self.log_found, term), places, _WIDEST, fixed)
+        mean, covariance = self._normal(np.delete(self.log_fitted, term), places, _WIDEST, fixed)
         old = np.delete(np.arange(self.terms + self.processes), new)
         full_mean, full = np.empty(len(old) + len(new)), np.zeros((len(old) + len(new),) * 2)
         full_mean[old], full[np.ix_(old, old)] = mean, covariance
@@ -240,7 +235,7 @@ class _Target:
     ) -> tuple[Array, Array]:
         """Return mean and covariance of a normal one, of some of the linear terms and processes."""
         log_amplitudes, curvature, parts = mode_at(
-            start, places, fixed, self.bins, self.found.terms.ramp, self.table
+            start, places, fixed, self.bins, self.maximum.terms.ramp, self.table
         )
         p, g, linear = len(start), len(places), fixed.shape[1]
         information = np.zeros((p + g, p + g))
@@ -268,20 +263,20 @@ class _Target:
         shape_at(high, self.table, ends[1])
         return np.asarray(np.log(ends[1] / ends[0]) / (high - low))
 
-    def posterior(self, kept: Array, effective: float, rng: np.random.Generator) -> Posterior:
+    def posterior(self, amplitudes: Array, effective: float, rng: np.random.Generator) -> Posterior:
         """Return equally weighted points as draws of the parameters."""
         p = self.terms
-        ramps = np.zeros(len(kept))
-        if self.found.terms.ramp:
+        ramps = np.zeros(len(amplitudes))
+        if self.maximum.terms.ramp:
             # Given the noise R is normal.
-            _, first, again = np.unique(kept[:, 0], return_index=True, return_inverse=True)
-            _, best, known = log_posteriors(kept[first], *self.arguments)
-            ramps = best[again] + rng.standard_normal(len(kept)) / np.sqrt(known[again])
-        times = np.exp(kept[:, p:])
+            _, first, again = np.unique(amplitudes[:, 0], return_index=True, return_inverse=True)
+            _, best, information = log_posteriors(amplitudes[first], *self.arguments)
+            ramps = best[again] + rng.standard_normal(len(amplitudes)) / np.sqrt(information[again])
+        times = np.exp(amplitudes[:, p:])
         order = np.argsort(times, axis=1)
-        biases = np.take_along_axis(np.exp(kept[:, self.linear : p]), order, axis=1)
+        biases = np.take_along_axis(np.exp(amplitudes[:, self.linear : p]), order, axis=1)
         return Posterior(
-            np.concatenate([np.exp(kept[:, : self.linear]), biases], axis=1),
+            np.concatenate([np.exp(amplitudes[:, : self.linear]), biases], axis=1),
             np.take_along_axis(times, order, axis=1),
             ramps * self.ramp_unit,
             effective,

@@ -75,10 +75,10 @@ def log_posterior(
         value += point[j]  # flat in the amplitude a is e^x in x = log a
     if not with_ramp:
         return value, 0.0, 0.0
-    best, known = _ramp_at(bins, model)
-    if known > 0.0:
-        value += 0.5 * (best * best * known - math.log(known))
-    return value, best, known
+    best, information = _ramp_at(bins, model)
+    if information > 0.0:
+        value += 0.5 * (best * best * information - math.log(information))
+    return value, best, information
 
 
 @njit(cache=True)
@@ -87,13 +87,13 @@ def log_posteriors(
 ) -> tuple[Array, Array, Array]:
     """Return those of points, each of shape (n,)."""
     n = points.shape[0]
-    values, best, known = np.empty(n), np.empty(n), np.empty(n)
+    values, best, information = np.empty(n), np.empty(n), np.empty(n)
     model, shape = np.empty(fixed.shape[0]), np.empty(fixed.shape[0])
     for k in range(n):
-        values[k], best[k], known[k] = log_posterior(
+        values[k], best[k], information[k] = log_posterior(
             points[k], fixed, bins, processes, with_ramp, table, model, shape
         )
-    return values, best, known
+    return values, best, information
 
 
 @njit(cache=True)
@@ -117,15 +117,15 @@ def mode_at(
         columns[:, linear + g] = shape
     x = start.copy()
     model, data, parts = np.empty(b), density.copy(), np.empty((b, p))
-    here = -np.inf
+    best = -np.inf
     curvature = np.eye(p)
     step = np.zeros(p)
     for _ in range(_MOST_STEPS):
         size = 1.0
         moved = False
         for _ in range(8):
-            tried = x + size * step
-            powers = np.exp(2.0 * tried)
+            proposal = x + size * step
+            powers = np.exp(2.0 * proposal)
             for i in range(b):
                 total = 0.0
                 for j in range(p):
@@ -135,15 +135,15 @@ def mode_at(
                 R, _ = _ramp_at(bins, model)
                 for i in range(b):
                     data[i] = max(density[i] - 2.0 * R * cross[i] + R * R * ramp[i], 0.0)
-            there = tried.sum() - cost_of(nu, data, model)
-            if there >= here:
+            value = proposal.sum() - cost_of(nu, data, model)
+            if value >= best:
                 moved = True
                 break
             size *= 0.5
         if not moved:
             break
-        gained = there - here
-        x, here = tried, there
+        gained = value - best
+        x, best = proposal, value
         gradient = np.ones(p)
         curvature[:] = 0.0
         for i in range(b):

@@ -28,10 +28,10 @@ from imubench_pipeline.typing import Row
 
 def allan_rows(key: Key, curve: AllanCurve) -> Iterator[Row]:
     """Yield the rows of the table ``allan``."""
-    for i, about in enumerate(limit_rows(curve)):
+    for i, limits in enumerate(limit_rows(curve)):
         yield (
             asdict(key)
-            | about
+            | limits
             | {
                 "cluster_size": int(curve.cluster_size[i]),
                 "averaged": float(curve.averaged[i]),
@@ -78,17 +78,17 @@ def draw_rows(key: Key, estimate: Estimate) -> Iterator[Row]:
     for number, (first, further) in enumerate(
         zip(estimate.draws.first.tolist(), estimate.draws.further.tolist(), strict=True)
     ):
-        about = asdict(key) | {"method": estimate.method, "draw": number}
-        there = {name: value for name, value in zip(FAMILY, first, strict=True) if value}
-        yield about | {"component": 1} | there
+        key_columns = asdict(key) | {"method": estimate.method, "draw": number}
+        nonzero = {name: value for name, value in zip(FAMILY, first, strict=True) if value}
+        yield key_columns | {"component": 1} | nonzero
         for component, (B, T_B) in enumerate(further, start=2):
             if B:
-                yield about | {"component": component, "B": B, "T_B": T_B}
+                yield key_columns | {"component": component, "B": B, "T_B": T_B}
 
 
 def draws(path: Path) -> dict[tuple[str, str], JointDraws]:
     """Read the table ``draws`` of a recording, by channel and method."""
-    found = {}
+    joint_draws = {}
     for (channel, method), table in divided(read("draws", [path]), "channel", "method").items():
         columns = {name: table[name].to_numpy().astype(np.float64) for name in FAMILY}
         draw, component = table["draw"].to_numpy(), table["component"].to_numpy()
@@ -102,8 +102,8 @@ def draws(path: Path) -> dict[tuple[str, str], JointDraws]:
         for number in range(further.shape[1]):
             own = component == number + 2
             further[draw[own], number] = np.column_stack((columns["B"][own], columns["T_B"][own]))
-        found[str(channel), str(method)] = JointDraws(first, further)
-    return found
+        joint_draws[str(channel), str(method)] = JointDraws(first, further)
+    return joint_draws
 
 
 def estimates(path: Path, joint: Path | None = None) -> dict[str, list[Estimate]]:
@@ -121,18 +121,18 @@ def estimates(path: Path, joint: Path | None = None) -> dict[str, list[Estimate]
 def recommended_estimates(path: Path, joint: Path | None = None) -> dict[str, Estimate]:
     """Read the recommended estimate of each channel (see `estimates`)."""
     table = read("parameters", [path])
-    found = _estimates(table.filter(table["recommended"]), joint)
-    return {channel: by_method[0] for channel, by_method in found.items()}
+    estimates_of_channels = _estimates(table.filter(table["recommended"]), joint)
+    return {channel: by_method[0] for channel, by_method in estimates_of_channels.items()}
 
 
 def _estimates(table: pa.Table, joint: Path | None) -> dict[str, list[Estimate]]:
     drawn = draws(joint) if joint is not None else {}
-    found: dict[str, list[Estimate]] = {}
+    estimates_of_channels: dict[str, list[Estimate]] = {}
     for (channel, method), rows in divided(table, "channel", "method").items():
         estimate = estimate_of(method, rows.to_pylist())
         estimate = replace(estimate, draws=drawn.get((channel, method)))
-        found.setdefault(channel, []).append(estimate)
-    return found
+        estimates_of_channels.setdefault(channel, []).append(estimate)
+    return estimates_of_channels
 
 
 def estimate_of(method: str, rows: Iterable[Row]) -> Estimate:

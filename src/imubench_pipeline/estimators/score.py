@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from imubench_pipeline.typing import Array
 
 
 @dataclass(frozen=True)
@@ -27,12 +28,7 @@ class Scores:
     inside_band: float
 
 
-def score(
-    measured: NDArray[np.float64],
-    reconstructed: NDArray[np.float64],
-    lower: NDArray[np.float64],
-    upper: NDArray[np.float64],
-) -> Scores:
+def score(measured: Array, reconstructed: Array, lower: Array, upper: Array) -> Scores:
     """Compare Allan deviations on the same tau, all of shape (m,), in rad/s or m/s².
 
     Raises

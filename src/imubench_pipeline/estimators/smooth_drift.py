@@ -72,5 +72,5 @@ def _beyond(whittle: Whittle, number: int) -> Whittle:
     """Return the likelihood without the lowest cosines of each part of the log."""
     spectrum = whittle.spectrum
     place = 2.0 * spectrum.frequency * spectrum.length
-    kept = place > number + 0.5
-    return whittle if bool(np.all(kept)) else whittle.taken(spectrum, kept)
+    beyond = place > number + 0.5
+    return whittle if bool(np.all(beyond)) else whittle.select(spectrum, beyond)

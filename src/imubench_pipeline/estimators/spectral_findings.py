@@ -34,12 +34,12 @@ def line_findings(
         if line["kind"] != "alias":
             by_channel.setdefault(line["channel"], []).append(line)
     findings = []
-    for channel, found in by_channel.items():
-        strongest = max(found, key=lambda line: line["ratio"])
-        sinusoids = [line for line in found if line["kind"] == "sinusoid"]
+    for channel, group in by_channel.items():
+        strongest = max(group, key=lambda line: line["ratio"])
+        sinusoids = [line for line in group if line["kind"] == "sinusoid"]
         number = len(sinusoids)
         detail = (
-            f"{channel} has {number} sinusoids and {len(found) - number} bands of noise, the "
+            f"{channel} has {number} sinusoids and {len(group) - number} bands of noise, the "
             f"strongest at {strongest['frequency']:.5g} Hz, {strongest['ratio']:.3g} times the "
             "noise there; they are left out of the likelihood"
         )

@@ -99,10 +99,10 @@ class Shapes:
         q, p = -math.expm1(-h), math.exp(-h)
         Q, P = -np.expm1(-m * h), np.exp(-m * h)
         # Covariance 0 and 1 of the block means; for m = 1 they are v and v p.
-        zero = variance / m**2 * _bracket(m, h, p, q)
-        one = variance / m**2 * p * (Q / q) ** 2
+        covariance_0 = variance / m**2 * _bracket(m, h, p, q)
+        covariance_1 = variance / m**2 * p * (Q / q) ** 2
         spread = Q**2 + P * self._gap
-        shape = zero + one * (2.0 * (np.cos(self._omega) - P)) / spread
+        shape = covariance_0 + covariance_1 * (2.0 * (np.cos(self._omega) - P)) / spread
         # That cancels for T_B far longer than a block; then averaging acts as on a random walk.
         averaged = 1.0 - self._gap / 6.0 * (1.0 - 1.0 / m**2)
         slow = -variance * np.expm1(-2.0 * m * h) / spread * averaged

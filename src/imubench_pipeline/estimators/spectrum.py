@@ -82,7 +82,7 @@ class Spectrum:
     duration: float
     mean: float
 
-    def taken(self, chosen: NDArray[np.bool_]) -> Spectrum:
+    def select(self, chosen: NDArray[np.bool_]) -> Spectrum:
         """Return the spectrum of chosen bins."""
         names = (
             "frequency",
@@ -137,7 +137,8 @@ def spectra(
     Parameters
     ----------
     blocks : iterable of ndarray
-        The log in order, in SI, without missing samples inside the segments (`missing.filled`).
+        The log in order, in SI, without missing samples inside the segments
+        (`missing.fill_missing`).
     samples : int
         L, the length of all blocks together.
     rate : float
@@ -274,9 +275,7 @@ def _transform(values: Array, interval: float) -> tuple[Array, Array, Array, Arr
     half = np.pi * k / (2.0 * n)
     # sum of (i + 1/2) cos(2 half (i + 1/2)) in closed form: only odd ordinates have a ramp.
     ramp = np.where(
-        k % 2 == 1,
-        -math.sqrt(2.0 / n) * interval * np.cos(half) / (2.0 * np.sin(half) ** 2),
-        0.0,
+        k % 2 == 1, -math.sqrt(2.0 / n) * interval * np.cos(half) / (2.0 * np.sin(half) ** 2), 0.0
     )
     return (
         k / (2.0 * n * interval),

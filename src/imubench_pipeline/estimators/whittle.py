@@ -86,9 +86,14 @@ class Maximum:
         return float(np.sqrt(self.powers[self.terms.linear.index(letter)]))
 
     @property
+    def process_powers(self) -> Array:
+        """B^2 of each Gauss-Markov process."""
+        return self.powers[len(self.terms.linear) :]
+
+    @property
     def biases(self) -> Array:
         """B of each Gauss-Markov process."""
-        return np.asarray(np.sqrt(self.powers[len(self.terms.linear) :]))
+        return np.asarray(np.sqrt(self.process_powers))
 
 
 @dataclass(frozen=True)
@@ -107,7 +112,7 @@ class Behind:
     flicker: Array
     slow: Array
 
-    def taken(self, chosen: NDArray[np.bool_]) -> Behind:
+    def select(self, chosen: NDArray[np.bool_]) -> Behind:
         """Return that of chosen bins."""
         return Behind(self.white[chosen], self.flicker[chosen], self.slow[chosen])
 
@@ -181,11 +186,11 @@ class Whittle:
         other.columns = self.columns | {letter: shape}
         return other
 
-    def taken(self, spectrum: Spectrum, chosen: NDArray[np.bool_]) -> Whittle:
+    def select(self, spectrum: Spectrum, chosen: NDArray[np.bool_]) -> Whittle:
         """Return the likelihood of other data in chosen bins."""
-        other = self.of(spectrum.taken(chosen))
+        other = self.of(spectrum.select(chosen))
         if other.behind is not None:
-            other.behind = other.behind.taken(chosen)
+            other.behind = other.behind.select(chosen)
         other.columns = {letter: self.column(letter)[chosen] for letter in "QNFK"}
         other.table = np.ascontiguousarray(self.table[:, chosen])
         return other
@@ -235,13 +240,13 @@ class Whittle:
         columns += [self.gauss_markov(float(time)) for time in times]
         return np.column_stack(columns)
 
-    def density(self, found: Maximum) -> Array:
+    def density(self, maximum: Maximum) -> Array:
         """Return the density of a fitted model in each bin, without its ramp."""
-        return np.asarray(self.matrix(found.terms, found.times) @ found.powers)
+        return np.asarray(self.matrix(maximum.terms, maximum.times) @ maximum.powers)
 
-    def data(self, found: Maximum) -> Array:
+    def data(self, maximum: Maximum) -> Array:
         """Return the measured density in each bin, less the ramp of a model."""
-        spectrum, R = self.spectrum, found.ramp
+        spectrum, R = self.spectrum, maximum.ramp
         return np.asarray(spectrum.density - 2.0 * R * spectrum.cross + R**2 * spectrum.ramp)
 
     def maximum(self, terms: Terms) -> Maximum:
@@ -263,20 +268,20 @@ class Whittle:
         powers[: len(size)] /= size
         return Maximum(terms, powers, times, ramp, cost)
 
-    def sensitivity(self, found: Maximum) -> Array:
+    def sensitivity(self, maximum: Maximum) -> Array:
         """Return S with S S^T the Fisher information of (log parameter ..., log T_B ..., R).
 
         Shape (m, b), or (m, 2 b) with a ramp, which shares no information with the others; the
         parameters stand in the order of `Maximum.powers`, then `times`.
         """
-        matrix = self.matrix(found.terms, found.times)
-        total = matrix @ found.powers
+        matrix = self.matrix(maximum.terms, maximum.times)
+        total = matrix @ maximum.powers
         rows = [
             2.0 * power * column / total
-            for power, column in zip(found.powers, matrix.T, strict=True)
+            for power, column in zip(maximum.powers, matrix.T, strict=True)
         ]
         step = 0.05
-        for power, time in zip(found.powers[len(found.terms.linear) :], found.times, strict=True):
+        for power, time in zip(maximum.process_powers, maximum.times, strict=True):
             low, high = (
                 max(time / (1 + step), self.times[0]),
                 min(time * (1 + step), self.times[-1]),
@@ -284,7 +289,7 @@ class Whittle:
             change = self.gauss_markov(high) - self.gauss_markov(low)
             rows.append(power * change / np.log(high / low) / total)
         noise = np.array(rows) * np.sqrt(self._nu / 2.0)
-        if not found.terms.ramp:
+        if not maximum.terms.ramp:
             return np.asarray(noise)
         bins = len(total)
         full = np.zeros((len(rows) + 1, 2 * bins))
@@ -292,9 +297,9 @@ class Whittle:
         full[-1, bins:] = np.sqrt(self._nu * self.spectrum.ramp / total)
         return full
 
-    def information(self, found: Maximum) -> Array:
+    def information(self, maximum: Maximum) -> Array:
         """Return the Fisher information of (log of each parameter ..., log T_B ..., R)."""
-        sensitivity = self.sensitivity(found)
+        sensitivity = self.sensitivity(maximum)
         return np.asarray(sensitivity @ sensitivity.T)
 
 
@@ -327,13 +332,13 @@ def whittle_of(
     return Whittle(spectrum, min(least, longest / 4.0), longest, shapes, behind)
 
 
-def model_of(found: Maximum) -> NoiseModel:
+def model_of(maximum: Maximum) -> NoiseModel:
     """Return the noise model of a fit; flicker noise comes first, then processes by T_B."""
-    terms = found.terms
-    values = {letter: found.parameter(letter) for letter in terms.linear}
+    terms = maximum.terms
+    values = {letter: maximum.parameter(letter) for letter in terms.linear}
     processes = [
         GaussMarkov(float(B), float(time))
-        for B, time in zip(found.biases, found.times, strict=True)
+        for B, time in zip(maximum.biases, maximum.times, strict=True)
     ]
     first = None if "F" in values or not processes else processes.pop(0)
     return NoiseModel(
@@ -342,6 +347,6 @@ def model_of(found: Maximum) -> NoiseModel:
         B=values.get("F", first.B if first else 0.0),
         T_B=first.T_B if first else None,
         K=values.get("K", 0.0),
-        R=found.ramp,
+        R=maximum.ramp,
         further=[process for process in processes if process.B > 0],
     )

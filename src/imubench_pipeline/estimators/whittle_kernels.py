@@ -225,12 +225,7 @@ def _best_powers(
 
 @njit(cache=True)
 def _cost_at(
-    places: Array,
-    fixed: Array,
-    bins: Bins,
-    with_ramp: bool,
-    table: ShapeTable,
-    tolerance: float,
+    places: Array, fixed: Array, bins: Bins, with_ramp: bool, table: ShapeTable, tolerance: float
 ) -> float:
     """Return the cost at logarithms of correlation times, profiled over everything else."""
     b, p = fixed.shape
@@ -244,7 +239,7 @@ def _cost_at(
 
 
 @njit(cache=True)
-def _polished(
+def _polish(
     places: Array,
     which: int,
     low: float,
@@ -255,29 +250,29 @@ def _polished(
     table: ShapeTable,
 ) -> tuple[float, float]:
     """Minimise the cost over one correlation time by golden section."""
-    here = places.copy()
+    tried = places.copy()
     a, d = low, high
     b, c = d - _GOLDEN * (d - a), a + _GOLDEN * (d - a)
-    here[which] = b
-    cost_b = _cost_at(here, fixed, bins, with_ramp, table, _POLISH_TOLERANCE)
-    here[which] = c
-    cost_c = _cost_at(here, fixed, bins, with_ramp, table, _POLISH_TOLERANCE)
+    tried[which] = b
+    cost_b = _cost_at(tried, fixed, bins, with_ramp, table, _POLISH_TOLERANCE)
+    tried[which] = c
+    cost_c = _cost_at(tried, fixed, bins, with_ramp, table, _POLISH_TOLERANCE)
     while d - a > 5e-4:
         if cost_b <= cost_c:
             d, c, cost_c = c, b, cost_b
             b = d - _GOLDEN * (d - a)
-            here[which] = b
-            cost_b = _cost_at(here, fixed, bins, with_ramp, table, _POLISH_TOLERANCE)
+            tried[which] = b
+            cost_b = _cost_at(tried, fixed, bins, with_ramp, table, _POLISH_TOLERANCE)
         else:
             a, b, cost_b = b, c, cost_c
             c = a + _GOLDEN * (d - a)
-            here[which] = c
-            cost_c = _cost_at(here, fixed, bins, with_ramp, table, _POLISH_TOLERANCE)
+            tried[which] = c
+            cost_c = _cost_at(tried, fixed, bins, with_ramp, table, _POLISH_TOLERANCE)
     return (b, cost_b) if cost_b <= cost_c else (c, cost_c)
 
 
 @njit(cache=True)
-def _scanned(
+def _scan(
     places: Array,
     which: int,
     low: float,
@@ -288,52 +283,35 @@ def _scanned(
     table: ShapeTable,
 ) -> tuple[float, float]:
     """Return the best of one correlation time on a grid between limits, and its cost."""
-    here = places.copy()
+    tried = places.copy()
     best, lowest = places[which], np.inf
     for i in range(0, table.logarithms.shape[0], _SCAN_STEP):
-        here[which] = table.first + i * table.step
-        if low <= here[which] <= high:
-            cost = _cost_at(here, fixed, bins, with_ramp, table, _SCAN_TOLERANCE)
+        tried[which] = table.first + i * table.step
+        if low <= tried[which] <= high:
+            cost = _cost_at(tried, fixed, bins, with_ramp, table, _SCAN_TOLERANCE)
             if cost < lowest:
-                best, lowest = here[which], cost
+                best, lowest = tried[which], cost
     return best, lowest
 
 
 @njit(cache=True)
-def one_process(
-    fixed: Array,
-    bins: Bins,
-    with_ramp: bool,
-    table: ShapeTable,
-) -> Array:
+def one_process(fixed: Array, bins: Bins, with_ramp: bool, table: ShapeTable) -> Array:
     """Scan the correlation time, then polish the best."""
     first, step, logarithms = table
     last = first + step * (logarithms.shape[0] - 1)
     place = np.array([first])
-    best, lowest = _scanned(place, 0, first, last, fixed, bins, with_ramp, table)
+    best, lowest = _scan(place, 0, first, last, fixed, bins, with_ramp, table)
     reach = _SCAN_STEP * step
     place[0] = best
-    found, cost = _polished(
-        place,
-        0,
-        max(first, best - reach),
-        min(last, best + reach),
-        fixed,
-        bins,
-        with_ramp,
-        table,
+    polished, cost = _polish(
+        place, 0, max(first, best - reach), min(last, best + reach), fixed, bins, with_ramp, table
     )
-    place[0] = found if cost < lowest else best
+    place[0] = polished if cost < lowest else best
     return place
 
 
 @njit(cache=True)
-def two_processes(
-    fixed: Array,
-    bins: Bins,
-    with_ramp: bool,
-    table: ShapeTable,
-) -> Array:
+def two_processes(fixed: Array, bins: Bins, with_ramp: bool, table: ShapeTable) -> Array:
     """Begin with the best pair of a coarse grid and with the best single process; take the better.
 
     A strong process has a sharp correlation time, beside which no pair of a coarse grid shows that
@@ -354,7 +332,7 @@ def two_processes(
             if cost < lowest:
                 lowest = cost
                 pair = places.copy()
-    pair, lowest = _descended(pair, lowest, fixed, bins, with_ramp, table)
+    pair, lowest = _descend(pair, lowest, fixed, bins, with_ramp, table)
     single = one_process(fixed, bins, with_ramp, table)[0]
     for slower in range(2):
         beside = np.array([single, single])
@@ -362,23 +340,18 @@ def two_processes(
         if high <= low:
             continue
         which = 1 if slower == 0 else 0
-        beside[which], cost = _scanned(beside, which, low, high, fixed, bins, with_ramp, table)
+        beside[which], cost = _scan(beside, which, low, high, fixed, bins, with_ramp, table)
         if cost == np.inf:
             continue
-        beside, cost = _descended(beside, cost, fixed, bins, with_ramp, table)
+        beside, cost = _descend(beside, cost, fixed, bins, with_ramp, table)
         if cost < lowest:
             pair, lowest = beside, cost
     return pair
 
 
 @njit(cache=True)
-def _descended(
-    pair: Array,
-    lowest: float,
-    fixed: Array,
-    bins: Bins,
-    with_ramp: bool,
-    table: ShapeTable,
+def _descend(
+    pair: Array, lowest: float, fixed: Array, bins: Bins, with_ramp: bool, table: ShapeTable
 ) -> tuple[Array, float]:
     """Polish each of two correlation times in turn."""
     first, step, logarithms = table
@@ -396,10 +369,10 @@ def _descended(
                 low = max(low, best[0] + apart)
             if high <= low:
                 continue
-            found, cost = _polished(best, g, low, high, fixed, bins, with_ramp, table)
+            polished, cost = _polish(best, g, low, high, fixed, bins, with_ramp, table)
             if cost < lowest:
                 lowest = cost
-                best[g] = found
+                best[g] = polished
         reach = max(0.7 * reach, 0.1 * step)
         if before - lowest < 1e-4:
             break

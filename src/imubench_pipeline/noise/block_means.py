@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from imubench_pipeline.noise.state_space import StateSpace, repeated
+from imubench_pipeline.noise.state_space import StateSpace, repeat_step
 
 
 def of_block_means(space: StateSpace, size: int) -> StateSpace:
@@ -38,7 +38,7 @@ def of_block_means(space: StateSpace, size: int) -> StateSpace:
     step[m, m] = 1.0
     noise = np.zeros((m + 1, m + 1))
     noise[:m, :m] = space.process_noise
-    transition, process_noise = repeated(step, noise, size)
+    transition, process_noise = repeat_step(step, noise, size)
     transition[:, m] = 0.0  # each sum begins anew
     mean, variance = np.zeros(m + 1), np.zeros((m + 1, m + 1))
     mean[:m], variance[:m, :m] = space.initial_mean, space.initial_variance

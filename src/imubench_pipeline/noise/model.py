@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import block_diag
 
 from imubench_pipeline.noise.state_space import StateSpace
 from imubench_pipeline.noise.terms import (
@@ -26,7 +25,6 @@ from imubench_pipeline.typing import Array
 
 _LONGEST_FLICKER = 1e5
 """Tau in s up to which a state space follows flicker noise, where nothing else is asked."""
-
 
 _OWN_PLACE = (Quantization, WhiteNoise, Flicker, RandomWalk, Deterministic)
 """Kinds of terms that a model has in a parameter of their own."""
@@ -216,15 +214,7 @@ class NoiseModel:
             Tau up to which flicker noise is followed, s; only then it has several states.
         """
         spaces = [term.state_space(1.0 / rate) for term in self.realised(1.0 / rate, longest)]
-        spaces.append(StateSpace.without_states(0.0))
-        return StateSpace(
-            block_diag(*(space.transition for space in spaces)),
-            block_diag(*(space.process_noise for space in spaces)),
-            np.concatenate([space.output for space in spaces]),
-            sum(space.measurement_noise for space in spaces),
-            np.concatenate([space.initial_mean for space in spaces]),
-            block_diag(*(space.initial_variance for space in spaces)),
-        )
+        return StateSpace.together([*spaces, StateSpace.without_states(0.0)])
 
 
 def _sum(parts: Sequence[Array], like: Array) -> Array:

@@ -76,7 +76,7 @@ def sigma_range(
         raise ValueError("expected noise models, and there is none")
     if not 0 < level < 1:
         raise ValueError(f"level is {level}, expected one between 0 and 1")
-    values = np.array([np.asarray(sigma(one), dtype=np.float64) for one in drawn])
+    values = np.array([np.asarray(sigma(drawn_model), dtype=np.float64) for drawn_model in drawn])
     tail = (1.0 - level) / 2.0
     lower, upper = np.quantile(values, [tail, 1.0 - tail], axis=0)
     return SigmaRange(
@@ -88,11 +88,7 @@ def sigma_range(
 
 
 def drawn_from_covariance(
-    model: NoiseModel,
-    names: Sequence[str],
-    covariance: Array,
-    draws: int,
-    rng: np.random.Generator,
+    model: NoiseModel, names: Sequence[str], covariance: Array, draws: int, rng: np.random.Generator
 ) -> list[NoiseModel]:
     """Return noise models whose parameters are log-normal about those of a model, together.
 
@@ -130,11 +126,11 @@ def drawn_from_covariance(
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     logarithms = rng.standard_normal((draws, len(names))) @ root.T
     medians = [float(getattr(model, name)) for name in names]
-    found = []
+    models = []
     for row in logarithms.tolist():
         changed: dict[str, Any] = {
             name: median * math.exp(change)
             for name, median, change in zip(names, medians, row, strict=True)
         }
-        found.append(replace(model, **changed))
-    return found
+        models.append(replace(model, **changed))
+    return models

@@ -118,11 +118,7 @@ def _add_states(
 
 
 def reconstructed_variance(
-    model: NoiseModel,
-    rate: float,
-    samples: int,
-    sizes: NDArray[np.int64],
-    rng: np.random.Generator,
+    model: NoiseModel, rate: float, samples: int, sizes: NDArray[np.int64], rng: np.random.Generator
 ) -> Array:
     """Return the Allan variance of one full-length simulated log, shape (m,)."""
     phase = integrate(simulate_blocks(model, rate, samples, rng), samples, holes=False)

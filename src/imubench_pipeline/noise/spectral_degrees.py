@@ -118,20 +118,22 @@ def _degrees(
     mask = presence.differences(n) if presence is not None else None
     if mask is None:
         squares, products = zip(*(noise.sums(int(M)) for M in terms), strict=True)
-        done = share * float(terms.sum())
-        relative = sum(squares) / float(terms.sum()) / done
-        crossed = sum(products) / float(terms.sum()) / done
+        differences = share * float(terms.sum())
+        relative = sum(squares) / float(terms.sum()) / differences
+        crossed = sum(products) / float(terms.sum()) / differences
     else:
-        there, stride = mask
-        if not there.any():
+        present, stride = mask
+        if not present.any():
             return 1.0, 1.0
-        counted, done = float(there.sum()) * stride, share * float(terms.sum())
-        square, product = noise.masked_sums(there, stride)
-        relative, crossed = square / counted / done, product / counted / done
+        counted, differences = float(present.sum()) * stride, share * float(terms.sum())
+        square, product = noise.masked_sums(present, stride)
+        relative, crossed = square / counted / differences, product / counted / differences
     # Variance over squared mean: 2 / edf.
     mean = noise.at_zero + noise.ramp**2 + noise.lines
     varied = 2.0 * noise.at_zero**2 * relative
-    varied += 4.0 * noise.ramp**2 * noise.at_zero * crossed + 4.0 * noise.line_products / done
+    varied += (
+        4.0 * noise.ramp**2 * noise.at_zero * crossed + 4.0 * noise.line_products / differences
+    )
     edf = max(2.0 * mean**2 / varied, 1.0)
     if edf > _MOST_WITH_TAIL:
         return edf, edf
@@ -203,11 +205,11 @@ class _Covariance:
         square = both @ smooth**2 + sharp @ (2.0 * smooth + rounding)
         return float(square), float(both @ smooth + sharp.sum())
 
-    def masked_sums(self, there: NDArray[np.bool_], stride: int) -> tuple[float, float]:
+    def masked_sums(self, mask: NDArray[np.bool_], stride: int) -> tuple[float, float]:
         """Return the same sums over the pairs of differences that are there, a stride apart."""
-        reach = min(len(there), _REACH * self._n // stride + 2)
-        size = 1 << (len(there) + reach).bit_length()
-        pairs = np.fft.irfft(np.abs(np.fft.rfft(there.astype(np.float64), size)) ** 2, size)[:reach]
+        reach = min(len(mask), _REACH * self._n // stride + 2)
+        size = 1 << (len(mask) + reach).bit_length()
+        pairs = np.fft.irfft(np.abs(np.fft.rfft(mask.astype(np.float64), size)) ** 2, size)[:reach]
         lags = np.arange(reach) * stride
         smooth, _ = self._at(lags)
         both = np.where(lags == 0, 1.0, 2.0) * pairs * stride**2
@@ -227,11 +229,11 @@ class _Covariance:
         """Return those of the covariance of the differences, thinned; None where too many."""
         eigenvalues = []
         if mask is not None:
-            there, stride = mask
+            present, stride = mask
             thinning = max(1, round(self._n / _TAIL_STEPS / stride))
-            places = np.flatnonzero(there[::thinning])
+            places = np.flatnonzero(present[::thinning])
             if not len(places):
-                places = np.flatnonzero(there)[:1]
+                places = np.flatnonzero(present)[:1]
             layouts = [(places, float(thinning * stride))]
         else:
             thinned = [

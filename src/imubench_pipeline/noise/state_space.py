@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from imubench_pipeline.typing import Array
 
@@ -53,6 +55,18 @@ class StateSpace:
         """Return a model of white noise alone."""
         none = np.zeros((0, 0))
         return cls(none, none, np.zeros(0), measurement_noise, np.zeros(0), none)
+
+    @classmethod
+    def together(cls, spaces: Sequence[StateSpace]) -> StateSpace:
+        """Return the model of the sum of independent ones, their states in order."""
+        return cls(
+            np.asarray(block_diag(*(space.transition for space in spaces))),
+            np.asarray(block_diag(*(space.process_noise for space in spaces))),
+            np.concatenate([space.output for space in spaces]),
+            sum(space.measurement_noise for space in spaces),
+            np.concatenate([space.initial_mean for space in spaces]),
+            np.asarray(block_diag(*(space.initial_variance for space in spaces))),
+        )
 
     def of_either_sign(self) -> StateSpace:
         """Return the model whose first state has no mean, and its square in the variance."""
@@ -106,7 +120,7 @@ def root_of(covariance: Array) -> Array:
     return root
 
 
-def repeated(transition: Array, noise: Array, times: int) -> tuple[Array, Array]:
+def repeat_step(transition: Array, noise: Array, times: int) -> tuple[Array, Array]:
     """Return what a step does when it is done several times, by powers of two.
 
     Parameters

@@ -46,8 +46,8 @@ def run(arguments: argparse.Namespace) -> int:
         return 2
     if lost := lost_inputs(arguments.results, "report"):
         print(
-            f"{arguments.results / lost[0]}: is no longer there; run snakemake -c2 again, as for these "
-            "results, and it is made anew",
+            f"{arguments.results / lost[0]}: is no longer there; run snakemake -c2 again, as for "
+            "these results, and it is made anew",
             file=sys.stderr,
         )
         return 2

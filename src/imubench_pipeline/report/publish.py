@@ -75,7 +75,7 @@ def publish(site: Site, folder: Path, say: Progress = lambda _: None) -> list[st
     if unchanged != before:
         _put(folder, _KEYS, _text(unchanged))
     templates = environment(site.system)
-    shown = dict(kept)
+    shown = dict(unchanged)
     for page in every:
         if page.path not in unchanged:
             say(page.path)

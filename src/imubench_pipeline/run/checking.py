@@ -9,7 +9,7 @@ from pathlib import Path
 
 from imubench_pipeline.datasheets.plausibility import implausible_of
 from imubench_pipeline.estimators.frame import FEWEST_BINS, frame_of
-from imubench_pipeline.estimators.likelihood import explaining
+from imubench_pipeline.estimators.likelihood import fit_models
 from imubench_pipeline.estimators.spectral_findings import band_finding, line_findings
 from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.recordings.ingest import ingest_as_planned
@@ -56,6 +56,6 @@ def spectral_findings(channel: str, log: ChannelLog, bandwidth: float | None) ->
     spectrum, line_spectra = spectra(log.blocks(), log.grid, log.rate, log.segments)
     frame = frame_of(spectrum, line_spectra, bandwidth=bandwidth)
     if frame.used.sum() >= FEWEST_BINS:
-        frame, _, _ = explaining(spectrum, frame)
+        frame, _, _ = fit_models(spectrum, frame)
     rows = [asdict(line) | {"channel": channel} for line in frame.lines]
     return [*line_findings(rows), *band_finding(channel, frame.band.highest, frame.band.source)]

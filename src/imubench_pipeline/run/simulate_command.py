@@ -95,7 +95,7 @@ def _run(given: argparse.Namespace) -> None:
         origin.assume("log", text)
     if not motion:
         origin.assume("log", "at rest, and no gravity (--motion)")
-    remarks = [MARK, f"from {origin.said}"]
+    remarks = [MARK, f"from {origin.source}"]
     figures = {name: [one.text for one in said] for name, said in origin.figures.items()}
     assumed = [one.text for one in origin.assumed]
     remarks += [f"{name}: {line}" for name, lines in figures.items() for line in lines]
@@ -120,7 +120,7 @@ def _run(given: argparse.Namespace) -> None:
         "holes": dict.fromkeys(columns, False),
         "unusable": [],
         "simulation": {
-            "from": origin.said,
+            "from": origin.source,
             "figures": figures,
             "assumed": assumed,
             "seed": given.seed,
@@ -142,7 +142,7 @@ def _run(given: argparse.Namespace) -> None:
     )
     with _progress(samples) as said:
         write_log(given.out, blocks, columns, form, metadata, remarks, said)
-    write_notes(given.out, form, log, f"from {origin.said}")
+    write_notes(given.out, form, log, f"from {origin.source}")
     size = given.out.stat().st_size / 1e6
     print(f"{given.out}: {size:.1f} MB; {given.out.with_suffix('.yaml')} says how it is written")
 
@@ -182,7 +182,7 @@ def _origin(given: argparse.Namespace) -> tuple[Origin, Any]:
         if given.results:
             origin = with_estimates(origin, given.results, given.sensor, given.recording)
     if asked:
-        origin = sources.only(origin, asked)
+        origin = sources.select_channels(origin, asked)
     return origin, sensor
 
 

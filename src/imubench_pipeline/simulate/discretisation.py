@@ -108,12 +108,7 @@ def slow_sources(times: Array, interval: float, low_pass: LowPass | None) -> Slo
     transition, factor = _integrated(system, np.broadcast_to(impulse, (n, 1 + m)), interval)
     sign = np.sign(factor[:, 0, 0])
     return SlowSources(
-        decay,
-        lost,
-        own,
-        transition[:, 1:, 0],
-        factor[:, 0, 1:] * sign[:, None],
-        factor[:, 1:, 1:],
+        decay, lost, own, transition[:, 1:, 0], factor[:, 0, 1:] * sign[:, None], factor[:, 1:, 1:]
     )
 
 

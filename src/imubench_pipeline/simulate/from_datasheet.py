@@ -43,14 +43,14 @@ def from_datasheet(name: str, sensor: Sensor, seed: int) -> Origin:
         If no noise is printed for any channel of its log format.
     """
     document = sensor.datasheet.document or "the sensor file"
-    found = Origin(ImuModel(axes={}), f"the datasheet of {name}: {document}", sensor=name)
+    origin = Origin(ImuModel(axes={}), f"the datasheet of {name}: {document}", sensor=name)
     axes: dict[str, SensorModel] = {}
     for channel in (name for name in CHANNELS if name in sensor.log.channels):
-        axis = _Printed(sensor, channel, found)
+        axis = _Printed(sensor, channel, origin)
         noise = axis.noise()
         if noise is None:
-            found.figures.pop(channel)
-            found.assume("noise", f"{channel} is left out: no noise is printed of it")
+            origin.figures.pop(channel)
+            origin.assume("noise", f"{channel} is left out: no noise is printed of it")
             continue
         drawn = channel_rng(seed, name, channel, "signs").choice([-1.0, 1.0], 2)
         signs = (float(drawn[0]), float(drawn[1]))
@@ -60,8 +60,8 @@ def from_datasheet(name: str, sensor: Sensor, seed: int) -> Origin:
             f"{name}: the datasheet prints no noise density, random walk or rms noise of any "
             "channel; expected one, or --results, or a file of models"
         )
-    found.imu = ImuModel(axes=axes)
-    return found
+    origin.imu = ImuModel(axes=axes)
+    return origin
 
 
 class _Printed:
@@ -72,7 +72,7 @@ class _Printed:
         self._quantity, self._axis = quantity_of(channel), channel[-1]
         sheet: QuantityDatasheet | None = getattr(sensor.datasheet, self._quantity)
         self._sheet = sheet or QuantityDatasheet()
-        self._said = origin.figures.setdefault(channel, [])
+        self._remarks = origin.figures.setdefault(channel, [])
         self._assume = origin.assume
 
     def noise(self) -> NoiseModel | None:
@@ -80,7 +80,7 @@ class _Printed:
         density = _best([row for row in rows if row.statistic == "N"])
         if density is None or density.value is None:
             return None
-        self._say("N", density)
+        self._note("N", density)
         if density.figure and density.quantity == "N" and "assumed" in (density.reason or ""):
             self._assume(
                 "noise",
@@ -91,7 +91,7 @@ class _Printed:
         time = _best([row for row in rows if row.statistic == "T_B"])
         walk = _best([row for row in rows if row.statistic == "K"])
         if floor is not None and floor.value:
-            self._say("bias instability", floor)
+            self._note("bias instability", floor)
             B, T_B = floor.value / FLOOR, time.value if time else None
             self._assume(
                 "noise",
@@ -101,7 +101,7 @@ class _Printed:
         else:
             self._assume("noise", f"{self._quantity}: no bias instability, it is not printed")
         if walk is not None and walk.value:
-            self._say("K", walk)
+            self._note("K", walk)
             K = walk.value
         else:
             self._assume("noise", f"{self._quantity}: no random walk K, it is not printed")
@@ -137,7 +137,7 @@ class _Printed:
         stated = self._sensor.log.bandwidth
         printed = self._single("bandwidth", "low-pass", "cut-off") if stated is None else None
         if stated is not None:
-            self._said.append(Remark("low-pass", f"cut-off {stated}: of the log format"))
+            self._remarks.append(Remark("low-pass", f"cut-off {stated}: of the log format"))
             printed = quantity_to_si(stated, "frequency")
         if printed is None:
             self._assume("low-pass", f"{self._quantity}: no low-pass, its cut-off is not known")
@@ -152,10 +152,10 @@ class _Printed:
                 if not isinstance(value, float) or figure.unit is None:
                     continue
                 dimension = dimension_of(figure.unit, FIGURE_DIMENSIONS[self._quantity][name])
-                found = to_si(value, figure.unit, dimension)
+                step = to_si(value, figure.unit, dimension)
                 text = f"{name} {value:g} {figure.unit}: {figure.kind}, datasheet"
-                self._said.append(Remark("register", text))
-                return 1.0 / found if dimension.endswith("sensitivity") else found
+                self._remarks.append(Remark("register", text))
+                return 1.0 / step if dimension.endswith("sensitivity") else step
         self._assume("register", f"{self._quantity}: not rounded, no sensitivity is printed")
         return None
 
@@ -172,7 +172,7 @@ class _Printed:
                 # The sensitivity is printed for the range that a register of 16 bits then has.
                 chosen = int(np.argmin(np.abs(np.log(np.array(ranges) / (step * _REGISTER)))))
             text = f"full scale {values[chosen]:g} {figure.unit}: datasheet"
-            self._said.append(Remark("register", text))
+            self._remarks.append(Remark("register", text))
             if len(ranges) > 1:
                 self._assume(
                     "register", f"{self._quantity}: range {values[chosen]:g} {figure.unit}"
@@ -188,7 +188,7 @@ class _Printed:
             value = figure.on_axis(self._axis)
             if isinstance(value, float) and figure.unit is not None:
                 text = f"{label} {value:g} {figure.unit}: {figure.kind}, datasheet"
-                self._said.append(Remark(topic, text))
+                self._remarks.append(Remark(topic, text))
                 return to_si(value, figure.unit, dimension)
         return None
 
@@ -196,15 +196,17 @@ class _Printed:
         """Return the figures of a name for the logged options, typical ones first."""
         options = self._sensor.datasheet.options
         printed = self._sheet.printed(name)
-        logged = [one for one in printed if one.option is None or one.option in options] or printed
-        usable = [one for one in logged if choices or one.kind not in ("choices", "range")]
-        return sorted(usable, key=lambda one: one.kind not in ("typ", "1sigma"))
+        logged = [
+            figure for figure in printed if figure.option is None or figure.option in options
+        ] or printed
+        usable = [figure for figure in logged if choices or figure.kind not in ("choices", "range")]
+        return sorted(usable, key=lambda figure: figure.kind not in ("typ", "1sigma"))
 
-    def _say(self, name: str, row: Comparable) -> None:
+    def _note(self, name: str, row: Comparable) -> None:
         assert row.figure is not None  # it has a value
         why = f" ({row.reason})" if row.reason else ""
         text = f"{name} {row.printed:g} {row.figure.unit}: {row.figure.kind}, datasheet{why}"
-        self._said.append(Remark("noise", text))
+        self._remarks.append(Remark("noise", text))
 
 
 def _best(rows: Sequence[Comparable]) -> Comparable | None:

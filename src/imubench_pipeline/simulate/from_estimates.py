@@ -23,7 +23,9 @@ Rows = list[dict[str, Any]]
 _NEEDED = ("recordings", "parameters", "fixed_bias", "temperature", "low_pass")
 
 
-def with_estimates(found: Origin, results: Path, name: str, recording: str | None = None) -> Origin:
+def with_estimates(
+    printed: Origin, results: Path, name: str, recording: str | None = None
+) -> Origin:
     """Put what a run has estimated in the place of printed figures.
 
     They are those of the longest recording: the noise, by the recommended method, and the bias;
@@ -32,7 +34,7 @@ def with_estimates(found: Origin, results: Path, name: str, recording: str | Non
 
     Parameters
     ----------
-    found : Origin
+    printed : Origin
         What is known without them; its channels may be none.
     results : Path
         Folder of the results of a run.
@@ -47,11 +49,11 @@ def with_estimates(found: Origin, results: Path, name: str, recording: str | Non
     """
     folder = results / "tables" if (results / "tables").is_dir() else results
     try:
-        tables = {one: read(one, [folder / f"{one}.parquet"]) for one in _NEEDED}
+        tables = {table: read(table, [folder / f"{table}.parquet"]) for table in _NEEDED}
     except (OSError, ValueError) as error:
         raise ConfigError(f"{folder}: not the tables of a run: {error}") from error
-    about = _recording(tables["recordings"], folder, name, recording)
-    chosen = about["recording"]
+    recorded = _recording(tables["recordings"], folder, name, recording)
+    chosen = recorded["recording"]
     of_log = {
         table: tables[table].filter(
             (pc.field("sensor") == name) & (pc.field("recording") == chosen)
@@ -67,25 +69,25 @@ def with_estimates(found: Origin, results: Path, name: str, recording: str | Non
             for table, rows in of_log.items()
         }
         if of_channel["parameters"]:
-            axis = _Axis(found, channel, of_channel, f"{name}/{chosen}")
-            axes[channel] = axis.model(float(about["rate"]))
-            topics.append({remark.topic for remark in axis.said})
-            of_datasheet = found.figures.get(channel, [])
+            axis = _Axis(printed, channel, of_channel, f"{name}/{chosen}")
+            axes[channel] = axis.model(float(recorded["rate"]))
+            topics.append({remark.topic for remark in axis.remarks})
+            of_datasheet = printed.figures.get(channel, [])
             figures[channel] = [
-                *axis.said,
-                *(one for one in of_datasheet if one.topic not in topics[-1]),
+                *axis.remarks,
+                *(remark for remark in of_datasheet if remark.topic not in topics[-1]),
             ]
     if not axes:
         raise ConfigError(f"{folder}: no estimate of {name}/{chosen}")
-    known = set[Topic].intersection(*topics)
+    estimated = set[Topic].intersection(*topics)
     origin = Origin(
         ImuModel(axes=axes),
         f"the estimates of a run in {results}, from the recording {name}/{chosen}",
         figures,
-        [remark for remark in found.assumed if remark.topic not in known],
+        [remark for remark in printed.assumed if remark.topic not in estimated],
         name,
     )
-    if about["simulated"]:
+    if recorded["simulated"]:
         origin.assume("log", f"{name}/{chosen} is itself simulated")
     if any(quantity_of(channel) == "accel" for channel in axes):
         text = "accel: the mean of a recording is mostly gravity, so it is no bias here"
@@ -97,11 +99,11 @@ def _recording(
     recordings: pa.Table, folder: Path, name: str, asked: str | None
 ) -> Mapping[str, Any]:
     """Return the row of the recording to take: that asked for, or the longest."""
-    mine = recordings.filter(pc.field("sensor") == name).to_pylist()
-    usable = {row["recording"]: row for row in mine if row["status"] == "ok"}
+    of_sensor = recordings.filter(pc.field("sensor") == name).to_pylist()
+    usable = {row["recording"]: row for row in of_sensor if row["status"] == "ok"}
     if not usable:
-        there = ", ".join(sorted(set(recordings["sensor"].to_pylist()))) or "none"
-        raise ConfigError(f"{folder}: no estimate of sensor {name!r}; there are: {there}")
+        sensors = ", ".join(sorted(set(recordings["sensor"].to_pylist()))) or "none"
+        raise ConfigError(f"{folder}: no estimate of sensor {name!r}; there are: {sensors}")
     if asked is not None and asked not in usable:
         raise ConfigError(
             f"{folder}: no recording {asked!r} of {name}; there are: {', '.join(usable)}"
@@ -113,16 +115,16 @@ def _recording(
 class _Axis:
     """What a run has found of one channel."""
 
-    def __init__(self, found: Origin, channel: str, tables: Mapping[str, Rows], log: str) -> None:
-        self._printed = found.imu.axes.get(channel) or SensorModel()
+    def __init__(self, printed: Origin, channel: str, tables: Mapping[str, Rows], log: str) -> None:
+        self._printed = printed.imu.axes.get(channel) or SensorModel()
         self._gravity = quantity_of(channel) == "accel"
         self._tables, self._log = tables, log
         self._temperature = {row["parameter"]: row for row in tables["temperature"]}
         self._low_pass = {row["parameter"]: row for row in tables["low_pass"]}
-        self.said: list[Remark] = []
+        self.remarks: list[Remark] = []
 
     def model(self, rate: float) -> SensorModel:
-        """Return the model; ``said`` then has what its figures are from. The rate is in Hz."""
+        """Return the model; ``remarks`` then has what its figures are from. The rate is in Hz."""
         printed = replace(self._printed, low_pass=self._filter(), drift=self._drift())
         method = "compensated" if self._compensated else None
         rows = [
@@ -131,7 +133,7 @@ class _Axis:
             if (row["method"] == method if method else row["recommended"])
         ]
         estimate = estimate_of(rows[0]["method"], rows)
-        self._say(
+        self._note(
             "noise",
             f"noise {estimate.model.name}: estimated by {estimate.method} from {self._log}, N "
             "taken back to before low-pass and rounding",
@@ -143,32 +145,32 @@ class _Axis:
     def _compensated(self) -> bool:
         return any(row["compensated"] for row in self._temperature.values())
 
-    def _say(self, topic: Topic, text: str) -> None:
-        self.said.append(Remark(topic, text))
+    def _note(self, topic: Topic, text: str) -> None:
+        self.remarks.append(Remark(topic, text))
 
     def _filter(self) -> LowPass | None:
         cutoff = self._low_pass.get("cutoff")
         if cutoff is None or cutoff["value"] is None:
             return self._printed.low_pass
-        self._say("low-pass", f"cut-off {cutoff['value']:.4g} Hz: estimated from {self._log}")
+        self._note("low-pass", f"cut-off {cutoff['value']:.4g} Hz: estimated from {self._log}")
         return LowPass(cutoff["value"], cutoff["order"])
 
     def _drift(self) -> TemperatureDrift | None:
         if not self._compensated:
             return self._printed.drift
-        found = {
+        values = {
             name: row["value"] if row["value"] is not None else row["fitted"]
             for name, row in self._temperature.items()
         }
-        slope, unit = found["sensitivity"] or 0.0, self._temperature["sensitivity"]["unit"]
-        self._say(
+        slope, unit = values["sensitivity"] or 0.0, self._temperature["sensitivity"]["unit"]
+        self._note(
             "drift", f"temperature sensitivity {slope:.4g} {unit}: estimated from {self._log}"
         )
         return TemperatureDrift(
             sensitivity=slope,
-            reference=found["T_0"],
-            quadratic=found["quadratic"] or 0.0,
-            lag=found["lag"] or 0.0,
+            reference=values["T_0"],
+            quadratic=values["quadratic"] or 0.0,
+            lag=values["lag"] or 0.0,
         )
 
     def _bias(self) -> float:
@@ -176,9 +178,9 @@ class _Axis:
             return self._printed.bias
         if self._compensated and self._temperature["bias"]["value"] is not None:
             bias = float(self._temperature["bias"]["value"])
-            self._say("bias", f"bias {bias:g} rad/s at T_0: estimated from {self._log}")
+            self._note("bias", f"bias {bias:g} rad/s at T_0: estimated from {self._log}")
             return bias
         for row in self._tables["fixed_bias"]:
-            self._say("bias", f"bias {row['value']:g} rad/s: mean of {self._log}")
+            self._note("bias", f"bias {row['value']:g} rad/s: mean of {self._log}")
             return float(row["value"])
         return self._printed.bias

@@ -155,11 +155,11 @@ class _Shared:
             return None
 
         def true(start: int, stop: int) -> Array:
-            here = slice(start - self._start, stop - self._start)
-            found = np.zeros(stop - start)
+            within_block = slice(start - self._start, stop - self._start)
+            signal = np.zeros(stop - start)
             for name, part in parts.items():
-                found += part * self._motion[name][here]
-            return found
+                signal += part * self._motion[name][within_block]
+            return signal
 
         return true
 

@@ -40,8 +40,8 @@ def axis_model(settings: AxisSettings, channel: str) -> SensorModel:
     return SensorModel(
         noise=NoiseModel(
             **{name: figures[name] for name in _OF_NOISE if name in figures},
-            further=[GaussMarkov(**one.si(quantity)) for one in settings.further],
-            sinusoids=[Sinusoid(**one.si(quantity)) for one in settings.sinusoids],
+            further=[GaussMarkov(**term.si(quantity)) for term in settings.further],
+            sinusoids=[Sinusoid(**term.si(quantity)) for term in settings.sinusoids],
         ),
         bias=figures.get("bias", 0.0),
         drift=None if drift is None else TemperatureDrift(**drift.si(quantity)),
@@ -157,7 +157,7 @@ def figures_of(settings: AxisSettings, channel: str, rate: float) -> Iterator[Tr
 def _processes(settings: AxisSettings, channel: str) -> list[tuple[dict[str, float], str]]:
     """Return B and T_B of each process as estimates number them: flicker noise first, then T_B."""
     own = settings.si(channel)
-    found = [(process.si(quantity_of(channel)), "further") for process in settings.further]
+    processes = [(process.si(quantity_of(channel)), "further") for process in settings.further]
     if "B" in own:
-        found.append(({name: own[name] for name in ("B", "T_B") if name in own}, "B"))
-    return sorted(found, key=lambda process: process[0].get("T_B", 0.0))
+        processes.append(({name: own[name] for name in ("B", "T_B") if name in own}, "B"))
+    return sorted(processes, key=lambda process: process[0].get("T_B", 0.0))

@@ -43,7 +43,7 @@ class FileSeries:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._headings = self._read_headings()
-        self._taken: dict[str, tuple[str, float, float]] = {}
+        self._asked: dict[str, tuple[str, float, float]] = {}
         self.take(_TIME, "time")
         self._batches: Iterator[tuple[int, pa.RecordBatch]] | None = None
         self._window: dict[str, Array] = {}
@@ -79,7 +79,7 @@ class FileSeries:
             factor, offset = conversion(unit or SI_UNITS[dimension], dimension)
         except UnitError as error:
             raise ConfigError(f"{self.path}: column {heading!r}: {error}") from error
-        self._taken[name] = (heading, factor, offset)
+        self._asked[name] = (heading, factor, offset)
         self._batches = None
 
     def span(self) -> tuple[float, float]:
@@ -129,20 +129,20 @@ class FileSeries:
         """Have in memory the rows from the one before ``first`` to the one after ``last``."""
         if self._batches is None or (self._trimmed and first < self._window[_TIME][0]):
             self._batches = self._read()
-            self._window = {name: np.empty(0) for name in self._taken}
+            self._window = {name: np.empty(0) for name in self._asked}
             self._trimmed = False
         parts = [self._window]
         reached = float(self._window[_TIME][-1]) if len(self._window[_TIME]) else -np.inf
         while not reached >= last:
-            found = next(self._batches, None)
-            if found is None:
+            row_and_batch = next(self._batches, None)
+            if row_and_batch is None:
                 break
-            row, batch = found
+            row, batch = row_and_batch
             columns = self._columns(batch, row, reached)
             if len(columns[_TIME]):
                 parts.append(self._from(columns, first))
                 reached = float(columns[_TIME][-1])
-        joined = {name: np.concatenate([part[name] for part in parts]) for name in self._taken}
+        joined = {name: np.concatenate([part[name] for part in parts]) for name in self._asked}
         if not len(joined[_TIME]):
             raise ConfigError(f"{self.path}: has no rows")
         self._window = self._from(joined, first)
@@ -155,8 +155,8 @@ class FileSeries:
 
     def _columns(self, batch: pa.RecordBatch, row: int, before: float) -> dict[str, Array]:
         """Return the columns of a batch in SI; ``row`` is the number of its first row."""
-        found = {}
-        for name, (heading, factor, offset) in self._taken.items():
+        columns = {}
+        for name, (heading, factor, offset) in self._asked.items():
             column = batch.column(heading)
             if pa.types.is_string(column.type) or pa.types.is_binary(column.type):
                 raise ConfigError(f"{self.path}: column {heading!r} is text; expected numbers")
@@ -167,8 +167,8 @@ class FileSeries:
                     f"{self.path}: column {heading!r}: a number is missing in row {at}; expected "
                     "one a row: leave out the row, or fill it in"
                 )
-            found[name] = raw * factor + offset
-        times = np.concatenate(([before if np.isfinite(before) else -np.inf], found[_TIME]))
+            columns[name] = raw * factor + offset
+        times = np.concatenate(([before if np.isfinite(before) else -np.inf], columns[_TIME]))
         rises = np.diff(times) > 0
         if not rises.all():
             at = int(np.argmin(rises))
@@ -177,10 +177,10 @@ class FileSeries:
                 f"after {times[at]:g} s; expected each row later than the one before: put the rows "
                 "in order, each time once"
             )
-        return found
+        return columns
 
     def _read_headings(self) -> dict[str, tuple[str, str | None]]:
-        found = {}
+        headings = {}
         for heading, unit in self._schema():
             if self.path.suffix != ".parquet" and (";" in heading or "\t" in heading):
                 raise ConfigError(
@@ -188,13 +188,13 @@ class FileSeries:
                 )
             match = _HEADING.match(heading)
             if match:
-                found[match[1]] = (heading, match[2] or unit)
-        if _TIME not in found:
+                headings[match[1]] = (heading, match[2] or unit)
+        if _TIME not in headings:
             raise ConfigError(
-                f"{self.path}: no column 'time'; it has {', '.join(found) or 'none'}; expected "
+                f"{self.path}: no column 'time'; it has {', '.join(headings) or 'none'}; expected "
                 "such as 'time [s]'"
             )
-        return found
+        return headings
 
     def _schema(self) -> list[tuple[str, str | None]]:
         """Return headings, and the units that stand in the metadata of Parquet columns."""
@@ -228,15 +228,14 @@ class FileSeries:
             row += len(batch)
 
     def _batches_of_file(self) -> Iterator[pa.RecordBatch]:
-        headings = [heading for heading, _, _ in self._taken.values()]
+        headings = [heading for heading, _, _ in self._asked.values()]
         try:
             if self.path.suffix == ".parquet":
                 with pq.ParquetFile(self.path) as file:
                     yield from file.iter_batches(_ROWS, columns=headings, use_threads=False)
             else:
                 chosen = pacsv.ConvertOptions(
-                    include_columns=headings,
-                    column_types=dict.fromkeys(headings, pa.float64()),
+                    include_columns=headings, column_types=dict.fromkeys(headings, pa.float64())
                 )
                 with pacsv.open_csv(self.path, convert_options=chosen) as reader:
                     yield from reader

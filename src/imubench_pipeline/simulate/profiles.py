@@ -130,13 +130,14 @@ def profiles_of(around: Surroundings, folder: Path) -> tuple[dict[str, Profile],
     """
     opened: dict[Path, FileSeries] = {}
     motion = {
-        str(channel): made(form, channel, folder, opened) for channel, form in around.motion.items()
+        str(channel): make_profile(form, channel, folder, opened)
+        for channel, form in around.motion.items()
     }
     warm = around.temperature
-    return motion, None if warm is None else made(warm, "temperature", folder, opened)
+    return motion, None if warm is None else make_profile(warm, "temperature", folder, opened)
 
 
-def made(form: Form, name: str, folder: Path, opened: dict[Path, FileSeries]) -> Profile:
+def make_profile(form: Form, name: str, folder: Path, opened: dict[Path, FileSeries]) -> Profile:
     """Return a profile in SI.
 
     Parameters

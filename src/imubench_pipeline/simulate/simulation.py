@@ -47,7 +47,7 @@ Signal = Callable[[int, int], Array]
 @njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})
 def run(
     log: Array,
-    given: Array,
+    entering: Array,
     temperature: Array,
     normal: Array,
     memory: Array,
@@ -73,7 +73,7 @@ def run(
     ----------
     log : ndarray, shape (L,)
         Written: what comes out of the filter.
-    given : ndarray, shape (L,)
+    entering : ndarray, shape (L,)
         The input at the samples without noise and drift; linear in between.
     temperature : ndarray, shape (L,)
         °C; empty: no drift.
@@ -99,7 +99,7 @@ def run(
     n, m = x.size, e.size
     before = np.empty(m)
     for i in range(log.size):
-        u = given[i]
+        u = entering[i]
         present = 0.0
         change_of_temperature = 0.0
         if temperature.size:
@@ -228,7 +228,7 @@ class _Discrete:
     factor: Array
     output: Array
     white: float
-    held: HeldInput
+    input_hold: HeldInput
 
 
 class _Axis:
@@ -245,10 +245,10 @@ class _Axis:
         self._white = sources.white
         begin, self._noise, self._lines, self._counts = rng.spawn(4)
         self._discrete = self._discretised(interval)
-        slow, held = self._discrete.slow, self._discrete.held
+        slow, hold = self._discrete.slow, self._discrete.input_hold
         self._coupling = np.ascontiguousarray(slow.coupling.T)
         self._shared = np.ascontiguousarray(slow.shared.T)
-        self._lag = np.array([held.lag_decay, held.lag_step])
+        self._lag = np.array([hold.lag_decay, hold.lag_step])
         self._x, self._e = self._start(begin)
         self._memory = np.zeros(4)
         self._sinusoids = [
@@ -269,18 +269,18 @@ class _Axis:
         driven = SlowSources(
             slow.decay, slow.lost, slow.own * scale, slow.coupling, shared, slow.residual
         )
-        held = held_input(low_pass, lag, interval)
+        hold = held_input(low_pass, lag, interval)
         if low_pass is None:
             none = np.zeros((0, 0))
             white = math.sqrt(self._white / interval)
-            return _Discrete(driven, none, none, np.zeros(0), white, held)
+            return _Discrete(driven, none, none, np.zeros(0), white, hold)
         # What is left to the filter itself: all its noise that is not in a slow state.
         m = low_pass.order
         parts = (slow.residual * scale[:, None, None]).reshape(-1, m)
         white_part = math.sqrt(self._white) * white_factor(low_pass, interval)
         factor = np.asarray(np.linalg.qr(np.concatenate([parts, white_part]), mode="r"))
         transition = filter_transition(low_pass, interval)
-        return _Discrete(driven, transition, factor, low_pass.output, 0.0, held)
+        return _Discrete(driven, transition, factor, low_pass.output, 0.0, hold)
 
     def _start(self, rng: np.random.Generator) -> tuple[Array, Array]:
         """Draw the states at the first sample."""
@@ -303,7 +303,7 @@ class _Axis:
         self, start: int, stop: int, true: Signal | None, temperature: Signal | None
     ) -> Array:
         """Return the next samples."""
-        model, discrete, held = self._model, self._discrete, self._discrete.held
+        model, discrete, hold = self._model, self._discrete, self._discrete.input_hold
         size = stop - start
         entering = np.full(size, model.bias)
         if true is not None:
@@ -332,10 +332,10 @@ class _Axis:
             discrete.factor,
             discrete.output,
             discrete.white,
-            held.step,
+            hold.step,
             self._lag,
-            held.lag_coupling,
-            held.lagged_step,
+            hold.lag_coupling,
+            hold.lagged_step,
             self._drift,
         )
         for line, phase in self._sinusoids:

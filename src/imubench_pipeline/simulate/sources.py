@@ -32,7 +32,7 @@ class Origin:
     Attributes
     ----------
     imu : ImuModel
-    said : str
+    source : str
         What the figures are from, in words.
     figures : dict of str to list of Remark
         The figures of each channel, with their source.
@@ -43,7 +43,7 @@ class Origin:
     """
 
     imu: ImuModel
-    said: str
+    source: str
     figures: dict[str, list[Remark]] = field(default_factory=dict)
     assumed: list[Remark] = field(default_factory=list)
     sensor: str | None = None
@@ -63,18 +63,18 @@ def from_file(path: Path) -> Origin:
     ConfigError
         If it is not there, or a figure cannot be used.
     """
-    given = parse(ModelSettings, read_yaml(path), str(path))
-    named = f"{path.name}" + (f" ({given.source})" if given.source else "")
+    settings = parse(ModelSettings, read_yaml(path), str(path))
+    named = f"{path.name}" + (f" ({settings.source})" if settings.source else "")
     as_given = Remark("noise", f"as {path.name} has it")
-    figures = {str(name): [as_given] for name in given.axes}
+    figures = {str(name): [as_given] for name in settings.axes}
     try:
-        model = imu_model(given.axes, given)
+        model = imu_model(settings.axes, settings)
     except ValueError as error:
         raise ConfigError(f"{path}: axes.{error}") from error
-    return Origin(model, f"the model file {named}", figures, [], given.sensor)
+    return Origin(model, f"the model file {named}", figures, [], settings.sensor)
 
 
-def only(origin: Origin, channels: Sequence[str]) -> Origin:
+def select_channels(origin: Origin, channels: Sequence[str]) -> Origin:
     """Return a model with some of its channels.
 
     Raises
@@ -83,8 +83,8 @@ def only(origin: Origin, channels: Sequence[str]) -> Origin:
         If it has no such channel.
     """
     if missing := [name for name in channels if name not in origin.imu.axes]:
-        there = ", ".join(origin.imu.axes) or "none"
-        raise ConfigError(f"no figures of {missing[0]}; there are those of {there}")
+        channels_there = ", ".join(origin.imu.axes) or "none"
+        raise ConfigError(f"no figures of {missing[0]}; there are those of {channels_there}")
     axes = {name: axis for name, axis in origin.imu.axes.items() if name in channels}
     figures = {name: lines for name, lines in origin.figures.items() if name in channels}
     return replace(origin, imu=replace(origin.imu, axes=axes), figures=figures)

@@ -98,7 +98,7 @@ def sampled_spectrum(sources: Sources, low_pass: LowPass, omega: Array, rate: fl
     slow = slow_sources(times, interval, low_pass)
     transition = filter_transition(low_pass, interval)
     white = white_factor(low_pass, interval)
-    found = np.empty_like(flat)
+    spectrum = np.empty_like(flat)
     for begin in range(0, len(flat), _CHUNK):
         w = flat[begin : begin + _CHUNK]
         turn = np.exp(1j * w)[:, None, None] * np.eye(low_pass.order)
@@ -115,8 +115,8 @@ def sampled_spectrum(sources: Sources, low_pass: LowPass, omega: Array, rate: fl
             first = np.abs(through * slow.own + g @ slow.shared.T) ** 2
             rest = (np.abs(np.einsum("wm,nkm->wnk", g, slow.residual)) ** 2).sum(axis=2)
             power += (first + rest) @ densities
-        found[begin : begin + _CHUNK] = power
-    return found.reshape(np.shape(omega))
+        spectrum[begin : begin + _CHUNK] = power
+    return spectrum.reshape(np.shape(omega))
 
 
 def allan_variance(sources: Sources, low_pass: LowPass, n: Array, rate: float) -> Array:
@@ -144,18 +144,18 @@ def allan_variance(sources: Sources, low_pass: LowPass, n: Array, rate: float) -
     sizes = np.ravel(n).astype(np.int64)
     longest = interval * int(sizes.max(initial=1))
     times, densities = sources.realised(low_pass, interval, longest)
-    one, start = _one_sample(sources.white, times, densities, low_pass, interval)
-    powers = [one]
+    sample, start = _one_sample(sources.white, times, densities, low_pass, interval)
+    powers = [sample]
     for _ in range(int(sizes.max(initial=1)).bit_length() - 1):
         powers.append(powers[-1].then(powers[-1]))
-    found = np.empty(len(sizes))
+    variance = np.empty(len(sizes))
     for i, size in enumerate(sizes):
         chosen = [powers[bit] for bit in range(int(size).bit_length()) if size >> bit & 1]
         cluster = chosen[0]
         for part in chosen[1:]:
             cluster = cluster.then(part)
-        found[i] = cluster.difference(start) / (2.0 * float(size) ** 2)
-    return found.reshape(np.shape(n))
+        variance[i] = cluster.difference(start) / (2.0 * float(size) ** 2)
+    return variance.reshape(np.shape(n))
 
 
 @dataclass(frozen=True)
@@ -229,7 +229,7 @@ def _one_sample(
     sums = np.zeros((n + 1, 1 + m))
     sums[:n, 0] = 1.0
     sums[:, 1:] = low_pass.output
-    one = _Cluster(
+    sample = _Cluster(
         transition,
         lost,
         sums,
@@ -247,4 +247,4 @@ def _one_sample(
         start[i, 0, 1:] = start[i, 1:, 0] = variance * mean[0]
         start[i, 1:, 1:] = covariance + variance * np.outer(mean[0], mean[0])
     start[n, 1:, 1:] = stationary(times[:0], densities[:0], white, low_pass)[1]
-    return one, start
+    return sample, start

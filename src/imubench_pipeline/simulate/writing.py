@@ -43,7 +43,7 @@ def write_log(
     log: LogFormat,
     metadata: Mapping[str, Any],
     remarks: Iterable[str],
-    said: Callable[[int], None],
+    progress: Callable[[int], None],
 ) -> None:
     """Write a simulated log, atomically.
 
@@ -61,28 +61,30 @@ def write_log(
         Of the Parquet file.
     remarks : iterable of str
         Comments at the top of a CSV file.
-    said : callable
+    progress : callable
         Is told after each block how many samples there are.
     """
     names = list(columns)
-    known = {str(name): source for name, source in log.channels.items()}
-    known |= {} if log.temperature is None else {TEMPERATURE: log.temperature}
-    sources = {name: known[name] for name in names}
+    known_sources = {str(name): source for name, source in log.channels.items()}
+    known_sources |= {} if log.temperature is None else {TEMPERATURE: log.temperature}
+    sources = {name: known_sources[name] for name in names}
     with replacing(path) as temporary:
-        done = 0
+        samples = 0
         if path.suffix == ".parquet":
             with LogWriter(temporary, dict.fromkeys(names, pa.float64())) as writer:
                 for block in blocks:
                     writer.write(block)
-                    done += len(next(iter(block.values())))
-                    said(done)
-                writer.finish({**metadata, "rows": done, "grid": done, "segments": [[0, done]]})
+                    samples += len(next(iter(block.values())))
+                    progress(samples)
+                writer.finish(
+                    {**metadata, "rows": samples, "grid": samples, "segments": [[0, samples]]}
+                )
             return
         with TextLog(temporary, log, sources, log.rate_hz or 1.0, remarks) as text:
             for block in blocks:
                 text.write(block)
-                done += len(next(iter(block.values())))
-                said(done)
+                samples += len(next(iter(block.values())))
+                progress(samples)
 
 
 def write_notes(path: Path, log: LogFormat, sensor: LogFormat | None, words: str) -> None:
@@ -163,7 +165,9 @@ def layout(path: Path, columns: Iterable[str], rate: float, sensor: LogFormat | 
     keys: dict[str, Any] = {
         "reader": "csv" if text else "arrow",
         "rate": f"{rate:.17g} Hz",
-        "channels": {name: one.model_dump(exclude_unset=True) for name, one in channels.items()},
+        "channels": {
+            name: source.model_dump(exclude_unset=True) for name, source in channels.items()
+        },
     }
     if temperature is not None:
         keys["temperature"] = temperature.model_dump(exclude_unset=True)
@@ -176,8 +180,8 @@ def layout(path: Path, columns: Iterable[str], rate: float, sensor: LogFormat | 
 
 def _has_names(sensor: LogFormat, channels: Mapping[str, ColumnSource]) -> bool:
     """Return whether a sensor's logs are one text file with a name for each of these channels."""
-    held = {str(name): source for name, source in sensor.channels.items()}
-    sources = [held.get(name) for name in channels]
+    by_name = {str(name): source for name, source in sensor.channels.items()}
+    sources = [by_name.get(name) for name in channels]
     if sensor.temperature is not None:
         sources.append(sensor.temperature)
     named = all(s is not None and isinstance(s.column, str) and not s.file for s in sources)
@@ -191,12 +195,12 @@ def _si_source(name: str) -> ColumnSource:
 
 def _over(own: Mapping[str, Any], base: Mapping[str, Any]) -> dict[str, Any]:
     """Return what makes ``own`` of ``base`` when it is merged over it; null takes a key out."""
-    found: dict[str, Any] = {key: None for key, value in base.items() if key not in own and value}
+    changes: dict[str, Any] = {key: None for key, value in base.items() if key not in own and value}
     for key, value in own.items():
         before = base.get(key)
         if isinstance(value, Mapping) and isinstance(before, Mapping):
             if inner := _over(value, before):
-                found[key] = inner
+                changes[key] = inner
         elif value != before:
-            found[key] = dict(value) if isinstance(value, Mapping) else value
-    return found
+            changes[key] = dict(value) if isinstance(value, Mapping) else value
+    return changes

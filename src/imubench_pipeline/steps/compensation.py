@@ -15,7 +15,7 @@ from imubench_pipeline.estimators.rows import limit_rows
 from imubench_pipeline.estimators.thermal.fit import fit_temperature
 from imubench_pipeline.estimators.thermal.path import TemperaturePath
 from imubench_pipeline.estimators.thermal.register import step_of
-from imubench_pipeline.estimators.thermal.result import ThermalFit, shifted
+from imubench_pipeline.estimators.thermal.result import ThermalFit, shift_by_effect
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables.keys import Key
@@ -87,7 +87,7 @@ def temperature_curve(log: ChannelLog, fit: ThermalFit, measured: AllanCurve) ->
     Its parameters are those of `compensated_curve`.
     """
     nothing = (np.zeros(len(values)) for values in log.blocks())
-    blocks = shifted(nothing, fit.path, fit.effect, 1.0)
+    blocks = shift_by_effect(nothing, fit.path, fit.effect, 1.0)
     sizes, rate = measured.cluster_size, log.rate
     return of_blocks(blocks, log.grid, rate, sizes, holes=False, segments=log.segments)
 

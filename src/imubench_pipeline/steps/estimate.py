@@ -14,7 +14,7 @@ from imubench_pipeline.allan import AllanCurve, of_blocks
 from imubench_pipeline.allan.presence import presence
 from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators import least_squares, likelihood
-from imubench_pipeline.estimators.agreement import agreeing, disagreements
+from imubench_pipeline.estimators.agreement import disagreements, doubt_contradicted
 from imubench_pipeline.estimators.curve_limits import with_fitted_limits
 from imubench_pipeline.estimators.deterministic.courses import find_courses
 from imubench_pipeline.estimators.deterministic.verdict import deterministic_rows, verdict_of
@@ -108,7 +108,7 @@ def estimate_channel(
     into.add_findings(key, disagreements(key.channel, estimates))
     if "likelihood" in estimates:
         estimates |= {
-            method: agreeing(estimates[method], estimates["likelihood"])
+            method: doubt_contradicted(estimates[method], estimates["likelihood"])
             for method in _BY_CURVE
             if method in estimates
         }
@@ -147,7 +147,7 @@ class _Channel:
     def by_curve(self) -> dict[str, Estimate]:
         """Return the estimates that are read from the Allan variance, or fitted to it."""
         settings, curve = self.settings, self.curve
-        if self.courses.found:
+        if self.courses.courses:
             curve = of_blocks(
                 self._blocks(),
                 self.log.grid,
@@ -175,7 +175,7 @@ class _Channel:
         present = presence(log.blocks(), log.grid, log.segments) if log.holes else None
         limited = partial(with_fitted_limits, segments=log.segments, presence=present)
         into.allan += allan_rows(key, limited(self.curve, fitted))
-        if not self.courses.found:  # else what they explain is taken out
+        if not self.courses.courses:  # else what they explain is taken out
             white = fitted.estimates[0].parameters["N"].lower
             lack = slow_noise_missing(key.channel, fitted.spectrum, fitted.fitted, white)
             into.add_findings(key, [lack] if lack else [])
@@ -202,7 +202,7 @@ class _Channel:
             rng = channel_rng(self.settings.seed, key.sensor, key.recording, log.path.name)
             into.paths[log.path] = temperature_path(log.temperatures(), log.segments, rng)
         # A warm-up is what temperature explains: it stays in the log that they are fitted to.
-        plain = self._fitted(log.blocks) if self.courses.found else fitted
+        plain = self._fitted(log.blocks) if self.courses.courses else fitted
         rng = self._stream("temperature")
         return temperature_of(log, into.paths[log.path], plain, self._band, self._bandwidth, rng)
 
@@ -248,12 +248,12 @@ _BEST_FIRST = ("likelihood", "likelihood_gm", "weighted", "paper", "curve")
 def _model_rows(key: Key, fit: Likelihood) -> Iterator[Row]:
     """Yield the rows of the table ``models``, the chosen model first."""
     for place, candidate in enumerate(fit.candidates):
-        terms = candidate.found.terms
+        terms = candidate.terms
         yield asdict(key) | {
             "model": terms.name,
             "chosen": place == 0,
             "free": terms.parameters,
-            "log_likelihood": -candidate.found.cost,
+            "log_likelihood": -candidate.maximum.cost,
             "bic": candidate.bic,
             "aic": candidate.aic,
             "weight": candidate.weight,

@@ -184,7 +184,7 @@ def from_printed(name: str, sensor: Sensor, channel: str) -> NoiseSource | None:
     return NoiseSource(
         model,
         model,
-        f"typical figures of {origin.said}, not measured: no static recording of this sensor "
+        f"typical figures of {origin.source}, not measured: no static recording of this sensor "
         "tells its noise",
     )
 

@@ -15,9 +15,9 @@ from imubench_pipeline.experiments.earth_rate.courses import (
     METHODS,
     Course,
     Courses,
-    estimated,
+    estimate_courses,
     sigma_ranges,
-    thinned,
+    thin,
     white_sigma,
 )
 from imubench_pipeline.experiments.earth_rate.experiment import Dwell, Experiment
@@ -136,7 +136,9 @@ def earth_rate_of(
         chosen = [dwell for dwell in dwells if dwell.start >= start * log.rate]
         try:
             experiment = _experiment(chosen, log.rate, declared)
-            courses = estimated(used, experiment, model, source.papers, declared.turn_on_bias_si)
+            courses = estimate_courses(
+                used, experiment, model, source.papers, declared.turn_on_bias_si
+            )
         except (ValueError, LinAlgError) as error:
             tables.earth_rate += _without(names, part, "too_short", str(error))
             continue
@@ -343,7 +345,7 @@ def _series(key: Key, part: str, courses: Courses) -> Iterator[Row]:
     shown = [*(("rate", course) for course in courses.courses), ("drift", drift)]
     for quantity, course in shown:
         names = asdict(key) | {"part": part, "method": course.method, "quantity": quantity}
-        for k in thinned(len(course.time)):
+        for k in thin(len(course.time)):
             sigma = None if course.sigma is None else float(course.sigma[k])
             yield names | {
                 "time": float(course.time[k]),

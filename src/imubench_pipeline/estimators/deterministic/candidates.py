@@ -48,7 +48,7 @@ SAFETY: dict[Kind, float] = {
 """Times the threshold for known noise: that of few ordinates is known badly itself."""
 
 
-def candidates(ordinates: Ordinates, fit: Fit) -> list[tuple[Score, Array]]:
+def find_candidates(ordinates: Ordinates, fit: Fit) -> list[tuple[Score, Array]]:
     """Return the candidates that may pass, each with the density of the noise it stands out of.
 
     Parameters
@@ -57,18 +57,18 @@ def candidates(ordinates: Ordinates, fit: Fit) -> list[tuple[Score, Array]]:
     fit : Fit
         What is there already.
     """
-    found: dict[Regressor, tuple[Score, Array]] = {}
+    scores: dict[Regressor, tuple[Score, Array]] = {}
     pauses = restarts(ordinates)
     for seen in best_scores(ordinates, fit, fit.density):
         score = _at_its_pause(seen, pauses, fit)
         slow = score.regressor.kind in _SLOW
         if score.gain > (_SEEN if slow else score.threshold - _NEARLY):
-            found[score.regressor] = score, fit.density
+            scores[score.regressor] = score, fit.density
     carried_on = ordinates.carried_on(fit, _HELD_OUT)
     for score in best_scores(ordinates, fit, carried_on, smooth=True):
         if score.gain > score.threshold:
-            found[score.regressor] = score, carried_on
-    return list(found.values())
+            scores[score.regressor] = score, carried_on
+    return list(scores.values())
 
 
 def restarts(ordinates: Ordinates) -> tuple[Regressor, ...]:
@@ -80,7 +80,7 @@ def restarts(ordinates: Ordinates) -> tuple[Regressor, ...]:
     )
 
 
-def beside(regressor: Regressor, pause: Regressor) -> bool:
+def lies_at_pause(regressor: Regressor, pause: Regressor) -> bool:
     """Return whether a step lies in a pause, or so near that it may be one in it."""
     near = abs(regressor.where - pause.where) <= 0.5 * pause.length + _NEAR_A_PAUSE
     return regressor.part == pause.part and near
@@ -90,7 +90,7 @@ def _at_its_pause(score: Score, pauses: Sequence[Regressor], fit: Fit) -> Score:
     """Put a step that lies in a pause at the pause, over which the means are no step."""
     if score.regressor.kind == "step":
         for pause in pauses:
-            if pause not in fit.regressors and beside(score.regressor, pause):
+            if pause not in fit.regressors and lies_at_pause(score.regressor, pause):
                 return replace(score, regressor=pause)
     return score
 
@@ -112,7 +112,7 @@ def with_candidate(
     regressors = (*fit.regressors, score.regressor)
     if density is not fit.density:
         # Far above the noise, what a frequency beside the right one leaves is much.
-        regressors = polished(ordinates, regressors, len(regressors) - 1, density)
+        regressors = polish(ordinates, regressors, len(regressors) - 1, density)
     tried = ordinates.fit(regressors, fit.density, fit.noise.terms)
     gain = 2.0 * (tried.log_likelihood - fit.log_likelihood)
     if score.regressor.kind == "sinusoid":
@@ -120,7 +120,7 @@ def with_candidate(
     return tried, gain
 
 
-def polished(
+def polish(
     ordinates: Ordinates, regressors: Sequence[Regressor], which: int, density: Array
 ) -> tuple[Regressor, ...]:
     """Move the place, time constant or frequency of a regressor to where it fits best.
@@ -140,19 +140,19 @@ def polished(
     n = ordinates.sizes[best.part]
     step = {"step": 0.5, "exponential": 0.12 * best.where, "sinusoid": 0.125 / n}[best.kind]
     least = FEWEST_CYCLES / n if best.kind == "sinusoid" else 0.0
-    gain = Gain(ordinates, but(regressors, which), density, best.part)
+    gain = Gain(ordinates, leave_out(regressors, which), density, best.part)
     most = gain.of(best)
     for _ in range(5):
         for side in (-1.0, 1.0):
             moved = replace(best, where=max(best.where + side * step, least))
-            there = gain.of(moved)
-            if there > most:
-                best, most = moved, there
+            moved_gain = gain.of(moved)
+            if moved_gain > most:
+                best, most = moved, moved_gain
         step *= 0.5
     return (*regressors[:which], best, *regressors[which + 1 :])
 
 
-def but(regressors: Sequence[Regressor], left_out: int) -> tuple[Regressor, ...]:
+def leave_out(regressors: Sequence[Regressor], left_out: int) -> tuple[Regressor, ...]:
     """Return all regressors but one."""
     return tuple(x for i, x in enumerate(regressors) if i != left_out)
 
@@ -162,8 +162,8 @@ def _level_beside(ordinates: Ordinates, fit: Fit, sinusoid: Regressor) -> float:
 
     A process that swings is a broad hump of the spectrum, and no sinusoid.
     """
-    here = ordinates.part(sinusoid.part)
-    ratio = fit.residual[here] ** 2 * ordinates.weights(fit.density)[here]
+    of_part = ordinates.part(sinusoid.part)
+    ratio = fit.residual[of_part] ** 2 * ordinates.weights(fit.density)[of_part]
     centre = 2.0 * sinusoid.where * ordinates.sizes[sinusoid.part]
     away = np.abs(np.arange(1, len(ratio) + 1) - centre)
     beside = ratio[(away >= _BESIDE[0]) & (away <= _BESIDE[1])]

@@ -13,7 +13,8 @@ from imubench_pipeline.estimators.deterministic.means import Means, means_of
 from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates, covariance_of_sizes
 from imubench_pipeline.estimators.deterministic.regressors import Regressor
 from imubench_pipeline.estimators.deterministic.scores import FEWEST_CYCLES, Gain
-from imubench_pipeline.estimators.deterministic.search import Searched, again, search
+from imubench_pipeline.estimators.deterministic.search import Searched, move_regressors, search
+from imubench_pipeline.estimators.estimate import SIGMAS
 from imubench_pipeline.typing import Array
 
 Kind = Literal["bias_step", "warm_up_drift", "periodic_drift"]
@@ -32,7 +33,6 @@ _LARGE = 8.0
 _MOST_STEPS = 8
 """More, among as many regressors as are taken, are telegraph noise."""
 
-_LIMIT = 1.96
 _HALF_LOG_LIKELIHOOD = 1.92
 _MOST_LEVERAGE = 0.5
 """Part of what a log tells of its random walk that may go to what is taken out."""
@@ -82,7 +82,7 @@ class Courses:
 
     Attributes
     ----------
-    found : tuple of Course
+    courses : tuple of Course
     means : Means or None
         The block means that were searched; None where the log is too short.
     searched : Searched or None
@@ -90,7 +90,7 @@ class Courses:
         There are more steps than can be told one by one: nothing was taken out.
     """
 
-    found: tuple[Course, ...]
+    courses: tuple[Course, ...]
     means: Means | None
     searched: Searched | None
     telegraph: bool = False
@@ -106,7 +106,7 @@ class Courses:
         reached = 0
         for values in blocks:
             stop = reached + len(values)
-            yield values - self.at(reached, stop) if self.found else values
+            yield values - self.at(reached, stop) if self.courses else values
             reached = stop
 
     def at(self, start: int, stop: int) -> Array:
@@ -114,7 +114,7 @@ class Courses:
         total = np.zeros(stop - start)
         if self.means is None:
             return total
-        for course in self.found:
+        for course in self.courses:
             part = self.means.parts[course.regressor.part]
             first, last = self._span(course.regressor.part)
             low, high = max(start, first), min(stop, last)
@@ -144,7 +144,7 @@ class Courses:
         parts = []
         for number, part in enumerate(self.means.parts):
             mean = part.mean.copy()
-            for course in self.found:
+            for course in self.courses:
                 if course.regressor.part == number:
                     mean -= course.amplitudes @ course.regressor.means(len(mean))
             parts.append(replace(part, mean=mean))
@@ -157,9 +157,9 @@ class Courses:
             return None
         rival = self.searched.rival
         if rival is not None:
-            what = _in_words(rival.courses, self.means)
-            return f"{what} would explain the log about as well as a random walk"
-        if self.found and _leverage_on_walk(self.searched.fit) > _MOST_LEVERAGE:
+            course = _in_words(rival.courses, self.means)
+            return f"{course} would explain the log about as well as a random walk"
+        if self.courses and _leverage_on_walk(self.searched.fit) > _MOST_LEVERAGE:
             return (
                 "what is taken out as deterministic takes most of what the log tells of a random "
                 "walk with it"
@@ -230,34 +230,34 @@ def find_courses(
         # Bursts of noise look like pulses, and are another finding.
         return Courses((), means, searched, telegraph=steps > _MOST_STEPS)
     if any(x.kind == "step" for x in searched.fit.regressors):
-        placed = _placed(blocks, means, searched.fit)
+        placed = _place_steps(blocks, means, searched.fit)
         if placed != searched.fit.regressors:
-            searched = again(ordinates, searched, placed)
-    return Courses(tuple(_described(ordinates, searched)), means, searched)
+            searched = move_regressors(ordinates, searched, placed)
+    return Courses(tuple(_describe(ordinates, searched)), means, searched)
 
 
-def _described(ordinates: Ordinates, searched: Searched) -> Iterator[Course]:
+def _describe(ordinates: Ordinates, searched: Searched) -> Iterator[Course]:
     """Yield the courses with their sizes and intervals."""
     fit, means = searched.fit, ordinates.means
     covariance = covariance_of_sizes(ordinates, fit)
     column = 0
     for regressor, gain in zip(fit.regressors, searched.gains, strict=True):
-        here = slice(column, column + regressor.columns)
-        column = here.stop
+        own = slice(column, column + regressor.columns)
+        column = own.stop
         if regressor.kind not in _NAMES:
             continue
-        amplitudes = fit.sizes[here]
+        amplitudes = fit.sizes[own]
         part = means.parts[regressor.part]
         start = part.start / means.rate
         end = start + len(part.mean) * means.interval
         size = _size(amplitudes)
         along = amplitudes / size if len(amplitudes) > 1 else np.ones(1)
-        error = _LIMIT * math.sqrt(float(along @ covariance[here, here] @ along))
+        error = SIGMAS * math.sqrt(float(along @ covariance[own, own] @ along))
         low, high = _limits(ordinates, fit, regressor)
         if regressor.kind not in ("exponential", "restart"):
             # Where it is taken to be has been chosen to make it large; and of a swing that is
             # shorter than its period the size hangs on the period.
-            error = math.hypot(error, _spread(ordinates, fit, regressor, here, (low, high)))
+            error = math.hypot(error, _spread(ordinates, fit, regressor, own, (low, high)))
         place = start + regressor.where * means.interval
         period = regressor.kind == "sinusoid"
         step = regressor.kind in ("step", "restart")
@@ -310,18 +310,14 @@ def _limits(ordinates: Ordinates, fit: Fit, regressor: Regressor) -> tuple[float
 
 
 def _spread(
-    ordinates: Ordinates,
-    fit: Fit,
-    regressor: Regressor,
-    here: slice,
-    limits: tuple[float, float],
+    ordinates: Ordinates, fit: Fit, regressor: Regressor, own: slice, limits: tuple[float, float]
 ) -> float:
     """Return half the range of a size over the limits of its place."""
     sizes = []
     for where in limits:
         moved = tuple(replace(x, where=where) if x is regressor else x for x in fit.regressors)
-        sizes.append(ordinates.solved(moved, fit.density)[0][here])
-    return 0.5 * float(np.ptp([_size(one) for one in (fit.sizes[here], *sizes)]))
+        sizes.append(ordinates.solved(moved, fit.density)[0][own])
+    return 0.5 * float(np.ptp([_size(amplitudes) for amplitudes in (fit.sizes[own], *sizes)]))
 
 
 def _size(amplitudes: Array) -> float:
@@ -329,7 +325,9 @@ def _size(amplitudes: Array) -> float:
     return float(np.hypot(*amplitudes)) if len(amplitudes) > 1 else float(amplitudes[0])
 
 
-def _placed(blocks: Callable[[], Iterable[Array]], means: Means, fit: Fit) -> tuple[Regressor, ...]:
+def _place_steps(
+    blocks: Callable[[], Iterable[Array]], means: Means, fit: Fit
+) -> tuple[Regressor, ...]:
     """Return the regressors with large steps placed to the sample, in one pass over the log.
 
     Around a step that is many times the noise of a block the place is where the squares of the
@@ -374,9 +372,9 @@ def _placed(blocks: Callable[[], Iterable[Array]], means: Means, fit: Fit) -> tu
 
 def _change_point(samples: Array) -> int:
     """Return where two levels explain samples best: the first of the second level."""
-    there = np.isfinite(samples)
-    values = np.where(there, samples - np.nanmean(samples), 0.0)
-    count = np.cumsum(there)
+    present = np.isfinite(samples)
+    values = np.where(present, samples - np.nanmean(samples), 0.0)
+    count = np.cumsum(present)
     total = np.cumsum(values)
     before, after = count[:-1], count[-1] - count[:-1]
     left, right = total[:-1], total[-1] - total[:-1]

@@ -74,14 +74,14 @@ def compare_halves(means: Means, noise: Maximum) -> Iterator[Halves]:
     Halves
         Of the random walk, where there is one, and of all slow noise; nothing of short logs.
     """
-    part = max(means.parts, key=lambda one: len(one.mean))
+    part = max(means.parts, key=lambda part: len(part.mean))
     half = len(part.mean) // 2
     if half < _FEWEST // 2:
         return
     densities = []
     for first in (0, half):
-        one = replace(part, mean=part.mean[first : first + half], power=part.power[:half])
-        ordinates = Ordinates(replace(means, parts=(one,)))
+        half_part = replace(part, mean=part.mean[first : first + half], power=part.power[:half])
+        ordinates = Ordinates(replace(means, parts=(half_part,)))
         if not ordinates.usable:
             return
         densities.append(_densities(ordinates, noise))

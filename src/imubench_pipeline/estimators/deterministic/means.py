@@ -37,7 +37,6 @@ _SHORTEST_PAUSE = 2.0
 
 _MOST_PAUSES = 48
 
-
 _SECTIONS = 16
 
 _FEWEST_IN_SECTION = 16
@@ -161,43 +160,43 @@ def _rows(values: Array) -> Array:
         power = squares.sum(axis=1) / (2.0 * pairs)
         fourth = np.einsum("ij,ij->i", squares, squares) / pairs
         return np.array([mean, power, fourth, np.ones(len(values))])
-    there = np.isfinite(values)
-    count = there.sum(axis=1)
-    mean = np.where(there, values, 0.0).sum(axis=1) / np.maximum(count, 1)
-    both = there[:, 1:] & there[:, :-1]
-    steps = np.where(both, np.diff(np.where(there, values, 0.0), axis=1), 0.0)
+    present = np.isfinite(values)
+    count = present.sum(axis=1)
+    mean = np.where(present, values, 0.0).sum(axis=1) / np.maximum(count, 1)
+    both = present[:, 1:] & present[:, :-1]
+    steps = np.where(both, np.diff(np.where(present, values, 0.0), axis=1), 0.0)
     pairs = both.sum(axis=1)
     squares = steps**2
-    known = np.where(pairs > 0, np.maximum(pairs, 1), np.nan)
-    power = squares.sum(axis=1) / (2.0 * known)
-    return np.array([mean, power, (squares**2).sum(axis=1) / known, count / size])
+    pairs_or_nan = np.where(pairs > 0, np.maximum(pairs, 1), np.nan)
+    power = squares.sum(axis=1) / (2.0 * pairs_or_nan)
+    return np.array([mean, power, (squares**2).sum(axis=1) / pairs_or_nan, count / size])
 
 
 def _parts(start: int, size: int, rows: Array, interval: float) -> list[Part]:
     """Divide a segment at its longest holes, and bridge the others."""
     mean, power, fourth, share = rows
-    there = np.flatnonzero(share >= 0.5)
-    if len(there) < _SHORTEST_PART:
+    covered = np.flatnonzero(share >= 0.5)
+    if len(covered) < _SHORTEST_PART:
         return []
     longest = max(2.0, _LONGEST_HOLE * len(mean))
-    cuts = np.flatnonzero(np.diff(there) > longest)
+    cuts = np.flatnonzero(np.diff(covered) > longest)
     parts = []
     for first, last in zip(
-        there[np.concatenate(([0], cuts + 1))],
-        there[np.append(cuts, len(there) - 1)],
+        covered[np.concatenate(([0], cuts + 1))],
+        covered[np.append(cuts, len(covered) - 1)],
         strict=True,
     ):
-        here = slice(int(first), int(last) + 1)
-        if here.stop - here.start < _SHORTEST_PART:
+        span = slice(int(first), int(last) + 1)
+        if span.stop - span.start < _SHORTEST_PART:
             continue
         parts.append(
             Part(
-                start + here.start * size,
-                _bridged(mean[here], share[here] >= 0.5),
-                np.where(share[here] >= 0.5, power[here], np.nan),
-                _kurtosis(power[here], fourth[here], share[here] >= 0.5),
-                float(share[here].mean()),
-                _pauses(share[here] < 0.5, interval),
+                start + span.start * size,
+                _bridged(mean[span], share[span] >= 0.5),
+                np.where(share[span] >= 0.5, power[span], np.nan),
+                _kurtosis(power[span], fourth[span], share[span] >= 0.5),
+                float(share[span].mean()),
+                _pauses(share[span] < 0.5, interval),
             )
         )
     return parts
@@ -209,37 +208,37 @@ def _pauses(missing: NDArray[np.bool_], interval: float) -> tuple[tuple[float, f
     first, end = edges[::2].astype(np.float64), edges[1::2].astype(np.float64)
     long = np.flatnonzero((end - first) * interval >= _SHORTEST_PAUSE)
     longest = long[np.argsort(first[long] - end[long], kind="stable")][:_MOST_PAUSES]
-    kept = np.sort(longest)
-    return tuple(zip(0.5 * (first + end)[kept], (end - first)[kept], strict=True))
+    in_order = np.sort(longest)
+    return tuple(zip(0.5 * (first + end)[in_order], (end - first)[in_order], strict=True))
 
 
-def _kurtosis(power: Array, fourth: Array, there: NDArray[np.bool_]) -> float:
+def _kurtosis(power: Array, fourth: Array, present: NDArray[np.bool_]) -> float:
     """Return the excess kurtosis of samples whose differences have these moments."""
-    known = there & np.isfinite(fourth)
-    square = 2.0 * float(power[known].mean()) if known.any() else 0.0
-    return 2.0 * (float(fourth[known].mean()) / square**2 - 3.0) if square > 0.0 else 0.0
+    usable = present & np.isfinite(fourth)
+    square = 2.0 * float(power[usable].mean()) if usable.any() else 0.0
+    return 2.0 * (float(fourth[usable].mean()) / square**2 - 3.0) if square > 0.0 else 0.0
 
 
-def _bridged(mean: Array, there: NDArray[np.bool_]) -> Array:
+def _bridged(mean: Array, present: NDArray[np.bool_]) -> Array:
     """Fill blocks without samples: interpolated, with the white noise of the others.
 
     A long hole is bridged between the means of several blocks, for the white noise of one would
     be a slow course over it.
     """
-    if there.all():
+    if present.all():
         return mean
     filled = mean.copy()
-    neighbours = np.diff(mean)[there[1:] & there[:-1]]
+    neighbours = np.diff(mean)[present[1:] & present[:-1]]
     white = _MAD * float(np.median(np.abs(neighbours))) / np.sqrt(2.0) if len(neighbours) else 0.0
-    rng = np.random.default_rng(int((~there).sum()))
-    missing = np.flatnonzero(~there)
+    rng = np.random.default_rng(int((~present).sum()))
+    missing = np.flatnonzero(~present)
     for run in np.split(missing, np.flatnonzero(np.diff(missing) > 1) + 1):
         first, last = int(run[0]), int(run[-1])
         reach = max(1, len(run) // 4)
         before = slice(max(0, first - reach), first)
         after = slice(last + 1, last + 1 + reach)
-        left = mean[before][there[before]].mean()
-        right = mean[after][there[after]].mean()
+        left = mean[before][present[before]].mean()
+        right = mean[after][present[after]].mean()
         share = (run - first + 1) / (len(run) + 1)
         filled[run] = left + share * (right - left) + white * rng.standard_normal(len(run))
     return filled
@@ -287,15 +286,15 @@ def steadiness_of(means: Means) -> Steadiness | None:
     Steadiness or None
         None for a short log, or one of constant samples.
     """
-    part = max(means.parts, key=lambda one: len(one.power))
+    part = max(means.parts, key=lambda part: len(part.power))
     size = len(part.power) // _SECTIONS
     if size < _FEWEST_IN_SECTION or means.block < 2:
         return None
     sections = part.power[: size * _SECTIONS].reshape(_SECTIONS, size)
-    there = np.isfinite(sections)
-    if (there.sum(axis=1) < _FEWEST_IN_SECTION // 2).any():
+    finite = np.isfinite(sections)
+    if (finite.sum(axis=1) < _FEWEST_IN_SECTION // 2).any():
         return None
-    count = there.sum(axis=1)
+    count = finite.sum(axis=1)
     power = np.nansum(sections, axis=1) / count
     if not (power > 0.0).all():
         return None

@@ -34,7 +34,6 @@ _ROUNDS = 2
 _LEAST_WEIGHT = 0.05
 """Of an ordinate that regressors explain nearly whole."""
 
-
 _WALKS = np.concatenate(([0.0], np.geomspace(0.03, 100.0, 18)))
 """K that are tried, as deviation at the lowest frequency over that of the other noise."""
 
@@ -221,7 +220,7 @@ class Ordinates:
         beyond = np.rint(2.0 * spectrum.frequency * spectrum.length) > held_out
         if beyond.sum() < 4 * NOISE.parameters:
             return fit.density
-        whittle = self._whittle.taken(spectrum, beyond)
+        whittle = self._whittle.select(spectrum, beyond)
         return self.density(whittle.maximum(fit.noise.terms))
 
     def log_likelihood(self, residual: Array, density: Array) -> float:
@@ -245,9 +244,9 @@ class Ordinates:
         gram, target = np.zeros((p, p)), np.zeros(p)
         weighted = []
         for a in range(p):
-            here = self.part(owner[a])
-            weighted.append(columns[a] * weight[here])
-            target[a] = weighted[a] @ self.coefficient[here]
+            of_part = self.part(owner[a])
+            weighted.append(columns[a] * weight[of_part])
+            target[a] = weighted[a] @ self.coefficient[of_part]
             for b in range(a + 1):
                 if owner[b] == owner[a]:
                     gram[a, b] = gram[b, a] = weighted[a] @ columns[b]
@@ -259,12 +258,12 @@ class Ordinates:
         residual = self.coefficient.copy()
         leverage = np.zeros_like(residual)
         for number in set(owner):
-            here = self.part(number)
+            of_part = self.part(number)
             own = [a for a in range(p) if owner[a] == number]
             X = np.array([columns[a] for a in own])
-            residual[here] -= sizes[own] @ X
+            residual[of_part] -= sizes[own] @ X
             solved = covariance[np.ix_(own, own)] @ X
-            leverage[here] = np.einsum("ak,ak->k", X, solved) * weight[here]
+            leverage[of_part] = np.einsum("ak,ak->k", X, solved) * weight[of_part]
         return sizes, covariance, residual, leverage
 
 

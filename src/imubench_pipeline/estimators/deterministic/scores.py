@@ -92,8 +92,8 @@ def best_scores(
         residual = ordinates.solved(fit.regressors, density)[2]
     parts = len(ordinates.sizes)
     for number, n in enumerate(ordinates.sizes):
-        here = ordinates.part(number)
-        w, r = weight[here], residual[here]
+        of_part = ordinates.part(number)
+        w, r = weight[of_part], residual[of_part]
         others = [x for x in fit.regressors if x.part == number]
         basis = _orthonormal([row for x in others for row in ordinates.columns(x)], w)
         if not smooth:
@@ -122,12 +122,12 @@ class Gain:
         self, ordinates: Ordinates, regressors: Sequence[Regressor], density: Array, part: int
     ) -> None:
         self._ordinates = ordinates
-        here = ordinates.part(part)
-        self._weight = ordinates.weights(density)[here]
+        of_part = ordinates.part(part)
+        self._weight = ordinates.weights(density)[of_part]
         others = [row for x in regressors if x.part == part for row in ordinates.columns(x)]
         self._basis = _orthonormal(others, self._weight)
-        given = ordinates.coefficient[here]
-        self._residual = given - (self._basis @ (self._weight * given)) @ self._basis
+        coefficient = ordinates.coefficient[of_part]
+        self._residual = coefficient - (self._basis @ (self._weight * coefficient)) @ self._basis
 
     def of(self, regressor: Regressor) -> float:
         """Return twice the log likelihood that a regressor adds."""
@@ -136,10 +136,10 @@ class Gain:
             return float(_gains(columns, self._weight, self._residual, self._basis)[0])
         # Cosine and sine of a few cycles are not orthogonal: what the one takes, the other lacks.
         first = _orthonormal([self._beside(columns[0])], self._weight)
-        taken = first @ (self._weight * self._residual)
+        projection = first @ (self._weight * self._residual)
         both = np.concatenate([self._basis, first])
-        left = self._residual - taken @ first
-        return float(taken @ taken + _gains(columns[1:], self._weight, left, both)[0])
+        left = self._residual - projection @ first
+        return float(projection @ projection + _gains(columns[1:], self._weight, left, both)[0])
 
     def _beside(self, column: Array) -> Array:
         return np.asarray(column - (self._basis @ (self._weight * column)) @ self._basis)
@@ -153,8 +153,10 @@ def _orthonormal(columns: Sequence[Array], w: Array) -> Array:
     gram = (X * w) @ X.T
     scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
-    kept = values > 1e-10
-    return np.asarray((vectors[:, kept] / np.sqrt(values[kept])).T @ (X / scale[:, None]))
+    independent = values > 1e-10
+    return np.asarray(
+        (vectors[:, independent] / np.sqrt(values[independent])).T @ (X / scale[:, None])
+    )
 
 
 def _gains(columns: Array, w: Array, r: Array, basis: Array) -> Array:
@@ -163,6 +165,11 @@ def _gains(columns: Array, w: Array, r: Array, basis: Array) -> Array:
     above = weighted @ r
     whole = np.einsum("ck,ck->c", weighted, columns)
     left = whole - np.sum((weighted @ basis.T) ** 2, axis=1)
+    return _filtered(above, whole, left)
+
+
+def _filtered(above: Array, whole: Array, left: Array) -> Array:
+    """Return the squared output of the filter over what others leave of each regressor's power."""
     return np.asarray(np.where(left > _KNOWN * whole, above**2 / np.maximum(left, 1e-300), 0.0))
 
 
@@ -179,7 +186,7 @@ def _steps_and_pulses(
     left = whole.copy()
     for row in basis:
         left -= _sines(slope * w * row) ** 2
-    gains = np.where(left > _KNOWN * whole, above**2 / np.maximum(left, 1e-300), 0.0)
+    gains = _filtered(above, whole, left)
     gains[: _EDGE - 1] = 0.0
     gains[n - _EDGE :] = 0.0
     place = int(np.argmax(gains))
@@ -198,7 +205,7 @@ def _steps_and_pulses(
     left = whole.copy()
     for row in basis:
         left -= scipy.fft.idct(np.concatenate(([0.0], w * row)), type=2, norm="ortho") ** 2
-    gains = np.where(left > _KNOWN * whole, above**2 / np.maximum(left, 1e-300), 0.0)
+    gains = _filtered(above, whole, left)
     place = int(np.argmax(gains))
     yield Score(
         Regressor("pulse", number, float(place)),
@@ -251,28 +258,28 @@ def _sinusoid_columns(n: int) -> tuple[Array, Array, int]:
     """Return cycles in the part, coefficients of cosine and sine (2, c, k), and how many k."""
     most = min(_MOST_CYCLES, n // 8)
     cycles = np.arange(FEWEST_CYCLES, most + 1e-9, _CYCLES)
-    kept = min(n - 1, 4 * most)
-    columns = np.empty((2, len(cycles), kept))
+    count = min(n - 1, 4 * most)
+    columns = np.empty((2, len(cycles), count))
     # The low ordinates of a slow course are those of fewer, longer blocks.
     few = min(n, 8 * most)
     scale = math.sqrt(n / few)
     for i, c in enumerate(cycles):
-        columns[:, i] = scale * Regressor("sinusoid", 0, c / few).coefficients(few)[:, :kept]
-    return cycles, columns, kept
+        columns[:, i] = scale * Regressor("sinusoid", 0, c / few).coefficients(few)[:, :count]
+    return cycles, columns, count
 
 
 def _sinusoids(number: int, n: int, w: Array, r: Array, basis: Array, parts: int) -> Score:
-    cycles, columns, kept = _sinusoid_columns(n)
-    w, r, basis = w[:kept], r[:kept], basis[:, :kept]
+    cycles, columns, count = _sinusoid_columns(n)
+    w, r, basis = w[:count], r[:count], basis[:, :count]
     weighted = columns * w
     above = weighted @ r
     a, b = np.einsum("xck,xck->xc", weighted, columns)
     c = np.einsum("ck,ck->c", weighted[0], columns[1])
-    known = weighted @ basis.T
+    projected = weighted @ basis.T
     whole = a * b - c**2
-    a = a - np.sum(known[0] ** 2, axis=1)
-    b = b - np.sum(known[1] ** 2, axis=1)
-    c = c - np.sum(known[0] * known[1], axis=1)
+    a = a - np.sum(projected[0] ** 2, axis=1)
+    b = b - np.sum(projected[1] ** 2, axis=1)
+    c = c - np.sum(projected[0] * projected[1], axis=1)
     left = a * b - c**2
     good = left > 10.0 * _KNOWN * whole
     gains = np.where(

@@ -27,10 +27,10 @@ from scipy.special import chdtri
 
 from imubench_pipeline.estimators.deterministic.candidates import (
     SAFETY,
-    beside,
-    but,
-    candidates,
-    polished,
+    find_candidates,
+    leave_out,
+    lies_at_pause,
+    polish,
     restarts,
     with_candidate,
 )
@@ -49,7 +49,6 @@ _AS_GOOD = 0.5
 """AIC by which steps at known places may be worse and still be as good."""
 
 _WITHOUT_WALK = Terms("NF", NOISE.gauss_markov)
-
 
 MOST = 16
 """Regressors that are taken; a log with more steps is one of telegraph noise."""
@@ -122,7 +121,7 @@ def rival_of_walk(ordinates: Ordinates, fit: Fit) -> Rival | None:
     bare = ordinates.fit(fit.regressors, fit.density, _WITHOUT_WALK)
     walk = 2.0 * (fit.log_likelihood - bare.log_likelihood)
     best = anew_at_pauses(ordinates, bare, walk)
-    for score, density in candidates(ordinates, bare):
+    for score, density in find_candidates(ordinates, bare):
         wanted = walk + score.threshold * SAFETY[score.regressor.kind]
         hopeless = score.gain < wanted - _NEAR - _FITTED_ANEW
         if hopeless or score.regressor.kind in ("ramp", "pulse"):
@@ -149,8 +148,10 @@ def anew_at_pauses(ordinates: Ordinates, fit: Fit, walk: float = 0.0) -> Rival |
     Rival or None
         As good as a walk is what has the same AIC.
     """
-    taken = [x for x in fit.regressors if x.kind in ("step", "restart")]
-    steps = tuple(x for x in restarts(ordinates) if not any(beside(one, x) for one in taken))
+    steps_before = [x for x in fit.regressors if x.kind in ("step", "restart")]
+    steps = tuple(
+        x for x in restarts(ordinates) if not any(lies_at_pause(step, x) for step in steps_before)
+    )
     if not steps:
         return None
     tried = ordinates.fit((*fit.regressors, *steps), fit.density, fit.noise.terms)
@@ -191,70 +192,72 @@ def search(ordinates: Ordinates) -> Searched:
     fit = without
     rival: Rival | None = None
     while len(fit.regressors) < MOST:
-        taken = _next(ordinates, fit)
-        if taken is None:
+        extended = _next_fit(ordinates, fit)
+        if extended is None:
             # Steps at the pauses that hide in a slow process together, none being large.
             together = anew_at_pauses(ordinates, fit)
             if together is not None and together.better:
-                taken = together.fit
-        if taken is None:
+                extended = together.fit
+        if extended is None:
             rival = rival_of_walk(ordinates, fit)
             if rival is None or not rival.better:
                 break
-            taken = ordinates.fit(rival.fit.regressors, rival.fit.density)
-        fit = taken
+            extended = ordinates.fit(rival.fit.regressors, rival.fit.density)
+        fit = extended
     if len(fit.regressors) >= MOST:
         return Searched(fit, without, (), True)
     if len(fit.regressors) > 1:
-        fit = _all_polished(ordinates, fit)
-    fit, gains = _eliminated(ordinates, fit)
+        fit = _polish_all(ordinates, fit)
+    fit, gains = _eliminate(ordinates, fit)
     alike = rival if rival is not None and rival.as_good else None
     return Searched(fit, without, gains, False, alike)
 
 
-def again(ordinates: Ordinates, searched: Searched, regressors: Sequence[Regressor]) -> Searched:
+def move_regressors(
+    ordinates: Ordinates, searched: Searched, regressors: Sequence[Regressor]
+) -> Searched:
     """Return a search with its regressors moved, those left out that are needless then."""
-    fit, gains = _eliminated(ordinates, ordinates.fit(regressors, searched.fit.density))
+    fit, gains = _eliminate(ordinates, ordinates.fit(regressors, searched.fit.density))
     return replace(searched, fit=fit, gains=gains)
 
 
-def _next(ordinates: Ordinates, fit: Fit) -> Fit | None:
+def _next_fit(ordinates: Ordinates, fit: Fit) -> Fit | None:
     """Return the fit with the best further regressor, or None where none is to be taken."""
     best: Fit | None = None
     most = 0.0
-    for score, density in candidates(ordinates, fit):
+    for score, density in find_candidates(ordinates, fit):
         tried, gain = with_candidate(ordinates, fit, score, density)
         beyond = gain - score.threshold * SAFETY[score.regressor.kind]
         if beyond > most:
             best, most = tried, beyond
     if best is None:
         return None
-    moved = polished(ordinates, best.regressors, len(best.regressors) - 1, best.density)
+    moved = polish(ordinates, best.regressors, len(best.regressors) - 1, best.density)
     return ordinates.fit(moved, best.density)
 
 
-def _all_polished(ordinates: Ordinates, fit: Fit) -> Fit:
+def _polish_all(ordinates: Ordinates, fit: Fit) -> Fit:
     """Polish each regressor in turn beside all others."""
     moved = fit.regressors
     for which in range(len(moved)):
-        moved = polished(ordinates, moved, which, fit.density)
+        moved = polish(ordinates, moved, which, fit.density)
     return ordinates.fit(moved, fit.density)
 
 
-def _eliminated(ordinates: Ordinates, fit: Fit) -> tuple[Fit, tuple[float, ...]]:
+def _eliminate(ordinates: Ordinates, fit: Fit) -> tuple[Fit, tuple[float, ...]]:
     """Leave out regressors that the others made needless; return what each of the rest gains."""
     while True:
         gains = [_lost_without(ordinates, fit, i) for i in range(len(fit.regressors))]
         margins = [gain - _KEPT[x.kind] for x, gain in zip(fit.regressors, gains, strict=True)]
         if not margins or min(margins) > 0.0:
             return fit, tuple(gains)
-        fit = ordinates.fit(but(fit.regressors, int(np.argmin(margins))), fit.density)
+        fit = ordinates.fit(leave_out(fit.regressors, int(np.argmin(margins))), fit.density)
 
 
 def _lost_without(ordinates: Ordinates, fit: Fit, which: int) -> float:
     """Return twice the log likelihood that is lost without a regressor."""
     regressor = fit.regressors[which]
-    others = but(fit.regressors, which)
+    others = leave_out(fit.regressors, which)
     for_this_noise = Gain(ordinates, others, fit.density, regressor.part).of(regressor)
     if len(others) > 2 and for_this_noise > _SURE * _KEPT[regressor.kind]:
         return for_this_noise

@@ -52,10 +52,13 @@ class Verdict:
             return estimate
 
         def of(parameters: Mapping[str, Parameter]) -> dict[str, Parameter]:
-            given = {name: _with(one, self.caveats.get(name)) for name, one in parameters.items()}
-            if "N" in given and self.widening > 1.0:
-                given["N"] = _widened(given["N"], self.widening)
-            return given
+            judged = {
+                name: _with(parameter, self.caveats.get(name))
+                for name, parameter in parameters.items()
+            }
+            if "N" in judged and self.widening > 1.0:
+                judged["N"] = _widened(judged["N"], self.widening)
+            return judged
 
         slow = [self.caveats[name] for name in ("B", "K") if name in self.caveats]
         # The lowest point of the curve is where its slow terms begin.
@@ -66,7 +69,10 @@ class Verdict:
             estimate,
             parameters=of(estimate.parameters),
             further=[of(group) for group in estimate.further],
-            curve={name: _with(one, of_curve.get(name)) for name, one in estimate.curve.items()},
+            curve={
+                name: _with(parameter, of_curve.get(name))
+                for name, parameter in estimate.curve.items()
+            },
             draws=self._drawn(estimate.draws),
         )
 
@@ -76,15 +82,15 @@ class Verdict:
             return None
         first, place = draws.first.copy(), FAMILY.index("N")
         N = first[:, place]
-        there = N > 0.0
-        if not there.any():
+        positive = N > 0.0
+        if not positive.any():
             return draws
-        middle = float(np.median(N[there]))
+        middle = float(np.median(N[positive]))
         # Evenly over the log, and in an order that no other parameter has.
         even = (np.arange(len(N)) + 0.5) / len(N)
         even = np.random.default_rng(len(N)).permutation(even)
         other_times = np.exp(self.growth * (even - 0.5) + self.scatter * ndtri(even))
-        first[there, place] = (middle * (N / middle) ** self.widening * other_times)[there]
+        first[positive, place] = (middle * (N / middle) ** self.widening * other_times)[positive]
         return replace(draws, first=first)
 
 
@@ -122,12 +128,12 @@ def verdict_of(channel: str, unit: str, courses: Courses) -> Verdict:
         SI unit of its samples.
     courses : Courses
     """
-    findings = [_finding(channel, unit, course) for course in courses.found]
+    findings = [_finding(channel, unit, course) for course in courses.courses]
     caveats: dict[str, tuple[Status, str]] = {}
     if courses.means is None or courses.searched is None:
         return Verdict((), {})
     widening = 1.0
-    kurtosis = max(courses.means.parts, key=lambda one: len(one.mean)).kurtosis
+    kurtosis = max(courses.means.parts, key=lambda part: len(part.mean)).kurtosis
     if kurtosis > _HEAVY:
         # The power of L samples has a relative variance of (2 + kurtosis) / L.
         widening = math.sqrt(1.0 + 0.5 * kurtosis)
@@ -172,7 +178,7 @@ def deterministic_rows(key: Mapping[str, str], unit: str, courses: Courses) -> I
         SI unit of the samples.
     courses : Courses
     """
-    for course in courses.found:
+    for course in courses.courses:
         yield {
             **key,
             "kind": course.kind,
@@ -246,9 +252,9 @@ def _unsteady(channel: str, steady: Steadiness) -> Finding:
 
 def _differ(channel: str, halves: Halves) -> Finding:
     name = "K_differs" if halves.of == "K" else "slow_noise_differs"
-    what = "K" if halves.of == "K" else "the slow noise"
+    noise = "K" if halves.of == "K" else "the slow noise"
     detail = (
-        f"{what} of {channel} up to {halves.middle:.5g} s is {halves.first:.3g} times, from there "
+        f"{noise} of {channel} up to {halves.middle:.5g} s is {halves.first:.3g} times, from there "
         f"on {halves.second:.3g} times that of the whole log, beyond chance: it is not one process"
     )
     return Finding(name, "warning", detail, halves.ratio, channel, halves.begin, halves.end)

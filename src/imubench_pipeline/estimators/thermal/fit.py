@@ -16,10 +16,10 @@ from functools import cached_property, partial
 import numpy as np
 
 from imubench_pipeline.estimators import likelihood
-from imubench_pipeline.estimators.estimate import Parameter
+from imubench_pipeline.estimators.estimate import SIGMAS, Parameter
 from imubench_pipeline.estimators.frame import Frame, frame_of
 from imubench_pipeline.estimators.likelihood import Likelihood
-from imubench_pipeline.estimators.missing import block_means, divided
+from imubench_pipeline.estimators.missing import block_means, divide_at_holes
 from imubench_pipeline.estimators.model_choice import Candidate, compare
 from imubench_pipeline.estimators.spectrum import LineSpectrum, Spectrum, block_of, spectra
 from imubench_pipeline.estimators.thermal.path import TemperaturePath
@@ -27,7 +27,7 @@ from imubench_pipeline.estimators.thermal.path_errors import without_errors
 from imubench_pipeline.estimators.thermal.products import BlockSeries, Coefficients
 from imubench_pipeline.estimators.thermal.register import Span
 from imubench_pipeline.estimators.thermal.regression import Regression, Regressors
-from imubench_pipeline.estimators.thermal.result import ThermalFit, complete, shifted
+from imubench_pipeline.estimators.thermal.result import ThermalFit, complete_log, shift_by_effect
 from imubench_pipeline.estimators.thermal.uncertainty import (
     Verdict,
     judge,
@@ -119,7 +119,7 @@ def fit_temperature(
     varies = path.range > 0.0 and path.range >= 2.0 * float(np.median(path.deviation))
     if holes:
         means = block_means(blocks(), spans)
-        spans = divided(means, spans)
+        spans = divide_at_holes(means, spans)
         plain = plain or likelihood.fit_blocks(
             blocks,
             samples,
@@ -133,12 +133,12 @@ def fit_temperature(
         )
         model, effect = plain.estimates[0].model, np.zeros(len(path.value))
         for _ in range(2):
-            log = complete(blocks, spans, model, path, effect, rate, rng)
+            log = complete_log(blocks, spans, model, path, effect, rate, rng)
             fit = _Fit(log, samples, rate, spans, path, frame, longest_lag)
             if not (fit.possible and varies):
                 break
-            found = fit.settle(quadratic)
-            model, effect = _model_of(found), found.regressors.effect(found.regression)
+            settled = fit.settle(quadratic)
+            model, effect = _model_of(settled), settled.regressors.effect(settled.regression)
     else:
         fit = _Fit(blocks(), samples, rate, spans, path, frame, longest_lag)
         plain = plain or likelihood.fit_spectrum(fit.spectrum, fit.frame, rng=rng)
@@ -146,33 +146,33 @@ def fit_temperature(
         return _nothing(plain, path, fit, "too short a log")
     if not varies:
         return _nothing(plain, path, fit, f"the temperature changes by {path.range:.2g} K only")
-    found = fit.settle(quadratic)
-    verdict = fit.judged(found, rng)
+    settled = fit.settle(quadratic)
+    verdict = fit.judged(settled, rng)
     if not verdict.compensated and len(fit.lags) > 1:
         # A lag of nothing is whatever lets a walk pass for temperature: there is none.
         fit.lags = fit.lags[:1]
-        found = fit.settle(quadratic)
-        verdict = replace(fit.judged(found, rng), lag=verdict.lag)
+        settled = fit.settle(quadratic)
+        verdict = replace(fit.judged(settled, rng), lag=verdict.lag)
 
     def spectra_left() -> tuple[Spectrum, list[LineSpectrum]]:
-        effect, log = found.regressors.effect(found.regression), blocks()
+        effect, log = settled.regressors.effect(settled.regression), blocks()
         if holes:
-            log = complete(blocks, spans, _model_of(found), path, effect, rate, rng)
-        return spectra(shifted(log, path, effect, -1.0), samples, rate, spans)
+            log = complete_log(blocks, spans, _model_of(settled), path, effect, rate, rng)
+        return spectra(shift_by_effect(log, path, effect, -1.0), samples, rate, spans)
 
     lines = fit.lines
     if verdict.compensated:
         left, lines = spectra_left()
         if fit.take_fast(left):
-            found = fit.settle(quadratic)
-            verdict = replace(fit.judged(found, rng), compensated=True, reason=verdict.reason)
+            settled = fit.settle(quadratic)
+            verdict = replace(fit.judged(settled, rng), compensated=True, reason=verdict.reason)
             left, lines = spectra_left()
             fit.take_fast(left)
-    return _described(fit, found, verdict, plain, path, lines, find_frame, rng)
+    return _described(fit, settled, verdict, plain, path, lines, find_frame, rng)
 
 
 @dataclass(frozen=True)
-class _Found:
+class _Settled:
     """Where the fit has settled."""
 
     regressors: Regressors
@@ -205,7 +205,7 @@ class _Fit:
         self.possible = bool(self.used.sum() >= _FEWEST_BINS)
         if not self.possible:
             return
-        self.chosen = self.spectrum.taken(self.used)
+        self.chosen = self.spectrum.select(self.used)
         self.whittle = self.frame.whittle(self.spectrum)
         self.quantization = self.frame.shows_quantization(rate)
         self.regressors = Regressors(
@@ -227,40 +227,40 @@ class _Fit:
         density = self.spectrum.density.copy()
         density[fast] = after
         self.spectrum = replace(self.spectrum, density=density)
-        self.chosen = self.spectrum.taken(self.used)
+        self.chosen = self.spectrum.select(self.used)
         self.whittle = self.whittle.of(self.chosen)
         vars(self).pop("of_the_log", None)
         return True
 
-    def settle(self, quadratic: bool | None) -> _Found:
+    def settle(self, quadratic: bool | None) -> _Settled:
         """Return the joint fit; the square is tried where nothing is said of it.
 
         So is another sensitivity at the beginning, where a sensor settles.
         """
         needed = 0.5 * math.log(len(self.chosen.density)) + _WORTH_TRYING
-        found = self._best(self.regressors.also(quadratic=bool(quadratic)))
+        settled = self._best(self.regressors.also(quadratic=bool(quadratic)))
         duration = self.spectrum.duration
         for _ in range(2):
-            tried = [found.regressors.also(settling=part * duration) for part in _SETTLING]
-            tried = [] if found.regressors.settling else tried
-            if quadratic is None and not found.regressors.quadratic:
-                tried.append(found.regressors.also(quadratic=True))
-            gains = [self._gained(found, regressors) for regressors in tried]
+            extended = [settled.regressors.also(settling=part * duration) for part in _SETTLING]
+            extended = [] if settled.regressors.settling else extended
+            if quadratic is None and not settled.regressors.quadratic:
+                extended.append(settled.regressors.also(quadratic=True))
+            gains = [self._gained(settled, regressors) for regressors in extended]
             if not gains or max(gains) < needed:
                 break
-            wider = self._best(tried[int(np.argmax(gains))])
-            if wider.cost > found.cost - _BEYOND or _error(wider) > _MOST_LOST * _error(found):
+            wider = self._best(extended[int(np.argmax(gains))])
+            if wider.cost > settled.cost - _BEYOND or _error(wider) > _MOST_LOST * _error(settled):
                 break
-            found = wider
-        return found
+            settled = wider
+        return settled
 
-    def _gained(self, found: _Found, regressors: Regressors) -> float:
+    def _gained(self, settled: _Settled, regressors: Regressors) -> float:
         """Return the log likelihood that more regressors gain, for the noise as it is fitted."""
-        density = found.whittle.density(found.candidates[0].found)
-        wider = regressors.at(found.regression.lag, self.chosen.ordinates / density)
-        return wider.log_likelihood_gain - found.regression.log_likelihood_gain
+        density = settled.whittle.density(settled.candidates[0].maximum)
+        wider = regressors.at(settled.regression.lag, self.chosen.ordinates / density)
+        return wider.log_likelihood_gain - settled.regression.log_likelihood_gain
 
-    def _best(self, regressors: Regressors) -> _Found:
+    def _best(self, regressors: Regressors) -> _Settled:
         """Settle from the noise of the log as it is, and from that of ordinary least squares."""
         flat = self.chosen.ordinates
         rough = regressors.at(0.0, flat)
@@ -275,56 +275,58 @@ class _Fit:
         return compare(whittle, quantization=self.quantization)
 
     def _weights(self, whittle: Whittle, candidates: Sequence[Candidate]) -> Array:
-        return self.chosen.ordinates / whittle.density(candidates[0].found)
+        return self.chosen.ordinates / whittle.density(candidates[0].maximum)
 
-    def _settle(self, regressors: Regressors, weights: Array) -> _Found:
+    def _settle(self, regressors: Regressors, weights: Array) -> _Settled:
         before: Regression | None = None
         for _ in range(_MOST_ROUNDS):
-            found = regressors.best(weights, self.lags)
-            left = regressors.without(self.chosen, found, weights)
+            regression = regressors.best(weights, self.lags)
+            left = regressors.without(self.chosen, regression, weights)
             whittle = self.whittle.of(left)
             candidates = self._compared(whittle)
             weights = self._weights(whittle, candidates)
-            ramp = candidates[0].found.terms.ramp
+            ramp = candidates[0].terms.ramp
             if ramp != regressors.ramp:
                 regressors = regressors.also(ramp=ramp)
                 before = None
                 continue
             if before is not None:
-                spread = math.sqrt(found.covariance[0, 0])
-                if abs(found.beta[0] - before.beta[0]) < _SETTLED * spread:
+                spread = math.sqrt(regression.covariance[0, 0])
+                if abs(regression.beta[0] - before.beta[0]) < _SETTLED * spread:
                     break
-            before = found
-        free = candidates[0].found.terms.parameters + len(found.beta) - ramp + (found.lag > 0.0)
-        return _Found(regressors, found, whittle, candidates, self._cost(whittle, candidates, free))
+            before = regression
+        free = candidates[0].terms.parameters + len(regression.beta) - ramp + (regression.lag > 0.0)
+        return _Settled(
+            regressors, regression, whittle, candidates, self._cost(whittle, candidates, free)
+        )
 
     def _cost(self, whittle: Whittle, candidates: Sequence[Candidate], free: int) -> float:
         """Return half the BIC, with the ordinates of the log.
 
         Those that a fit takes are counted as its parameters.
         """
-        found, ordinates = candidates[0].found, self.chosen.ordinates
-        density = whittle.density(found)
-        data = whittle.data(found) * whittle.spectrum.ordinates / ordinates
+        maximum, ordinates = candidates[0].maximum, self.chosen.ordinates
+        density = whittle.density(maximum)
+        data = whittle.data(maximum) * whittle.spectrum.ordinates / ordinates
         cost = 0.5 * float(np.sum(ordinates * (np.log(density) + data / density)))
         return cost + 0.5 * free * math.log(len(density))
 
-    def judged(self, found: _Found, rng: np.random.Generator) -> Verdict:
+    def judged(self, settled: _Settled, rng: np.random.Generator) -> Verdict:
         """Return what a settled fit tells."""
         return judge(
-            found.regressors,
-            found.regression,
-            found.whittle,
-            found.candidates,
+            settled.regressors,
+            settled.regression,
+            settled.whittle,
+            settled.candidates,
             self.lags,
-            gained=2.0 * (self.plain() - found.cost),
+            gained=2.0 * (self.plain() - settled.cost),
             rng=rng,
         )
 
     def plain(self) -> float:
         """Return half the BIC of the best noise without temperature."""
         candidates = self.of_the_log
-        return self._cost(self.whittle, candidates, candidates[0].found.terms.parameters)
+        return self._cost(self.whittle, candidates, candidates[0].terms.parameters)
 
     @cached_property
     def of_the_log(self) -> Sequence[Candidate]:
@@ -332,18 +334,18 @@ class _Fit:
         return self._compared(self.whittle)
 
 
-def _error(found: _Found) -> float:
+def _error(settled: _Settled) -> float:
     """Return the standard deviation of s, for given noise."""
-    return math.sqrt(float(found.regression.covariance[0, 0]))
+    return math.sqrt(float(settled.regression.covariance[0, 0]))
 
 
-def _model_of(found: _Found) -> NoiseModel:
-    return model_of(found.candidates[0].found)
+def _model_of(settled: _Settled) -> NoiseModel:
+    return model_of(settled.candidates[0].maximum)
 
 
 def _described(
     fit: _Fit,
-    found: _Found,
+    settled: _Settled,
     verdict: Verdict,
     plain: Likelihood,
     path: TemperaturePath,
@@ -358,22 +360,22 @@ def _described(
     without, effect = plain, np.zeros(len(path.value))
     mean = fit.spectrum.mean
     if verdict.compensated:
-        regressors = found.regressors.also(used=np.ones(len(fit.used), dtype=np.bool_))
+        regressors = settled.regressors.also(used=np.ones(len(fit.used), dtype=np.bool_))
         weights = np.zeros(len(fit.used))
-        weights[fit.used] = fit.chosen.ordinates / found.whittle.density(found.candidates[0].found)
-        left = regressors.without(fit.spectrum, found.regression, weights)
-        terms = found.candidates[0].found.terms
-        left = without_errors(left, fit.used, found.whittle, terms, verdict.path_errors)
-        effect = regressors.effect(found.regression)
+        best = settled.candidates[0].maximum
+        weights[fit.used] = fit.chosen.ordinates / settled.whittle.density(best)
+        left = regressors.without(fit.spectrum, settled.regression, weights)
+        left = without_errors(left, fit.used, settled.whittle, best.terms, verdict.path_errors)
+        effect = regressors.effect(settled.regression)
         without = likelihood.fit_spectrum(left, find_frame(left, lines), rng=rng)
     added = [path.means(*place, effect) for place in fit.series.places]
     shift = float(np.concatenate(added).mean())
-    candidates = found.candidates if verdict.compensated else fit.of_the_log
+    candidates = settled.candidates if verdict.compensated else fit.of_the_log
     K = without.estimates[0].parameters["K"]
     noises = [
-        (with_likely_walk(model, K) if "K" in one.found.terms.linear else model, share)
-        for one, share in shares(candidates)
-        for model in [model_of(one.found)]
+        (with_likely_walk(model, K) if "K" in candidate.terms.linear else model, share)
+        for candidate, share in shares(candidates)
+        for model in [model_of(candidate.maximum)]
     ]
     # T_0 is as uncertain as the mean of the path.
     of_reference = float(np.std(path.draws.mean(axis=1))) * (verdict.sensitivity.in_model or 0.0)
@@ -383,7 +385,7 @@ def _described(
         of_reference if verdict.compensated else 0.0,
     )
     bias = Parameter(
-        mean - shift, lower=mean - shift - 1.96 * spread, upper=mean - shift + 1.96 * spread
+        mean - shift, lower=mean - shift - SIGMAS * spread, upper=mean - shift + SIGMAS * spread
     )
     return ThermalFit(
         path.mean,
@@ -408,7 +410,7 @@ def _nothing(plain: Likelihood, path: TemperaturePath, fit: _Fit, reason: str) -
         unknown,
         unknown,
         unknown,
-        Parameter(mean, lower=mean - 1.96 * spread, upper=mean + 1.96 * spread),
+        Parameter(mean, lower=mean - SIGMAS * spread, upper=mean + SIGMAS * spread),
         False,
         reason,
         plain,

@@ -25,8 +25,14 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import ndtri
 
-from imubench_pipeline.estimators.thermal.path_kernels import drawn, propagate
-from imubench_pipeline.estimators.thermal.register import Readings, Span, at_jumps, dwells, readings
+from imubench_pipeline.estimators.thermal.path_kernels import draw_paths, propagate
+from imubench_pipeline.estimators.thermal.register import (
+    Readings,
+    Span,
+    cut_at_jumps,
+    dwells,
+    readings,
+)
 from imubench_pipeline.typing import Array
 
 DRAWS = 24
@@ -99,8 +105,8 @@ class TemperaturePath:
         """
         cuts = np.searchsorted(points, [start for start, _ in self.segments[1:]])
         pieces = zip(np.split(points, cuts), self.parts, strict=True)
-        found = [np.interp(piece, self.sample[part], values[part]) for piece, part in pieces]
-        return np.concatenate(found)
+        pieces_at = [np.interp(piece, self.sample[part], values[part]) for piece, part in pieces]
+        return np.concatenate(pieces_at)
 
     def means(self, first: int, block: int, count: int, values: Array) -> Array:
         """Return the means over blocks of what is known at the knots, linear between them.
@@ -122,12 +128,12 @@ class TemperaturePath:
         """
         part = self.parts[sum(start <= first for start, _ in self.segments) - 1]
         edges = first - 0.5 + block * np.arange(count + 1)
-        knots, known = self.sample[part], values[..., part]
+        knots, at_knots = self.sample[part], values[..., part]
         # Flat beyond the first and the last knot.
         x = np.concatenate(
             ([min(edges[0], knots[0]) - 1.0], knots, [max(edges[-1], knots[-1]) + 1])
         )
-        y = np.concatenate((known[..., :1], known, known[..., -1:]), axis=-1)
+        y = np.concatenate((at_knots[..., :1], at_knots, at_knots[..., -1:]), axis=-1)
         width = np.diff(x)
         below = np.cumsum(width * 0.5 * (y[..., 1:] + y[..., :-1]), axis=-1)
         below = np.concatenate((np.zeros_like(y[..., :1]), below), axis=-1)
@@ -162,16 +168,16 @@ def temperature_path(
     spread = max(float(np.nanmax(read.high) - np.nanmin(read.low)), read.step, 1e-6)
     evidence = _Evidence(read, level, spread)
     q, noise, height = evidence.best()
-    cut = at_jumps(read)
+    cut = cut_at_jumps(read)
     if cut is not read:
         jumping = _Evidence(cut, level, spread)
-        *found, higher = jumping.best()
+        *best, higher = jumping.best()
         if higher > height:
-            read, evidence, (q, noise) = cut, jumping, found
+            read, evidence, (q, noise) = cut, jumping, best
     value, variance = np.empty(len(read.begin)), np.empty(len(read.begin))
     draws = np.empty((DRAWS, len(read.begin)))
     for part in read.pieces:
-        if evidence.held(part):
+        if evidence.stays_in_a_cell(part):
             # Anywhere in the cell, all the time: as errors of a level go, the most that it may be.
             value[part], variance[part] = read.mean[part] - level, read.step**2 / 12.0
             off = read.step * (rng.random((DRAWS, 1)) - 0.5)
@@ -179,7 +185,7 @@ def temperature_path(
             continue
         value[part], variance[part], _, precision, shift = evidence.part(part, q, noise)
         normals = rng.standard_normal((DRAWS, part.stop - part.start, 2))
-        draws[:, part] = drawn(evidence.steps(part), q, spread, precision, shift, normals)
+        draws[:, part] = draw_paths(evidence.steps(part), q, spread, precision, shift, normals)
         draws[:, part] += evidence.dwelling(part, q, noise, variance[part], rng)
     value, draws = value + level, draws + level
     if noise < _COARSE * read.step:
@@ -204,11 +210,11 @@ class _Evidence:
     def __init__(self, read: Readings, level: float, spread: float) -> None:
         self._read, self._level, self._spread = read, level, spread
         self._width = float(np.median(read.end - read.begin))
-        there = read.count > 0
-        stepped = there & (read.step > 0.0)
+        present = read.count > 0
+        stepped = present & (read.step > 0.0)
         self._cell = stepped & (read.high == read.low)
         self._two = stepped & ~self._cell & (read.high - read.low < 1.5 * read.step)
-        self._mean = there & ~self._cell & ~self._two
+        self._mean = present & ~self._cell & ~self._two
         count = np.maximum(read.count, 1)
         # All of n readings in one cell: x keeps clear of its edges by about the greatest of n
         # normal variates, whose median and (nearly) standard deviation these are.
@@ -219,15 +225,15 @@ class _Evidence:
         share = np.clip((share * count + 0.5) / (count + 1.0), 0.01, 0.99)
         self._beyond = ndtri(share)
         density = np.exp(-0.5 * self._beyond**2) / math.sqrt(2.0 * math.pi)
-        self._known = share * (1.0 - share) / count / density**2
+        self._share_variance = share * (1.0 - share) / count / density**2
         # Within a block x moves on.
         self._floor = max(_FLOOR * read.step, 2.0 * spread / len(count))
 
-    def held(self, part: slice) -> bool:
+    def stays_in_a_cell(self, part: slice) -> bool:
         """Return whether a piece between jumps stays in one cell of the register."""
         read = self._read
-        one = bool(self._cell[part].all() and np.ptp(read.mean[part]) < 0.5 * read.step)
-        return one and part not in read.parts
+        in_one_cell = bool(self._cell[part].all() and np.ptp(read.mean[part]) < 0.5 * read.step)
+        return in_one_cell and part not in read.parts
 
     def steps(self, part: slice) -> Array:
         """Return the time from the block before, in blocks; 1 for the first."""
@@ -242,14 +248,16 @@ class _Evidence:
         edge = 0.5 * (read.low[part] + read.high[part]) - self._level
         at = np.where(two, edge + noise * self._beyond[part], mean)
         variance = noise**2 * np.where(
-            two, self._known[part], 1.0 / np.maximum(read.count[part], 1)
+            two, self._share_variance[part], 1.0 / np.maximum(read.count[part], 1)
         )
         variance += np.where(two, self._floor**2, 0.0) + least
         precision = np.where(two | many, 1.0 / variance, 0.0)
         shift = np.where(two | many, at / variance, 0.0)
         height = -0.5 * np.log(variance[many]).sum()
         # The share of a block is given, not the x that it tells: with dx = noise dz.
-        height += 0.5 * np.log((noise**2 * self._known[part] + least) / variance)[two].sum()
+        height += (
+            0.5 * np.log((noise**2 * self._share_variance[part] + least) / variance)[two].sum()
+        )
         height += float((-0.5 * at**2 / variance)[two | many].sum())
         half = self._half(part, noise)
         path, spread, evidence = propagate(
@@ -290,25 +298,25 @@ class _Evidence:
     def best(self) -> tuple[float, float, float]:
         """Return q and the noise that make the readings most likely, and log their evidence."""
         read = self._read
-        there = read.mean[read.count > 0]
-        rough = float(np.median(np.abs(np.diff(there)))) if len(there) > 1 else 0.0
+        present = read.mean[read.count > 0]
+        rough = float(np.median(np.abs(np.diff(present)))) if len(present) > 1 else 0.0
         least = _QUIETEST * self._spread
         noises = {max(part * read.step, least) for part in _NOISES} | {max(rough, least)}
-        moving = [part for part in read.pieces if not self.held(part)]
+        moving = [part for part in read.pieces if not self.stays_in_a_cell(part)]
         # A level is anywhere in the spread of all of them.
-        held = len(read.pieces) - len(moving)
-        constant = held * math.log(read.step / self._spread) if held else 0.0
+        level_pieces = len(read.pieces) - len(moving)
+        constant = level_pieces * math.log(read.step / self._spread) if level_pieces else 0.0
 
         def cost(at: Array) -> float:
             q, noise = self._spread**2 * 10.0 ** float(at[0]), 10.0 ** float(at[1])
             if not (-16.0 < at[0] < 6.0 and 0.99 * least < noise < 10.0 * self._spread):
                 return _NEVER
-            found = sum(self.part(part, q, noise)[2] for part in moving)
-            return min(-(found + constant), _NEVER)
+            evidence = sum(self.part(part, q, noise)[2] for part in moving)
+            return min(-(evidence + constant), _NEVER)
 
         starts = [np.array([k, math.log10(noise)]) for k in _SCAN for noise in sorted(noises)]
         first = min(starts, key=cost)
-        found = minimize(
+        minimum = minimize(
             cost,
             first,
             method="Nelder-Mead",
@@ -320,8 +328,8 @@ class _Evidence:
                 "fatol": 0.05,
             },
         )
-        best = float(found.x[0]), float(found.x[1])
-        return self._spread**2 * 10.0 ** best[0], 10.0 ** best[1], -float(found.fun)
+        best = float(minimum.x[0]), float(minimum.x[1])
+        return self._spread**2 * 10.0 ** best[0], 10.0 ** best[1], -float(minimum.fun)
 
 
 @njit(cache=True)

@@ -42,22 +42,24 @@ class PathErrors:
     density: Array
 
 
-def path_errors(regressors: Regressors, found: Regression, weights: Array) -> PathErrors:
+def path_errors(regressors: Regressors, regression: Regression, weights: Array) -> PathErrors:
     """Return what the drawn paths do to an estimate, to first order.
 
     Parameters
     ----------
     regressors : Regressors
-    found : Regression
+    regression : Regression
         Of these regressors.
     weights : ndarray, shape (b,)
         nu / S of the bins used, as `Regressors.at` takes them.
     """
     path, p = regressors.path, regressors.thermal
-    knots, slope = regressors.knots(found.lag), regressors.slope(found)
-    step = max(0.05 * found.lag, 0.5 * float(np.median(np.diff(path.sample))) / regressors.rate)
-    by_lag = slope * (regressors.knots(found.lag + step) - knots) / step
-    columns = regressors.columns(found.lag)
+    knots, slope = regressors.knots(regression.lag), regressors.slope(regression)
+    step = max(
+        0.05 * regression.lag, 0.5 * float(np.median(np.diff(path.sample))) / regressors.rate
+    )
+    by_lag = slope * (regressors.knots(regression.lag + step) - knots) / step
+    columns = regressors.columns(regression.lag)
     columns.extend(regressors.coefficients.of_knots(path, [by_lag]))
     full = np.zeros(len(regressors.used))
     full[regressors.used] = weights
@@ -67,7 +69,7 @@ def path_errors(regressors: Regressors, found: Regression, weights: Array) -> Pa
     # A lag that the log hardly tells must not carry the error of the path away.
     inverse = np.linalg.inv(information / np.outer(scale, scale) + 1e-6 * np.eye(len(scale)))
     errors = [
-        slope * lagged_path(path, draw - path.value, regressors.rate, found.lag)
+        slope * lagged_path(path, draw - path.value, regressors.rate, regression.lag)
         for draw in path.draws
     ]
     moved, density = [], np.zeros(len(full))
@@ -115,23 +117,23 @@ def without_errors(
     D. A. Harville, "Maximum likelihood approaches to variance component estimation", J. Am. Stat.
     Assoc. 72, 1977.
     """
-    fitted, added = left.taken(used), errors[used]
+    fitted, added = left.select(used), errors[used]
     density = whittle.density(whittle.of(fitted).maximum(terms))
     if not (added * np.sqrt(fitted.ordinates) > _NEGLIGIBLE * density).any():
         return left
-    known = np.ones(len(added))
+    part_of_noise = np.ones(len(added))
     for _ in range(_MOST_ROUNDS):
-        before, known = known, np.maximum(density / (density + added), _LEAST_KNOWN)
-        if np.abs(known - before).max() < _SETTLED:
+        before, part_of_noise = part_of_noise, np.maximum(density / (density + added), _LEAST_KNOWN)
+        if np.abs(part_of_noise - before).max() < _SETTLED:
             break
-        own = whittle.of(_known(fitted, known))
+        own = whittle.of(_of_noise(fitted, part_of_noise))
         density = own.density(own.maximum(terms))
     everywhere = np.ones(len(used))
-    everywhere[used] = known
-    return _known(left, everywhere)
+    everywhere[used] = part_of_noise
+    return _of_noise(left, everywhere)
 
 
-def _known(spectrum: Spectrum, part: Array) -> Spectrum:
+def _of_noise(spectrum: Spectrum, part: Array) -> Spectrum:
     """Return the spectrum of noise that makes up a part of each bin's power."""
     return replace(
         spectrum,

@@ -286,7 +286,7 @@ def _joined(x: float, s: float, a: float, b: float, c: float, future: Array) -> 
 
 
 @njit(cache=True)
-def drawn(
+def draw_paths(
     steps: Array, q: float, spread: float, precision: Array, shift: Array, normals: Array
 ) -> Array:
     """Return draws of the path from its Gaussian posterior: filter forwards, sample backwards.

@@ -78,9 +78,8 @@ class BlockSeries:
     def centres(self) -> list[Array]:
         """Middle of each block of those parts, samples."""
         return [
-            np.asarray(start + (np.arange(len(sums)) + 0.5) * self.block - 0.5, dtype=np.float64)
-            for sums, (start, _) in zip(self._sums, self.segments, strict=True)
-            if len(sums) >= 2
+            np.asarray(first + (np.arange(count) + 0.5) * block - 0.5, dtype=np.float64)
+            for first, block, count in self.places
         ]
 
 
@@ -120,8 +119,8 @@ class Coefficients:
         lengths = [len(means) for means in series.means]
         f = np.concatenate([np.arange(1, n) / (2.0 * n * self._interval) for n in lengths])
         highest = BLOCK_BAND if series.block > 1 else np.inf
-        kept = np.flatnonzero(2.0 * np.pi * f * self._interval <= highest)
-        self._kept = kept[np.argsort(f[kept], kind="stable")]
+        low_ordinates = np.flatnonzero(2.0 * np.pi * f * self._interval <= highest)
+        self._order = low_ordinates[np.argsort(f[low_ordinates], kind="stable")]
         self._edges = np.concatenate(([0], np.cumsum(counts)[:-1]))
         self._counts = counts
         self.ordinates = spectrum.ordinates
@@ -134,7 +133,7 @@ class Coefficients:
             )[..., 1:]
             for values in parts
         ]
-        return np.asarray(np.concatenate(transformed, axis=-1)[..., self._kept])
+        return np.asarray(np.concatenate(transformed, axis=-1)[..., self._order])
 
     def of_knots(self, path: TemperaturePath, values: Sequence[Array]) -> Array:
         """Return the coefficients of regressors that are linear between knots.

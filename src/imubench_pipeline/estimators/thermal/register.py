@@ -3,10 +3,10 @@
 A temperature varies slowly. It is kept in blocks, at most `KNOTS` in a log: blocks of one sample
 where the log is no longer, else of ceil(L / KNOTS) samples.
 
-Where a temperature jumps the smooth path of its readings begins anew (`at_jumps`). A chamber that
-is set to another temperature, or a sensor that is carried out, changes within a few samples by far
-more than in the minutes around. One smooth path through that would have to be rough everywhere, and
-would say of the levels between the jumps that they are known all too well.
+Where a temperature jumps the smooth path of its readings begins anew (`cut_at_jumps`). A chamber
+that is set to another temperature, or a sensor that is carried out, changes within a few samples by
+far more than in the minutes around. One smooth path through that would have to be rough everywhere,
+and would say of the levels between the jumps that they are known all too well.
 
 Long times in one cell of the register leave more open than others (`dwells`). A path that wanders
 as it does elsewhere would have left the cell: while it stays there, it moves less, and may as well
@@ -46,7 +46,6 @@ _BY_CHANCE = 1e-3
 
 _ROUNDED = 0.2
 """Part of a step by which readings in decimals may miss its multiples."""
-
 
 _STEPS = 1.5
 """Least significant bits that a jump is at least."""
@@ -215,7 +214,7 @@ def _common_divisor(gaps: Array) -> float:
     )
 
 
-def at_jumps(read: Readings) -> Readings:
+def cut_at_jumps(read: Readings) -> Readings:
     """Return readings with the blocks cut where the temperature jumps, and a piece between jumps.
 
     The sample of a jump follows from the mean of the block that it falls into. A single sample
@@ -232,14 +231,14 @@ def at_jumps(read: Readings) -> Readings:
     columns: list[Array] = []
     pieces: list[slice] = []
     places: list[slice] = []
-    done = 0
+    blocks_before = 0
     for part, jumps in zip(read.parts, parts, strict=True):
-        found, cuts = _cut(read, part, jumps)
-        columns.append(found)
-        ends = [0, *cuts, found.shape[1]]
-        places.append(slice(done, done + found.shape[1]))
-        pieces += [slice(done + a, done + b) for a, b in pairwise(ends)]
-        done += found.shape[1]
+        blocks, cuts = _cut(read, part, jumps)
+        columns.append(blocks)
+        ends = [0, *cuts, blocks.shape[1]]
+        places.append(slice(blocks_before, blocks_before + blocks.shape[1]))
+        pieces += [slice(blocks_before + a, blocks_before + b) for a, b in pairwise(ends)]
+        blocks_before += blocks.shape[1]
     begin, end, count, mean, low, high = np.concatenate(columns, axis=1)
     return replace(
         read,

@@ -89,7 +89,7 @@ class Regressors:
         self.coefficients, self.path, self.rate = coefficients, path, rate
         self.reference, self.used = reference, used
         self.quadratic, self.ramp, self.settling = quadratic, ramp, settling
-        self._known: dict[float, Products] = {}
+        self._products: dict[float, Products] = {}
         self._time = coefficients.of_time(rate)
         # With the ramp and in all bins, for `also` to share: the transforms are the costly part.
         self._full: dict[tuple[float, bool, float], Products] = {}
@@ -117,7 +117,7 @@ class Regressors:
         other.quadratic = self.quadratic if quadratic is None else quadratic
         other.ramp = self.ramp if ramp is None else ramp
         other.settling = self.settling if settling is None else settling
-        other._known = {}
+        other._products = {}
         other.ordinates = self.coefficients.ordinates[other.used]
         return other
 
@@ -141,12 +141,12 @@ class Regressors:
         """
         return lagged_path(self.path, self.path.value, self.rate, lag) - self.reference
 
-    def effect(self, found: Regression) -> Array:
+    def effect(self, regression: Regression) -> Array:
         """Return what temperature adds to the log, at the knots of the path.
 
         Parameters
         ----------
-        found : Regression
+        regression : Regression
             Of these regressors.
 
         Returns
@@ -154,8 +154,8 @@ class Regressors:
         ndarray, shape (k,)
             rad/s or m/s².
         """
-        of_knots = self._of(self.knots(found.lag))
-        return np.asarray(np.einsum("i,ik->k", found.beta[: self.thermal], np.array(of_knots)))
+        of_knots = self._of(self.knots(regression.lag))
+        return np.asarray(np.einsum("i,ik->k", regression.beta[: self.thermal], np.array(of_knots)))
 
     def _of(self, knots: Array) -> list[Array]:
         """Return the regressors of temperature at the knots."""
@@ -166,22 +166,22 @@ class Regressors:
             terms.append(np.where(np.arange(len(knots)) < end, knots - settled, 0.0))
         return terms
 
-    def slope(self, found: Regression) -> Array:
+    def slope(self, regression: Regression) -> Array:
         """Return how what temperature adds to the log changes with it, at the knots of the path.
 
-        `found`: as of `effect`.
+        `regression`: as of `effect`.
 
         Returns
         -------
         ndarray, shape (k,)
             SI per K.
         """
-        knots = self.knots(found.lag)
-        slope = np.full(len(knots), found.beta[0])
+        knots = self.knots(regression.lag)
+        slope = np.full(len(knots), regression.beta[0])
         if self.quadratic:
-            slope += 2.0 * found.beta[1] * knots
+            slope += 2.0 * regression.beta[1] * knots
         if self.settling > 0.0:
-            slope[: self._settled_from()] += found.beta[self.thermal - 1]
+            slope[: self._settled_from()] += regression.beta[self.thermal - 1]
         return slope
 
     def _settled_from(self) -> int:
@@ -222,14 +222,14 @@ class Regressors:
         lags : sequence of float
             s.
         """
-        new = [float(lag) for lag in lags if self._key(float(lag)) not in self._full]
-        for first in range(0, len(new), _TOGETHER):
-            some = new[first : first + _TOGETHER]
-            terms = [term for lag in some for term in self._of(self.knots(lag))]
+        lags_to_do = [float(lag) for lag in lags if self._key(float(lag)) not in self._full]
+        for first in range(0, len(lags_to_do), _TOGETHER):
+            batch = lags_to_do[first : first + _TOGETHER]
+            terms = [term for lag in batch for term in self._of(self.knots(lag))]
             columns = self.coefficients.of_knots(self.path, terms).reshape(
-                len(some), self.thermal, -1
+                len(batch), self.thermal, -1
             )
-            for lag, own in zip(some, columns, strict=True):
+            for lag, own in zip(batch, columns, strict=True):
                 self._full[self._key(lag)] = self.coefficients.products([*own, self._time])
 
     def _key(self, lag: float) -> tuple[float, bool, float]:
@@ -240,12 +240,12 @@ class Regressors:
 
         `lag`: as of `knots`.
         """
-        if lag not in self._known:
+        if lag not in self._products:
             self.prepare([lag])
-            full, kept = self._full[self._key(lag)], slice(None if self.ramp else self.thermal)
-            cross, gram = full.cross[self.used, kept], full.gram[self.used, kept, kept]
-            self._known[lag] = Products(cross, gram)
-        return self._known[lag]
+            full, own = self._full[self._key(lag)], slice(None if self.ramp else self.thermal)
+            cross, gram = full.cross[self.used, own], full.gram[self.used, own, own]
+            self._products[lag] = Products(cross, gram)
+        return self._products[lag]
 
     def at(self, lag: float, weights: Array) -> Regression:
         """Return the fit at a lag.
@@ -311,7 +311,7 @@ class Regressors:
         other = self.at(float(polished.x), weights)
         return other if other.log_likelihood_gain > best.log_likelihood_gain + 1e-9 else best
 
-    def without(self, spectrum: Spectrum, found: Regression, weights: Array) -> Spectrum:
+    def without(self, spectrum: Spectrum, regression: Regression, weights: Array) -> Spectrum:
         """Return the spectrum (of the bins used) less what temperature explains.
 
         The degrees of freedom that the fit takes from a bin are taken from its ordinates, so
@@ -321,20 +321,22 @@ class Regressors:
         ----------
         spectrum : Spectrum
             Of the bins used.
-        found : Regression
+        regression : Regression
             Of these regressors.
         weights : ndarray, shape (b,)
             As for `at`: those that the fit was made with.
         """
-        products = self.products(found.lag)
+        products = self.products(regression.lag)
         p = self.thermal
-        beta, cross, gram = found.beta[:p], products.cross[:, :p], products.gram[:, :p, :p]
+        beta, cross, gram = regression.beta[:p], products.cross[:, :p], products.gram[:, :p, :p]
         left = spectrum.density - 2.0 * cross @ beta + np.einsum("i,bij,j->b", beta, gram, beta)
-        taken = weights * np.einsum("bij,ij->b", gram, np.linalg.inv(found.information[:p, :p]))
-        ordinates = np.maximum(
-            spectrum.ordinates - np.minimum(taken, 1.0), _LEAST_ORDINATES * spectrum.ordinates
+        degrees = weights * np.einsum(
+            "bij,ij->b", gram, np.linalg.inv(regression.information[:p, :p])
         )
-        with_time = self.also(ramp=True).products(found.lag) if not self.ramp else products
+        ordinates = np.maximum(
+            spectrum.ordinates - np.minimum(degrees, 1.0), _LEAST_ORDINATES * spectrum.ordinates
+        )
+        with_time = self.also(ramp=True).products(regression.lag) if not self.ramp else products
         return replace(
             spectrum,
             ordinates=ordinates,

@@ -9,14 +9,14 @@ import numpy as np
 
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.likelihood import Likelihood
-from imubench_pipeline.estimators.missing import block_means, filled, slow_part
+from imubench_pipeline.estimators.missing import block_means, fill_missing, slow_part
 from imubench_pipeline.estimators.thermal.path import TemperaturePath
 from imubench_pipeline.estimators.thermal.register import Span
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
 
-def shifted(
+def shift_by_effect(
     blocks: Iterable[Array], path: TemperaturePath, effect: Array, sign: float
 ) -> Iterator[Array]:
     """Yield the blocks of a log with what temperature adds to it, put in or taken out.
@@ -43,7 +43,7 @@ def shifted(
         reached += len(values)
 
 
-def complete(
+def complete_log(
     blocks: Callable[[], Iterable[Array]],
     spans: Sequence[Span],
     model: NoiseModel,
@@ -60,7 +60,7 @@ def complete(
         Gives the log in order, SI, as often as it is called; NaN where a sample is missing.
     spans : sequence of (int, int)
         First and one-past-last sample of each part whose holes can be filled
-        (`imubench_pipeline.estimators.missing.divided`).
+        (`imubench_pipeline.estimators.missing.divide_at_holes`).
     model : NoiseModel
         Of what temperature leaves.
     path : TemperaturePath
@@ -75,10 +75,10 @@ def complete(
     iterator of ndarray
         The blocks, SI.
     """
-    means = block_means(shifted(blocks(), path, effect, -1.0), spans)
+    means = block_means(shift_by_effect(blocks(), path, effect, -1.0), spans)
     slow = slow_part(means, spans, model, rate, rng)
-    without = shifted(blocks(), path, effect, -1.0)
-    return shifted(filled(without, slow, model, rate, rng), path, effect, 1.0)
+    without = shift_by_effect(blocks(), path, effect, -1.0)
+    return shift_by_effect(fill_missing(without, slow, model, rate, rng), path, effect, 1.0)
 
 
 @dataclass(frozen=True)
@@ -135,4 +135,4 @@ class ThermalFit:
         iterator of ndarray
             SI, in the shape of each block.
         """
-        return shifted(blocks, self.path, self.effect, -1.0)
+        return shift_by_effect(blocks, self.path, self.effect, -1.0)

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from imubench_pipeline.estimators.estimate import Parameter
+from imubench_pipeline.estimators.estimate import SIGMAS, Parameter
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.posterior import sample
 from imubench_pipeline.estimators.spectrum import Spectrum
@@ -50,7 +50,6 @@ _AS_SHORT = 1.02
 """Width of the interval from 0 over that of the shortest, up to which it is that from 0: draws are
 uneven."""
 
-
 _UPPER_OF_RMS = 2.24
 """The 97.5 % limit of the size of a normal variate, over its standard deviation."""
 
@@ -81,7 +80,7 @@ class Verdict:
 
 def judge(
     regressors: Regressors,
-    found: Regression,
+    regression: Regression,
     whittle: Whittle,
     candidates: Sequence[Candidate],
     lags: Array,
@@ -94,7 +93,7 @@ def judge(
     Parameters
     ----------
     regressors : Regressors
-    found : Regression
+    regression : Regression
     whittle : Whittle
         Of what temperature leaves.
     candidates : sequence of Candidate
@@ -105,19 +104,19 @@ def judge(
         BIC of the best noise without temperature, less that of the fit.
     rng : numpy.random.Generator
     """
-    weights = whittle.spectrum.ordinates / whittle.density(candidates[0].found)
+    weights = whittle.spectrum.ordinates / whittle.density(candidates[0].maximum)
     p = regressors.thermal
-    errors = path_errors(regressors, found, weights)
+    errors = path_errors(regressors, regression, weights)
     fine = _fine(regressors, weights, lags)
     betas, drawn_lags = _drawn(regressors, whittle, candidates, fine, rng)
     moved = np.sqrt(np.mean(errors.moved**2, axis=0))
     extra = rng.standard_normal((len(betas), 1)) * moved[None, :]
     betas, drawn_lags = betas[:, :p] + extra[:, :p], np.maximum(drawn_lags + extra[:, p], 0.0)
     lower, upper = np.quantile(betas, [0.025, 0.975], axis=0)
-    lower, upper = np.minimum(lower, found.beta[:p]), np.maximum(upper, found.beta[:p])
-    at_mean = regressors.means(found.lag)
+    lower, upper = np.minimum(lower, regression.beta[:p]), np.maximum(upper, regression.beta[:p])
+    at_mean = regressors.means(regression.lag)
     excluded = any(lower[i] > 0.0 or upper[i] < 0.0 for i in range(1 + regressors.quadratic))
-    confused = _confused(regressors, found, weights, excluded)
+    confused = _confused(regressors, regression, weights, excluded)
     compensated = excluded and confused is None and gained > _FAVOURED
     reason = confused or _reason(excluded, gained)
     if regressors.settling > 0.0:
@@ -125,14 +124,14 @@ def judge(
             f"; the first {regressors.settling:.0f} s follow it otherwise and do not count for the "
             "sensitivity"
         )
-    s = _parameter(float(found.beta[0]), float(lower[0]), float(upper[0]), confused)
+    s = _parameter(float(regression.beta[0]), float(lower[0]), float(upper[0]), confused)
     q = Parameter(None, "absent", "the data do not ask for it")
     if regressors.quadratic:
-        q = _parameter(float(found.beta[1]), float(lower[1]), float(upper[1]), confused)
+        q = _parameter(float(regression.beta[1]), float(lower[1]), float(upper[1]), confused)
     return Verdict(
         s,
         q,
-        told_lag(found.lag, drawn_lags, float(lags[-1]), compensated),
+        lag_parameter(regression.lag, drawn_lags, float(lags[-1]), compensated),
         compensated,
         reason,
         float(np.std(betas @ at_mean)),
@@ -154,7 +153,7 @@ def _parameter(value: float, lower: float, upper: float, confused: str | None) -
     return Parameter(value, "ok", None, lower, upper)
 
 
-def told_lag(value: float, draws: Array, longest: float, compensated: bool) -> Parameter:
+def lag_parameter(value: float, draws: Array, longest: float, compensated: bool) -> Parameter:
     """Return the lag as it is told, with the shortest interval that holds 95 % of its draws.
 
     Equal tails would leave out a lag of 0 in every other log that has none.
@@ -199,10 +198,10 @@ def _shortest(draws: Array) -> tuple[float, float]:
 
 
 def _confused(
-    regressors: Regressors, found: Regression, weights: Array, excluded: bool
+    regressors: Regressors, regression: Regression, weights: Array, excluded: bool
 ) -> str | None:
     """Return why temperature and time cannot be told apart, or None where they can."""
-    both = regressors.also(ramp=True).at(found.lag, weights)
+    both = regressors.also(ramp=True).at(regression.lag, weights)
     of_s, of_time = both.information[0, 0], both.information[-1, -1]
     shared = both.information[0, -1] ** 2 / (of_s * of_time)
     if shared > _AS_TIME:
@@ -213,9 +212,9 @@ def _confused(
     value = regressors.path.value
     if abs(value[-1] - value[0]) > _MONOTONE * regressors.path.range:
         z = both.beta[0] / math.sqrt(both.covariance[0, 0])
-        if excluded and abs(z) < 1.96:
+        if excluded and abs(z) < SIGMAS:
             return "the temperature only rises or falls, and a drift with time explains as much"
-    if not excluded and _explained(regressors, found) > _EXPLAINED:
+    if not excluded and _explained(regressors, regression) > _EXPLAINED:
         return (
             "temperature follows most of the slow drift, but a random walk as strong as the "
             "log's own would do so by chance"
@@ -223,9 +222,9 @@ def _confused(
     return None
 
 
-def _explained(regressors: Regressors, found: Regression) -> float:
+def _explained(regressors: Regressors, regression: Regression) -> float:
     """Return the part of the drift, at the frequencies of the temperature, that it follows."""
-    products = regressors.products(found.lag)
+    products = regressors.products(regression.lag)
     plain = regressors.coefficients.density()[regressors.used]
     nu = regressors.ordinates
     power = nu * products.gram[:, 0, 0]
@@ -264,12 +263,10 @@ def shares(candidates: Sequence[Candidate]) -> list[tuple[Candidate, float]]:
     alike = {
         place: c.share
         for place, c in enumerate(candidates)
-        if c is chosen or (c.share >= _LEAST_SHARE and not c.found.terms.ramp)
+        if c is chosen or (c.share >= _LEAST_SHARE and not c.terms.ramp)
     }
     walks = (
-        place
-        for place, c in enumerate(candidates)
-        if "K" in c.found.terms.linear and not c.found.terms.ramp
+        place for place, c in enumerate(candidates) if "K" in c.terms.linear and not c.terms.ramp
     )
     walk = next(walks, None)
     if walk is not None:
@@ -290,13 +287,13 @@ def _drawn(
     """Return draws of beta (d, p) and of the lag (d,)."""
     alike = shares(candidates)
     regressors.prepare(lags)
-    everything = [regressors.products(float(lag)) for lag in lags]
-    cross = np.array([products.cross for products in everything])
-    gram = np.array([products.gram for products in everything])
+    products_of_lags = [regressors.products(float(lag)) for lag in lags]
+    cross = np.array([products.cross for products in products_of_lags])
+    gram = np.array([products.gram for products in products_of_lags])
     betas, chosen_lags = [], []
     for candidate, share in alike:
         number = max(8, round(_NOISES * share))
-        densities = _densities(whittle, candidate.found, number, rng)
+        densities = _densities(whittle, candidate.maximum, number, rng)
         weights = regressors.ordinates / densities
         information = np.einsum("db,lbij->dlij", weights, gram, optimize=True)
         information += (
@@ -319,13 +316,13 @@ def _drawn(
     return np.concatenate(betas), np.concatenate(chosen_lags)
 
 
-def _densities(whittle: Whittle, found: Maximum, number: int, rng: np.random.Generator) -> Array:
+def _densities(whittle: Whittle, maximum: Maximum, number: int, rng: np.random.Generator) -> Array:
     """Return densities of the noise drawn from its posterior, shape (number, b)."""
-    posterior = sample(whittle, found, rng, 8 * number)
+    posterior = sample(whittle, maximum, rng, 8 * number)
     rows = []
     for row in range(0, 8 * number, 8):
         powers, times = posterior.parameters[row] ** 2, posterior.times[row]
-        rows.append(whittle.matrix(found.terms, times) @ powers)
+        rows.append(whittle.matrix(maximum.terms, times) @ powers)
     return np.array(rows)
 
 

@@ -91,8 +91,8 @@ def simulate_triad(
         )
         for (model, bias), stream in zip(triad.axes, rng.spawn(6), strict=True)
     ]
-    errors = np.stack([one.means for one in drawn], axis=2)
-    drift = np.stack([one.drift for one in drawn], axis=2)
+    errors = np.stack([runs_of_axis.means for runs_of_axis in drawn], axis=2)
+    drift = np.stack([runs_of_axis.drift for runs_of_axis in drawn], axis=2)
     return TriadRuns(errors + true_means(positions, site, attitude), drift)
 
 

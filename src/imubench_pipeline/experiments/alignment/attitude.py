@@ -101,12 +101,12 @@ def rotation(vector: ArrayLike) -> Array:
     angle = np.linalg.norm(v, axis=-1)[..., None, None]
     across = cross_matrix(v)
     # sin(x)/x and (1 - cos(x))/x^2 = sinc^2(x/2)/2, which keep their digits towards 0.
-    one = np.sinc(angle / np.pi)
-    two = 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2
-    return np.asarray(np.eye(3) + one * across + two * across @ across)
+    sine_part = np.sinc(angle / np.pi)
+    cosine_part = 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2
+    return np.asarray(np.eye(3) + sine_part * across + cosine_part * across @ across)
 
 
-def corrected(attitude: Array, psi: Array) -> Array:
+def correct(attitude: Array, psi: Array) -> Array:
     """Return an attitude from which an error is taken off.
 
     Parameters

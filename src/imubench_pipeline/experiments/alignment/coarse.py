@@ -124,15 +124,15 @@ def _weights(positions: Positions) -> Array:
     """Return the weight of each block, whose sum is 1: samples present, dwells alike."""
     blocks = positions.blocks
     of_dwell = np.bincount(blocks.dwell, weights=blocks.count)
-    there = np.count_nonzero(of_dwell)
-    return np.asarray(blocks.count / of_dwell[blocks.dwell] / there)
+    dwells_with_samples = np.count_nonzero(of_dwell)
+    return np.asarray(blocks.count / of_dwell[blocks.dwell] / dwells_with_samples)
 
 
 def _frame(first: Array, second: Array) -> Array:
     """Return unit columns: the first, the normal of both, and what is across these."""
-    one = _unit(first)
-    two = _unit(np.cross(first, second))
-    return np.stack([one, two, np.cross(one, two)], axis=-1)
+    along = _unit(first)
+    normal = _unit(np.cross(first, second))
+    return np.stack([along, normal, np.cross(along, normal)], axis=-1)
 
 
 def _unit(vector: Array) -> Array:

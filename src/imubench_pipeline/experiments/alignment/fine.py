@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from imubench_pipeline.experiments.alignment.attitude import (
-    corrected,
+    correct,
     cross_matrix,
     of_euler_angles,
 )
@@ -167,7 +167,7 @@ class FineAlignment:
         psi = states[:, :, :3]
         white = np.linalg.solve(self._filter.innovation_roots, innovations[..., None])[..., 0]
         return Aligned(
-            corrected(attitudes, psi[:, -1]), psi, states[:, :, -6:], np.sum(white**2, axis=2)
+            correct(attitudes, psi[:, -1]), psi, states[:, :, -6:], np.sum(white**2, axis=2)
         )
 
     @property

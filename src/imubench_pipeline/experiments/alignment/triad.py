@@ -113,8 +113,8 @@ class Triad:
     @property
     def axes(self) -> list[tuple[NoiseModel, float]]:
         """Noise and deviation of the fixed bias of gyros x, y, z and accelerometers x, y, z."""
-        return [(one, self.gyro_bias) for one in self.gyros] + [
-            (one, self.accelerometer_bias) for one in self.accelerometers
+        return [(model, self.gyro_bias) for model in self.gyros] + [
+            (model, self.accelerometer_bias) for model in self.accelerometers
         ]
 
 

@@ -292,7 +292,7 @@ class RateTable:
         if self._each is None:
             return None
         each = self._each.fit(means)
-        more = np.maximum(line.chi_squared - each.chi_squared, 0.0)
+        explained = np.maximum(line.chi_squared - each.chi_squared, 0.0)
         at_rates = np.column_stack([np.ones(len(self._rates)), self._rates])
         # The line is fitted to the same means: what it takes of their noise is no deviation.
         variance = np.diag(each.covariance - at_rates @ line.covariance @ at_rates.T)
@@ -301,7 +301,7 @@ class RateTable:
             (each.value - line.value @ at_rates.T) / full_scale,
             np.sqrt(np.maximum(variance, 0.0)) / full_scale,
             full_scale,
-            np.asarray(chi2.sf(more, line.freedom - each.freedom)),
+            np.asarray(chi2.sf(explained, line.freedom - each.freedom)),
         )
 
     def _fraction(self, means: Array) -> Term | None:

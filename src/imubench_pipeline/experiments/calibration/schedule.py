@@ -83,13 +83,7 @@ class Schedule:
 
     @classmethod
     def from_column(
-        cls,
-        column: Array,
-        rate: float,
-        *,
-        tolerance: float,
-        shortest: float,
-        settling: float = 0.0,
+        cls, column: Array, rate: float, *, tolerance: float, shortest: float, settling: float = 0.0
     ) -> Schedule:
         """Find the steady rates in a column with the table's rate.
 

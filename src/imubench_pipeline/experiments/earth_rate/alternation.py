@@ -59,9 +59,9 @@ def differences(
         Variance of the means of the dwells from the noise of the blocks alone, (rad/s)^2.
     """
     total = np.concatenate(([0.0], np.cumsum(calm_means(blocks))))
-    there = np.concatenate(([0], np.cumsum(blocks.there)))
+    present = np.concatenate(([0], np.cumsum(blocks.present)))
     edges = np.clip(np.rint(np.asarray(stretches) / blocks.length), 0, len(blocks.z)).astype(int)
-    count = there[edges[:, 1]] - there[edges[:, 0]]
+    count = present[edges[:, 1]] - present[edges[:, 0]]
     has = count > 0
     mean = (total[edges[:, 1]] - total[edges[:, 0]]) / np.maximum(count, 1)
     mean[~has] = np.nan
@@ -85,15 +85,15 @@ def alternation(blocks: LevelBlocks, stretches: Sequence[tuple[float, float]]) -
 
 
 def _mean(difference: Array, white: Array) -> Alternation:
-    there = np.isfinite(difference)
-    if not there.any():
+    finite = np.isfinite(difference)
+    if not finite.any():
         return Alternation(0.0, math.inf)
-    n = int(there.sum())
+    n = int(finite.sum())
     # Where dwells have no samples, few of the others are in a difference.
     variance = float(np.nanmean(white)) / min(len(white), n + 2)
     if n > 2:
-        variance = max(variance, _WHITE * float(np.var(difference[there], ddof=1)) / (n + 2))
-    return Alternation(float(difference[there].mean()), math.sqrt(variance))
+        variance = max(variance, _WHITE * float(np.var(difference[finite], ddof=1)) / (n + 2))
+    return Alternation(float(difference[finite].mean()), math.sqrt(variance))
 
 
 def contradiction(blocks: LevelBlocks, stretches: Sequence[tuple[float, float]]) -> int | None:
@@ -145,12 +145,14 @@ def best_shift(
         Alternation in standard errors with it, and without.
     """
     shifts = np.arange(-math.floor(longest / 0.5), math.floor(longest / 0.5) + 1) * 0.5
-    found = []
+    alternations = []
     for shift in shifts:
         moved = turns + shift
         moved = moved[(moved > half_width) & (moved < duration - half_width)]
-        found.append(alternation(blocks, between(moved, half_width, duration)))
-    z = np.array([one.value for one in found]) / np.median([one.sigma for one in found])
+        alternations.append(alternation(blocks, between(moved, half_width, duration)))
+    z = np.array([shifted.value for shifted in alternations]) / np.median(
+        [shifted.sigma for shifted in alternations]
+    )
     best = int(np.argmax(np.abs(z)))
     return float(shifts[best]), float(z[best]), float(z[shifts == 0.0][0])
 

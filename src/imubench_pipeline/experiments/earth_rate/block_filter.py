@@ -95,12 +95,12 @@ class BlockFilter:
         b, _, n = self._seen.shape
         states = np.empty((len(means), b, n))
         innovations = np.empty_like(means)
-        here = np.zeros((len(means), n))
+        state = np.zeros((len(means), n))
         for k in range(b):
-            here = here @ self.matrices(k)[0].T
-            innovations[:, k] = means[:, k] - here @ self._seen[k].T
-            here = here + innovations[:, k] @ self.gains[k].T
-            states[:, k] = here
+            state = state @ self.matrices(k)[0].T
+            innovations[:, k] = means[:, k] - state @ self._seen[k].T
+            state = state + innovations[:, k] @ self.gains[k].T
+            states[:, k] = state
         return states, innovations
 
     def _matrix(

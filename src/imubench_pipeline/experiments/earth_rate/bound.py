@@ -10,7 +10,7 @@ It uses nothing of the filter. White noise alone gives N / sqrt(T) / cos(latitud
 dwells, where the bias is known; all else only adds to it.
 
 Block means are made independent in a time that grows with their number and not with its cube
-(`whitened`). What `covariance.of_means` and a Cholesky root do for any blocks, the innovations of a
+(`whiten`). What `covariance.of_means` and a Cholesky root do for any blocks, the innovations of a
 Kalman filter do for those whose noise has states: divided by their standard deviations they are
 L^-1 y, L the root of the same covariance (R. E. Kalman 1960). The covariance is closed form against
 states; they are checked against each other.
@@ -41,7 +41,7 @@ MOST_BLOCKS = 2048
 """Blocks whose covariance is still formed."""
 
 
-def whitened(model: NoiseModel, blocks: Blocks, columns: Array) -> Array:
+def whiten(model: NoiseModel, blocks: Blocks, columns: Array) -> Array:
     """Return L^-1 columns, L L^T the covariance of the block means of a noise model.
 
     Parameters
@@ -60,13 +60,13 @@ def whitened(model: NoiseModel, blocks: Blocks, columns: Array) -> Array:
     ValueError
         If a mean has no noise, given those before it.
     """
-    known = block_states(model, blocks, turn_on_bias=0.0)
+    states = block_states(model, blocks, turn_on_bias=0.0)
     innovations = _innovations(
-        np.stack([step.transition for step in known.steps]),
-        np.stack([step.factor @ step.factor.T for step in known.steps]),
-        known.which,
-        known.initial @ known.initial.T,
-        known.white**2,
+        np.stack([step.transition for step in states.steps]),
+        np.stack([step.factor @ step.factor.T for step in states.steps]),
+        states.which,
+        states.initial @ states.initial.T,
+        states.white**2,
         np.ascontiguousarray(columns),
     )
     if not np.isfinite(innovations).all():
@@ -167,7 +167,7 @@ def information_by_states(blocks: Blocks, model: NoiseModel, turn_on_bias: float
     ndarray, shape (n,)
         Of the data up to each block, 1/(rad/s)².
     """
-    return _of_rate(whitened(model, blocks, _seen(blocks)), turn_on_bias)
+    return _of_rate(whiten(model, blocks, _seen(blocks)), turn_on_bias)
 
 
 def _seen(blocks: Blocks) -> Array:

@@ -36,7 +36,6 @@ METHODS = ("pairs", "triples", "filter", "smoother", "known_rate")
 
 _KEPT = 400
 
-
 Range = dict[str, float]
 
 
@@ -101,7 +100,7 @@ def white_sigma(model: NoiseModel, blocks: Blocks) -> float:
     return model.N / math.sqrt(blocks.time_in_blocks) / math.cos(blocks.latitude)
 
 
-def estimated(
+def estimate_courses(
     log: Array,
     experiment: Experiment,
     model: NoiseModel,
@@ -137,36 +136,28 @@ def estimated(
     measured = block_means([log], experiment, longest)
     blocks, means = measured.blocks, measured.means
     first = blocks.start[0] / blocks.rate
-    one = RateFilter(blocks, model, turn_on_bias=WIDE if turn_on_bias is None else turn_on_bias)
-    filtered = one.run(means)
-    smoothed = one.smooth(filtered)
+    rate_filter = RateFilter(
+        blocks, model, turn_on_bias=WIDE if turn_on_bias is None else turn_on_bias
+    )
+    filtered = rate_filter.run(means)
+    smoothed = rate_filter.smooth(filtered)
     # Before the second position is seen the rate is not told from the bias.
-    known = slice(int(np.argmax(blocks.sense != blocks.sense[0])), None)
+    from_second = slice(int(np.argmax(blocks.sense != blocks.sense[0])), None)
     whole = np.array([first, first + blocks.duration])
     courses = (
         _differences("pairs", blocks, lambda: by_pairs(means, blocks, model)),
         _differences("triples", blocks, lambda: by_triples(means, blocks, model)),
         Course(
             "filter",
-            first + filtered.time[known],
-            filtered.rate[0, known],
-            filtered.rate_sigma[known],
+            first + filtered.time[from_second],
+            filtered.rate[0, from_second],
+            filtered.rate_sigma[from_second],
         ),
-        Course(
-            "smoother",
-            whole,
-            np.full(2, smoothed.rate[0]),
-            np.full(2, smoothed.rate_sigma),
-        ),
+        Course("smoother", whole, np.full(2, smoothed.rate[0]), np.full(2, smoothed.rate_sigma)),
         _tracked(log, experiment, papers),
     )
     return Courses(
-        courses,
-        measured,
-        longest,
-        first + blocks.middle,
-        smoothed.drift[0],
-        smoothed.drift_sigma,
+        courses, measured, longest, first + blocks.middle, smoothed.drift[0], smoothed.drift_sigma
     )
 
 
@@ -187,7 +178,7 @@ def _tracked(log: Array, experiment: Experiment, papers: NoiseModel) -> Course:
     return Course("known_rate", tracked.sample / experiment.rate, tracked.mean, None)
 
 
-def thinned(points: int) -> Iterator[int]:
+def thin(points: int) -> Iterator[int]:
     """Yield places of a course that show it: as many at its begin as later, and its end.
 
     Parameters
@@ -226,15 +217,15 @@ def sigma_ranges(
     """
     if not drawn:
         return {}
-    nothing = np.zeros((1, len(blocks)))
+    zero_means = np.zeros((1, len(blocks)))
     bias = math.inf if turn_on_bias is None else turn_on_bias
 
-    def filtered(one: NoiseModel) -> float:
-        return bound(blocks, one, bias)
+    def filtered(drawn_model: NoiseModel) -> float:
+        return bound(blocks, drawn_model, bias)
 
     methods: dict[str, Callable[[NoiseModel], float]] = {
-        "pairs": lambda one: float(by_pairs(nothing, blocks, one).sigma[-1]),
-        "triples": lambda one: float(by_triples(nothing, blocks, one).sigma[-1]),
+        "pairs": lambda drawn_model: float(by_pairs(zero_means, blocks, drawn_model).sigma[-1]),
+        "triples": lambda drawn_model: float(by_triples(zero_means, blocks, drawn_model).sigma[-1]),
         "filter": filtered,
     }
     ranges: dict[str, Range] = {}

@@ -148,9 +148,9 @@ class Experiment:
         if longest < 1:
             raise ValueError(f"a block of {longest} samples is empty")
         edges = [_edges(dwell, longest) for dwell in self.dwells]
-        number = [len(one) - 1 for one in edges]
-        start = np.concatenate([one[:-1] for one in edges])
-        stop = np.concatenate([one[1:] for one in edges])
+        number = [len(of_dwell) - 1 for of_dwell in edges]
+        start = np.concatenate([of_dwell[:-1] for of_dwell in edges])
+        stop = np.concatenate([of_dwell[1:] for of_dwell in edges])
         sense = np.array([dwell.sense for dwell in self.dwells], dtype=np.float64)
         return Blocks(
             start,

@@ -229,11 +229,7 @@ class RateFilter:
             predicted = filtered.states[:, k] @ transition.T
             states[:, k] += (states[:, k + 1] - predicted) @ gains[k].T
         return Smoothed(
-            states[:, -1, 0],
-            float(self.rate_sigma[-1]),
-            states[:, :, -1],
-            sigma,
-            states,
+            states[:, -1, 0], float(self.rate_sigma[-1]), states[:, :, -1], sigma, states
         )
 
     @cached_property

@@ -104,11 +104,7 @@ def by_triples(means: Array, blocks: Blocks, model: NoiseModel) -> Differences:
             continue
         part = (middle[i] - middle[i - 1]) / (middle[i + 1] - middle[i - 1])
         differences.append(
-            [
-                (i - 1, -sense * (1.0 - part) / 2.0),
-                (i, sense / 2.0),
-                (i + 1, -sense * part / 2.0),
-            ]
+            [(i - 1, -sense * (1.0 - part) / 2.0), (i, sense / 2.0), (i + 1, -sense * part / 2.0)]
         )
     return _estimated(differences, means, blocks, dwells, model, "three dwells of alternate sense")
 

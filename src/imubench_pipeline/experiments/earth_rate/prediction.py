@@ -43,7 +43,6 @@ _CURVE = 40
 _BETWEEN = 15
 """Numbers of dwells about the best of these."""
 
-
 Row = dict[str, Any]
 
 _POINTS = 60
@@ -282,10 +281,10 @@ class Outlook:
         )
 
 
-def _growth(found: Array) -> float:
+def _growth(information: Array) -> float:
     """Return what each of the latter half of the dwells adds on average."""
-    half = len(found) // 2
-    return float(found[-1] - found[-1 - half]) / half
+    half = len(information) // 2
+    return float(information[-1] - information[-1 - half]) / half
 
 
 def prediction_rows(
@@ -337,15 +336,15 @@ def _rows(outlook: Outlook, dwell: float, goals: Sequence[float], run_time: floa
 
 
 def _row(dwell: float, turns: int, time: float, sigma: float) -> Row:
-    known = sigma if math.isfinite(sigma) else None
-    relative = None if known is None else known / EARTH_RATE
+    finite_sigma = sigma if math.isfinite(sigma) else None
+    relative = None if finite_sigma is None else finite_sigma / EARTH_RATE
     # The heading that a gyro across north finds is off by sigma cos(latitude) over what it would
     # see of the Earth's rate, w_ie cos(latitude): `Outlook.heading`.
     return {
         "dwell": dwell,
         "turns": turns,
         "time": time,
-        "sigma": known,
+        "sigma": finite_sigma,
         "relative": relative,
         "heading": relative,
     }

@@ -60,7 +60,7 @@ class RunDesign:
         )
 
 
-def allowed(run: RunDesign, duration: float, model: NoiseModel) -> Row:
+def allowed_sigmas(run: RunDesign, duration: float, model: NoiseModel) -> Row:
     """Return the standard deviations that noise gives the estimates of a run, rad/s.
 
     Parameters
@@ -77,10 +77,10 @@ def allowed(run: RunDesign, duration: float, model: NoiseModel) -> Row:
     """
     design = run.experiment(duration)
     blocks = design.blocks(block_length(design, model))
-    nothing = np.zeros((1, len(blocks)))
+    zero_means = np.zeros((1, len(blocks)))
     return {
         "white": white_sigma(model, blocks),
-        "sigma": float(by_pairs(nothing, blocks, model).sigma[-1]),
+        "sigma": float(by_pairs(zero_means, blocks, model).sigma[-1]),
         "sigma_filter": float(RateFilter(blocks, model).rate_sigma[-1]),
     }
 
@@ -98,7 +98,7 @@ def published_row(value: float, run: RunDesign, duration: float, model: NoiseMod
     model : NoiseModel
         As published.
     """
-    noise = allowed(run, duration, model)
+    noise = allowed_sigmas(run, duration, model)
     off = (value - EARTH_RATE) / noise["sigma"]
     verdict = "within the noise" if abs(off) <= _WITHIN else "beyond the noise"
     return noise | {

@@ -185,7 +185,8 @@ def _filled(
 def _hole(blocks: LevelBlocks, time: float, schedule: TurnSchedule) -> bool:
     """Tell whether the samples are missing where a turn would be."""
     first = max(0, int((time - 0.5 * schedule.turning) / blocks.length))
-    return not blocks.there[first : int((time + 0.5 * schedule.turning) / blocks.length) + 1].any()
+    last = int((time + 0.5 * schedule.turning) / blocks.length)
+    return not blocks.present[first : last + 1].any()
 
 
 def _silent(time: float, schedule: TurnSchedule) -> Turn:
@@ -209,7 +210,7 @@ def _scheduled(
     slots = slots[(slots > half) & (slots < longest)]
     if len(slots) == 0:
         raise ValueError("the schedule has no turn within the log")
-    calm = without(blocks, disturbances([e for e in events if e.kind == "transient"]))
+    calm = leave_out_knocks(blocks, disturbances([e for e in events if e.kind == "transient"]))
     longest_shift = min(schedule.dwell / 3.0, 3.0 * schedule.tolerance)
     shift, z, unshifted = best_shift(
         calm, slots, 0.5 * schedule.turning, longest_shift, schedule.duration
@@ -273,7 +274,7 @@ def disturbances(events: Sequence[Event]) -> list[tuple[float, float]]:
     ]
 
 
-def without(blocks: LevelBlocks, knocks: Sequence[tuple[float, float]]) -> LevelBlocks:
+def leave_out_knocks(blocks: LevelBlocks, knocks: Sequence[tuple[float, float]]) -> LevelBlocks:
     """Return the blocks without those of knocks.
 
     Parameters
@@ -282,7 +283,8 @@ def without(blocks: LevelBlocks, knocks: Sequence[tuple[float, float]]) -> Level
     knocks : sequence of (float, float)
         Start and stop, s.
     """
-    there = blocks.there.copy()
+    present = blocks.present.copy()
     for start, stop in knocks:
-        there[max(0, int(start / blocks.length)) : max(0, math.ceil(stop / blocks.length))] = False
-    return replace(blocks, there=there)
+        first, last = int(start / blocks.length), math.ceil(stop / blocks.length)
+        present[max(0, first) : max(0, last)] = False
+    return replace(blocks, present=present)

@@ -99,16 +99,16 @@ def simulate_runs(
     runs : int
     rng : numpy.random.Generator
     """
-    known = block_states(model, blocks, turn_on_bias)
-    m = len(known.names)
-    here = rng.standard_normal((runs, m)) @ known.initial.T
+    block_model = block_states(model, blocks, turn_on_bias)
+    m = len(block_model.names)
+    state = rng.standard_normal((runs, m)) @ block_model.initial.T
     states, drift = np.empty((runs, len(blocks), m)), np.empty((runs, len(blocks)))
-    for k, which in enumerate(known.which):
-        step = known.steps[which]
-        after = here @ step.transition.T + rng.standard_normal((runs, m + 1)) @ step.factor.T
-        here, drift[:, k] = after[:, :m], after[:, m]
-        states[:, k] = here
-    white = known.white * rng.standard_normal(drift.shape)
+    for k, which in enumerate(block_model.which):
+        step = block_model.steps[which]
+        after = state @ step.transition.T + rng.standard_normal((runs, m + 1)) @ step.factor.T
+        state, drift[:, k] = after[:, :m], after[:, m]
+        states[:, k] = state
+    white = block_model.white * rng.standard_normal(drift.shape)
     return Runs(earth_rate * blocks.seen + drift + white, drift, states)
 
 

@@ -12,13 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 
 from imubench_pipeline.experiments.earth_rate.covariance import longest
 from imubench_pipeline.experiments.earth_rate.experiment import Blocks
 from imubench_pipeline.noise import NoiseModel, Role, Term
 from imubench_pipeline.noise.block_means import of_block_means
-from imubench_pipeline.noise.state_space import StateSpace, repeated, root_of
+from imubench_pipeline.noise.state_space import StateSpace, repeat_step, root_of
 from imubench_pipeline.typing import Array
 
 WIDE = 1.0
@@ -102,7 +101,7 @@ def block_states(model: NoiseModel, blocks: Blocks, turn_on_bias: float = WIDE) 
         names += _names(term, names)
     spaces.append(StateSpace.scalar(1.0, drive, turn_on_bias**2))
     names.append("z_K")
-    whole = _together(spaces)
+    whole = StateSpace.together(spaces)
     gaps = np.diff(blocks.start, prepend=blocks.start[0])
     gaps[1:] -= (blocks.stop - blocks.start)[:-1]
     kinds, which = np.unique(
@@ -126,17 +125,6 @@ def _names(term: Term, before: list[str]) -> list[str]:
     return [f"{name}{sum(other.startswith(name) for other in before) + 1}"]
 
 
-def _together(spaces: list[StateSpace]) -> StateSpace:
-    return StateSpace(
-        np.asarray(block_diag(*(space.transition for space in spaces))),
-        np.asarray(block_diag(*(space.process_noise for space in spaces))),
-        np.concatenate([space.output for space in spaces]),
-        0.0,
-        np.concatenate([space.initial_mean for space in spaces]),
-        np.asarray(block_diag(*(space.initial_variance for space in spaces))),
-    )
-
-
 def _step(space: StateSpace, gap: int, size: int) -> Step:
     m = len(space.output)
     transition, noise = np.zeros((m + 1, m)), np.zeros((m + 1, m + 1))
@@ -146,7 +134,7 @@ def _step(space: StateSpace, gap: int, size: int) -> Step:
     else:
         means = of_block_means(space, size)
         transition[:], noise[:] = means.transition[:, :m], means.process_noise
-    over, added = repeated(space.transition, space.process_noise, gap)
+    over, added = repeat_step(space.transition, space.process_noise, gap)
     return Step(transition @ over, _root(noise + transition @ added @ transition.T))
 
 

@@ -71,7 +71,7 @@ class LevelBlocks:
         Mean of the samples present (NaN where there are none), and the running median, rad/s.
     z : ndarray, shape (b,)
         Mean less level in standard deviations; 0 where there are no samples.
-    there : ndarray of bool, shape (b,)
+    present : ndarray of bool, shape (b,)
         Where there are samples.
     sigma : float
         Standard deviation of the noise of a full block, rad/s.
@@ -83,7 +83,7 @@ class LevelBlocks:
     mean: Array
     level: Array
     z: Array
-    there: NDArray[np.bool_]
+    present: NDArray[np.bool_]
     sigma: float
     rough: bool
 
@@ -152,26 +152,26 @@ def blocks_of(
     padded[: len(log)] = log
     rows = padded.reshape(-1, size)
     count = np.isfinite(rows).sum(axis=1)
-    there = count > 0
-    if there.sum() < 8 * len(_WINDOWS):
+    present = count > 0
+    if present.sum() < 8 * len(_WINDOWS):
         raise ValueError(f"the log has {int(count.sum())} samples, too few to find turns in it")
     mean = np.full(len(rows), np.nan)
-    mean[there] = np.nansum(rows[there], axis=1) / count[there]
+    mean[present] = np.nansum(rows[present], axis=1) / count[present]
     width = round(min(_LEVEL, 0.7 * dwell) / length) // 2 * 2 + 1
     level = np.full(len(rows), np.nan)
     # "nearest" would repeat the first block: its noise would be the level, and all after it off.
-    level[there] = median_filter(mean[there], width, mode="reflect")
+    level[present] = median_filter(mean[present], width, mode="reflect")
     weight = np.sqrt(count / size)
-    residual = np.where(there, (mean - level) * weight, 0.0)
-    own = _spread(residual[there])
+    residual = np.where(present, (mean - level) * weight, 0.0)
+    own = _spread(residual[present])
     if own == 0.0:
         raise ValueError("all samples of the log are the same, or nearly all: no noise, no turns")
     sigma, rough = own, False
     if model is not None:
-        known = math.sqrt(float(model.allan_variance(length, rate)))
-        rough = not 2 / 3 < own / known < 1.5
-        sigma = own if rough else known
-    return LevelBlocks(length, mean, level, residual / sigma, there, sigma, rough)
+        of_model = math.sqrt(float(model.allan_variance(length, rate)))
+        rough = not 2 / 3 < own / of_model < 1.5
+        sigma = own if rough else of_model
+    return LevelBlocks(length, mean, level, residual / sigma, present, sigma, rough)
 
 
 def _spread(residual: Array) -> float:
@@ -221,7 +221,7 @@ def transients(blocks: LevelBlocks, log: Array, rate: float) -> list[Event]:
 
 def _correlation(blocks: LevelBlocks) -> Array:
     """Return the correlation of calm blocks, from that of neighbours on until it is lost."""
-    calm = np.where(blocks.there & (np.abs(blocks.z) < _EDGE), blocks.z, 0.0)
+    calm = np.where(blocks.present & (np.abs(blocks.z) < _EDGE), blocks.z, 0.0)
     seen = (calm != 0.0).astype(float)
     square = float(np.mean(calm[seen > 0.0] ** 2))
     correlations: list[float] = []
@@ -238,7 +238,7 @@ def _ratio(blocks: LevelBlocks, window: int, correlation: Array) -> Array:
     """Return the log-likelihood ratio of the windows that begin at each block."""
     square = np.minimum(blocks.z**2, _CLIP**2)
     energy = _sums(square, window)
-    count = _sums(blocks.there.astype(float), window)
+    count = _sums(blocks.present.astype(float), window)
     r = np.maximum(energy / np.maximum(count, 1.0), 1.0)
     lag = np.arange(1, len(correlation) + 1)
     largest = 1.0 + 2.0 * float(np.sum(np.maximum(1.0 - lag / window, 0.0) * correlation))
@@ -312,7 +312,7 @@ def outliers(blocks: LevelBlocks, log: Array, rate: float) -> list[tuple[float, 
     if len(out) == 0:
         return []
     groups = np.split(out, np.flatnonzero(np.diff(out) > size) + 1)
-    return [(float(one[0]) / rate, float(one[-1] + 1) / rate) for one in groups]
+    return [(float(group[0]) / rate, float(group[-1] + 1) / rate) for group in groups]
 
 
 def steps(
@@ -338,7 +338,7 @@ def steps(
     if width < 4 or 2 * width >= len(blocks.z):
         return []
     value = calm_means(blocks)
-    count = _sums(blocks.there.astype(float), width)
+    count = _sums(blocks.present.astype(float), width)
     mean = _sums(value, width) / np.maximum(count, 1.0)
     difference = mean[width:] - mean[:-width]
     enough = np.minimum(count[width:], count[:-width])
@@ -366,4 +366,4 @@ def calm_means(blocks: LevelBlocks) -> Array:
         rad/s.
     """
     within = np.clip(blocks.z, -4.0, 4.0) * blocks.sigma
-    return np.where(blocks.there, np.nan_to_num(blocks.level) + within, 0.0)
+    return np.where(blocks.present, np.nan_to_num(blocks.level) + within, 0.0)

@@ -21,7 +21,7 @@ from imubench_pipeline.experiments.earth_rate.sight import (
     TurnSchedule,
     by_sight,
     disturbances,
-    without,
+    leave_out_knocks,
 )
 from imubench_pipeline.experiments.earth_rate.transients import (
     CLEAR,
@@ -86,10 +86,10 @@ def stays(position: Array, rate: float, shortest: float) -> Stays:
     ValueError
         If the column has one position only, or none.
     """
-    known = np.flatnonzero(np.isfinite(position))
-    if len(known) == 0:
+    finite = np.flatnonzero(np.isfinite(position))
+    if len(finite) == 0:
         raise ValueError("the column with the position has no numbers")
-    value = position[known]
+    value = position[finite]
     middle = 0.5 * (float(value.min()) + float(value.max()))
     if value.min() == value.max():
         raise ValueError(f"the position is {middle:g} throughout: the log never turns")
@@ -102,7 +102,7 @@ def stays(position: Array, rate: float, shortest: float) -> Stays:
     merged: list[list[float]] = []
     away = 0.0
     for a, b in zip(first, last, strict=True):
-        start, stop = known[a] / rate, (known[b] + 1) / rate
+        start, stop = finite[a] / rate, (finite[b] + 1) / rate
         if state[a] < 0 or stop - start < shortest:
             away += (stop - start) if stop - start > shortest else 0.0
             continue
@@ -197,18 +197,18 @@ def find_turning(
         doubts.append("the noise of the log is not that of the model: the log's is used")
     column_sense = None
     if position is not None:
-        turns, knocks, column_sense, more = _by_column(position, log, rate, events, schedule)
+        turns, knocks, column_sense, more_doubts = _by_column(position, log, rate, events, schedule)
     else:
-        turns, knocks, more = by_sight(blocks, events, schedule, trust_schedule)
-    doubts += more
-    stretches, more = _stretches(turns, knocks, schedule)
-    doubts += more
+        turns, knocks, more_doubts = by_sight(blocks, events, schedule, trust_schedule)
+    doubts += more_doubts
+    stretches, more_doubts = _stretches(turns, knocks, schedule)
+    doubts += more_doubts
     knocks = sorted([*knocks, *_lone(outliers(blocks, log, rate), turns, knocks)])
     knocks = [(max(start, 0.0), min(stop, schedule.duration)) for start, stop in knocks]
-    signs = without(blocks, knocks)
+    signs = leave_out_knocks(blocks, knocks)
     size = alternation(signs, stretches)
-    first, more = _first_sense(first_sense, column_sense)
-    doubts += more
+    first, more_doubts = _first_sense(first_sense, column_sense)
+    doubts += more_doubts
     place = contradiction(signs, stretches)
     if place is not None:
         doubts.append(
@@ -277,9 +277,9 @@ def _by_column(
         raise ValueError(
             f"the position has the shape {np.shape(position)}, the log {np.shape(log)}"
         )
-    found = stays(np.asarray(position, dtype=np.float64), rate, 0.1 * schedule.dwell)
+    column_stays = stays(np.asarray(position, dtype=np.float64), rate, 0.1 * schedule.dwell)
     turns, used = [], set()
-    for stop, start in zip(found.stop[:-1], found.start[1:], strict=True):
+    for stop, start in zip(column_stays.stop[:-1], column_stays.start[1:], strict=True):
         first, last, peak = float(stop), float(start), None
         for k, event in enumerate(events):
             near = event.stop > stop - 3.0 and event.start < start + 3.0
@@ -289,9 +289,11 @@ def _by_column(
                 used.add(k)
         time = 0.5 * float(stop + start)
         turns.append(Turn(first - schedule.margin, last + schedule.margin, time, "column", peak))
-    doubts = ["the column is in neither position for long: more than two?"] if found.away else []
+    doubts = (
+        ["the column is in neither position for long: more than two?"] if column_stays.away else []
+    )
     rest = [e for k, e in enumerate(events) if k not in used and e.kind == "transient"]
-    sense = (1 if found.high[0] else -1) if found.senses else None
+    sense = (1 if column_stays.high[0] else -1) if column_stays.senses else None
     return turns, disturbances(rest), sense, doubts
 
 

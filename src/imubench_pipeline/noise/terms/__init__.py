@@ -21,7 +21,7 @@ from imubench_pipeline.noise.terms.gauss_markov import (
 from imubench_pipeline.noise.terms.quantization import Quantization
 from imubench_pipeline.noise.terms.ramp import Ramp
 from imubench_pipeline.noise.terms.random_walk import RandomWalk
-from imubench_pipeline.noise.terms.registry import registered
+from imubench_pipeline.noise.terms.registry import register_terms
 from imubench_pipeline.noise.terms.sinusoid import Sinusoid
 from imubench_pipeline.noise.terms.traits import Role, TermParameter
 from imubench_pipeline.noise.terms.white_noise import WhiteNoise
@@ -48,7 +48,7 @@ __all__ = [
     "sampled_gauss_markov_shape",
 ]
 
-TERMS = registered(Quantization, WhiteNoise, Flicker, GaussMarkov, RandomWalk, Ramp, Sinusoid)
+TERMS = register_terms(Quantization, WhiteNoise, Flicker, GaussMarkov, RandomWalk, Ramp, Sinusoid)
 """Every kind of noise term, in the order of a model's name."""
 
 PARAMETERS = {parameter.symbol: parameter for kind in TERMS for parameter in kind.parameters}

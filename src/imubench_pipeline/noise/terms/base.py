@@ -12,13 +12,7 @@ import numpy as np
 
 from imubench_pipeline.noise.growth import SensorStart, Uncalibrated
 from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace, root_of
-from imubench_pipeline.noise.terms.traits import (
-    Drive,
-    Reading,
-    Role,
-    SampleBlocks,
-    TermParameter,
-)
+from imubench_pipeline.noise.terms.traits import Drive, Reading, Role, SampleBlocks, TermParameter
 from imubench_pipeline.typing import Array
 
 if TYPE_CHECKING:

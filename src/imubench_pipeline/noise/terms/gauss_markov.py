@@ -259,8 +259,8 @@ def _grown(order: int, time: float, T_B: float, start: SensorStart) -> float:
     constant = of_constant(order, time)
     driven = time ** (2 * order + 3) * squared_response(order, x)
     if isinstance(start, Uncalibrated):
-        kept = math.factorial(order + 1) * decay(order + 1, x)
-        return driven + (constant * kept) ** 2 * T_B / 2.0
+        remaining = math.factorial(order + 1) * decay(order + 1, x)
+        return driven + (constant * remaining) ** 2 * T_B / 2.0
     y = start.window / T_B
     # Differences from 1 of what is kept: the difference of the two itself would cancel for
     # long T_B.

@@ -9,12 +9,7 @@ import numpy as np
 from imubench_pipeline.noise.growth import Calibrated, SensorStart, of_constant
 from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace
 from imubench_pipeline.noise.terms.base import Deterministic
-from imubench_pipeline.noise.terms.traits import (
-    Reading,
-    Role,
-    SampleBlocks,
-    TermParameter,
-)
+from imubench_pipeline.noise.terms.traits import Reading, Role, SampleBlocks, TermParameter
 from imubench_pipeline.typing import Array
 
 

@@ -12,7 +12,7 @@ _STATED = ("symbol", "label", "standard_name", "word", "role", "parameters", "st
 """Class variables that every kind gives a value."""
 
 
-def registered(*kinds: type[Term]) -> tuple[type[Term], ...]:
+def register_terms(*kinds: type[Term]) -> tuple[type[Term], ...]:
     """Return the kinds of terms, each of which lacks nothing.
 
     Parameters
@@ -33,10 +33,10 @@ def registered(*kinds: type[Term]) -> tuple[type[Term], ...]:
         for value in stated:
             if stated.count(value) > 1:
                 raise TypeError(f"{name} {value!r} is that of two noise terms")
-    known: dict[str, TermParameter] = {}
+    parameters: dict[str, TermParameter] = {}
     for kind in kinds:
         for parameter in kind.parameters:
-            if known.setdefault(parameter.symbol, parameter) != parameter:
+            if parameters.setdefault(parameter.symbol, parameter) != parameter:
                 raise TypeError(f"{parameter.symbol} is another parameter in {kind.__name__}")
     return kinds
 

@@ -12,12 +12,7 @@ from imubench_pipeline.noise.exponentials import phi
 from imubench_pipeline.noise.growth import SensorStart, Uncalibrated, of_constant
 from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace
 from imubench_pipeline.noise.terms.base import Deterministic
-from imubench_pipeline.noise.terms.traits import (
-    Reading,
-    Role,
-    SampleBlocks,
-    TermParameter,
-)
+from imubench_pipeline.noise.terms.traits import Reading, Role, SampleBlocks, TermParameter
 from imubench_pipeline.typing import Array
 
 

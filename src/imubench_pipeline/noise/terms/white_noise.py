@@ -17,13 +17,7 @@ from imubench_pipeline.noise.growth import (
 )
 from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace
 from imubench_pipeline.noise.terms.base import Term
-from imubench_pipeline.noise.terms.traits import (
-    Drive,
-    Reading,
-    Role,
-    SampleBlocks,
-    TermParameter,
-)
+from imubench_pipeline.noise.terms.traits import Drive, Reading, Role, SampleBlocks, TermParameter
 from imubench_pipeline.typing import Array
 
 
