@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from imubench_pipeline.tables import write_json
+from imubench_pipeline.tables import read_json, write_json
 from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.tables.parquet import end_of
 
@@ -46,7 +46,7 @@ class Quality:
             If it is damaged.
         """
         try:
-            data = json.loads(path.read_text(encoding="utf-8"))
+            data = read_json(path)
             stated = data.pop(_DIGEST, None)
             if stated is None or stated == _digest(data):
                 return cls(**{one.name: data[one.name] for one in fields(cls) if one.name in data})

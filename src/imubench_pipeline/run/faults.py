@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 from collections.abc import Iterator
 from dataclasses import asdict
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.tables import read_json, write_json
 from imubench_pipeline.tables.failures import Failure
 from imubench_pipeline.tables.findings import RecordingError
 
@@ -86,8 +86,6 @@ class Faults:
         log : Path
             Of the step, which is told, too.
         """
-        from imubench_pipeline.tables import write_json
-
         path = self._path((failure.step, failure.sensor, failure.recording))
         record = {"attempt": attempt, "failed": True, "log": str(log), **asdict(failure)}
         write_json(record, path)
@@ -99,8 +97,6 @@ class Faults:
         """Keep that a step which had failed did not any more."""
         path = self._path(of)
         if attempt or path.is_file():
-            from imubench_pipeline.tables import write_json
-
             step, sensor, recording = of
             about = {"step": step, "sensor": sensor, "recording": recording}
             write_json({"attempt": attempt, "failed": False, **about}, path)
@@ -132,6 +128,16 @@ class Faults:
 
     def _records(self) -> Iterator[tuple[Of, dict[str, Any]]]:
         for path in sorted(self._folder.glob("*/**/*.json")):
-            with contextlib.suppress(OSError, ValueError, KeyError):  # one that was cut off
-                record = json.loads(path.read_text(encoding="utf-8"))
-                yield (record["step"], record["sensor"], record["recording"]), record
+            with contextlib.suppress(OSError, ValueError):  # one that was cut off
+                if _is_record(record := read_json(path)):
+                    yield (record["step"], record["sensor"], record["recording"]), record
+
+
+def _is_record(found: Any) -> bool:
+    """Return whether what was read has all that is asked of a record."""
+    if not isinstance(found, dict) or not isinstance(found.get("recording", 0), str | None):
+        return False
+    failed = found.get("failed")
+    texts = ("step", "sensor", *(("cause", "reason", "log") if failed else ()))
+    counted = isinstance(failed, bool) and isinstance(found.get("attempt"), int)
+    return counted and all(isinstance(found.get(name), str) for name in texts)

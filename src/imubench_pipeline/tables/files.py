@@ -184,6 +184,20 @@ def write_content(content: str | bytes, path: Path) -> None:
         temporary.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
+def read_json(path: Path) -> Any:
+    """Read JSON.
+
+    Raises
+    ------
+    ValueError
+        If it is none, or deeper than Python reads.
+    """
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except RecursionError:
+        raise ValueError(f"{path}: lists and mappings too deep in each other") from None
+
+
 def write_json(data: object, path: Path) -> None:
     """Write JSON, atomically."""
     with replacing(path) as temporary:
