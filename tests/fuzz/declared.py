@@ -38,7 +38,7 @@ from imubench_pipeline.settings.sensor import RecordingNotes, Sensor, merged_log
 from imubench_pipeline.settings.simulated_recordings import read_simulated
 from imubench_pipeline.settings.validation import ConfigError, parse
 from imubench_pipeline.settings.yaml_files import read_yaml
-from imubench_pipeline.simulate.sources import ModelSettings
+from imubench_pipeline.simulate.sources import from_file
 from imubench_pipeline.tables import TableError, read, write
 from imubench_pipeline.tables.failures import Failure, failure_of
 from imubench_pipeline.tables.findings import RecordingError
@@ -155,6 +155,18 @@ _NOTES = _yaml(
     {"pointing": {"latitude": "40 deg", "heading": "90 deg", "heading_sigma": "1 deg"}},
     {"use": {"start": "10 s", "end": "1 h"}, "temperature": {"column": "T", "unit": "degC"}},
 )  # fmt: skip
+_FIGURES = {"gyro_x": {"N": "0.01 deg/s/sqrt(Hz)"}}
+_MODELS = _yaml({"source": "a paper", "axes": _FIGURES})
+_SIMULATED = _yaml(
+    {
+        "recordings": [
+            {
+                "sensor": "s", "recording": "sim_a", "duration": "40 s", "rate": "100 Hz",
+                "seed": 1, "source": "none", "channels": _FIGURES,
+            }
+        ]
+    }
+)  # fmt: skip
 _UNITS = [
     f"{number} {unit}".encode()
     for number in ("0.005", "-3e-2", "10/3", "1,5")
@@ -176,7 +188,7 @@ def _take_run(path: Path) -> object:
 
 
 def _take_simulated(path: Path) -> object:
-    return read_simulated(path, {"s": _SENSOR, "bmi088": _SENSOR})
+    return read_simulated(path, {"s": _SENSOR})
 
 
 def _take_unit(path: Path) -> object:
@@ -224,7 +236,6 @@ def subjects() -> dict[str, Subject]:
     """Return all that is fuzzed here, by name."""
     sensors = _settings("config/sensors/*.yaml")
     requirements = _settings("config/requirements/*.yaml")
-    simulated = _settings("config/simulated.yaml", "config/boards/*.yaml")
     bias = {
         "sensor": "s", "recording": "a", "channel": "gyro_x", "value": 1e-4, "unit": "rad/s"
     }  # fmt: skip
@@ -241,9 +252,8 @@ def subjects() -> dict[str, Subject]:
         "notes": Subject("a.yaml", _take_notes, _NOTES),
         "requirement": Subject("r.yaml", partial(parsed, Requirement), requirements),
         "run": Subject("config.yaml", _take_run, _settings("config/config.yaml")),
-        "simulated": Subject("s.yaml", _take_simulated, simulated),
-        "model": Subject("m.yaml", partial(parsed, ModelSettings), _yaml(
-            {"channels": {"gyro_x": {"N": "0.01 deg/s/sqrt(Hz)", "B": "3 deg/h"}}})),
+        "simulated": Subject("s.yaml", _take_simulated, _SIMULATED),
+        "model": Subject("m.yaml", from_file, _MODELS),
         "unit": Subject("unit", _take_unit, _UNITS),
         "table": Subject(
             "fixed_bias.parquet",
