@@ -24,6 +24,7 @@ from tests.release.small import LONGEST, FaultError, Undisturbed, left_over, sma
 from tests.workflow.project import Project
 
 _SAMPLES = 4000
+_COMPILING = 3  # times as long, where what numba has compiled is not there
 _NOWHERE = "/proc/nowhere"  # where root cannot make a folder, either
 _NOBODY = 65534
 
@@ -35,7 +36,8 @@ class Surroundings:
     Attributes
     ----------
     environment : mapping
-        Of the run, beside that of this process; None: without this variable.
+        Of the run, beside that of this process; None: without this variable. ``{folder}`` is that
+        of the project.
     before : tuple of str
         Words before its command.
     prepare : callable
@@ -104,7 +106,7 @@ CASES = {
     "logs of the next year": Surroundings(prepare=_stamped(_YEAR)),
     "logs of 1971": Surroundings(prepare=_stamped(_YEAR - time.time())),
     "a user who owns nothing else": Surroundings(
-        {"HOME": _NOWHERE, "XDG_CACHE_HOME": ".cache"},
+        {"HOME": _NOWHERE, "XDG_CACHE_HOME": "{folder}/cache"},
         ("setpriv", f"--reuid={_NOBODY}", f"--regid={_NOBODY}", "--clear-groups"),
         _given_to_nobody,
     ),
@@ -121,11 +123,15 @@ def _tried(name: str, folder: Path, expected: Undisturbed) -> str:
     made = small_project(folder, 0, expected.samples)
     around.prepare(made)
     changed = os.environ | around.environment
-    environment = {key: value for key, value in changed.items() if value is not None}
+    environment = {
+        key: value.replace("{folder}", str(made.folder))
+        for key, value in changed.items()
+        if value is not None
+    }
     begin = time.monotonic()
     done = subprocess.run(
         [*around.before, *made.command()], cwd=made.place, env=environment, capture_output=True,
-        text=True, errors="replace", check=False, timeout=LONGEST,
+        text=True, errors="replace", check=False, timeout=_COMPILING * LONGEST,
     )  # fmt: skip
     came = "the same files"
     if done.returncode and around.refused and around.refused in done.stderr:
