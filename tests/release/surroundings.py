@@ -120,6 +120,9 @@ def _tried(name: str, folder: Path, expected: Undisturbed) -> str:
     around = CASES[name]
     if around.before and shutil.which(around.before[0]) is None:
         return f"not tried: there is no {around.before[0]}"
+    reached = [*around.before, "test", "-x", sys.executable]
+    if subprocess.run(reached, check=False).returncode:
+        return f"not tried: {sys.executable} is out of reach there"
     made = small_project(folder, 0, expected.samples)
     around.prepare(made)
     changed = os.environ | around.environment
