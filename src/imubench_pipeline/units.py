@@ -7,6 +7,7 @@ The registry is ours: angles have a dimension of their own, so that °/s and Hz,
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -444,17 +445,23 @@ def quantity_to_si(text: str, dimension: str) -> float:
     Raises
     ------
     UnitError
-        If there is no number, no unit, or a unit of another dimension.
+        If there is no number, no unit, a unit of another dimension, or more than a float holds.
     """
     number, unit = _number_and_unit(text, dimension)
-    return to_si(number, unit, dimension)
+    return _finite(to_si(number, unit, dimension), text)
 
 
 def difference_to_si(text: str, dimension: str) -> float:
     """Read a difference with its unit into SI: 5 degC are 5 K, not 278 (see `quantity_to_si`)."""
     number, unit = _number_and_unit(text, dimension)
     factor, _ = conversion(unit, dimension)
-    return factor * number
+    return _finite(factor * number, text)
+
+
+def _finite(value: float, text: str) -> float:
+    if not math.isfinite(value):
+        raise UnitError(f"{str(text)[:_LONGEST]!r} is out of range; expected less than 1e308 in SI")
+    return value
 
 
 def _number_and_unit(text: str, dimension: str) -> tuple[float, str]:

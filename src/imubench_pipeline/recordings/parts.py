@@ -99,7 +99,8 @@ def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
             keep = _used(batch, use, read_rows, rate)
             read_rows += len(batch)
             if time is not None:
-                np.ascontiguousarray(time[keep]).tofile(stamps)
+                # Not `tofile`: what it hands to the C library may fail unseen when it is closed.
+                stamps.write(np.ascontiguousarray(time[keep]).data)
             kept = {
                 name: part.columns[name].add(values[keep]) for name, values in batch.columns.items()
             }

@@ -16,7 +16,7 @@ from imubench_pipeline.report.html import environment
 from imubench_pipeline.report.pages import ENTRIES, pages
 from imubench_pipeline.report.practical import units_of_pages
 from imubench_pipeline.report.site import Page, Site
-from imubench_pipeline.tables import read, write_content
+from imubench_pipeline.tables import read, read_json, write_content
 from imubench_pipeline.tables.provenance import source_digest
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 
@@ -101,7 +101,7 @@ def _key(key: str, content: bytes) -> str:
 def _keys(path: Path) -> dict[str, str]:
     """Return what the pages that are there show; nothing where that is not known."""
     try:
-        keys = json.loads(path.read_text(encoding="utf-8"))
+        keys = read_json(path)
     except (OSError, ValueError):
         return {}
     if not isinstance(keys, dict):

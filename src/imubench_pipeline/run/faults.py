@@ -128,6 +128,16 @@ class Faults:
 
     def _records(self) -> Iterator[tuple[Of, dict[str, Any]]]:
         for path in sorted(self._folder.glob("*/**/*.json")):
-            with contextlib.suppress(OSError, ValueError, KeyError):  # one that was cut off
-                record = read_sealed_json(path)
-                yield (record["step"], record["sensor"], record["recording"]), record
+            with contextlib.suppress(OSError, ValueError):  # one that was cut off
+                if _is_record(record := read_sealed_json(path)):
+                    yield (record["step"], record["sensor"], record["recording"]), record
+
+
+def _is_record(found: Any) -> bool:
+    """Return whether what was read has all that is asked of a record."""
+    if not isinstance(found, dict) or not isinstance(found.get("recording", 0), str | None):
+        return False
+    failed = found.get("failed")
+    texts = ("step", "sensor", *(("cause", "reason", "log") if failed else ()))
+    counted = isinstance(failed, bool) and isinstance(found.get("attempt"), int)
+    return counted and all(isinstance(found.get(name), str) for name in texts)

@@ -127,16 +127,20 @@ def _run(connection: socket.socket, job: Job, *, imported: bool) -> None:
             limit_memory(job.memory)
         with sealed(job):
             runpy.run_path(str(job.script), init_globals={"snakemake": job}, run_name="__main__")
+            sys.stdout.flush()
+            sys.stderr.flush()
         how = DONE
     except BaseException as error:
-        told["trace"] = _said(error, str(job.script))
+        told["trace"] = _trace(error, str(job.script))
         told["error"] = one_line("".join(traceback.format_exception_only(error)), _LONGEST)
         if isinstance(error, MemoryError):
             told["error"] += f"; limits.memory allows {(job.memory or 0) // 10**6} MB"
         told["errno"] = error.errno if isinstance(error, OSError) else None
     finally:
-        sys.stdout.flush()
-        sys.stderr.flush()
+        with suppress(OSError):  # a disk that is full takes no words either
+            sys.stderr.write(told["trace"])
+            sys.stdout.flush()
+            sys.stderr.flush()
         used = resource.getrusage(resource.RUSAGE_SELF)
         cost = {"cpu": used.ru_utime + used.ru_stime, "memory": used.ru_maxrss * 1024 / 1e6}  # KiB
         connection.sendall(_message(how, cost if how == DONE else told))
@@ -165,14 +169,12 @@ def _end_with_who_asked(connection: socket.socket) -> None:
         os._exit(1)
 
 
-def _said(error: BaseException, script: str) -> str:
-    """Print where the script failed, without how it was started, and return it."""
+def _trace(error: BaseException, script: str) -> str:
+    """Return where the script failed, without how it was started."""
     trace = error.__traceback__
     while trace is not None and trace.tb_frame.f_code.co_filename != script:
         trace = trace.tb_next
-    text = "".join(traceback.format_exception(error.with_traceback(trace or error.__traceback__)))
-    sys.stderr.write(text)
-    return text
+    return "".join(traceback.format_exception(error.with_traceback(trace or error.__traceback__)))
 
 
 if __name__ == "__main__":

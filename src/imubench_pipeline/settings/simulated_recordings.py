@@ -42,6 +42,7 @@ from imubench_pipeline.units import naming, quantity_to_si
 _Around = TypeVar("_Around", bound=Surroundings)
 
 _NAMES = r"^sim_[A-Za-z0-9_.-]+$"
+_MOST_SAMPLES = 1e10  # 80 GB a channel: whoever states more has mistaken a unit
 
 
 class PublishedFigure(Strict):
@@ -97,8 +98,10 @@ class OfASensor(ImuSettings):
 
     @model_validator(mode="after")
     def _samples_and_units(self) -> Self:
-        if self.samples < 1:
-            raise ValueError(f"duration: {self.duration} at {self.rate} hold no sample")
+        length = quantity_to_si(self.duration, "time") * quantity_to_si(self.rate, "frequency")
+        if not 0.5 < length <= _MOST_SAMPLES:
+            held = "no sample" if length < 1.0 else f"more than {_MOST_SAMPLES:g} samples"
+            raise ValueError(f"duration: {self.duration} at {self.rate} hold {held}")
         check_axes(self.channels, "channels")
         return self
 

@@ -17,7 +17,7 @@ from typing import Literal
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from imubench_pipeline.tables.files import build, joined, read_part, schema, write_arrow
+from imubench_pipeline.tables.files import build, joined, read_json, read_part, schema, write_arrow
 from imubench_pipeline.tables.findings import Finding
 
 Cause = Literal["error", "killed", "time"]
@@ -76,10 +76,10 @@ def failure_of(path: Path) -> Failure | None:
     """
     if path.name == QUALITY:
         with contextlib.suppress(ValueError, TypeError, AttributeError):
-            found = json.loads(path.read_text(encoding="utf-8")).get("failure")
+            found = read_json(path).get("failure")
             return Failure(**found) if found else None
     if path.suffix == ".parquet":
-        with contextlib.suppress(pa.ArrowException):
+        with contextlib.suppress(OSError, ValueError, TypeError, pa.ArrowException):
             return told_by(pq.read_schema(path))
     return None
 

@@ -81,9 +81,9 @@ def replacing(path: Path) -> Iterator[Path]:
     """Give a temporary name beside ``path``, renamed to it when the block ends without error."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
-    os.close(handle)
     temporary = Path(name)
     try:
+        os.close(handle)
         yield temporary
         # mkstemp makes private files; results are for everybody, as the umask says.
         umask = os.umask(0)
@@ -127,7 +127,9 @@ def write_arrow(table: pa.Table, path: Path) -> None:
     """
     with replacing(path) as temporary:
         if path.suffix == ".csv":
-            pacsv.write_csv(with_safe_cells(table), temporary)
+            # Arrow ignores that a file which it opened itself cannot be closed.
+            with temporary.open("wb") as file:
+                pacsv.write_csv(with_safe_cells(table), file)
         else:
             # A small file is read in half the time by snappy, and thousands of them are.
             compression = "zstd" if table.nbytes > _SMALL else "snappy"
@@ -201,6 +203,20 @@ def write_content(content: str | bytes, path: Path) -> None:
     """Write a text or bytes, atomically."""
     with replacing(path) as temporary:
         temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
+def read_json(path: Path) -> Any:
+    """Read JSON.
+
+    Raises
+    ------
+    ValueError
+        If it is none, or deeper than Python reads.
+    """
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except RecursionError:
+        raise ValueError(f"{path}: lists and mappings too deep in each other") from None
 
 
 def write_json(data: object, path: Path) -> None:

@@ -15,6 +15,8 @@ from typing import Any
 
 import psutil
 
+from imubench_pipeline.tables import read_json
+
 _PAUSE = 0.5  # s between two attempts
 
 
@@ -132,7 +134,7 @@ def read_note(path: Path) -> Mapping[str, Any]:
         The file of the lock.
     """
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        found = read_json(path)
     except (OSError, ValueError):
         return {}
     return found if isinstance(found, dict) else {}

@@ -1,0 +1,62 @@
+"""What is installed: one version of each package, and a digest of every file of it."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+from tests.conftest import PROJECT
+
+FILES = sorted((PROJECT / "requirements").glob("*.txt"))
+_DIGEST = re.compile(r"--hash=sha256:[0-9a-f]{64}")
+
+
+def pins(path: Path) -> dict[str, Requirement]:
+    """The requirements of a file by name, each checked to have a digest."""
+    found = {}
+    for entry in path.read_text().replace("\\\n", " ").splitlines():
+        words = entry.partition("--hash")[0].strip()
+        if not words or words.startswith("#"):
+            continue
+        one = Requirement(words)
+        if path.parent.name == "requirements":
+            assert _DIGEST.search(entry), words
+        found[canonicalize_name(one.name)] = one
+    return found
+
+
+def project() -> dict:
+    return tomllib.loads((PROJECT / "pyproject.toml").read_text())
+
+
+def test_there_is_a_file_for_each_use() -> None:
+    assert [path.stem for path in FILES] == ["dev", "run", "test"]
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_what_is_installed_is_what_was_tested(path: Path) -> None:
+    constraints, found = pins(PROJECT / "constraints.txt"), pins(path)
+    (build,) = project()["build-system"]["requires"]
+    (backend,) = (PROJECT / "requirements/build.in").read_text().split()
+    assert str(found.pop("setuptools").specifier) == str(Requirement(backend).specifier)
+    assert build == backend
+    for name, one in found.items():
+        assert one.specifier == constraints[name].specifier, name
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_all_that_is_asked_for_is_there(path: Path) -> None:
+    about = project()["project"]
+    asked = [*about["dependencies"], *about["optional-dependencies"].get(path.stem, ())]
+    names = {canonicalize_name(Requirement(one).name) for one in asked}
+    assert names - {canonicalize_name(about["name"])} <= pins(path).keys()
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_no_host_is_named(path: Path) -> None:
+    assert not re.search(r"://|^--?[a-z]|index", path.read_text(), re.MULTILINE)
