@@ -24,14 +24,14 @@ from functools import partial
 from pathlib import Path
 
 import yaml
-from imubench_pipeline.run.bounded import limit_memory
 
+from imubench_pipeline.readers.bounded import limit_memory
 from imubench_pipeline.recordings.quality_file import Quality
 from imubench_pipeline.report.publish import _keys
 from imubench_pipeline.run.faults import Faults
 from imubench_pipeline.run.nightly.lock import _holder, read_note
 from imubench_pipeline.run.nightly.recovery import restarted
-from imubench_pipeline.run.nightly.state import State, read_state
+from imubench_pipeline.run.nightly.state import State, StateError, read_state
 from imubench_pipeline.settings.config import read_run
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import RecordingNotes, Sensor, merged_log
@@ -267,7 +267,7 @@ def subjects() -> dict[str, Subject]:
             _made(quality.write, "quality.json"),
             (RecordingError,),
         ),
-        "state": Subject("state.json", read_state, _made(state.write, "state.json"), ()),
+        "state": Subject("state.json", read_state, _made(state.write, "state.json"), (StateError,)),
         "record": Subject("faults/recordings/s/estimate.json", _take_record, held[:1], ()),
         "note": Subject("lock", _take_note, held[1:2], ()),
         "pages": Subject("pages.json", _keys, held[2:], ()),
