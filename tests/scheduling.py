@@ -12,6 +12,7 @@ FIRST = (
     "tests/workflow/test_nightly.py",  # so are these
     "tests/workflow/test_failures.py",  # waits for a step that takes too long
     "tests/workflow/test_earth_rate.py",  # a run, and lists of jobs
+    "tests/verification",  # a folder: one finished project, of which every file is spoilt once
     "tests/test_corpus.py",  # logs of every format, together and one by one
     "tests/test_fuzz.py",  # waits for readers that hang
     "tests/thermal/test_fit.py",  # the longest of those that only compute, and else among the last

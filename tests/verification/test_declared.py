@@ -13,7 +13,7 @@ import pytest
 from imubench_pipeline.run.processes import Job, Processes
 from tests.verification.finished import Finished
 
-pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("verification")]
+pytestmark = pytest.mark.workflow
 
 RESULTS = Path("results")
 

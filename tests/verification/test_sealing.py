@@ -13,7 +13,7 @@ from imubench_pipeline.tables.digests import read_sealed_json, write_sealed_json
 from imubench_pipeline.tables.seals import SealedFile, places, read_seal, seal_file
 from tests.verification.finished import Finished
 
-pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("verification")]
+pytestmark = pytest.mark.workflow
 
 A = "recordings/one/a"
 JOINED = "sensors/one/sensor_tables"

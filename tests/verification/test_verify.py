@@ -21,7 +21,7 @@ from imubench_pipeline.tables.digests import read_sealed_json, write_sealed_json
 from imubench_pipeline.tables.seals import SealedFile, read_seal, seal_file
 from tests.verification.finished import Finished
 
-pytestmark = [pytest.mark.workflow, pytest.mark.xdist_group("verification")]
+pytestmark = pytest.mark.workflow
 
 LOGS = ("logs", "nightly/lock", "nightly/held_back.yaml")
 """What steps printed, and what stands for the moment: no results."""

@@ -335,7 +335,13 @@ def _summary(
 
 
 def ingest_as_planned(
-    source: Path, settings: str, sensor: str, recording: str, folder: Path
+    source: Path,
+    settings: str,
+    sensor: str,
+    recording: str,
+    folder: Path,
+    *,
+    guarded: bool = False,
 ) -> Quality:
     """Ingest a recording as the plan says; one that cannot be used is rejected, with its reason.
 
@@ -348,6 +354,9 @@ def ingest_as_planned(
     sensor, recording : str
     folder : Path
         Where the Parquet files go.
+    guarded : bool
+        A process of its own opens the log first (`opening.check_opening`), so that none that hangs
+        or crashes its reader does so here; it takes 0.1 s.
     """
     given = json.loads(settings)
     notes = RecordingNotes.model_validate(given.get("notes", {}))
@@ -358,7 +367,8 @@ def ingest_as_planned(
             raise RecordingError(given["error"])
         log = LogFormat.model_validate(given["log"])
         limits = QualitySettings.model_validate(given["quality"])
-        check_opening(source, log, limits.opening)
+        if guarded:
+            check_opening(source, log, limits.opening)
         kept = ingest(source, log, notes, limits, folder, names)
     except RecordingError as error:
         remove_kept(folder)

@@ -32,7 +32,9 @@ def check(plan: Plan) -> Iterator[tuple[str, str, Quality]]:
             continue
         with tempfile.TemporaryDirectory(prefix="imubench.") as folder:
             settings = plan.ingest_settings(sensor, name)
-            quality = ingest_as_planned(recording.path, settings, sensor, name, Path(folder))
+            quality = ingest_as_planned(
+                recording.path, settings, sensor, name, Path(folder), guarded=True
+            )
             quality.findings.extend(implausible_of(quality, plan.sensors.get(sensor)))
             for channel, log in static_logs(Path(folder)).items():
                 for finding in spectral_findings(channel, log, plan.bandwidth(sensor, name)):

@@ -15,7 +15,7 @@ def write_recording(
 ) -> None:
     """Write what is kept of a log, beside ``quality.json``, and what it looks like."""
     folder = outputs["quality"].parent
-    quality = ingest_as_planned(source, settings, sensor, recording, folder)
+    quality = ingest_as_planned(source, settings, sensor, recording, folder, guarded=True)
     seen = overview(folder, sensor, recording)
     write("envelope", seen.envelope, outputs["envelope"])
     write("histogram", seen.histogram, outputs["histogram"])
