@@ -31,6 +31,11 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeSch
     return ByUnit(config, log)
 
 
+def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
+    """Name a long text by its length: names go between the workers with every report."""
+    return f"{argname} of {len(val)}" if isinstance(val, str | bytes) and len(val) > 60 else None
+
+
 def few(chosen: Iterable[Any], others: Iterable[Any]) -> list[Any]:
     """The values of a parametrised test: few that tell, and others that the release has too."""
 
