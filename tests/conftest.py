@@ -1,6 +1,11 @@
 from __future__ import annotations
 
 import os
+
+# A worker of pytest-xdist has one processor: the threads of the linear algebra would wait for each
+# other on it, which takes half as long again.
+os.environ |= {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "NUMBA")}
+
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
