@@ -5,7 +5,6 @@ from __future__ import annotations
 from xdist.scheduler import LoadScopeScheduling
 
 FIRST = (
-    "tests/slurm/test_slurm.py",  # waits for Slurm: the other worker has the processors meanwhile
     "tests/workflow/test_incremental.py",  # two dozen lists of jobs, of one finished project
     "tests/report/browser",  # a folder: one browser, and one report that is looked at in all of it
     "tests/workflow/test_workflow.py",  # runs of one project, each upon those before

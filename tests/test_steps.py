@@ -16,8 +16,9 @@ import pytest
 from imubench_pipeline.run.processes import Job, Processes, StepError
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def steps() -> Iterator[Processes]:
+    """One process that forks for all of these tests: where it is killed, another begins."""
     made = Processes()
     yield made
     made.close()

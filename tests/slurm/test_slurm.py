@@ -1,4 +1,8 @@
-"""A run on a Slurm of one node, which lives in a temporary folder, against a run without it."""
+"""A run on a Slurm of one node, which lives in a temporary folder, against a run without it.
+
+For a release: most of the time it waits for Slurm. What the profile asks for is looked at every
+day, in test_profile.py.
+"""
 
 import importlib.util
 import os
@@ -19,7 +23,7 @@ from tests.workflow.project import Project, linked, put_log, put_sensor
 from tests.workflow.rules import costs
 from tests.workflow.test_workflow import STEPS_OF_A_RECORDING
 
-pytestmark = pytest.mark.workflow
+pytestmark = [pytest.mark.workflow, pytest.mark.release]
 
 SCRIPTS = Path(__file__).parent
 PROGRAMS = ("slurmctld", "slurmd", "munged", "sbatch", "srun", "squeue")
@@ -103,7 +107,6 @@ def watched(folder: Path) -> Iterator[set[str]]:
         watching.join()
 
 
-@pytest.mark.release
 def test_a_job_that_is_killed_is_named_and_the_rest_is_done(project: Project) -> None:
     with watched(project.folder) as alone:
         done = project.run(*flags(4), cores=1)
