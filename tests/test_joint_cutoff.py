@@ -78,7 +78,7 @@ def test_a_mean_of_many_samples_is_found_between_its_nulls(seed):
 
 
 @pytest.mark.parametrize("seed", few([0], [1]))
-@pytest.mark.parametrize("order, cutoff", [(3, 5.8), (4, 19.0)])
+@pytest.mark.parametrize("order, cutoff", few([(4, 19.0)], [(3, 5.8)]))
 def test_the_ends_of_a_log_do_not_hide_a_steep_digital_filter(seed, order, cutoff):
     sections = butter(order, cutoff, output="sos", fs=RATE)
     made = sosfilt(sections, process(seed, SAMPLES + 2000))[2000:]

@@ -68,7 +68,7 @@ def test_a_log_that_no_filter_bends_keeps_the_full_band(
 
 @pytest.mark.parametrize(
     "model",
-    [NoiseModel(K=1e-2), NoiseModel(N=N, K=0.1), NoiseModel(N=N, B=6e-3)],
+    few([NoiseModel(N=N, B=6e-3)], [NoiseModel(K=1e-2), NoiseModel(N=N, K=0.1)]),
     ids=lambda model: model.name,
 )
 def test_slow_noise_that_hides_the_white_noise_is_no_bend(rng, model: NoiseModel) -> None:
@@ -112,7 +112,9 @@ def test_a_band_ends_where_what_a_filter_takes_is_less_than_what_is_known(
     assert np.mean(parts) > 0.01
 
 
-@pytest.mark.parametrize("coefficients", [TWO_TAPS, low_pass(20.0)], ids=["two taps", "20 Hz"])
+@pytest.mark.parametrize(
+    "coefficients", few([TWO_TAPS], [low_pass(20.0)]), ids=["two taps", "20 Hz"]
+)
 def test_a_gentle_filter_costs_little_of_the_band(rng, coefficients: Coefficients) -> None:
     for _ in range(4):
         log = filtered(simulate(WHITE, RATE, 201_000, rng), coefficients)

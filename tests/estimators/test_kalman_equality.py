@@ -175,6 +175,7 @@ def test_a_correlation_far_longer_than_a_fiftieth_of_the_log_is_estimated_as_wel
             assert np.mean(apart) == pytest.approx(0.0, abs=0.1), name
 
 
+@pytest.mark.release
 def test_all_samples_tell_what_an_exact_likelihood_of_means_tells_once_n_is_known(rng) -> None:
     truth, rate = truth_of(MTI_7), 100.0
     pairs = []

@@ -190,6 +190,7 @@ def test_limits_hold_the_truth_as_often_as_they_say(model: NoiseModel) -> None:
     assert min(held.values()) >= 51, held
 
 
+@pytest.mark.release  # test_limits.py has the coverage of the same limits
 def test_standard_errors_are_the_scatter_of_fits() -> None:
     """Thirty logs know a standard deviation to 13 %."""
     values: dict[str, list[float]] = {"N": [], "B": [], "T_B": []}
@@ -205,7 +206,7 @@ def test_standard_errors_are_the_scatter_of_fits() -> None:
         assert np.median(errors[name]) == pytest.approx(np.std(logarithms), rel=0.3), name
 
 
-@pytest.mark.parametrize("method", ["weighted", "paper"])
+@pytest.mark.parametrize("method", few(["weighted"], ["paper"]))
 def test_white_logs_have_neither_b_nor_k(method) -> None:
     """At most 5 % may have; more than 5 of 30 then has a probability of 0.3 %."""
     phantoms = 0
