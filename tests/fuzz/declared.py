@@ -22,6 +22,7 @@ from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -175,6 +176,10 @@ _UNITS = [
 _FAILURE = Failure("s", "a", "estimate", "error", "the step estimate failed: ValueError: no")
 
 
+def _take_model(model: type[Any], path: Path) -> object:
+    return parse(model, read_yaml(path), str(path))
+
+
 def _take_notes(path: Path) -> object:
     notes = parse(RecordingNotes, read_yaml(path) or {}, str(path))
     return merged_log(_SENSOR, notes, str(path))
@@ -245,12 +250,11 @@ def subjects() -> dict[str, Subject]:
     record = {"attempt": 1, "failed": True, "log": "l", **asdict(_FAILURE)}
     note = {"process": 1, "host": "h", "since": now.isoformat(), "snakemake": 2, "boot": 1.0}
     held = [json.dumps(one, indent=1).encode() for one in (record, note, {"index.html": "ab"})]
-    parsed = lambda model, path: parse(model, read_yaml(path), str(path))  # noqa: E731
     return {
         "yaml": Subject("a.yaml", read_yaml, [*_NOTES, *sensors[:3], b"a: &a [1]\nb: *a\n"]),
-        "sensor": Subject("s.yaml", partial(parsed, Sensor), sensors),
+        "sensor": Subject("s.yaml", partial(_take_model, Sensor), sensors),
         "notes": Subject("a.yaml", _take_notes, _NOTES),
-        "requirement": Subject("r.yaml", partial(parsed, Requirement), requirements),
+        "requirement": Subject("r.yaml", partial(_take_model, Requirement), requirements),
         "run": Subject("config.yaml", _take_run, _settings("config/config.yaml")),
         "simulated": Subject("s.yaml", _take_simulated, _SIMULATED),
         "model": Subject("m.yaml", from_file, _MODELS),
