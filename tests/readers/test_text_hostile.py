@@ -63,6 +63,9 @@ READ = {
     *("one row", "20000 columns", "lines of delimiters", "a number of 500 kB"),
     *("zeros at the end", "zeros after a cut record", "zeros between", "comments and a record"),
 }
+PACKED = sorted(FILES)[::4]
+"""They are read packed, too, and packed and cut: what unpacks knows nothing of what it hands on."""
+
 LIMIT_MB, LIMIT_S = 500, 12
 
 
@@ -88,8 +91,10 @@ def main(folder: str) -> None:
 def test_hostile_files_cost_little_and_end_in_a_reason(tmp_path: Path) -> None:
     for name, make in FILES.items():
         text = make()
-        packed = gzip.compress(text, 1)
         written(tmp_path, text, name)
+        if name not in PACKED:
+            continue
+        packed = gzip.compress(text, 1)
         written(tmp_path, packed, f"{name}, packed")
         written(tmp_path, packed[: len(packed) * 2 // 3], f"{name}, packed and cut")
     # Another process, for its memory is to be that of the reader alone.
@@ -105,7 +110,7 @@ def test_hostile_files_cost_little_and_end_in_a_reason(tmp_path: Path) -> None:
     said = json.loads(done.stdout)
     assert said["peak"] < LIMIT_MB
     results = said["results"]
-    assert len(results) == 3 * len(FILES)
+    assert len(results) == len(FILES) + 2 * len(PACKED)
     for name, outcomes in results.items():
         for outcome, seconds in outcomes:
             assert seconds < LIMIT_S, name
@@ -114,8 +119,11 @@ def test_hostile_files_cost_little_and_end_in_a_reason(tmp_path: Path) -> None:
     for name in FILES:
         whole = results[name][0][0]
         assert (len(whole) == 2) == (name in READ), (name, whole)
-        packed = results[f"{name}, packed"][0][0]
-        assert [str(said).replace(", packed", "", 1) for said in packed] == list(map(str, whole))
+        if name in PACKED:
+            packed = results[f"{name}, packed"][0][0]
+            assert [str(said).replace(", packed", "", 1) for said in packed] == list(
+                map(str, whole)
+            )
 
 
 TEXT = st.lists(
