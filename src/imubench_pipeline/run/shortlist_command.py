@@ -40,14 +40,14 @@ def run(given: argparse.Namespace) -> int:
     from imubench_pipeline.report.terminal_table import fitting
     from imubench_pipeline.settings.requirements import Requirement, read_requirements
     from imubench_pipeline.settings.sensor import read_sensors
-    from imubench_pipeline.settings.validation import ConfigError, parse
-    from imubench_pipeline.settings.yaml_files import read_yaml
+    from imubench_pipeline.settings.validation import ConfigError
+    from imubench_pipeline.settings.yaml_files import read_settings
     from imubench_pipeline.steps.shortlist import NEEDED, rows_of_run
 
     try:
         path = Path(given.requirement)
         if path.suffix in (".yaml", ".yml"):
-            name, asked = path.stem, parse(Requirement, read_yaml(path), str(path))
+            name, asked = path.stem, read_settings(Requirement, path)
         else:
             known = read_requirements(given.requirements)
             if given.requirement not in known:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from imubench_pipeline.settings.validation import ConfigError, parse
-from imubench_pipeline.settings.yaml_files import read_yaml
+from imubench_pipeline.settings.yaml_files import read_settings, read_yaml
 from imubench_pipeline.units import UnitError, naming, quantity_to_si
 
 if TYPE_CHECKING:
@@ -164,7 +164,7 @@ def _origin(given: argparse.Namespace) -> tuple[Origin, Any]:
             raise ConfigError("--results are for a sensor by name; the file of models has its own")
         origin = sources.from_file(path)
         own = origin.sensor and given.sensors / f"{origin.sensor}.yaml"
-        sensor = parse(Sensor, read_yaml(own), str(own)) if own else None
+        sensor = read_settings(Sensor, own) if own else None
     else:
         file = given.sensors / f"{given.sensor}.yaml"
         if not file.is_file():
@@ -172,7 +172,7 @@ def _origin(given: argparse.Namespace) -> tuple[Origin, Any]:
             raise ConfigError(
                 f"{file}: no such sensor file; there are: {there}; or name a file of models"
             )
-        sensor = parse(Sensor, read_yaml(file), str(file))
+        sensor = read_settings(Sensor, file)
         try:
             origin = from_datasheet(given.sensor, sensor, given.seed)
         except ConfigError:

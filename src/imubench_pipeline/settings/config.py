@@ -23,7 +23,7 @@ from imubench_pipeline.settings.validation import (
     Text,
     parse,
 )
-from imubench_pipeline.settings.yaml_files import read_yaml
+from imubench_pipeline.settings.yaml_files import read_settings
 
 _OF_NO_RECORDING = {"held_back", "exports", "limits", "report"}
 
@@ -279,7 +279,7 @@ def given_beside(run: Run, file: Path) -> list[str]:
         The configuration that Snakemake reads by itself.
     """
     try:
-        written = parse(Run, read_yaml(file), str(file))
+        written = read_settings(Run, file)
     except ConfigError:
         written = Run()
     here, there = (one.model_dump(mode="json", exclude=_OF_NO_RECORDING) for one in (run, written))

@@ -15,14 +15,13 @@ from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.two_position import TwoPosition
 from imubench_pipeline.settings.validation import (
     Between,
-    ConfigError,
     Frequency,
     Strict,
     Text,
     of_size,
     parse,
 )
-from imubench_pipeline.settings.yaml_files import read_yaml
+from imubench_pipeline.settings.yaml_files import read_folder
 from imubench_pipeline.units import UnitError, conversion, quantity_to_si
 
 QUANTITIES: dict[str, str] = {"gyro": "angular_rate", "accel": "acceleration"}
@@ -358,12 +357,7 @@ def read_sensors(folder: Path) -> dict[str, Sensor]:
     ConfigError
         If the folder is not there or a file cannot be used.
     """
-    if not folder.is_dir():
-        raise ConfigError(f"{folder}: no such folder; expected one YAML file a sensor")
-    return {
-        path.stem: parse(Sensor, read_yaml(path), str(path))
-        for path in sorted(folder.glob("*.yaml"))
-    }
+    return read_folder(Sensor, folder, "sensor")
 
 
 def sensors_of(catalogue: str) -> dict[str, Sensor]:

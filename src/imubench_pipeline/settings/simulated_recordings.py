@@ -34,9 +34,8 @@ from imubench_pipeline.settings.validation import (
     Frequency,
     Strict,
     Text,
-    parse,
 )
-from imubench_pipeline.settings.yaml_files import read_yaml
+from imubench_pipeline.settings.yaml_files import read_settings
 from imubench_pipeline.units import naming, quantity_to_si
 
 _Around = TypeVar("_Around", bound=Surroundings)
@@ -243,7 +242,7 @@ def read_simulated(path: Path | None, sensors: Mapping[str, Sensor]) -> ToSimula
     """
     if path is None:
         return ToSimulate([], {})
-    given = parse(Simulated, read_yaml(path), str(path))
+    given = read_settings(Simulated, path)
     recordings = []
     for number, entry in enumerate(given.recordings):
         _check(entry, sensors, f"{path}: recordings.{number}")
@@ -271,7 +270,7 @@ def read_simulated(path: Path | None, sensors: Mapping[str, Sensor]) -> ToSimula
 
 
 def _board(path: Path, sensors: Mapping[str, Sensor]) -> Board:
-    board = parse(Board, read_yaml(path), str(path))
+    board = read_settings(Board, path)
     for number, entry in enumerate(board.sensors):
         _check(entry, sensors, f"{path}: sensors.{number}")
     names = [entry.sensor for entry in board.sensors]

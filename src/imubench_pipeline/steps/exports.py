@@ -23,19 +23,9 @@ def exports(
 ) -> Iterator[tuple[Path, str | bytes]]:
     """Yield the files of a run, each with its place in the folder of the exports.
 
-    Parameters
-    ----------
-    tables : mapping of str to pyarrow.Table
-        Those of `imubench_pipeline.export.request.NEEDED`.
-    settings : ExportSettings
-    recordings : Path, optional
-        As `imubench_pipeline.export.request.made` takes it.
-
-    Yields
-    ------
-    (Path, str or bytes)
-        ``<sensor>/<target>/<file of the program>``; ``<sensor>/not_made.txt`` for what a program
-        cannot hold.
+    A place is ``<sensor>/<target>/<file of the program>``; ``<sensor>/not_made.txt`` is for what a
+    program cannot hold. `tables` and `recordings` are as
+    `imubench_pipeline.export.request.made` takes them.
     """
     for sensor in dict.fromkeys(tables["parameters"]["sensor"].to_pylist()):
         refused = []

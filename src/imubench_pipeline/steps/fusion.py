@@ -104,16 +104,7 @@ def fusion_rows(
     how: FusionSettings,
     joint: Mapping[tuple[str, str], Path] | None = None,
 ) -> Iterator[Row]:
-    """Return the rows of the table ``fusion``.
-
-    Parameters
-    ----------
-    tables : mapping of str to pyarrow.Table
-        Those of `NEEDED`, of a run.
-    how : FusionSettings
-    joint : mapping of (str, str) to Path, optional
-        As `candidates` takes it.
-    """
+    """Return the rows of the table ``fusion``; `tables` and `joint` are as of `candidates`."""
     rows = equivalence_rows(
         candidates(tables, joint),
         [quantity_to_si(tau, "time") for tau in how.tau],

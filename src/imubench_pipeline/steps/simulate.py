@@ -28,15 +28,7 @@ from imubench_pipeline.units import quantity_to_si
 
 
 def write_simulated(recording: SimulatedRecording, log: LogFormat, folder: Path) -> None:
-    """Simulate a recording and write it as text in the layout of its sensor's logs.
-
-    Parameters
-    ----------
-    recording : SimulatedRecording
-    log : LogFormat
-        Its `layout`: the columns, units and files that the reader expects.
-    folder : Path
-        Where the files go.
+    """Simulate a recording and write it as text, by its `layout` of the sensor's logs.
 
     Raises
     ------
@@ -112,10 +104,7 @@ def _sensed(recording: SimulatedRecording, rate: float) -> _Samples:
 
 
 def _on_table(table: SimulatedTable, rate: float, samples: int) -> _Samples:
-    """Return what the gyro indicates of the table, which goes straight from one rate to the next.
-
-    Its scale factor is in it.
-    """
+    """Return what the gyro indicates of the table, which goes straight from rate to rate."""
     times = [time for step in table.steps for time in step.seconds]
     rates = np.repeat([quantity_to_si(step.rate, "angular_rate") for step in table.steps], 2)
     true = np.interp(np.arange(samples) / rate, times, rates)
