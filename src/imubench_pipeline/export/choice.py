@@ -24,17 +24,7 @@ _NAMED = 40
 
 @dataclass(frozen=True)
 class Choice:
-    """The axis that was chosen.
-
-    Attributes
-    ----------
-    recording, channel, method : str
-    axis : AxisNoise
-    deviation : float
-        Allan deviation of its model at the horizon, SI.
-    of : int
-        Number of axes it was chosen from.
-    """
+    """The axis that was chosen, of `of` axes; Allan deviation of its model at the horizon, SI."""
 
     recording: str
     channel: str
@@ -186,8 +176,3 @@ def _least_walk(estimate: Estimate) -> float | None:
     """Return the upper limit of a K that the model does not have."""
     K = estimate.parameters.get("K")
     return K.upper if K is not None and K.in_model is None else None
-
-
-def devices_of(recordings: Sequence[Row]) -> dict[str, str]:
-    """Return the device of each recording, of rows of the table ``recordings`` of one sensor."""
-    return {row["recording"]: row["device"] for row in recordings}

@@ -14,8 +14,15 @@ _WIDTH = 96
 _WHITE = re.compile(r"[\t\n]")
 
 
-def heading(imu: Imu, program: str, convention: str, *, temperature: bool = False) -> list[str]:
-    """Return what is to be said of every file.
+def heading(
+    imu: Imu,
+    program: str,
+    convention: str,
+    mapped: Mapping[str, Mapped] | None = None,
+    *,
+    temperature: bool = False,
+) -> list[str]:
+    """Return what is to be said of every file, printable statements.
 
     Parameters
     ----------
@@ -24,13 +31,10 @@ def heading(imu: Imu, program: str, convention: str, *, temperature: bool = Fals
         What loads the file.
     convention : str
         Of its numbers, in words.
+    mapped : mapping of str to Mapped, optional
+        What was replaced in the models.
     temperature : bool
         The file holds how the biases follow the temperature.
-
-    Returns
-    -------
-    list of str
-        One statement each, printable.
     """
     statements = [f"Noise of the {imu.sensor} for {program}, by imubench."]
     if imu.simulated:
@@ -66,22 +70,16 @@ def heading(imu: Imu, program: str, convention: str, *, temperature: bool = Fals
             f"INFLATED: from here on all densities and amplitudes are {imu.inflation:g} times "
             f"those above, because: {imu.because}."
         )
+    for name, replacement in (mapped or {}).items():
+        statements += [f"{name}: {words}." for words in replacement.words]
     return [_on_one_line(words) for words in statements]
-
-
-def mapping_words(mapped: Mapping[str, Mapped]) -> list[str]:
-    """Return what was replaced in the models, one statement each."""
-    return [
-        f"{name}: {words}." for name, replacement in mapped.items() for words in replacement.words
-    ]
 
 
 def commented(statements: Sequence[str], mark: str = "#") -> str:
     """Return statements as comment lines, each beginning with a mark.
 
-    What no comment can hold in every format, such as the name of a recording with a line end of
-    Unicode or a control character in it, is written as its escape, and a longer word than a line is
-    divided.
+    What no comment can hold in every format, such as a line end of Unicode in the name of a
+    recording, is written as its escape, and a longer word than a line is divided.
     """
     lines = []
     for statement in statements:
@@ -95,7 +93,7 @@ def commented(statements: Sequence[str], mark: str = "#") -> str:
 def commented_python(statements: Sequence[str]) -> str:
     """Return statements as comments at the top of a file of Python.
 
-    Its encoding is stated before them: Python takes it from the words of the first comments, which
+    Its encoding stands before them: Python takes it from the words of the first comments, which
     hold names that others gave (PEP 263).
     """
     return "# -*- coding: utf-8 -*-\n" + commented(statements)

@@ -12,36 +12,37 @@ CONVENTION = (
 )
 
 
-def walks(imu: Imu) -> dict[str, Mapped]:
+TOPIC = "/imu0"
+"""ROS topic of the samples."""
+
+
+def walks(imu: Imu, program: str | None = None) -> dict[str, Mapped]:
     """Return gyro and accelerometer as white noise and random walk.
+
+    Parameters
+    ----------
+    imu : Imu
+    program : str, optional
+        That takes densities above 0 only.
 
     Raises
     ------
     ExportError
-        If one has no estimate.
+        If one has no estimate, or a density is 0 that must be above it.
     """
     imu.both()
-    return {
+    mapped = {
         name: as_walk(axis.model, imu.horizon, imu.rate, axis.least_walk)
         for name, axis in imu.axes.items()
     }
-
-
-def positive(mapped: dict[str, Mapped], program: str) -> None:
-    """Check that no density is 0.
-
-    Raises
-    ------
-    ExportError
-        If one is.
-    """
-    for name, axis in mapped.items():
+    for name, axis in mapped.items() if program else ():
         for letter in ("N", "K"):
             if not getattr(axis.model, letter) > 0.0:
                 raise ExportError(
                     f"{name}: {letter} is 0, and {program} takes values above 0 only; a longer "
                     "log, or an overbound, gives one"
                 )
+    return mapped
 
 
 def densities(mapped: dict[str, Mapped], indent: str = "") -> str:
