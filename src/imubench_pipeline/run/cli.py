@@ -103,9 +103,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     verification.add_arguments(
         commands.add_parser("verify", help="say whether all results are as runs left them")
     )
-    given = parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
     try:
-        status = _COMMANDS[given.command](given)
+        status = _COMMANDS[options.command](options)
         sys.stdout.flush()
         return status
     except BrokenPipeError:
@@ -166,65 +166,65 @@ def _seconds(text: str) -> float:
             raise argparse.ArgumentTypeError(str(error)) from None
 
 
-def _export(given: argparse.Namespace) -> int:
+def _export(options: argparse.Namespace) -> int:
     from imubench_pipeline.export.imu import ExportError
     from imubench_pipeline.export.request import Request, load, made, recordings_of
 
-    if given.inflate != 1.0 and not given.because:
+    if options.inflate != 1.0 and not options.because:
         print("--inflate needs its reason; expected --because '...'", file=sys.stderr)
         return 2
     asked = Request(
-        sensor=given.sensor,
-        target=given.target,
-        axis=given.axis,
-        horizon=given.horizon,
-        inflation=given.inflate,
-        because=given.because,
-        overbound=given.overbound,
-        most_excess=given.excess,
-        method=given.method,
-        latitude=given.latitude,
-        rate=given.rate,
+        sensor=options.sensor,
+        target=options.target,
+        axis=options.axis,
+        horizon=options.horizon,
+        inflation=options.inflate,
+        because=options.because,
+        overbound=options.overbound,
+        most_excess=options.excess,
+        method=options.method,
+        latitude=options.latitude,
+        rate=options.rate,
     )
     try:
-        content = made(load(given.results), asked, recordings_of(given.results))
+        content = made(load(options.results), asked, recordings_of(options.results))
     except ExportError as error:
         print(error, file=sys.stderr)
         return 2
-    if given.output is not None:
-        write_content(content, given.output)
+    if options.output is not None:
+        write_content(content, options.output)
     elif isinstance(content, bytes):
-        print(f"{given.target} is no text; expected --output FILE", file=sys.stderr)
+        print(f"{options.target} is no text; expected --output FILE", file=sys.stderr)
         return 2
     else:
         print(content, end="")
     return 0
 
 
-def _schema(given: argparse.Namespace) -> int:
-    found = SCHEMAS[given.file].model_json_schema()
-    found["$schema"] = "https://json-schema.org/draft/2020-12/schema"
-    if given.output:
-        write_json(found, given.output)
+def _schema(options: argparse.Namespace) -> int:
+    schema = SCHEMAS[options.file].model_json_schema()
+    schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
+    if options.output:
+        write_json(schema, options.output)
     else:
-        json.dump(found, sys.stdout, indent=1)
+        json.dump(schema, sys.stdout, indent=1)
         sys.stdout.write("\n")
     return 0
 
 
-def _check(given: argparse.Namespace) -> int:
+def _check(options: argparse.Namespace) -> int:
     # Numerics are loaded for this command only: the others answer at once.
     from imubench_pipeline.run.checking import check
     from imubench_pipeline.run.plan import Plan
 
     try:
-        config = read_yaml(given.config) if given.config.is_file() else None
-        over: dict[str, object] = {"logs": str(given.logs), "simulated": None}
-        if given.sensors:
-            over["sensors"] = str(given.sensors)
+        config = read_yaml(options.config) if options.config.is_file() else None
+        over: dict[str, object] = {"logs": str(options.logs), "simulated": None}
+        if options.sensors:
+            over["sensors"] = str(options.sensors)
         plan = Plan({**(config if isinstance(config, dict) else {}), **over})
         if not plan.recordings:
-            raise ConfigError(f"{given.logs}: no log found; expected <sensor>/<recording> in it")
+            raise ConfigError(f"{options.logs}: no log found; expected <sensor>/<recording> in it")
     except ConfigError as error:
         print(error, file=sys.stderr)
         return 2
@@ -244,7 +244,7 @@ INSPECTED_S, INSPECTED_BYTES = 10.0, 1 << 29
 """Time and memory in which a log is listed, or rejected."""
 
 
-def _inspect(given: argparse.Namespace) -> int:
+def _inspect(options: argparse.Namespace) -> int:
     from imubench_pipeline.readers.bounded import BoundError, bounded
     from imubench_pipeline.readers.inspection import inspect
     from imubench_pipeline.tables.findings import RecordingError
@@ -252,19 +252,19 @@ def _inspect(given: argparse.Namespace) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         # Names in a log may be in any script, and sensor files are UTF-8.
         sys.stdout.reconfigure(encoding="utf-8", errors="backslashreplace")
-    output: Path | None = given.output
+    output: Path | None = options.output
     if output is not None and output.exists():
         print(f"{output}: exists already; expected a new name", file=sys.stderr)
         return 2
     try:
         model = output.stem if output is not None else None
-        found = bounded(INSPECTED_S, INSPECTED_BYTES, inspect, given.log, model)
+        inspected = bounded(INSPECTED_S, INSPECTED_BYTES, inspect, options.log, model)
         if output is not None:
             with replacing(output) as temporary:
-                temporary.write_text(found.block, encoding="utf-8")
+                temporary.write_text(inspected.block, encoding="utf-8")
     except BoundError as error:
         print(
-            f"{given.log.name}: to list it {error}; expected the log of an inertial sensor: copy "
+            f"{options.log.name}: to list it {error}; expected the log of an inertial sensor: copy "
             "what it measured into a file of its own",
             file=sys.stderr,
         )
@@ -272,12 +272,12 @@ def _inspect(given: argparse.Namespace) -> int:
     except (RecordingError, OSError) as error:
         print(error, file=sys.stderr)
         return 2
-    if not given.block:
-        print(found.listing)
+    if not options.block:
+        print(inspected.listing)
     if output is None:
-        sys.stdout.write(found.block)
-    print(found.proof.said, file=sys.stderr if given.block else sys.stdout)
-    return 0 if found.complete else 1
+        sys.stdout.write(inspected.block)
+    print(inspected.proof.said, file=sys.stderr if options.block else sys.stdout)
+    return 0 if inspected.complete else 1
 
 
 _COMMANDS = {

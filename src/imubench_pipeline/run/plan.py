@@ -47,6 +47,9 @@ _OF_INGEST = ("quality.json", "envelope.parquet", "histogram.parquet")
 _EXPERIMENTS = ("two_position", "rate_table", "pointing")
 """Keys of the notes that the ingest does not depend on."""
 
+_PUBLISHED = {"channels": {"__all__": {"published", "figures"}}}
+"""Keys of a simulated recording that its samples do not depend on."""
+
 _OF_RANKING = ("price_class", "must")
 """Keys of a requirement that no error follows from."""
 
@@ -75,12 +78,12 @@ class Plan:
         self._of_ingest: dict[tuple[str, str], str] = {}
         self._read_notes: dict[Path, object] = {}
         self.recordings: dict[tuple[str, str], Recording] = {}
-        for found in [*self._found_logs(), *self._to_simulate()]:
-            other = self.recordings.setdefault((found.sensor, found.name), found)
-            if other is not found:
+        for recording in [*self._found_logs(), *self._to_simulate()]:
+            other = self.recordings.setdefault((recording.sensor, recording.name), recording)
+            if other is not recording:
                 raise ConfigError(
-                    f"{other.path} and {found.path} would both be the recording "
-                    f"{found.sensor}/{found.name}; rename or remove one"
+                    f"{other.path} and {recording.path} would both be the recording "
+                    f"{recording.sensor}/{recording.name}; rename or remove one"
                 )
 
     def _found_logs(self) -> list[Recording]:
@@ -91,12 +94,12 @@ class Plan:
                     "that holds <sensor>/<recording>"
                 )
             return []
-        found: dict[str, list[Recording]] = {}
+        by_name: dict[str, list[Recording]] = {}
         for log in found_logs(self.run.logs):
-            found.setdefault(f"{log.sensor}/{log.name}", []).append(log)
+            by_name.setdefault(f"{log.sensor}/{log.name}", []).append(log)
         for key in self.run.held_back:
-            found[key] = self._as_it_is(key, found.get(key, []))
-        return sorted(chain.from_iterable(found.values()), key=lambda log: log.path)
+            by_name[key] = self._as_it_is(key, by_name.get(key, []))
+        return sorted(chain.from_iterable(by_name.values()), key=lambda log: log.path)
 
     def _as_it_is(self, key: str, logs: list[Recording]) -> list[Recording]:
         """Return a recording that is held back, if its results are there; its log may be not."""
@@ -108,14 +111,13 @@ class Plan:
             return []
         path = logs[0].path if logs else self.run.logs / sensor / name
         notes = logs[0].notes if logs else path.with_name(f"{name}.yaml")
-        there = notes if notes and notes.is_file() else None
-        return [Recording(sensor, name, path, there, simulated=False, held_back=True)]
+        readable = notes if notes and notes.is_file() else None
+        return [Recording(sensor, name, path, readable, simulated=False, held_back=True)]
 
     def _to_simulate(self) -> list[Recording]:
+        folder = self.run.results / "simulated"
         return [
-            Recording(
-                sensor, name, self.run.results / "simulated" / sensor / name, None, simulated=True
-            )
+            Recording(sensor, name, folder / sensor / name, None, simulated=True)
             for sensor, name in self._simulated
         ]
 
@@ -152,9 +154,9 @@ class Plan:
             if settings["kind"] != "rate_table":
                 log = log.model_copy(update={"table_rate": None})
             written = log.model_dump(mode="json", exclude={"bandwidth"})
-            said = notes.model_dump(mode="json", exclude={"log", *_EXPERIMENTS})
+            stated = notes.model_dump(mode="json", exclude={"log", *_EXPERIMENTS})
             files = versions_of(recording, self.run.results)
-            return settings | {"notes": said, "log": written, "files": files}
+            return settings | {"notes": stated, "log": written, "files": files}
         except ConfigError as error:
             return settings | {"error": str(error)}
 
@@ -187,11 +189,11 @@ class Plan:
 
     @cached_property
     def _at_rest(self) -> dict[str, list[str]]:
-        found: dict[str, list[str]] = {}
+        by_sensor: dict[str, list[str]] = {}
         for sensor, name in self.recordings:
             if self.kind(sensor, name) == "static":
-                found.setdefault(sensor, []).append(name)
-        return found
+                by_sensor.setdefault(sensor, []).append(name)
+        return by_sensor
 
     @cached_property
     def calibrated(self) -> list[tuple[str, str]]:
@@ -213,27 +215,28 @@ class Plan:
     def experiment_settings(self, sensor: str, name: str) -> str:
         """Return what is found of a turned or a stated axis depends on beside the samples."""
         recording = self.recordings[sensor, name]
-        known = self.sensors.get(sensor)
+        declared = self.sensors.get(sensor)
         settings: dict[str, object] = {
             "earth_rate": self.run.earth_rate.model_dump(mode="json"),
-            "sensor": known.model_dump(mode="json", exclude_unset=True) if known else None,
+            "sensor": declared.model_dump(mode="json", exclude_unset=True) if declared else None,
         }
         if recording.simulated:
             entry = self._simulated[sensor, name]
-            published = {"channels": {"__all__": {"published", "figures"}}}
-            return _text(settings | {"simulated": entry.model_dump(mode="json", exclude=published)})
+            return _text(
+                settings | {"simulated": entry.model_dump(mode="json", exclude=_PUBLISHED)}
+            )
         try:
             notes = self._written(recording)[1]
         except ConfigError:
             return _text(settings)  # it is rejected, and says why
-        told = notes.model_dump(mode="json", include=set(_EXPERIMENTS), exclude_none=True)
-        return _text(settings | told)
+        experiments = notes.model_dump(mode="json", include=set(_EXPERIMENTS), exclude_none=True)
+        return _text(settings | experiments)
 
     def outlook_settings(self, sensor: str) -> str:
         """Return what is predicted of a sensor at rest depends on beside its noise."""
-        known = self.sensors.get(sensor)
+        declared = self.sensors.get(sensor)
         biases = {key: {"bias_repeatability", "offset"} for key in ("gyro", "accel")}
-        printed = known.datasheet.model_dump(mode="json", include=biases) if known else {}
+        printed = declared.datasheet.model_dump(mode="json", include=biases) if declared else {}
         settings = self.run.earth_rate.model_dump(mode="json")
         return _text({"earth_rate": settings, "datasheet": printed})
 
@@ -282,9 +285,7 @@ class Plan:
         written = layout(recording, self.sensors[sensor].log)
         return _text(
             {
-                "recording": recording.model_dump(
-                    mode="json", exclude={"channels": {"__all__": {"published", "figures"}}}
-                ),
+                "recording": recording.model_dump(mode="json", exclude=_PUBLISHED),
                 "log": written.model_dump(mode="json", exclude={"bandwidth"}),
                 "profiles": self._profiles(recording),
             }
@@ -307,10 +308,10 @@ class Plan:
 
     def datasheet_settings(self, sensor: str) -> str:
         """Return what the comparison with the datasheet of a sensor depends on."""
-        known = self.sensors.get(sensor)
+        declared = self.sensors.get(sensor)
         return _text(
             {
-                "datasheet": known.datasheet.model_dump(mode="json") if known else {},
+                "datasheet": declared.datasheet.model_dump(mode="json") if declared else {},
                 "tolerance": self.run.datasheet.tolerance,
                 "longest": self.run.estimate.longest,
             }
@@ -318,12 +319,12 @@ class Plan:
 
     def error_budget_settings(self, sensor: str) -> str:
         """Return the errors that are asked of a sensor's recordings, and what is printed of it."""
-        known = self.sensors.get(sensor)
+        declared = self.sensors.get(sensor)
         return _text(
             {
                 "error_budget": self.run.error_budget.model_dump(mode="json"),
                 "requirements": self._requirements(*_OF_RANKING, "title", "note", "example"),
-                "datasheet": known.datasheet.only(IN_USE) if known else {},
+                "datasheet": declared.datasheet.only(IN_USE) if declared else {},
             }
         )
 
@@ -338,8 +339,8 @@ class Plan:
     def _requirements(self, *unused: str) -> dict[str, object]:
         """Return what applications need, without what a step does not use of it."""
         return {
-            name: {"title": name} | one.model_dump(mode="json", exclude=set(unused))
-            for name, one in self.requirements.items()
+            name: {"title": name} | requirement.model_dump(mode="json", exclude=set(unused))
+            for name, requirement in self.requirements.items()
         }
 
     def _described(self, *keys: str) -> dict[str, dict[str, object]]:
@@ -384,7 +385,7 @@ class Plan:
             "title": board.title,
             "note": board.note,
             "sensors": {
-                sensor.sensor: {name: one.figures for name, one in sensor.channels.items()}
+                sensor.sensor: {name: channel.figures for name, channel in sensor.channels.items()}
                 for sensor in board.sensors
             },
             "temperature": board.temperature is not None,

@@ -282,21 +282,24 @@ def given_beside(run: Run, file: Path) -> list[str]:
         written = read_settings(Run, file)
     except ConfigError:
         written = Run()
-    here, there = (one.model_dump(mode="json", exclude=_OF_NO_RECORDING) for one in (run, written))
-    return [f"{key}={_as_given(value)}" for key, value in _differing(here, there).items()]
+    in_run, in_file = (
+        run_settings.model_dump(mode="json", exclude=_OF_NO_RECORDING)
+        for run_settings in (run, written)
+    )
+    return [f"{key}={_as_given(value)}" for key, value in _differing(in_run, in_file).items()]
 
 
-def _differing(here: Mapping[str, Any], there: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what is not there, or otherwise."""
-    found: dict[str, Any] = {}
-    for key, value in here.items():
-        other = there.get(key)
+def _differing(settings: Mapping[str, Any], other_settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the settings that the other ones lack, or have otherwise."""
+    differing: dict[str, Any] = {}
+    for key, value in settings.items():
+        other = other_settings.get(key)
         if isinstance(value, Mapping) and isinstance(other, Mapping):
             if inner := _differing(value, other):
-                found[key] = inner
+                differing[key] = inner
         elif value != other:
-            found[key] = value
-    return found
+            differing[key] = value
+    return differing
 
 
 def _as_given(value: object) -> str:

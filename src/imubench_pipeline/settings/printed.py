@@ -46,9 +46,9 @@ def _printed_value(value: object) -> Value | None:
             return tuple(_number(number) for number in value)
         return _number(value)
     except ValueError:
-        found = f"found {dict(value)}; " if isinstance(value, Mapping) else ""
+        mapping = f"found {dict(value)}; " if isinstance(value, Mapping) else ""
         raise ValueError(
-            f"{found}expected a number, one for each axis such as {{xy: 60, z: 80}}, a list "
+            f"{mapping}expected a number, one for each axis such as {{xy: 60, z: 80}}, a list "
             "[low, high], or null: not published"
         ) from None
 
@@ -304,8 +304,8 @@ class Datasheet(Strict):
         written = self.model_dump(mode="json", include={"options", *FIGURE_DIMENSIONS})
         for quantity in FIGURE_DIMENSIONS:
             sheet = written[quantity] or {}
-            kept = {name: figures for name, figures in sheet.items() if name in names}
-            written[quantity] = kept if written[quantity] is not None else None
+            chosen = {name: figures for name, figures in sheet.items() if name in names}
+            written[quantity] = chosen if written[quantity] is not None else None
         return written
 
     def _figures(self) -> Iterator[tuple[str, str, str, PrintedFigure]]:

@@ -212,7 +212,7 @@ class LogFormat(Strict):
         if self.table_rate is not None:
             _check_unit(self.table_rate.unit, "angular_rate", "table_rate.unit")
         beside = (self.temperature, self.position, self.table_rate)
-        sources = [*self.channels.values(), *(one for one in beside if one is not None)]
+        sources = [*self.channels.values(), *(source for source in beside if source is not None)]
         if any(source.file for source in sources) and not all(source.file for source in sources):
             raise ValueError("some channels name a 'file' and others do not; expected all or none")
         return self
@@ -362,7 +362,7 @@ def read_sensors(folder: Path) -> dict[str, Sensor]:
 
 def sensors_of(catalogue: str) -> dict[str, Sensor]:
     """Return the sensors as the plan wrote them."""
-    return {name: Sensor.model_validate(one) for name, one in json.loads(catalogue).items()}
+    return {name: Sensor.model_validate(section) for name, section in json.loads(catalogue).items()}
 
 
 def merged_log(sensor: Sensor, notes: RecordingNotes, file: str) -> LogFormat:

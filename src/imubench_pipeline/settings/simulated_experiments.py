@@ -33,9 +33,9 @@ class SimulatedTurns(TwoPosition):
     @model_validator(mode="after")
     def _parts_are_there(self) -> Self:
         parts = {"whole", *(f"last {text}" for text in self.last)}
-        for one in self.published:
-            if one.part not in parts:
-                raise ValueError(f"published: part is {one.part!r}; expected one of {parts}")
+        for rate in self.published:
+            if rate.part not in parts:
+                raise ValueError(f"published: part is {rate.part!r}; expected one of {parts}")
         return self
 
     @property

@@ -99,8 +99,8 @@ class OfASensor(ImuSettings):
     def _samples_and_units(self) -> Self:
         length = quantity_to_si(self.duration, "time") * quantity_to_si(self.rate, "frequency")
         if not 0.5 < length <= _MOST_SAMPLES:
-            held = "no sample" if length < 1.0 else f"more than {_MOST_SAMPLES:g} samples"
-            raise ValueError(f"duration: {self.duration} at {self.rate} hold {held}")
+            content = "no sample" if length < 1.0 else f"more than {_MOST_SAMPLES:g} samples"
+            raise ValueError(f"duration: {self.duration} at {self.rate} hold {content}")
         check_axes(self.channels, "channels")
         return self
 
@@ -122,7 +122,7 @@ class SimulatedRecording(OfASensor, Surroundings):
 
     @model_validator(mode="after")
     def _one_experiment(self) -> Self:
-        stated = [key for key, one in self._experiments.items() if one is not None]
+        stated = [key for key, experiment in self._experiments.items() if experiment is not None]
         if len(stated) > 1:
             raise ValueError(f"found {' and '.join(stated)}; expected one of them")
         for key in stated:
@@ -185,7 +185,7 @@ class Board(Surroundings):
 
     @model_validator(mode="after")
     def _explains_what_there_is(self) -> Self:
-        channels = (one for sensor in self.sensors for one in sensor.channels.values())
+        channels = (channel for sensor in self.sensors for channel in sensor.channels.values())
         figures = {figure.figure for channel in channels for figure in channel.published}
         if unknown := self.why.keys() - figures:
             expected = ", ".join(sorted(figures)) or "none: nothing is published"
@@ -205,7 +205,9 @@ class Board(Surroundings):
         around = {key: getattr(self, key) for key in Surroundings.model_fields}
         for sensor in self.sensors:
             own = {key: getattr(sensor, key) for key in OfASensor.model_fields}
-            own["channels"] = {key: self._explained(one) for key, one in sensor.channels.items()}
+            own["channels"] = {
+                key: self._explained(channel) for key, channel in sensor.channels.items()
+            }
             yield SimulatedRecording(**own, **around, recording=f"sim_{name}", seed=self.seed)
 
     def _explained(self, channel: SimulatedChannel) -> SimulatedChannel:
@@ -242,13 +244,13 @@ def read_simulated(path: Path | None, sensors: Mapping[str, Sensor]) -> ToSimula
     """
     if path is None:
         return ToSimulate([], {})
-    given = read_settings(Simulated, path)
+    declared = read_settings(Simulated, path)
     recordings = []
-    for number, entry in enumerate(given.recordings):
+    for number, entry in enumerate(declared.recordings):
         _check(entry, sensors, f"{path}: recordings.{number}")
         recordings.append(_found_from(entry, path, f"recordings.{number}."))
     boards: dict[str, Board] = {}
-    for file in given.boards:
+    for file in declared.boards:
         if not (path.parent / file).is_file():
             raise ConfigError(
                 f"{path}: boards: {path.parent / file}: no such file; expected the file of a "

@@ -29,11 +29,11 @@ def stated_gyro(stated: Gyro | None, channels: Sequence[str], what: str) -> str:
     gyros = [name for name in channels if name.startswith("gyro_")]
     if stated in gyros:
         return stated
-    found = ", ".join(gyros) or "no gyro"
+    in_log = ", ".join(gyros) or "no gyro"
     if stated is not None:
-        raise ValueError(f"channel: found {stated!r}; the log has {found}")
+        raise ValueError(f"channel: found {stated!r}; the log has {in_log}")
     if len(gyros) != 1:
         raise ValueError(
-            f"channel: missing; expected the gyro whose axis {what}, the log has {found}"
+            f"channel: missing; expected the gyro whose axis {what}, the log has {in_log}"
         )
     return gyros[0]
