@@ -26,7 +26,6 @@ from imubench_pipeline.settings.simulated_recordings import Board, Simulated
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.settings.yaml_files import read_yaml
 from imubench_pipeline.tables import replacing, write_content, write_json
-from imubench_pipeline.units import UnitError, quantity_to_si
 
 SCHEMAS: dict[str, type[BaseModel]] = {
     "run": Run,
@@ -125,7 +124,7 @@ def _add_export(exporting: argparse.ArgumentParser) -> None:
     )
     exporting.add_argument(
         "--horizon",
-        type=_seconds,
+        type=nightly.seconds,
         default="60 s",
         metavar="TIME",
         help="of coasting, for which terms that the program lacks are mapped; default: 60 s",
@@ -153,17 +152,6 @@ def _add_export(exporting: argparse.ArgumentParser) -> None:
     exporting.add_argument("--latitude", type=float, metavar="DEG", help="for gravity")
     exporting.add_argument("--rate", type=float, metavar="HZ", help="default: the recording's")
     exporting.add_argument("--output", type=Path, help="where to write; default: the terminal")
-
-
-def _seconds(text: str) -> float:
-    """Return a time in s, written with its unit or without."""
-    try:
-        return float(text)
-    except ValueError:
-        try:
-            return quantity_to_si(text, "time")
-        except UnitError as error:
-            raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def _export(options: argparse.Namespace) -> int:

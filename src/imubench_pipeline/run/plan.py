@@ -53,6 +53,12 @@ _PUBLISHED = {"channels": {"__all__": {"published", "figures"}}}
 _OF_RANKING = ("price_class", "must")
 """Keys of a requirement that no error follows from."""
 
+_SHOWN = {
+    *("allan", "estimate", "reconstruction", "quality"),
+    *("datasheet", "error_budget", "fusion", "earth_rate"),
+}
+"""Sections of the settings that the report shows."""
+
 _ANY_LOG = {"rate": "1 Hz", "channels": {"gyro_x": {"column": 1, "unit": "rad/s"}}}
 """Stands for the layout of a sensor's logs where that does not matter."""
 
@@ -165,10 +171,13 @@ class Plan:
         recording = self.recordings[sensor, name]
         if recording.simulated:
             return self._simulated[sensor, name].kind
+        return kind_of(self._readable_notes(recording))
+
+    def _readable_notes(self, recording: Recording) -> object:
         try:
-            return kind_of(self._notes(recording))
+            return self._notes(recording)
         except ConfigError:
-            return "static"
+            return {}
 
     def _notes(self, recording: Recording) -> object:
         """Return what the file of notes beside a log holds, which is read once a run."""
@@ -206,10 +215,7 @@ class Plan:
         recording = self.recordings[sensor, name]
         if recording.simulated:
             return self._simulated[sensor, name].pointing is not None
-        try:
-            notes = self._notes(recording)
-        except ConfigError:
-            return False
+        notes = self._readable_notes(recording)
         return isinstance(notes, Mapping) and notes.get("pointing") is not None
 
     def experiment_settings(self, sensor: str, name: str) -> str:
@@ -264,12 +270,8 @@ class Plan:
 
     def estimate_settings(self, sensor: str, name: str) -> str:
         """Return what the estimates of a recording depend on."""
-        return _text(
-            {
-                "estimate": self.run.estimate.model_dump(mode="json"),
-                "bandwidth": self.bandwidth(sensor, name),
-            }
-        )
+        settings = self.run.estimate.model_dump(mode="json")
+        return _text({"estimate": settings, "bandwidth": self.bandwidth(sensor, name)})
 
     def bandwidth(self, sensor: str, name: str) -> float | None:
         """Return the stated cut-off of the sensor's own filter, Hz."""
@@ -359,19 +361,7 @@ class Plan:
                 "report": self.run.report.model_dump(mode="json"),
                 "results": str(self.run.results),
                 "given": given_beside(self.run, Path("config/config.yaml")),
-                "settings": {
-                    section: getattr(self.run, section).model_dump(mode="json")
-                    for section in (
-                        "allan",
-                        "estimate",
-                        "reconstruction",
-                        "quality",
-                        "datasheet",
-                        "error_budget",
-                        "fusion",
-                        "earth_rate",
-                    )
-                },
+                "settings": self.run.model_dump(mode="json", include=_SHOWN),
                 "sensors": self._described("vendor", "model", "price_class"),
                 "boards": {name: self._board(board) for name, board in self.boards.items()},
                 "requirements": self._requirements(),

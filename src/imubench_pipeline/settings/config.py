@@ -270,13 +270,8 @@ def read_run(config: Mapping[str, object], file: str = "config/config.yaml or --
 def given_beside(run: Run, file: Path) -> list[str]:
     """Return what a run was given beside its file, as ``snakemake --config`` takes it.
 
-    What does not matter to the results of a recording is left out.
-
-    Parameters
-    ----------
-    run : Run
-    file : Path
-        The configuration that Snakemake reads by itself.
+    What does not matter to the results of a recording is left out. `file` is the configuration that
+    Snakemake reads by itself.
     """
     try:
         written = read_settings(Run, file)

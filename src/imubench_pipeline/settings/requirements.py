@@ -202,10 +202,7 @@ class Requirement(Strict):
 def read_requirements(folder: Path | None) -> dict[str, Requirement]:
     """Read every requirement of a folder, by the name of its file; none without a folder.
 
-    Raises
-    ------
-    ConfigError
-        If the folder is not there or a file cannot be used.
+    Raises `ConfigError`.
     """
     return {} if folder is None else read_folder(Requirement, folder, "requirement")
 

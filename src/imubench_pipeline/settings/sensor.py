@@ -310,11 +310,6 @@ class RecordingNotes(Strict):
     def check_gyro(self, log: LogFormat) -> None:
         """Check that the gyro of an experiment is in the log, and all that it takes.
 
-        Parameters
-        ----------
-        log : LogFormat
-            How the log is written.
-
         Raises
         ------
         ValueError
@@ -334,13 +329,7 @@ class RecordingNotes(Strict):
 
 
 def kind_of(notes: object) -> Kind:
-    """Return what notes make of a recording, though they may be wrong otherwise.
-
-    Parameters
-    ----------
-    notes : object
-        What the file beside the log holds.
-    """
+    """Return what the notes make of a recording, though they may be wrong otherwise."""
     if isinstance(notes, Mapping):
         if notes.get("two_position") is not None:
             return "two_position"
@@ -350,13 +339,7 @@ def kind_of(notes: object) -> Kind:
 
 
 def read_sensors(folder: Path) -> dict[str, Sensor]:
-    """Read every sensor file of a folder, by name.
-
-    Raises
-    ------
-    ConfigError
-        If the folder is not there or a file cannot be used.
-    """
+    """Read every sensor file of a folder, by name; raises `ConfigError`."""
     return read_folder(Sensor, folder, "sensor")
 
 

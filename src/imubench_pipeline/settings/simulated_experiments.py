@@ -76,8 +76,7 @@ class SimulatedRest(AtRest):
     @property
     def true(self) -> Pointing:
         """Where the axis points, exactly."""
-        stated = self.pointing
-        heading = stated.heading
+        stated, heading = self.pointing, self.pointing.heading
         if heading is None:
             heading = quantity_to_si(self.true_heading, "angle")
         return Pointing(latitude=stated.latitude, heading=heading, elevation=stated.elevation)

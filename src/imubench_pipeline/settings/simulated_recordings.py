@@ -10,7 +10,7 @@ from typing import Literal, Self, TypeVar
 
 from pydantic import Field, model_validator
 
-from imubench_pipeline.settings.profile_forms import FileForm, Surroundings, found_from
+from imubench_pipeline.settings.profile_forms import FileForm, Form, Surroundings
 from imubench_pipeline.settings.sensor import (
     QUANTITIES,
     Channel,
@@ -195,13 +195,7 @@ class Board(Surroundings):
         return self
 
     def recordings(self, name: str) -> Iterator[SimulatedRecording]:
-        """Yield the recording of each sensor.
-
-        Parameters
-        ----------
-        name : str
-            Of the board.
-        """
+        """Yield the recording of each sensor of the board of this name."""
         around = {key: getattr(self, key) for key in Surroundings.model_fields}
         for sensor in self.sensors:
             own = {key: getattr(sensor, key) for key in OfASensor.model_fields}
@@ -220,28 +214,14 @@ class Board(Surroundings):
 
 @dataclass(frozen=True)
 class ToSimulate:
-    """What a run simulates.
-
-    Attributes
-    ----------
-    recordings : list of SimulatedRecording
-        Those of the boards are among them.
-    boards : dict of str to Board
-        By name.
-    """
+    """What a run simulates: recordings, those of the boards among them, and the boards by name."""
 
     recordings: list[SimulatedRecording]
     boards: dict[str, Board]
 
 
 def read_simulated(path: Path | None, sensors: Mapping[str, Sensor]) -> ToSimulate:
-    """Read what is simulated; nothing where ``path`` is None.
-
-    Raises
-    ------
-    ConfigError
-        If the file or a board's cannot be used.
-    """
+    """Read what is simulated; nothing where ``path`` is None. Raises `ConfigError`."""
     if path is None:
         return ToSimulate([], {})
     declared = read_settings(Simulated, path)
@@ -297,21 +277,21 @@ def _check(entry: OfASensor, sensors: Mapping[str, Sensor], key: str) -> None:
 
 def _found_from(around: _Around, path: Path, key: str = "") -> _Around:
     """Return the same, with the files of its profiles named from the folder of its own file."""
-    forms = {"temperature": around.temperature} | {
-        f"motion.{c}": f for c, f in around.motion.items()
-    }
-    for name, form in forms.items():
-        if isinstance(form, FileForm) and not (path.parent / form.file).is_file():
+
+    def placed(form: Form | None, name: str) -> Form | None:
+        if not isinstance(form, FileForm):
+            return form
+        file = path.parent / form.file
+        if not file.is_file():
             raise ConfigError(
-                f"{path}: {key}{name}.file: {path.parent / form.file}: no such file; expected a "
-                "CSV or Parquet file, named from the folder of the file that names it"
+                f"{path}: {key}{name}.file: {file}: no such file; expected a CSV or Parquet file, "
+                "named from the folder of the file that names it"
             )
-    return around.model_copy(
-        update={
-            "temperature": found_from(around.temperature, path.parent),
-            "motion": {name: found_from(form, path.parent) for name, form in around.motion.items()},
-        }
-    )
+        return form.model_copy(update={"file": file})
+
+    temperature = placed(around.temperature, "temperature")
+    motion = {name: placed(form, f"motion.{name}") for name, form in around.motion.items()}
+    return around.model_copy(update={"temperature": temperature, "motion": motion})
 
 
 def profile_files(recording: SimulatedRecording) -> list[Path]:
@@ -323,12 +303,8 @@ def profile_files(recording: SimulatedRecording) -> list[Path]:
 def layout(recording: SimulatedRecording, log: LogFormat) -> LogFormat:
     """Return how the log of a simulated recording is written: with its columns and its rate.
 
-    Parameters
-    ----------
-    recording : SimulatedRecording
-    log : LogFormat
-        The sensor's. Where it has no temperature, and the recording has one, that gets a column
-        (or a file, where each channel has one) of its own, in degC.
+    Where the sensor's `log` has no temperature, and the recording has one, that gets a column (or a
+    file, where each channel has one) of its own, in degC.
     """
     channels = {name: log.channels[name] for name in recording.channels}
     temperature = None

@@ -48,13 +48,8 @@ _BRIEF.maxstring = _BRIEF.maxother = _BRIEF.maxlong = _SHORT
 def cut(value: object, words: Callable[[object], str] = _BRIEF.repr, most: int = _SHORT) -> str:
     """Return what a file holds as it may be printed: a line of it at most.
 
-    Parameters
-    ----------
-    value : object
-    words : callable
-        Makes text of it; by default, as Python writes it, the beginning of each list alone.
-    most : int
-        Letters.
+    `words` makes text of it; by default, as Python writes it, the beginning of each list alone.
+    `most`: letters.
     """
     text = words(value)
     return text if len(text) <= most else f"{text[: most - 3]}..."

@@ -28,14 +28,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--settle",
-        type=_seconds,
+        type=_wait,
         default="10 s",
         metavar="TIME",
         help="a log is complete when nothing of it has changed for so long; default: 10 s",
     )
     parser.add_argument(
         "--wait",
-        type=_seconds,
+        type=_wait,
         default="0 s",
         metavar="TIME",
         help="how long to wait for a run that goes on; default: not at all",
@@ -73,15 +73,18 @@ def run(options: argparse.Namespace) -> int:
     return status
 
 
-def _seconds(text: str) -> float:
-    """Return a time in s, written with its unit or without."""
+def seconds(text: str) -> float:
+    """Return the time in s that an option has, with its unit or without."""
     try:
-        seconds = float(text)
+        return float(text)
     except ValueError:
         try:
-            seconds = quantity_to_si(text, "time")
+            return quantity_to_si(text, "time")
         except UnitError as error:
             raise argparse.ArgumentTypeError(str(error)) from None
-    if not 0.0 <= seconds < float("inf"):
+
+
+def _wait(text: str) -> float:
+    if not 0.0 <= (time := seconds(text)) < float("inf"):
         raise argparse.ArgumentTypeError(f"found {text}; expected a time, such as 10 s")
-    return seconds
+    return time
