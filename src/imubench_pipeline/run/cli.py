@@ -7,8 +7,9 @@ import io
 import json
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from pydantic import BaseModel
 
@@ -45,66 +46,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
     parser = argparse.ArgumentParser(prog="imubench", description="Inertial sensor benchmark.")
     commands = parser.add_subparsers(dest="command", required=True)
-    schema = commands.add_parser(
-        "schema", help="write the JSON Schema of a configuration file, for editors"
-    )
-    schema.add_argument("file", choices=sorted(SCHEMAS), help="which configuration file")
-    schema.add_argument("--output", type=Path, help="where to write it; default: the terminal")
-    checking = commands.add_parser(
-        "check",
-        help="say what is wrong with logs, without analysing them",
-        description="Exit status: 0 all good, 1 warnings or rejected logs, 2 wrong settings.",
-    )
-    checking.add_argument("logs", type=Path, help="folder that holds <sensor>/<recording>")
-    checking.add_argument("--sensors", type=Path, help="folder of the sensor files")
-    checking.add_argument(
-        "--config", type=Path, default=Path("config/config.yaml"), help="settings of the findings"
-    )
-    inspecting = commands.add_parser(
-        "inspect",
-        help="show what a log holds, and draft a sensor file for it",
-        description="Exit status: 0 the sensor file is complete, 1 something is left to fill in, "
-        "2 the log cannot be read.",
-    )
-    inspecting.add_argument("log", type=Path, help="log file, or folder or archive of a recording")
-    inspecting.add_argument(
-        "--block", action="store_true", help="print the sensor file alone, and no listing"
-    )
-    inspecting.add_argument(
-        "--output", type=Path, help="where to write the sensor file; default: the terminal"
-    )
-    commands.add_parser("formats", help="list the logs that are read, and the exports")
-    _add_export(commands.add_parser("export", help="write what a filter or simulator loads"))
-    show.add_arguments(
-        commands.add_parser("show", help="show the comparison of the sensors in the terminal")
-    )
-    shortlist.add_arguments(
-        commands.add_parser(
-            "shortlist", help="say by datasheets alone which sensors are worth logging"
-        )
-    )
-    report.add_arguments(
-        commands.add_parser("report", help="write the report again, elsewhere or in one file")
-    )
-    figures.add_arguments(
-        commands.add_parser("figures", help="draw the figures of channels for print")
-    )
-    simulation.add_arguments(
-        commands.add_parser(
-            "simulate", help="write a simulated log of a sensor, to test filters on"
-        )
-    )
-    nightly.add_arguments(
-        commands.add_parser(
-            "nightly", help="run on the logs that are complete, and say what is new: for timers"
-        )
-    )
-    verification.add_arguments(
-        commands.add_parser("verify", help="say whether all results are as runs left them")
-    )
+    for name, command in _COMMANDS.items():
+        command.add_arguments(commands.add_parser(name, help=command.help))
     options = parser.parse_args(arguments)
     try:
-        status = _COMMANDS[options.command](options)
+        status = _COMMANDS[options.command].run(options)
         sys.stdout.flush()
         return status
     except BrokenPipeError:
@@ -113,34 +59,60 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _CLOSED_PIPE
 
 
-def _add_export(exporting: argparse.ArgumentParser) -> None:
-    exporting.add_argument("results", type=Path, help="folder of the results of a run")
-    exporting.add_argument("--sensor", required=True, help="name of the sensor file")
-    exporting.add_argument(
+def _add_schema(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", choices=sorted(SCHEMAS), help="which configuration file")
+    parser.add_argument("--output", type=Path, help="where to write it; default: the terminal")
+
+
+def _add_check(parser: argparse.ArgumentParser) -> None:
+    parser.description = "Exit status: 0 all good, 1 warnings or rejected logs, 2 wrong settings."
+    parser.add_argument("logs", type=Path, help="folder that holds <sensor>/<recording>")
+    parser.add_argument("--sensors", type=Path, help="folder of the sensor files")
+    parser.add_argument(
+        "--config", type=Path, default=Path("config/config.yaml"), help="settings of the findings"
+    )
+
+
+def _add_inspect(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Exit status: 0 the sensor file is complete, 1 something is left to fill in, "
+        "2 the log cannot be read."
+    )
+    parser.add_argument("log", type=Path, help="log file, or folder or archive of a recording")
+    parser.add_argument(
+        "--block", action="store_true", help="print the sensor file alone, and no listing"
+    )
+    parser.add_argument(
+        "--output", type=Path, help="where to write the sensor file; default: the terminal"
+    )
+
+
+def _add_export(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("results", type=Path, help="folder of the results of a run")
+    parser.add_argument("--sensor", required=True, help="name of the sensor file")
+    parser.add_argument(
         "--target", required=True, help="program, such as kalibr; a wrong name lists them all"
     )
-    exporting.add_argument(
+    parser.add_argument(
         "--axis", default="worst", help="worst, median, a device or a recording; default: worst"
     )
-    exporting.add_argument(
+    parser.add_argument(
         "--horizon",
         type=nightly.seconds,
         default="60 s",
         metavar="TIME",
         help="of coasting, for which terms that the program lacks are mapped; default: 60 s",
     )
-    exporting.add_argument(
+    parser.add_argument(
         "--inflate", type=float, default=1.0, metavar="FACTOR", help="multiplies every deviation"
     )
-    exporting.add_argument(
-        "--because", help="reason of --inflate, or of the use of unfit recordings"
-    )
-    exporting.add_argument(
+    parser.add_argument("--because", help="reason of --inflate, or of the use of unfit recordings")
+    parser.add_argument(
         "--overbound",
         action="store_true",
         help="the smallest model above the upper 95 %% limit of the measured curve up to --horizon",
     )
-    exporting.add_argument(
+    parser.add_argument(
         "--excess",
         type=float,
         default=3.0,
@@ -148,10 +120,10 @@ def _add_export(exporting: argparse.ArgumentParser) -> None:
         help="an overbound whose Allan deviation must be more times its limit is refused; "
         "default: 3",
     )
-    exporting.add_argument("--method", help="of the estimates; default: the recommended one")
-    exporting.add_argument("--latitude", type=float, metavar="DEG", help="for gravity")
-    exporting.add_argument("--rate", type=float, metavar="HZ", help="default: the recording's")
-    exporting.add_argument("--output", type=Path, help="where to write; default: the terminal")
+    parser.add_argument("--method", help="of the estimates; default: the recommended one")
+    parser.add_argument("--latitude", type=float, metavar="DEG", help="for gravity")
+    parser.add_argument("--rate", type=float, metavar="HZ", help="default: the recording's")
+    parser.add_argument("--output", type=Path, help="where to write; default: the terminal")
 
 
 def _export(options: argparse.Namespace) -> int:
@@ -268,17 +240,51 @@ def _inspect(options: argparse.Namespace) -> int:
     return 0 if inspected.complete else 1
 
 
+class _Command(NamedTuple):
+    help: str
+    add_arguments: Callable[[argparse.ArgumentParser], None]
+    run: Callable[[argparse.Namespace], int]
+
+
 _COMMANDS = {
-    "schema": _schema,
-    "check": _check,
-    "inspect": _inspect,
-    "formats": formats.run,
-    "export": _export,
-    "show": show.run,
-    "shortlist": shortlist.run,
-    "report": report.run,
-    "figures": figures.run,
-    "simulate": simulation.run,
-    "nightly": nightly.run,
-    "verify": verification.run,
+    "schema": _Command(
+        "write the JSON Schema of a configuration file, for editors", _add_schema, _schema
+    ),
+    "check": _Command("say what is wrong with logs, without analysing them", _add_check, _check),
+    "inspect": _Command(
+        "show what a log holds, and draft a sensor file for it", _add_inspect, _inspect
+    ),
+    "formats": _Command(
+        "list the logs that are read, and the exports", lambda _: None, formats.run
+    ),
+    "export": _Command("write what a filter or simulator loads", _add_export, _export),
+    "show": _Command(
+        "show the comparison of the sensors in the terminal", show.add_arguments, show.run
+    ),
+    "shortlist": _Command(
+        "say by datasheets alone which sensors are worth logging",
+        shortlist.add_arguments,
+        shortlist.run,
+    ),
+    "report": _Command(
+        "write the report again, elsewhere or in one file", report.add_arguments, report.run
+    ),
+    "figures": _Command(
+        "draw the figures of channels for print", figures.add_arguments, figures.run
+    ),
+    "simulate": _Command(
+        "write a simulated log of a sensor, to test filters on",
+        simulation.add_arguments,
+        simulation.run,
+    ),
+    "nightly": _Command(
+        "run on the logs that are complete, and say what is new: for timers",
+        nightly.add_arguments,
+        nightly.run,
+    ),
+    "verify": _Command(
+        "say whether all results are as runs left them",
+        verification.add_arguments,
+        verification.run,
+    ),
 }

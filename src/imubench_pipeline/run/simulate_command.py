@@ -104,33 +104,18 @@ def _run(options: argparse.Namespace) -> None:
     remarks += [f"assumed: {line}" for line in _short(assumed)]
     print(f"{remarks[0]}: {samples:,} samples of {', '.join(columns)} at {rate:g} Hz")
     print("\n".join(_short(remarks[1:])), flush=True)
-    name = options.out.stem
     sensor_name = origin.sensor or Path(options.sensor).stem
-    metadata = {
-        "sensor": sensor_name,
-        "device": "simulated",
-        "recording": name,
-        "kind": "static" if not motion else "in_motion",
-        "simulated": True,
-        "sources": [],
-        "reader": None,
-        "begins": 0.0,
-        "started": None,
-        "rate": rate,
-        "rate_from": "stated",
-        "uniform": True,
-        "holes": dict.fromkeys(columns, False),
-        "unusable": [],
-        "simulation": {
-            "from": origin.source,
-            "figures": figures,
-            "assumed": assumed,
-            "seed": options.seed,
-            "model": {channel: repr(axis) for channel, axis in origin.imu.axes.items()},
-            "temperature": options.temperature,
-            "motion": None if options.motion is None else str(options.motion),
-        },
+    about = {
+        "from": origin.source,
+        "figures": figures,
+        "assumed": assumed,
+        "seed": options.seed,
+        "model": {channel: repr(axis) for channel, axis in origin.imu.axes.items()},
+        "temperature": options.temperature,
+        "motion": None if options.motion is None else str(options.motion),
     }
+    kind = "static" if not motion else "in_motion"
+    metadata = _metadata(sensor_name, options.out.stem, kind, rate, columns) | {"simulation": about}
     # A name of its own in the stream: the same seed gives every sensor its own noise.
     blocks = simulate_imu(
         origin.imu,
@@ -149,6 +134,28 @@ def _run(options: argparse.Namespace) -> None:
     print(
         f"{options.out}: {size:.1f} MB; {options.out.with_suffix('.yaml')} says how it is written"
     )
+
+
+def _metadata(
+    sensor: str, recording: str, kind: str, rate: float, columns: list[str]
+) -> dict[str, Any]:
+    """Return what a log says of itself, as one that was ingested does."""
+    return {
+        "sensor": sensor,
+        "device": "simulated",
+        "recording": recording,
+        "kind": kind,
+        "simulated": True,
+        "sources": [],
+        "reader": None,
+        "begins": 0.0,
+        "started": None,
+        "rate": rate,
+        "rate_from": "stated",
+        "uniform": True,
+        "holes": dict.fromkeys(columns, False),
+        "unusable": [],
+    }
 
 
 def _origin(options: argparse.Namespace) -> tuple[Origin, Any]:
@@ -172,11 +179,10 @@ def _origin(options: argparse.Namespace) -> tuple[Origin, Any]:
     else:
         file = options.sensors / f"{options.sensor}.yaml"
         if not file.is_file():
-            names = (
-                ", ".join(sorted(file.stem for file in options.sensors.glob("*.yaml"))) or "none"
-            )
+            names = sorted(path.stem for path in options.sensors.glob("*.yaml"))
             raise ConfigError(
-                f"{file}: no such sensor file; there are: {names}; or name a file of models"
+                f"{file}: no such sensor file; there are: {', '.join(names) or 'none'}; or name a "
+                "file of models"
             )
         sensor = read_settings(Sensor, file)
         try:
@@ -237,12 +243,12 @@ def _profiles(
             forms["motion"] = _section(options.motion, "motion")
             folder = options.motion.parent
         else:
-            names = [
-                n for n in FileSeries(options.motion).names if n.startswith(("gyro_", "accel_"))
-            ]
+            columns = FileSeries(options.motion).names
+            names = [name for name in columns if name.startswith(("gyro_", "accel_"))]
             if not names:
                 raise ConfigError(f"{options.motion}: no column gyro_x to accel_z")
-            forms["motion"] = {n: {"form": "file", "file": str(options.motion)} for n in names}
+            form = {"form": "file", "file": str(options.motion)}
+            forms["motion"] = {name: form for name in names}
     motion, _ = profiles_of(parse(Surroundings, forms, str(options.motion)), folder)
     if options.temperature is None:
         return motion, None

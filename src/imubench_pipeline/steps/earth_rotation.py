@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,7 @@ from imubench_pipeline.experiments.earth_rate.prediction import Outlook, predict
 from imubench_pipeline.experiments.earth_rate.published import RunDesign, published_row
 from imubench_pipeline.experiments.earth_rate.turning import find_turning
 from imubench_pipeline.experiments.earth_rate.turns import FoundDwell, Turning
+from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.kept import kept_logs
 from imubench_pipeline.recordings.recording import ChannelLog, on_grid, read_metadata
 from imubench_pipeline.settings.config import EarthRateSettings
@@ -204,25 +205,27 @@ def _earth_rate(
         return tables
     used = _used(samples, turning, log.rate)
     dwells = [dwell for _, dwell in _dwells(turning, log.rate)]
-    model = source.with_drift(declared.drift_si)
+    bias, unsure = declared.turn_on_bias_si, _unsure(turning, declared.trust_schedule)
+    model, *drawn = (_drifting(each, declared.drift_si) for each in (source.model, *source.drawn))
     for part, start in _parts(declared, len(samples) / log.rate):
         chosen = [dwell for dwell in dwells if dwell.start >= start * log.rate]
         try:
             experiment = _experiment(chosen, log.rate, declared)
-            courses = estimate_courses(
-                used, experiment, model, source.papers, declared.turn_on_bias_si
-            )
+            courses = estimate_courses(used, experiment, model, source.papers, bias)
         except (ValueError, LinAlgError) as error:
             tables.earth_rate += _without(names, part, "too_short", str(error))
             continue
         extent = {"dwells": len(chosen), "turns": len(chosen) - 1}
-        drawn = source.drawn_with_drift(declared.drift_si)
-        ranges = sigma_ranges(courses.measured.blocks, model, drawn, declared.turn_on_bias_si)
-        unsure = _unsure(turning, declared.trust_schedule)
+        ranges = sigma_ranges(courses.measured.blocks, model, drawn, bias)
         rows = _estimates(names | extent, part, courses, source, unsure, log.rate)
         tables.earth_rate += [row | ranges.get(row["method"], {}) for row in rows]
         tables.earth_rate_series += _later(_series(key, part, courses), begins)
     return tables
+
+
+def _drifting(model: NoiseModel, drift: float) -> NoiseModel:
+    """Return a model with a steady drift of a standard deviation beside its own, rad/s^2."""
+    return replace(model, R=(model.R**2 + drift**2) ** 0.5) if drift else model
 
 
 def _predict(

@@ -8,7 +8,7 @@ several; without any, that of the typical figures of its datasheet.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -57,18 +57,6 @@ class NoiseSource:
     papers: NoiseModel
     words: str
     drawn: tuple[NoiseModel, ...] = ()
-
-    def with_drift(self, drift: float) -> NoiseModel:
-        """Return the model with a steady drift of a standard deviation beside its own, rad/s^2."""
-        return _drifting(self.model, drift)
-
-    def drawn_with_drift(self, drift: float) -> list[NoiseModel]:
-        """Return the drawn models with the same drift beside their own, rad/s^2."""
-        return [_drifting(model, drift) for model in self.drawn]
-
-
-def _drifting(model: NoiseModel, drift: float) -> NoiseModel:
-    return replace(model, R=(model.R**2 + drift**2) ** 0.5) if drift else model
 
 
 def from_static(

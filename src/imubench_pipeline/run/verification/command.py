@@ -76,10 +76,8 @@ def _progress(size: int) -> Iterator[Callable[[int], None]]:
         if now - begun >= _PATIENCE and now - last >= (0.2 if terminal else _PATIENCE):
             last = now
             share = f"{100 * done / max(size, 1):.0f} % of {size / 1e9:.2f} GB read"
-            print(
-                f"\r{share}" if terminal else share, end="" if terminal else "\n", file=sys.stderr
-            )
-            sys.stderr.flush()
+            line = f"\r{share}" if terminal else f"{share}\n"
+            print(line, end="", file=sys.stderr, flush=True)
 
     yield read
     if terminal and last != begun:
