@@ -14,27 +14,11 @@ _WIDTH = 96
 _WHITE = re.compile(r"[\t\n]")
 
 
-def heading(
-    imu: Imu,
-    program: str,
-    convention: str,
-    mapped: Mapping[str, Mapped] | None = None,
-    *,
-    temperature: bool = False,
-) -> list[str]:
+def heading(imu: Imu, program: str, convention: str, *, temperature: bool = False) -> list[str]:
     """Return what is to be said of every file, printable statements.
 
-    Parameters
-    ----------
-    imu : Imu
-    program : str
-        What loads the file.
-    convention : str
-        Of its numbers, in words.
-    mapped : mapping of str to Mapped, optional
-        What was replaced in the models.
-    temperature : bool
-        The file holds how the biases follow the temperature.
+    `program` is what loads the file, `convention` that of its numbers, in words; `temperature`:
+    it holds how the biases follow the temperature.
     """
     statements = [f"Noise of the {imu.sensor} for {program}, by imubench."]
     if imu.simulated:
@@ -70,9 +54,14 @@ def heading(
             f"INFLATED: from here on all densities and amplitudes are {imu.inflation:g} times "
             f"those above, because: {imu.because}."
         )
-    for name, replacement in (mapped or {}).items():
-        statements += [f"{name}: {words}." for words in replacement.words]
     return [_on_one_line(words) for words in statements]
+
+
+def mapping_words(mapped: Mapping[str, Mapped]) -> list[str]:
+    """Return what was replaced in the models, one statement each."""
+    return [
+        f"{name}: {words}." for name, replacement in mapped.items() for words in replacement.words
+    ]
 
 
 def commented(statements: Sequence[str], mark: str = "#") -> str:

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 
-from imubench_pipeline.export.comments import commented_python, heading
+from imubench_pipeline.export.comments import commented_python, heading, mapping_words
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.mapping import as_process
 from imubench_pipeline.export.target import Target
@@ -37,7 +37,7 @@ def write(imu: Imu) -> str:
     imu.both()
     mapped = {name: as_process(a.model, imu.horizon, imu.rate) for name, a in imu.axes.items()}
     gyro, accel = mapped["gyro"].model, mapped["accel"].model
-    about = heading(imu, "gnss-ins-sim", _CONVENTION, mapped)
+    about = [*heading(imu, "gnss-ins-sim", _CONVENTION), *mapping_words(mapped)]
     for name, process in mapped.items():
         if process.model.T_B is not None and process.model.T_B * imu.rate < _FEW:
             about.append(

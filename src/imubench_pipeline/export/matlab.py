@@ -28,7 +28,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from imubench_pipeline.export.comments import commented, heading
+from imubench_pipeline.export.comments import commented, heading, mapping_words
 from imubench_pipeline.export.imu import AxisNoise, Imu
 from imubench_pipeline.export.mapping import Mapped, as_process
 from imubench_pipeline.export.target import Target
@@ -63,7 +63,8 @@ def write(imu: Imu) -> str:
     for name, axis in imu.axes.items():
         mapped[name], parameters[name] = _parameters(axis, imu)
     convention = _CONVENTION.format(rate=imu.rate)
-    about = heading(imu, "MATLAB imuSensor", convention, mapped, temperature=True)
+    about = heading(imu, "MATLAB imuSensor", convention, temperature=True)
+    about += mapping_words(mapped)
     biases = {name: _temperature(imu.temperature.get(name)) for name in parameters}
     about += [f"{name} and temperature: {words}." for name in biases for words in biases[name][1]]
     text = commented(about, "%") + "IMU = imuSensor('accel-gyro');\n"

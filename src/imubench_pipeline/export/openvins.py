@@ -10,17 +10,19 @@ ov_msckf/src/utils/NoiseManager.h (units), ov_msckf/src/state/Propagator.cpp (di
 
 from __future__ import annotations
 
-from imubench_pipeline.export.comments import commented, heading, plain, setting
+from imubench_pipeline.export.comments import commented, heading, mapping_words, plain, setting
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.target import Target
-from imubench_pipeline.export.walks import CONVENTION, TOPIC, densities, walks
+from imubench_pipeline.export.walks import CONVENTION, TOPIC, densities, positive, walks
 
 
 def write(imu: Imu) -> str:
     """Return ``kalibr_imu_chain.yaml``."""
-    mapped = walks(imu, "OpenVINS")
+    mapped = walks(imu)
+    positive(mapped, "OpenVINS")
     about = [
-        *heading(imu, "OpenVINS", CONVENTION, mapped),
+        *heading(imu, "OpenVINS", CONVENTION),
+        *mapping_words(mapped),
         "Extrinsics and intrinsics (T_i_b, Tw, Ta, Tg, R_*) are those of an ideal sensor.",
     ]
     indent = "  "

@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import math
 
-from imubench_pipeline.export.comments import commented, heading
+from imubench_pipeline.export.comments import commented, heading, mapping_words
 from imubench_pipeline.export.imu import ExportError, Imu
 from imubench_pipeline.export.target import Target
 from imubench_pipeline.export.temperature import AXES
@@ -74,7 +74,7 @@ def write(imu: Imu, period: int = PERIOD) -> str:
         "EKF2_GYR_NOISE": (gyro.N / step, "rad/s, from N"),
     }
     convention = _CONVENTION.format(step=period / 1000.0)
-    about = heading(imu, "PX4 EKF2", convention, mapped, temperature=True)
+    about = heading(imu, "PX4 EKF2", convention, temperature=True) + mapping_words(mapped)
     rows = []
     for name, (value, comment) in values.items():
         low, high = _RANGES[name]

@@ -16,33 +16,24 @@ TOPIC = "/imu0"
 """ROS topic of the samples."""
 
 
-def walks(imu: Imu, program: str | None = None) -> dict[str, Mapped]:
-    """Return gyro and accelerometer as white noise and random walk.
-
-    Parameters
-    ----------
-    imu : Imu
-    program : str, optional
-        That takes densities above 0 only.
-
-    Raises
-    ------
-    ExportError
-        If one has no estimate, or a density is 0 that must be above it.
-    """
+def walks(imu: Imu) -> dict[str, Mapped]:
+    """Return gyro and accelerometer as white noise and random walk; ExportError without both."""
     imu.both()
-    mapped = {
+    return {
         name: as_walk(axis.model, imu.horizon, imu.rate, axis.least_walk)
         for name, axis in imu.axes.items()
     }
-    for name, axis in mapped.items() if program else ():
+
+
+def positive(mapped: dict[str, Mapped], program: str) -> None:
+    """Raise ExportError if a density is 0, for a program that takes values above 0 only."""
+    for name, axis in mapped.items():
         for letter in ("N", "K"):
             if not getattr(axis.model, letter) > 0.0:
                 raise ExportError(
                     f"{name}: {letter} is 0, and {program} takes values above 0 only; a longer "
                     "log, or an overbound, gives one"
                 )
-    return mapped
 
 
 def densities(mapped: dict[str, Mapped], indent: str = "") -> str:

@@ -13,6 +13,7 @@ from imubench_pipeline.recordings.quality_file import Quality
 from imubench_pipeline.tables.digests import read_sealed_json, write_sealed_json
 from imubench_pipeline.tables.failures import Failure
 from imubench_pipeline.tables.findings import RecordingError
+from imubench_pipeline.tables.seals import place_of
 
 Of = tuple[str, str, str | None]
 """Step, sensor and recording; None: a step of the whole sensor."""
@@ -105,9 +106,7 @@ class Faults:
         return "\n".join([title, *failures])
 
     def _path(self, of: Of) -> Path:
-        step, sensor, recording = of
-        place = Path("recordings", sensor, recording) if recording else Path("sensors", sensor)
-        return self._folder / place / f"{step}.json"
+        return self._folder / f"{place_of(*of)}.json"
 
     def _records(self) -> Iterator[tuple[Of, dict[str, Any]]]:
         for path in sorted(self._folder.glob("*/**/*.json")):

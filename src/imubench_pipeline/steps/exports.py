@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -52,7 +51,7 @@ def exports(
 
 def write_exports(tables: Path, settings: str, folder: Path) -> None:
     """Write a folder a sensor, with a file a program; all appear together."""
-    how = ExportSettings.model_validate(json.loads(settings))
+    how = ExportSettings.model_validate_json(settings)
     with making(folder) as made:
         for place, content in exports(load(tables), how, recordings_of(tables)):
             write_content(content, made / place)

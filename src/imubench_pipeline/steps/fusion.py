@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from functools import cache, partial
 from pathlib import Path
@@ -121,7 +120,7 @@ def write_fusion(
     inputs: Mapping[str, str], joint: list[Path], settings: str, outputs: list[Path]
 ) -> None:
     """Write the table ``fusion``, as Parquet and CSV; ``joint``: tables ``draws`` of recordings."""
-    how = FusionSettings.model_validate(json.loads(settings))
+    how = FusionSettings.model_validate_json(settings)
     tables = {name: read(name, [Path(inputs[name])]) for name in NEEDED}
     of_recording = {(path.parts[-3], path.parts[-2]): path for path in joint}
     table = build("fusion", fusion_rows(tables, how, of_recording))

@@ -58,10 +58,7 @@ def published_rows(
                     "recording": entry.recording,
                     "channel": channel,
                     "place": figure.where,
-                    "figure": figure.figure,
-                    "printed": figure.printed,
-                    "of": figure.of,
-                    "parameter": figure.parameter,
+                    **figure.model_dump(include={"figure", "printed", "of", "parameter"}),
                     "means": figure.si(quantity),
                     "unit": units.get(
                         figure.parameter,
