@@ -8,8 +8,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel
 
-from imubench_pipeline.report.run_summary import leaders, one_line, serious
-from imubench_pipeline.report.run_summary import left_out as told
+from imubench_pipeline.report.run_summary import leaders, left_out, one_line, serious
 from imubench_pipeline.run.nightly.state import (
     Known,
     Leader,
@@ -143,8 +142,8 @@ def compared(
     were written to while they were read.
     """
     was = before or State(finished=after.finished)
-    left_out = set(without)
-    now = {name: outcome for name, outcome in after.recordings.items() if name not in left_out}
+    written_to = set(without)
+    now = {name: outcome for name, outcome in after.recordings.items() if name not in written_to}
     both = [name for name in now if name in was.recordings]
     known_warnings, known_drift = set(was.warned), set(was.drifted)
     fields: dict[str, Any] = {
@@ -160,7 +159,7 @@ def compared(
         "failed": [
             Failed(**row)
             for row in tables["failures"]
-            if row["recording"] is None or name_in(row) not in left_out
+            if row["recording"] is None or name_in(row) not in written_to
         ],
         "rejected": [
             Rejected(
@@ -172,14 +171,14 @@ def compared(
             if outcome.rejected is not None
         ],
         "warnings": [
-            NewWarning(recording=name_in(row), **{name: row[name] for name in _OF_WARNING})
+            NewWarning.model_validate({**row, "recording": name_in(row)})
             for row in serious(tables["findings"])
-            if name_in(row) not in left_out and warned(row) not in known_warnings
+            if name_in(row) not in written_to and warned(row) not in known_warnings
         ],
         "drift": [
-            Drift(**{name: row[name] for name in Drift.model_fields})
+            Drift.model_validate(row)
             for row in changes(tables["drift"])
-            if name_in(row) not in left_out and drifted(row) not in known_drift
+            if name_in(row) not in written_to and drifted(row) not in known_drift
         ],
         "first": list(_first(was, after, tables)),
     }
@@ -187,9 +186,6 @@ def compared(
     flagged = rejected or fields["warnings"] or fields["drift"]
     outcome = "failed" if fields["failed"] else "flagged" if flagged else "fine"
     return fields | {"outcome": outcome}
-
-
-_OF_WARNING = ("channel", "finding", "detail")
 
 
 def _because(name: str, was: State, now: State) -> str:
@@ -234,29 +230,26 @@ def in_words(summary: Summary) -> str:
         lines += ["", "why it failed:", *(f"  {one_line(line, 500)}" for line in summary.failure)]
     else:
         lines.append(f"recordings, {since}: {counts}")
-    failed = [row.model_dump() for row in summary.failed]
-    sections: list[tuple[str, list[str]]] = [
-        ("failed, left out of a report that is there, and tried again next time", [*told(failed)]),
-        ("new", summary.new),
-        ("analysed again", [f"{change.recording}: {change.because}" for change in summary.changed]),
-        ("removed", summary.removed),
-        ("skipped, and looked at again next time", list(map(_skip, summary.skipped))),
-        (
-            f"rejected ({new or 'none'} of them new)",
-            [
-                f"{rejection.recording}{' (new)' * rejection.new}: {rejection.reason}"
-                for rejection in sorted(summary.rejected, key=lambda rejection: not rejection.new)
-            ],
-        ),
-        ("new warnings", [_warning(warning) for warning in summary.warnings]),
-        ("devices that have changed", list(map(_drift, summary.drift))),
-        (
-            "first for a requirement",
-            [lead.said + f" (before: {lead.before})" * bool(lead.before) for lead in summary.first],
-        ),
-        ("put right after an earlier run", summary.put_right),
-    ]
-    for title, entries in sections:
+    failed = "failed, left out of a report that is there, and tried again next time"
+    rejected = sorted(summary.rejected, key=lambda rejection: not rejection.new)
+    sections = {
+        failed: [*left_out([row.model_dump() for row in summary.failed])],
+        "new": summary.new,
+        "analysed again": [f"{change.recording}: {change.because}" for change in summary.changed],
+        "removed": summary.removed,
+        "skipped, and looked at again next time": [_skip(skip) for skip in summary.skipped],
+        f"rejected ({new or 'none'} of them new)": [
+            f"{rejection.recording}{' (new)' * rejection.new}: {rejection.reason}"
+            for rejection in rejected
+        ],
+        "new warnings": [_warning(warning) for warning in summary.warnings],
+        "devices that have changed": [_drift(drift) for drift in summary.drift],
+        "first for a requirement": [
+            lead.said + f" (before: {lead.before})" * bool(lead.before) for lead in summary.first
+        ],
+        "put right after an earlier run": summary.put_right,
+    }
+    for title, entries in sections.items():
         if entries:
             lines += ["", f"{title}:", *_bounded(entries)]
     lines += ["", f"report: {summary.report}", f"log: {summary.log}"]
