@@ -10,14 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from imubench_pipeline.settings.validation import (
-    Between,
-    Frequency,
-    Strict,
-    Text,
-    checked,
-    of_size,
-)
+from imubench_pipeline.settings.validation import Between, Frequency, Strict, Text, checked, of_size
 from imubench_pipeline.settings.yaml_files import read_folder
 from imubench_pipeline.units import difference_to_si, quantity_to_si
 

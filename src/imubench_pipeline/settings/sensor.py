@@ -13,14 +13,7 @@ from pydantic import Field, model_validator
 from imubench_pipeline.settings.known_rates import AtRest, OnRateTable
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.two_position import TwoPosition
-from imubench_pipeline.settings.validation import (
-    Between,
-    Frequency,
-    Strict,
-    Text,
-    of_size,
-    parse,
-)
+from imubench_pipeline.settings.validation import Between, Frequency, Strict, Text, of_size, parse
 from imubench_pipeline.settings.yaml_files import read_folder
 from imubench_pipeline.units import UnitError, conversion, quantity_to_si
 

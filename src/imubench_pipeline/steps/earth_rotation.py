@@ -32,8 +32,7 @@ from imubench_pipeline.recordings.kept import kept_logs
 from imubench_pipeline.recordings.recording import ChannelLog, on_grid, read_metadata
 from imubench_pipeline.settings.config import EarthRateSettings
 from imubench_pipeline.settings.sensor import Sensor
-from imubench_pipeline.settings.simulated_experiments import SimulatedTurns
-from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
+from imubench_pipeline.settings.simulated_recordings import SimulatedRecording, SimulatedTurns
 from imubench_pipeline.settings.two_position import TwoPosition
 from imubench_pipeline.simulate.models import axis_model
 from imubench_pipeline.steps.noise_source import (

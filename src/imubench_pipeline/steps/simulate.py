@@ -17,8 +17,11 @@ from imubench_pipeline.experiments.earth_rate.simulation import true_rate
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.readers.text_log import TextLog
 from imubench_pipeline.settings.sensor import TEMPERATURE, ColumnSource, LogFormat
-from imubench_pipeline.settings.simulated_experiments import SimulatedTable, SimulatedTurns
-from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
+from imubench_pipeline.settings.simulated_recordings import (
+    SimulatedRecording,
+    SimulatedTable,
+    SimulatedTurns,
+)
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.simulate.imu import simulate_imu
 from imubench_pipeline.simulate.models import imu_model

@@ -18,13 +18,7 @@ from imubench_pipeline.run.nightly import recovery
 from imubench_pipeline.run.nightly.lock import Lock, TakenError
 from imubench_pipeline.run.nightly.running import errors, last_lines, run_snakemake
 from imubench_pipeline.run.nightly.settling import Found, Skip, look, moved, settled
-from imubench_pipeline.run.nightly.state import (
-    State,
-    StateError,
-    load_tables,
-    read_state,
-    state_of,
-)
+from imubench_pipeline.run.nightly.state import State, StateError, load_tables, read_state, state_of
 from imubench_pipeline.run.nightly.summary import Skipped, Summary, compared, in_words
 from imubench_pipeline.settings.config import Run, read_run
 from imubench_pipeline.settings.validation import ConfigError
