@@ -247,13 +247,7 @@ class Plan:
         return _text({"earth_rate": settings, "datasheet": printed})
 
     def _written(self, recording: Recording) -> tuple[LogFormat, RecordingNotes]:
-        """Return how the log of a recording is written, and the notes beside it.
-
-        Raises
-        ------
-        ConfigError
-            If it cannot be used.
-        """
+        """Return how a log is written, and the notes beside it; ConfigError if it is of no use."""
         if recording.error:
             raise ConfigError(recording.error)
         notes = RecordingNotes()

@@ -29,7 +29,7 @@ NEEDED = ("recordings", "parameters", "allan_compensated", "temperature")
 
 
 def candidates(
-    tables: Mapping[str, pa.Table], joint: Mapping[tuple[str, str], Path] | None = None
+    tables: Mapping[str, pa.Table], joint: Mapping[tuple[str, str], Path] | None
 ) -> Iterator[FusionChannel]:
     """Yield the channels of recordings that decide, each with the estimate of the method to use.
 

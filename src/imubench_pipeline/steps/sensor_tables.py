@@ -33,7 +33,7 @@ from imubench_pipeline.typing import Row
 
 
 def joined_tables(
-    parts: Mapping[str, list[Path]], truths: str, catalogue: str, decide: str = "{}"
+    parts: Mapping[str, list[Path]], truths: str, catalogue: str, decide: str
 ) -> dict[str, pa.Table]:
     """Return every table of recordings, joined of those of a sensor.
 
