@@ -21,11 +21,10 @@ from imubench_pipeline.run import shortlist_command as shortlist
 from imubench_pipeline.run import simulate_command as simulation
 from imubench_pipeline.run.nightly import command as nightly
 from imubench_pipeline.run.verification import command as verification
-from imubench_pipeline.settings.config import Run
+from imubench_pipeline.settings.config import Run, read_config
 from imubench_pipeline.settings.sensor import RecordingNotes, Sensor
 from imubench_pipeline.settings.simulated_recordings import Board, Simulated
 from imubench_pipeline.settings.validation import ConfigError
-from imubench_pipeline.settings.yaml_files import read_yaml
 from imubench_pipeline.tables import replacing, write_content, write_json
 
 SCHEMAS: dict[str, type[BaseModel]] = {
@@ -178,11 +177,10 @@ def _check(options: argparse.Namespace) -> int:
     from imubench_pipeline.run.plan import Plan
 
     try:
-        config = read_yaml(options.config) if options.config.is_file() else None
         over: dict[str, object] = {"logs": str(options.logs), "simulated": None}
         if options.sensors:
             over["sensors"] = str(options.sensors)
-        plan = Plan({**(config if isinstance(config, dict) else {}), **over})
+        plan = Plan(read_config(options.config) | over)
         if not plan.recordings:
             raise ConfigError(f"{options.logs}: no log found; expected <sensor>/<recording> in it")
     except ConfigError as error:

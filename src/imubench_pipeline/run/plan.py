@@ -22,6 +22,7 @@ from imubench_pipeline.settings.config import Run, given_beside, read_run
 from imubench_pipeline.settings.printed import IN_USE
 from imubench_pipeline.settings.requirements import Requirement, read_requirements
 from imubench_pipeline.settings.sensor import (
+    EXPERIMENTS,
     Kind,
     LogFormat,
     RecordingNotes,
@@ -44,9 +45,6 @@ from imubench_pipeline.tables.provenance import source_digest
 from imubench_pipeline.units import quantity_to_si
 
 _OF_INGEST = ("quality.json", "envelope.parquet", "histogram.parquet")
-_EXPERIMENTS = ("two_position", "rate_table", "pointing")
-"""Keys of the notes that the ingest does not depend on."""
-
 _PUBLISHED = {"channels": {"__all__": {"published", "figures"}}}
 """Keys of a simulated recording that its samples do not depend on."""
 
@@ -160,7 +158,7 @@ class Plan:
             if settings["kind"] != "rate_table":
                 log = log.model_copy(update={"table_rate": None})
             written = log.model_dump(mode="json", exclude={"bandwidth"})
-            stated = notes.model_dump(mode="json", exclude={"log", *_EXPERIMENTS})
+            stated = notes.model_dump(mode="json", exclude={"log", *EXPERIMENTS})
             files = versions_of(recording, self.run.results)
             return settings | {"notes": stated, "log": written, "files": files}
         except ConfigError as error:
@@ -235,7 +233,7 @@ class Plan:
             notes = self._written(recording)[1]
         except ConfigError:
             return _text(settings)  # it is rejected, and says why
-        experiments = notes.model_dump(mode="json", include=set(_EXPERIMENTS), exclude_none=True)
+        experiments = notes.model_dump(mode="json", include=set(EXPERIMENTS), exclude_none=True)
         return _text(settings | experiments)
 
     def outlook_settings(self, sensor: str) -> str:

@@ -23,7 +23,7 @@ from imubench_pipeline.settings.validation import (
     Text,
     parse,
 )
-from imubench_pipeline.settings.yaml_files import read_settings
+from imubench_pipeline.settings.yaml_files import read_settings, read_yaml
 
 _OF_NO_RECORDING = {"held_back", "exports", "limits", "report"}
 
@@ -265,6 +265,12 @@ class Run(Strict):
 def read_run(config: Mapping[str, object], file: str = "config/config.yaml or --config") -> Run:
     """Validate the configuration of a run, as Snakemake hands it over (numbers may be text)."""
     return parse(Run, config, file)
+
+
+def read_config(file: Path) -> dict[str, Any]:
+    """Return the settings that stand in a configuration, unchecked; none where it is not there."""
+    content = read_yaml(file) if file.is_file() else None
+    return content if isinstance(content, dict) else {}
 
 
 def given_beside(run: Run, file: Path) -> list[str]:

@@ -35,6 +35,9 @@ TABLE_RATE = "table_rate"
 Kind = Literal["static", "two_position", "rate_table"]
 """What was done with a sensor during a recording."""
 
+EXPERIMENTS = ("two_position", "rate_table", "pointing")
+"""Keys of the notes that the ingest does not depend on; a recording has one at most."""
+
 Channel = Literal["gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"]
 
 
@@ -289,11 +292,7 @@ class RecordingNotes(Strict):
 
     @model_validator(mode="after")
     def _one_kind(self) -> RecordingNotes:
-        stated = [
-            key
-            for key in ("two_position", "rate_table", "pointing")
-            if getattr(self, key) is not None
-        ]
+        stated = [key for key in EXPERIMENTS if getattr(self, key) is not None]
         if len(stated) > 1:
             raise ValueError(
                 f"found {' and '.join(stated)}; expected one of them: a recording is of one kind"
@@ -309,7 +308,7 @@ class RecordingNotes(Strict):
             If it is not; the text begins with the key.
         """
         channels = [str(name) for name in log.channels]
-        for key in ("two_position", "rate_table", "pointing"):
+        for key in EXPERIMENTS:
             try:
                 if key == "two_position" and self.two_position is not None:
                     self.two_position.turned(channels)

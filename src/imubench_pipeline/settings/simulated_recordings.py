@@ -17,6 +17,7 @@ from imubench_pipeline.settings.known_rates import Angle, AtRest, OnRateTable
 from imubench_pipeline.settings.pointing import Pointing
 from imubench_pipeline.settings.profile_forms import FileForm, Form, Surroundings
 from imubench_pipeline.settings.sensor import (
+    EXPERIMENTS,
     QUANTITIES,
     Channel,
     ColumnSource,
@@ -206,11 +207,7 @@ class SimulatedRecording(OfASensor, Surroundings):
 
     @property
     def _experiments(self) -> dict[str, object]:
-        return {
-            "two_position": self.two_position,
-            "rate_table": self.rate_table,
-            "pointing": self.pointing,
-        }
+        return {key: getattr(self, key) for key in EXPERIMENTS}
 
     @property
     def experimental(self) -> str | None:

@@ -20,9 +20,8 @@ from imubench_pipeline.run.nightly.running import errors, last_lines, run_snakem
 from imubench_pipeline.run.nightly.settling import Found, Skip, look, moved, settled
 from imubench_pipeline.run.nightly.state import State, StateError, load_tables, read_state, state_of
 from imubench_pipeline.run.nightly.summary import Skipped, Summary, compared, in_words
-from imubench_pipeline.settings.config import Run, read_run
+from imubench_pipeline.settings.config import Run, read_config, read_run
 from imubench_pipeline.settings.validation import ConfigError
-from imubench_pipeline.settings.yaml_files import read_yaml
 from imubench_pipeline.tables import write_content, write_json
 from imubench_pipeline.tables.seals import night_place, seal_files
 
@@ -230,8 +229,7 @@ class Night:
 
 def _settings(file: Path, config: Sequence[str]) -> Run:
     """Return where the logs and the results are; the rest is Snakemake's to read."""
-    content = read_yaml(file) if file.is_file() else {}
-    settings = content if isinstance(content, dict) else {}
+    settings = read_config(file)
     for entry in config:
         key, equals, value = entry.partition("=")
         if not equals:

@@ -87,9 +87,9 @@ def look(logs: Path) -> dict[str, Found]:
         whole = complete_name(path.name)
         if whole is not None and path.is_file():
             key = f"{sensor_of(path.parent)}/{name_of(whole)}"
-            whole_files = recordings.get(key, Found())
-            if not whole_files.incomplete:
-                recordings[key] = Found(whole_files.files, _stamped(path, path.parent))
+            before = recordings.get(key, Found())
+            if not before.incomplete:
+                recordings[key] = Found(before.files, _stamped(path, path.parent))
     return recordings
 
 

@@ -167,8 +167,8 @@ class Results:
         for other in sorted(path.parent.glob(_SAMPLES)):
             if other.name not in samples:
                 yield self._stray(f"{place}/{other.name}")
-        log_digest = path.with_name(KNOWN)
-        if samples and not quality.recording["simulated"] and not log_digest.exists():
+        known_log = path.with_name(KNOWN)
+        if samples and not quality.recording["simulated"] and not known_log.exists():
             words = "expected what is known of the log, found no such file"
             yield Fault(f"{place}/{KNOWN}", words, self.run_again)
 
