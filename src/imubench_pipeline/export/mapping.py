@@ -46,12 +46,15 @@ class Mapped:
         What was replaced by what, and by how much it is off.
     half, twice : float
         Relative error of the Allan deviation at half and at twice the horizon; 0: exact.
+    most : float
+        The largest one at a tau up to the horizon.
     """
 
     model: NoiseModel
     words: Sequence[str]
     half: float = 0.0
     twice: float = 0.0
+    most: float = 0.0
 
 
 def as_walk(
@@ -179,4 +182,4 @@ def _compared(
         f"{horizon / 2:g} s, by {100 * twice:+.1f} % at {2 * horizon:g} s, and below the horizon "
         f"by at most {100 * float(below[worst]):+.1f} % (at {tau[worst]:.3g} s)"
     ]
-    return Mapped(replacement, [*words, *_left_out(model)], half, twice)
+    return Mapped(replacement, [*words, *_left_out(model)], half, twice, float(below[worst]))

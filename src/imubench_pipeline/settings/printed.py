@@ -46,9 +46,9 @@ def _printed_value(value: object) -> Value | None:
             return tuple(_number(number) for number in value)
         return _number(value)
     except ValueError:
-        mapping = f"found {dict(value)}; " if isinstance(value, Mapping) else ""
+        shown = f"found {dict(value)}; " if isinstance(value, Mapping) else ""
         raise ValueError(
-            f"{mapping}expected a number, one for each axis such as {{xy: 60, z: 80}}, a list "
+            f"{shown}expected a number, one for each axis such as {{xy: 60, z: 80}}, a list "
             "[low, high], or null: not published"
         ) from None
 
