@@ -145,11 +145,8 @@ def imu_of(tables: Tables, request: Request, folder: Path | None = None) -> Imu:
         warmed = _rows(tables["temperature"], sensor=request.sensor, recording=choice.recording)
         effects[quantity] = temperature_effect(warmed, about, quantity, request.horizon)
         if request.overbound:
-            family = TARGETS[request.target].family
-            drawn = _drawn(folder, request.sensor, choice)
-            axes[quantity] = _bounded(
-                tables["allan"], choice, request, float(about["rate"]), family, drawn
-            )
+            rate = float(about["rate"])
+            axes[quantity] = _bounded(tables["allan"], choice, request, rate, folder)
     if not axes:
         reasons = "; ".join(row["reason"] for row in recordings if row["reason"])
         raise ExportError(f"{request.sensor}: no estimate; its recordings are left out: {reasons}")
@@ -202,14 +199,11 @@ def _drawn(folder: Path | None, sensor: str, choice: Choice) -> Sequence[NoiseMo
 
 
 def _bounded(
-    allan: pa.Table,
-    choice: Choice,
-    request: Request,
-    rate: float,
-    family: Family,
-    drawn: Sequence[NoiseModel],
+    allan: pa.Table, choice: Choice, request: Request, rate: float, folder: Path | None
 ) -> AxisNoise:
     """Return the smallest model above the measured curve of the axis that was chosen."""
+    family = TARGETS[request.target].family
+    drawn = _drawn(folder, request.sensor, choice)
     curve = curve_of(
         _rows(allan, sensor=request.sensor, recording=choice.recording, channel=choice.channel)
     )
