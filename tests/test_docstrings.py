@@ -55,7 +55,7 @@ PUBLIC = ["units",
           "report/practical", "report/publish", "report/site", "report/turned", "report/view",
           "report/words",
           "steps/earth_rotation", "steps/exports", "steps/fusion", "steps/noise_source",
-          "steps/shortlist", "steps/turned",
+          "steps/shortlist",
           "run/resources"]  # fmt: skip
 
 

@@ -14,8 +14,7 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng, simulate
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.config import EstimateSettings, Method
-from imubench_pipeline.steps.compensation import resolution_of
-from imubench_pipeline.steps.estimate import Estimation, estimate_channel
+from imubench_pipeline.steps.estimate import Estimation, estimate_channel, resolution_of
 from imubench_pipeline.tables import build, write
 from imubench_pipeline.tables.keys import Key
 from tests.kept import curve_of, kept

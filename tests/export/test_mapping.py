@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from imubench_pipeline.export.mapping import as_process, as_process_and_walk, as_walk
+from imubench_pipeline.export.mapping import as_process, as_walk
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
 from tests.export.sensors import ACCEL, GYRO
 
@@ -46,7 +46,7 @@ def test_what_the_program_holds_is_left_as_it_is() -> None:
     assert not as_walk(walk, 60.0, 100.0).words
     process = NoiseModel(N=1.0, B=0.1, T_B=30.0)
     assert as_process(process, 60.0, 100.0).model == process
-    assert as_process_and_walk(GYRO, 60.0, 100.0).model == GYRO
+    assert as_process(GYRO, 60.0, 100.0, walk=True).model == GYRO
 
 
 def test_the_errors_of_the_two_sensors_and_of_flicker_noise() -> None:
@@ -69,7 +69,7 @@ def test_a_process_in_place_of_a_process_and_a_walk_is_near() -> None:
 
 def test_two_processes_become_one_beside_a_walk_that_stays() -> None:
     model = NoiseModel(N=1.0, B=0.5, T_B=10.0, K=0.01, further=[GaussMarkov(0.4, 40.0)])
-    found = as_process_and_walk(model, 60.0, 100.0)
+    found = as_process(model, 60.0, 100.0, walk=True)
     assert found.model.K == model.K
     assert deviation(found.model, 60.0) == pytest.approx(deviation(model, 60.0))
     assert "replaced by a Gauss-Markov process" in found.words[0]

@@ -1,6 +1,5 @@
 """Compute the Allan variance of every channel of a recording."""
 
-import json
 from pathlib import Path
 
 from imubench_pipeline.settings.config import AllanSettings
@@ -9,7 +8,7 @@ from imubench_pipeline.tables import write
 
 if __name__ == "__main__":
     names = snakemake.wildcards
-    settings = AllanSettings.model_validate(json.loads(snakemake.params.settings))
+    settings = AllanSettings.model_validate_json(snakemake.params.settings)
     kept = Path(snakemake.input.quality).parent
     rows = curves(kept, names.sensor, names.recording, settings)
     write("allan", rows, Path(snakemake.output.curve))

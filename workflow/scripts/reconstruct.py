@@ -1,6 +1,5 @@
 """Simulate logs from every estimated model, and score how well they repeat the curve."""
 
-import json
 from pathlib import Path
 
 from imubench_pipeline.settings.config import ReconstructionSettings
@@ -10,5 +9,5 @@ if __name__ == "__main__":
     write_reconstruction(
         [Path(name) for name in snakemake.input],
         [Path(name) for name in snakemake.output],
-        ReconstructionSettings.model_validate(json.loads(snakemake.params.settings)),
+        ReconstructionSettings.model_validate_json(snakemake.params.settings),
     )

@@ -27,13 +27,7 @@ _CONVENTION = (
 
 
 def write(imu: Imu) -> str:
-    """Return JSON with the fields of the sensor in ``value0``.
-
-    Raises
-    ------
-    ExportError
-        If gyro or accelerometer has no estimate, or a density is 0: Basalt divides by K.
-    """
+    """Return JSON with the fields of the sensor in ``value0``; Basalt divides by K."""
     mapped = walks(imu)
     positive(mapped, "Basalt")
     gyro, accel = mapped["gyro"].model, mapped["accel"].model

@@ -15,6 +15,7 @@ from imubench_pipeline.export.temperature import AXES
 from imubench_pipeline.typing import Row
 
 Key = tuple[str, str]  # recording, channel
+_Estimated = tuple[str, str, str]  # and method
 
 WORST, MEDIAN = "worst", "median"
 
@@ -24,17 +25,7 @@ _NAMED = 40
 
 @dataclass(frozen=True)
 class Choice:
-    """The axis that was chosen.
-
-    Attributes
-    ----------
-    recording, channel, method : str
-    axis : AxisNoise
-    deviation : float
-        Allan deviation of its model at the horizon, SI.
-    of : int
-        Number of axes it was chosen from.
-    """
+    """The axis that was chosen, of `of` axes; Allan deviation of its model at the horizon, SI."""
 
     recording: str
     channel: str
@@ -79,34 +70,24 @@ def choose(
     ExportError
         If there is no estimate of the quantity, or of the device.
     """
-    estimated: dict[tuple[str, str, str], list[Row]] = {}
+    everywhere: dict[_Estimated, list[Row]] = {}
     for row in rows:
         wanted = row["recommended"] if method is None else row["method"] == method
         if wanted and row["channel"].startswith(f"{quantity}_"):
             key = (row["recording"], row["channel"], row["method"])
-            estimated.setdefault(key, []).append(row)
-    named = devices or {}
-    everywhere = list(estimated)
+            everywhere.setdefault(key, []).append(row)
+    estimated = everywhere
     if axis not in (WORST, MEDIAN):
-        devices_present = sorted({named.get(recording, recording) for recording, _, _ in estimated})
+        device = {recording: recording for recording, _, _ in everywhere} | dict(devices or {})
         estimated = {
-            key: part
-            for key, part in estimated.items()
-            if axis in (key[0], named.get(key[0], key[0]))
+            key: part for key, part in everywhere.items() if axis in (key[0], device[key[0]])
         }
-        if not estimated and devices_present:
-            raise ExportError(
-                f"no {quantity} of device {axis!r}; there are: {', '.join(devices_present)}"
-            )
-    ranked = []
-    for key, part in estimated.items():
-        estimate = estimate_of(key[2], part)
-        if estimate.model.N > 0.0:
-            deviation = float(np.sqrt(estimate.model.allan_variance(np.array([horizon]))[0]))
-            ranked.append((deviation, key, estimate))
+        if everywhere and not estimated:
+            present = sorted({device[recording] for recording, _, _ in everywhere})
+            raise ExportError(f"no {quantity} of device {axis!r}; there are: {', '.join(present)}")
+    ranked = _ranked(estimated, horizon)
     if not ranked:
         raise ExportError(f"no estimate of a {quantity} with white noise")
-    ranked.sort(key=lambda entry: entry[0])
     place = len(ranked) // 2 if axis == MEDIAN else len(ranked) - 1
     deviation, (recording, channel, used), estimate = ranked[place]
     which = f"the {MEDIAN if axis == MEDIAN else WORST} of {len(ranked)} axes"
@@ -131,6 +112,19 @@ def choose(
     notes = [*_left_out(others, channel), *parameter_notes(estimate)]
     noise = AxisNoise(estimate.model, origin, notes, _least_walk(estimate))
     return Choice(recording, channel, used, noise, deviation, len(ranked))
+
+
+def _ranked(
+    estimated: Mapping[_Estimated, Sequence[Row]], horizon: float
+) -> list[tuple[float, _Estimated, Estimate]]:
+    """Return the axes with white noise, in the order of their Allan deviation at the horizon."""
+    ranked = []
+    for key, rows in estimated.items():
+        estimate = estimate_of(key[2], rows)
+        if estimate.model.N > 0.0:
+            deviation = float(np.sqrt(estimate.model.allan_variance(np.array([horizon]))[0]))
+            ranked.append((deviation, key, estimate))
+    return sorted(ranked, key=lambda entry: entry[0])
 
 
 def _left_out(others: Mapping[str, Sequence[Key]], chosen: str) -> list[str]:
@@ -186,8 +180,3 @@ def _least_walk(estimate: Estimate) -> float | None:
     """Return the upper limit of a K that the model does not have."""
     K = estimate.parameters.get("K")
     return K.upper if K is not None and K.in_model is None else None
-
-
-def devices_of(recordings: Sequence[Row]) -> dict[str, str]:
-    """Return the device of each recording, of rows of the table ``recordings`` of one sensor."""
-    return {row["recording"]: row["device"] for row in recordings}

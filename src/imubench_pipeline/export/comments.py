@@ -15,22 +15,10 @@ _WHITE = re.compile(r"[\t\n]")
 
 
 def heading(imu: Imu, program: str, convention: str, *, temperature: bool = False) -> list[str]:
-    """Return what is to be said of every file.
+    """Return what is to be said of every file, printable statements.
 
-    Parameters
-    ----------
-    imu : Imu
-    program : str
-        What loads the file.
-    convention : str
-        Of its numbers, in words.
-    temperature : bool
-        The file holds how the biases follow the temperature.
-
-    Returns
-    -------
-    list of str
-        One statement each, printable.
+    `program` is what loads the file, `convention` that of its numbers, in words; `temperature`:
+    it holds how the biases follow the temperature.
     """
     statements = [f"Noise of the {imu.sensor} for {program}, by imubench."]
     if imu.simulated:
@@ -79,9 +67,8 @@ def mapping_words(mapped: Mapping[str, Mapped]) -> list[str]:
 def commented(statements: Sequence[str], mark: str = "#") -> str:
     """Return statements as comment lines, each beginning with a mark.
 
-    What no comment can hold in every format, such as the name of a recording with a line end of
-    Unicode or a control character in it, is written as its escape, and a longer word than a line is
-    divided.
+    What no comment can hold in every format, such as a line end of Unicode in the name of a
+    recording, is written as its escape, and a longer word than a line is divided.
     """
     lines = []
     for statement in statements:
@@ -95,7 +82,7 @@ def commented(statements: Sequence[str], mark: str = "#") -> str:
 def commented_python(statements: Sequence[str]) -> str:
     """Return statements as comments at the top of a file of Python.
 
-    Its encoding is stated before them: Python takes it from the words of the first comments, which
+    Its encoding stands before them: Python takes it from the words of the first comments, which
     hold names that others gave (PEP 263).
     """
     return "# -*- coding: utf-8 -*-\n" + commented(statements)

@@ -33,13 +33,7 @@ _FEW = 20.0
 
 
 def write(imu: Imu) -> str:
-    """Return Python that defines ``imu_err``, for ``imu_model.IMU(accuracy=imu_err)``.
-
-    Raises
-    ------
-    ExportError
-        If gyro or accelerometer has no estimate.
-    """
+    """Return Python that defines ``imu_err``, for ``imu_model.IMU(accuracy=imu_err)``."""
     imu.both()
     mapped = {name: as_process(a.model, imu.horizon, imu.rate) for name, a in imu.axes.items()}
     gyro, accel = mapped["gyro"].model, mapped["accel"].model

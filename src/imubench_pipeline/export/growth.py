@@ -26,15 +26,15 @@ _BEYOND_HORIZON = 4.0
 
 @dataclass(frozen=True)
 class Growth:
-    """Variance of the integrals of the noise.
+    """Variance of the integrals of the noise, each of shape (m,).
 
     Attributes
     ----------
-    time : ndarray, shape (m,)
+    time : ndarray
         Since all was known, s.
-    first : ndarray, shape (m,)
+    first : ndarray
         Of angle, rad^2, or velocity, (m/s)^2.
-    second : ndarray, shape (m,)
+    second : ndarray
         Of the integral of that: rad^2 s^2, or position, m^2.
     """
 
@@ -46,6 +46,9 @@ class Growth:
 def growth(model: NoiseModel, time: ArrayLike, rate: float) -> Growth:
     """Return the variances of the integrals of the noise of a model.
 
+    They are of white noise, Gauss-Markov processes, random walk and flicker noise. What is
+    deterministic (ramp, lines) and what does not grow (quantization) has no part in it.
+
     Parameters
     ----------
     model : NoiseModel
@@ -53,12 +56,6 @@ def growth(model: NoiseModel, time: ArrayLike, rate: float) -> Growth:
         Since all was known, s.
     rate : float
         Hz; the processes that stand for flicker noise begin at half its period.
-
-    Returns
-    -------
-    Growth
-        Of white noise, Gauss-Markov processes, random walk and flicker noise. What is
-        deterministic (ramp, lines) and what does not grow (quantization) has no part in it.
     """
     t = np.atleast_1d(np.asarray(time, dtype=np.float64))
     first, second = np.zeros_like(t), np.zeros_like(t)

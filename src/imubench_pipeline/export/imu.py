@@ -17,12 +17,10 @@ class ExportError(ValueError):
 
 @dataclass(frozen=True)
 class AxisNoise:
-    """The noise model of one axis, which stands for all axes of its quantity.
+    """The noise model of one axis, SI, which stands for all axes of its quantity.
 
     Attributes
     ----------
-    model : NoiseModel
-        SI.
     origin : str
         In words: which axis of which recording, by which method.
     notes : sequence of str
@@ -47,7 +45,6 @@ class Imu:
 
     Attributes
     ----------
-    sensor : str
     rate : float
         Of the samples that the program will get, Hz.
     gyro, accel : AxisNoise or None
@@ -62,7 +59,7 @@ class Imu:
     because : str or None
         The reason for it, or for the use of a recording that does not decide.
     simulated : bool
-        The recordings are simulated.
+        The recordings are.
     cautions : sequence of str
         What speaks against the recordings that were used, and which were left out.
     temperature : mapping of str to TemperatureEffect
@@ -113,13 +110,7 @@ class Imu:
         }
 
     def both(self) -> tuple[AxisNoise, AxisNoise]:
-        """Return gyro and accelerometer, for programs that need them.
-
-        Raises
-        ------
-        ExportError
-            If one has no estimate.
-        """
+        """Return gyro and accelerometer; ExportError if one is missing, which the program needs."""
         axes = self.axes
         missing = [name for name in ("gyro", "accel") if name not in axes]
         if missing:
@@ -144,16 +135,10 @@ def inflated(model: NoiseModel, factor: float) -> NoiseModel:
 
 
 def normal_gravity(latitude: float) -> float:
-    """Return gravity on the WGS 84 ellipsoid, m/s^2, at a latitude in degrees (Somigliana).
+    """Return gravity on the WGS 84 ellipsoid, m/s^2, at a latitude in degrees; else ExportError.
 
-    Raises
-    ------
-    ExportError
-        If the latitude is not one.
-
-    References
-    ----------
-    NIMA TR8350.2, "Department of Defense World Geodetic System 1984", equation 4-1.
+    Somigliana's formula: NIMA TR8350.2, "Department of Defense World Geodetic System 1984",
+    equation 4-1.
     """
     if not abs(latitude) <= 90.0:
         raise ExportError(f"the latitude is {latitude}, expected degrees from -90 to 90")

@@ -13,29 +13,17 @@ from __future__ import annotations
 from imubench_pipeline.export.comments import commented, heading, mapping_words, plain, setting
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.target import Target
-from imubench_pipeline.export.walks import CONVENTION, densities, positive, walks
+from imubench_pipeline.export.walks import CONVENTION, TOPIC, densities, positive, walks
 
 
-def write(imu: Imu, topic: str = "/imu0") -> str:
-    """Return ``imu.yaml``.
-
-    Parameters
-    ----------
-    imu : Imu
-    topic : str
-        ROS topic of the samples.
-
-    Raises
-    ------
-    ExportError
-        If gyro or accelerometer has no estimate, or a density is 0.
-    """
+def write(imu: Imu) -> str:
+    """Return ``imu.yaml``."""
     mapped = walks(imu)
     positive(mapped, "Kalibr")
     return (
         commented([*heading(imu, "Kalibr", CONVENTION), *mapping_words(mapped)])
         + densities(mapped)
-        + setting("rostopic", topic, "of sensor_msgs/Imu")
+        + setting("rostopic", TOPIC, "of sensor_msgs/Imu")
         + setting("update_rate", plain(imu.rate), "Hz")
     )
 

@@ -89,21 +89,13 @@ def as_walk(
     return _compared(model, replacement, f"a random walk K = {K:.3e}", slow, horizon, rate)
 
 
-def as_process(model: NoiseModel, horizon: float, rate: float) -> Mapped:
-    """Return white noise and one Gauss-Markov process in place of a model (see `as_walk`).
+def as_process(model: NoiseModel, horizon: float, rate: float, *, walk: bool = False) -> Mapped:
+    """Return white noise and one Gauss-Markov process in place of a model.
 
     Its T_B is the one with which the logarithm of the Allan variance from a thirtieth of the
-    horizon to the horizon is nearest, in the mean square.
+    horizon to the horizon is nearest, in the mean square. `horizon` in s and `rate` in Hz are as of
+    `as_walk`; with `walk` the program also holds a random walk, and the model's stays.
     """
-    return _as_process(model, horizon, rate, walk=False)
-
-
-def as_process_and_walk(model: NoiseModel, horizon: float, rate: float) -> Mapped:
-    """Return white noise, one Gauss-Markov process and a random walk (see `as_process`)."""
-    return _as_process(model, horizon, rate, walk=True)
-
-
-def _as_process(model: NoiseModel, horizon: float, rate: float, *, walk: bool) -> Mapped:
     replaced = [term for term in _slow(model) if not (walk and term.role is Role.RANDOM_WALK)]
     processes = _processes(replaced)
     K = model.K if walk else 0.0

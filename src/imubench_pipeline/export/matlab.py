@@ -30,7 +30,7 @@ from dataclasses import dataclass
 
 from imubench_pipeline.export.comments import commented, heading, mapping_words
 from imubench_pipeline.export.imu import AxisNoise, Imu
-from imubench_pipeline.export.mapping import Mapped, as_process_and_walk
+from imubench_pipeline.export.mapping import Mapped, as_process
 from imubench_pipeline.export.target import Target
 from imubench_pipeline.export.temperature import AXES, TemperatureEffect
 from imubench_pipeline.noise import NoiseModel, driving_density
@@ -62,7 +62,8 @@ def write(imu: Imu) -> str:
     parameters: dict[str, _Parameters] = {}
     for name, axis in imu.axes.items():
         mapped[name], parameters[name] = _parameters(axis, imu)
-    about = heading(imu, "MATLAB imuSensor", _CONVENTION.format(rate=imu.rate), temperature=True)
+    convention = _CONVENTION.format(rate=imu.rate)
+    about = heading(imu, "MATLAB imuSensor", convention, temperature=True)
     about += mapping_words(mapped)
     biases = {name: _temperature(imu.temperature.get(name)) for name in parameters}
     about += [f"{name} and temperature: {words}." for name in biases for words in biases[name][1]]
@@ -124,11 +125,11 @@ def _parameters(axis: AxisNoise, imu: Imu) -> tuple[Mapped, _Parameters]:
             f"within 11 % up to {_REACH * poles / imu.rate:.4g} s"
         ]
         rest = NoiseModel(Q=model.Q, N=model.N, K=model.K, sinusoids=model.sinusoids)
-        with_walk = as_process_and_walk(rest, imu.horizon, imu.rate)
+        with_walk = as_process(rest, imu.horizon, imu.rate, walk=True)
         flicker = NoiseModel(N=model.N, B=model.B, K=model.K)
         mapped = Mapped(flicker, [*words, *with_walk.words])
         return mapped, _Parameters(model.N, model.K, model.B, f"fractalcoef({poles})")
-    mapped = as_process_and_walk(model, imu.horizon, imu.rate)
+    mapped = as_process(model, imu.horizon, imu.rate, walk=True)
     process = mapped.model
     if process.T_B is None or process.B == 0.0:
         return mapped, _Parameters(process.N, process.K, 0.0, "fractalcoef(1)")

@@ -72,16 +72,7 @@ class Matrices:
 
 
 def matrices(model: NoiseModel, rate: float, horizon: float) -> Matrices:
-    """Return the matrices of a model.
-
-    Parameters
-    ----------
-    model : NoiseModel
-    rate : float
-        Hz.
-    horizon : float
-        s; flicker noise is followed up to four times this.
-    """
+    """Return the matrices of a model at a rate, Hz; flicker noise up to four times `horizon`, s."""
     longest = max(FOLLOWED * horizon, 4.0 / rate)
     terms = model.realised(1.0 / rate, longest)
     discrete = model.state_space(rate, longest)

@@ -13,23 +13,11 @@ from __future__ import annotations
 from imubench_pipeline.export.comments import commented, heading, mapping_words, plain, setting
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.target import Target
-from imubench_pipeline.export.walks import CONVENTION, densities, positive, walks
+from imubench_pipeline.export.walks import CONVENTION, TOPIC, densities, positive, walks
 
 
-def write(imu: Imu, topic: str = "/imu0") -> str:
-    """Return ``kalibr_imu_chain.yaml``.
-
-    Parameters
-    ----------
-    imu : Imu
-    topic : str
-        ROS topic of the samples.
-
-    Raises
-    ------
-    ExportError
-        If gyro or accelerometer has no estimate, or a density is 0.
-    """
+def write(imu: Imu) -> str:
+    """Return ``kalibr_imu_chain.yaml``."""
     mapped = walks(imu)
     positive(mapped, "OpenVINS")
     about = [
@@ -44,7 +32,7 @@ def write(imu: Imu, topic: str = "/imu0") -> str:
         + "imu0:\n"
         + _matrix("T_i_b", 4)
         + densities(mapped, indent)
-        + setting("rostopic", topic, "of sensor_msgs/Imu", indent)
+        + setting("rostopic", TOPIC, "of sensor_msgs/Imu", indent)
         + setting("time_offset", plain(0.0), "s", indent)
         + setting("update_rate", plain(imu.rate), "Hz", indent)
         + setting("model", '"kalibr"', "of the intrinsics", indent)

@@ -30,13 +30,7 @@ _CONVENTION = (
 
 
 def write(imu: Imu) -> str:
-    """Return the lines of the settings that concern the noise of the sensor.
-
-    Raises
-    ------
-    ExportError
-        If gyro or accelerometer has no estimate, or a density is 0: the walks are inverted.
-    """
+    """Return the lines of the settings that concern the noise of the sensor; walks are inverted."""
     mapped = walks(imu)
     positive(mapped, "ORB-SLAM3")
     gyro, accel = mapped["gyro"].model, mapped["accel"].model

@@ -89,8 +89,6 @@ class Overbound:
 
     Attributes
     ----------
-    model : NoiseModel
-    family : str
     horizon, longest : float
         s.
     band : tuple of float
@@ -238,7 +236,7 @@ def overbound(
     ratio = model.allan_variance(tau, rate) / measured
     touches = {}
     for limit in limits:
-        above = np.sum([limit.of_term(term) for term in model.terms], axis=0) / limit.value
+        above = limit.ratio(model)
         if above.min() < _TOUCHES:
             touches[limit.kind] = float(limit.x[np.argmin(above)])
     lowest = float(ratio[np.argmin(measured)])
@@ -260,7 +258,7 @@ def overbound(
 
 def _excess(limit: Limits, model: NoiseModel) -> tuple[float, float]:
     """Return the largest deviation of a model over a limit, and where that is."""
-    above = np.sum([limit.of_term(term) for term in model.terms], axis=0) / limit.value
+    above = limit.ratio(model)
     worst = int(np.argmax(above))
     return math.sqrt(float(above[worst])), float(limit.x[worst])
 

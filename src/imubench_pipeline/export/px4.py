@@ -55,13 +55,7 @@ _CONVENTION = (
 
 
 def write(imu: Imu, period: int = PERIOD) -> str:
-    """Return a parameter file.
-
-    Parameters
-    ----------
-    imu : Imu
-    period : int
-        EKF2_PREDICT_US, us.
+    """Return a parameter file for a `period`, EKF2_PREDICT_US, in us.
 
     Raises
     ------
@@ -79,8 +73,8 @@ def write(imu: Imu, period: int = PERIOD) -> str:
         "EKF2_GYR_B_NOISE": (gyro.K / step, "rad/s^2, from K"),
         "EKF2_GYR_NOISE": (gyro.N / step, "rad/s, from N"),
     }
-    about = heading(imu, "PX4 EKF2", _CONVENTION.format(step=period / 1000.0), temperature=True)
-    about += mapping_words(mapped)
+    convention = _CONVENTION.format(step=period / 1000.0)
+    about = heading(imu, "PX4 EKF2", convention, temperature=True) + mapping_words(mapped)
     rows = []
     for name, (value, comment) in values.items():
         low, high = _RANGES[name]

@@ -14,7 +14,7 @@ import pyarrow.compute as pc
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.estimators.rows import draws
-from imubench_pipeline.export.choice import WORST, Choice, choose, devices_of
+from imubench_pipeline.export.choice import WORST, Choice, choose
 from imubench_pipeline.export.imu import AxisNoise, ExportError, Imu, normal_gravity
 from imubench_pipeline.export.mapping import named
 from imubench_pipeline.export.overbound import MOST_EXCESS, overbound
@@ -37,12 +37,10 @@ class Request:
 
     Attributes
     ----------
-    sensor, target : str
     axis : str
         ``worst``, ``median``, a device or a recording (`imubench_pipeline.export.choice`).
     horizon : float
         s.
-    inflation : float
     because : str or None
         Reason of the inflation, or of the use of recordings that do not decide.
     overbound : bool
@@ -72,12 +70,7 @@ class Request:
 
 
 def load(path: Path) -> dict[str, pa.Table]:
-    """Read the tables of a run.
-
-    Parameters
-    ----------
-    path : Path
-        Folder of the results, or the folder ``tables`` in it.
+    """Read the tables of a run, of the folder of its results or of ``tables`` in it.
 
     Raises
     ------
@@ -92,13 +85,7 @@ def load(path: Path) -> dict[str, pa.Table]:
 
 
 def recordings_of(path: Path) -> Path:
-    """Return the folder of the recordings of a run, of its results or the tables in them.
-
-    Parameters
-    ----------
-    path : Path
-        As `load` takes it.
-    """
+    """Return the folder of the recordings of a run, of a path as `load` takes it."""
     return (path if (path / "tables").is_dir() else path.parent) / "recordings"
 
 
@@ -108,7 +95,7 @@ def made(tables: Tables, request: Request, recordings: Path | None = None) -> st
     Parameters
     ----------
     tables : mapping of str to pyarrow.Table
-        ``recordings``, ``parameters``, ``allan`` and ``temperature`` of a run.
+        Those of `NEEDED`, of a run.
     request : Request
     recordings : Path, optional
         Folder of the recordings of the run: their tables ``draws`` say how sure a fit is that is to
@@ -146,7 +133,7 @@ def imu_of(tables: Tables, request: Request, folder: Path | None = None) -> Imu:
             quantity,
             axis=request.axis,
             horizon=request.horizon,
-            devices=devices_of(recordings),
+            devices={row["recording"]: row["device"] for row in recordings},
             method=request.method,
         )
         about = by_name[choice.recording]
@@ -158,11 +145,8 @@ def imu_of(tables: Tables, request: Request, folder: Path | None = None) -> Imu:
         warmed = _rows(tables["temperature"], sensor=request.sensor, recording=choice.recording)
         effects[quantity] = temperature_effect(warmed, about, quantity, request.horizon)
         if request.overbound:
-            family = TARGETS[request.target].family
-            drawn = _drawn(folder, request.sensor, choice)
-            axes[quantity] = _bounded(
-                tables["allan"], choice, request, float(about["rate"]), family, drawn
-            )
+            rate = float(about["rate"])
+            axes[quantity] = _bounded(tables["allan"], choice, request, rate, folder)
     if not axes:
         reasons = "; ".join(row["reason"] for row in recordings if row["reason"])
         raise ExportError(f"{request.sensor}: no estimate; its recordings are left out: {reasons}")
@@ -215,14 +199,11 @@ def _drawn(folder: Path | None, sensor: str, choice: Choice) -> Sequence[NoiseMo
 
 
 def _bounded(
-    allan: pa.Table,
-    choice: Choice,
-    request: Request,
-    rate: float,
-    family: Family,
-    drawn: Sequence[NoiseModel],
+    allan: pa.Table, choice: Choice, request: Request, rate: float, folder: Path | None
 ) -> AxisNoise:
     """Return the smallest model above the measured curve of the axis that was chosen."""
+    family = TARGETS[request.target].family
+    drawn = _drawn(folder, request.sensor, choice)
     curve = curve_of(
         _rows(allan, sensor=request.sensor, recording=choice.recording, channel=choice.channel)
     )
@@ -238,7 +219,9 @@ def _bounded(
         )
     except ValueError as error:
         raise ExportError(
-            f"{choice.channel} of {choice.recording}: {error}{_ways_out(family, request)}"
+            f"{choice.channel} of {choice.recording}: {error}{_holding(family)}; or take a horizon "
+            f"shorter than {request.horizon:g} s, or the fitted model without overbound, or allow "
+            "a larger excess"
         ) from error
     fitted = f"the fitted model was: {named(choice.axis.model.terms)}"
     notes = [bound.words, bound.density_words, fitted, *choice.axis.notes]
@@ -257,21 +240,8 @@ def _holding(family: Family) -> str:
     return "".join(f"; {other} is held by {names}" for other, names in kinds.items() if names)
 
 
-def _ways_out(family: Family, request: Request) -> str:
-    return (
-        f"{_holding(family)}; or take a horizon shorter than {request.horizon:g} s, or the fitted "
-        "model without overbound, or allow a larger excess"
-    )
-
-
 def curve_of(rows: list[dict[str, Any]]) -> AllanCurve:
-    """Return the curve of rows of the table ``allan`` of one channel.
-
-    Raises
-    ------
-    ExportError
-        If there is none.
-    """
+    """Return the curve of rows of the table ``allan`` of one channel; ExportError without any."""
     if not rows:
         raise ExportError("the channel has no Allan variance")
     return AllanCurve(

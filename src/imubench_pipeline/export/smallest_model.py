@@ -60,17 +60,16 @@ class Limits:
     value: Array
     of_term: Callable[[Term], Array]
 
+    def ratio(self, model: NoiseModel) -> Array:
+        """Return how many times the limit a model has, shape (m,)."""
+        return np.asarray(np.sum([self.of_term(term) for term in model.terms], axis=0) / self.value)
+
 
 def smallest(limits: Sequence[Limits], family: Family, times: tuple[float, float]) -> NoiseModel:
     """Return the smallest model of a family that lies above limits.
 
-    Parameters
-    ----------
-    limits : sequence of Limits
-        Those of the Allan variance first: there the model is kept close.
-    family : {"N+K", "N+GM", "N+GM+K"}
-    times : (float, float)
-        Shortest and longest T_B to try, s.
+    The first of the `limits` are those of the Allan variance: there the model is kept close.
+    `times`: shortest and longest T_B to try, s.
 
     Raises
     ------

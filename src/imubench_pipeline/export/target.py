@@ -15,14 +15,13 @@ class Target:
 
     Attributes
     ----------
-    name : str
-        What the command and the settings call it.
-    program : str
-        What people call it.
+    name, program : str
+        What the command and the settings call it, and what people do.
     file_name : str
         Its usual one.
     write : callable
-        Imu -> content of the file: str, or bytes.
+        Imu -> content of the file: str, or bytes. Raises ExportError where the program needs what
+        has no estimate, or a density above 0.
     family : str
         Terms that it holds: those of an overbound for it.
     """

@@ -17,8 +17,7 @@ from imubench_pipeline.typing import Row
 AXES = "xyz"
 
 _LEAST_KNOWN = 0.5
-"""Half of the 95 % interval over s, at most: a correction then leaves half of the effect.
-"""
+"""Half of the 95 % interval over s, at most: a correction then leaves half of the effect."""
 
 _LEAST_RANGE = 2.0
 """K; PX4 changes a correction after a change of 1 K only (update_offsets_gyro): in a smaller range
@@ -55,16 +54,9 @@ def temperature_effect(
 ) -> TemperatureEffect:
     """Return what temperature adds to the axes of a quantity in one recording.
 
-    Parameters
-    ----------
-    rows : iterable of mapping
-        Of the table ``temperature``, of the recording.
-    recording : mapping
-        Its row of the table ``recordings``.
-    quantity : {"gyro", "accel"}
-    horizon : float
-        How long the program goes without a measurement, s: a sensor that may follow the
-        temperature later than that is left out.
+    `rows` are those of the table ``temperature`` of the recording, `recording` its row of
+    ``recordings``. A sensor that may follow the temperature later than the `horizon`, how long the
+    program goes without a measurement, s, is left out.
     """
     low, high = recording["temperature_min"], recording["temperature_max"]
     by_axis: dict[str, dict[str, Row]] = {}

@@ -30,7 +30,7 @@ from imubench_pipeline.export.comments import (
 )
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.target import Target
-from imubench_pipeline.export.walks import walks
+from imubench_pipeline.export.walks import TOPIC, walks
 
 _CONVENTION = (
     "acc_n, gyr_n = N sqrt(2 rate) and acc_w, gyr_w = K sqrt(rate): discrete in time, for samples "
@@ -39,20 +39,8 @@ _CONVENTION = (
 )
 
 
-def write(imu: Imu, topic: str = "/imu0") -> str:
-    """Return the lines of the configuration that concern the sensor.
-
-    Parameters
-    ----------
-    imu : Imu
-    topic : str
-        ROS topic of the samples.
-
-    Raises
-    ------
-    ExportError
-        If gyro or accelerometer has no estimate.
-    """
+def write(imu: Imu) -> str:
+    """Return the lines of the configuration that concern the sensor."""
     mapped = walks(imu)
     gyro, accel = mapped["gyro"].model, mapped["accel"].model
     per_sample, per_step = math.sqrt(2.0 * imu.rate), math.sqrt(imu.rate)
@@ -65,7 +53,7 @@ def write(imu: Imu, topic: str = "/imu0") -> str:
         "%YAML:1.0\n\n"
         + commented(about)
         + setting("imu", "1", "use it")
-        + setting("imu_topic", f'"{topic}"', "of sensor_msgs/Imu")
+        + setting("imu_topic", f'"{TOPIC}"', "of sensor_msgs/Imu")
         + setting("acc_n", number(accel.N * per_sample), f"m/s^2 a sample, N = {accel.N:.4e}")
         + setting("gyr_n", number(gyro.N * per_sample), f"rad/s a sample, N = {gyro.N:.4e}")
         + setting("acc_w", number(accel.K * per_step), f"m/s^3, K = {accel.K:.4e}")

@@ -12,14 +12,12 @@ CONVENTION = (
 )
 
 
-def walks(imu: Imu) -> dict[str, Mapped]:
-    """Return gyro and accelerometer as white noise and random walk.
+TOPIC = "/imu0"
+"""ROS topic of the samples."""
 
-    Raises
-    ------
-    ExportError
-        If one has no estimate.
-    """
+
+def walks(imu: Imu) -> dict[str, Mapped]:
+    """Return gyro and accelerometer as white noise and random walk; ExportError without both."""
     imu.both()
     return {
         name: as_walk(axis.model, imu.horizon, imu.rate, axis.least_walk)
@@ -28,13 +26,7 @@ def walks(imu: Imu) -> dict[str, Mapped]:
 
 
 def positive(mapped: dict[str, Mapped], program: str) -> None:
-    """Check that no density is 0.
-
-    Raises
-    ------
-    ExportError
-        If one is.
-    """
+    """Raise ExportError if a density is 0, for a program that takes values above 0 only."""
     for name, axis in mapped.items():
         for letter in ("N", "K"):
             if not getattr(axis.model, letter) > 0.0:

@@ -20,13 +20,7 @@ from imubench_pipeline.tables.findings import Finding
 
 
 def check(plan: Plan) -> Iterator[tuple[str, str, Quality]]:
-    """Yield sensor, recording and quality of each recording that a plan finds.
-
-    Parameters
-    ----------
-    plan : Plan
-        Its simulated recordings are passed over.
-    """
+    """Yield sensor, recording and quality of each recording of a plan that is not simulated."""
     for (sensor, name), recording in plan.recordings.items():
         if recording.simulated:
             continue
@@ -45,12 +39,7 @@ def check(plan: Plan) -> Iterator[tuple[str, str, Quality]]:
 def spectral_findings(channel: str, log: ChannelLog, bandwidth: float | None) -> list[Finding]:
     """Return lines and the end of the band of a channel, if its spectrum can be taken.
 
-    Parameters
-    ----------
-    channel : str
-    log : ChannelLog
-    bandwidth : float or None
-        Cut-off of the sensor's own filter, where it is known, Hz.
+    `bandwidth`: cut-off of the sensor's own filter, where it is known, Hz.
     """
     if log.holes:
         # Filling holes takes a model: that is the estimation's.

@@ -7,8 +7,9 @@ import io
 import json
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from pydantic import BaseModel
 
@@ -20,13 +21,11 @@ from imubench_pipeline.run import shortlist_command as shortlist
 from imubench_pipeline.run import simulate_command as simulation
 from imubench_pipeline.run.nightly import command as nightly
 from imubench_pipeline.run.verification import command as verification
-from imubench_pipeline.settings.config import Run
+from imubench_pipeline.settings.config import Run, read_config
 from imubench_pipeline.settings.sensor import RecordingNotes, Sensor
 from imubench_pipeline.settings.simulated_recordings import Board, Simulated
 from imubench_pipeline.settings.validation import ConfigError
-from imubench_pipeline.settings.yaml_files import read_yaml
 from imubench_pipeline.tables import replacing, write_content, write_json
-from imubench_pipeline.units import UnitError, quantity_to_si
 
 SCHEMAS: dict[str, type[BaseModel]] = {
     "run": Run,
@@ -46,66 +45,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
     parser = argparse.ArgumentParser(prog="imubench", description="Inertial sensor benchmark.")
     commands = parser.add_subparsers(dest="command", required=True)
-    schema = commands.add_parser(
-        "schema", help="write the JSON Schema of a configuration file, for editors"
-    )
-    schema.add_argument("file", choices=sorted(SCHEMAS), help="which configuration file")
-    schema.add_argument("--output", type=Path, help="where to write it; default: the terminal")
-    checking = commands.add_parser(
-        "check",
-        help="say what is wrong with logs, without analysing them",
-        description="Exit status: 0 all good, 1 warnings or rejected logs, 2 wrong settings.",
-    )
-    checking.add_argument("logs", type=Path, help="folder that holds <sensor>/<recording>")
-    checking.add_argument("--sensors", type=Path, help="folder of the sensor files")
-    checking.add_argument(
-        "--config", type=Path, default=Path("config/config.yaml"), help="settings of the findings"
-    )
-    inspecting = commands.add_parser(
-        "inspect",
-        help="show what a log holds, and draft a sensor file for it",
-        description="Exit status: 0 the sensor file is complete, 1 something is left to fill in, "
-        "2 the log cannot be read.",
-    )
-    inspecting.add_argument("log", type=Path, help="log file, or folder or archive of a recording")
-    inspecting.add_argument(
-        "--block", action="store_true", help="print the sensor file alone, and no listing"
-    )
-    inspecting.add_argument(
-        "--output", type=Path, help="where to write the sensor file; default: the terminal"
-    )
-    commands.add_parser("formats", help="list the logs that are read, and the exports")
-    _add_export(commands.add_parser("export", help="write what a filter or simulator loads"))
-    show.add_arguments(
-        commands.add_parser("show", help="show the comparison of the sensors in the terminal")
-    )
-    shortlist.add_arguments(
-        commands.add_parser(
-            "shortlist", help="say by datasheets alone which sensors are worth logging"
-        )
-    )
-    report.add_arguments(
-        commands.add_parser("report", help="write the report again, elsewhere or in one file")
-    )
-    figures.add_arguments(
-        commands.add_parser("figures", help="draw the figures of channels for print")
-    )
-    simulation.add_arguments(
-        commands.add_parser(
-            "simulate", help="write a simulated log of a sensor, to test filters on"
-        )
-    )
-    nightly.add_arguments(
-        commands.add_parser(
-            "nightly", help="run on the logs that are complete, and say what is new: for timers"
-        )
-    )
-    verification.add_arguments(
-        commands.add_parser("verify", help="say whether all results are as runs left them")
-    )
-    given = parser.parse_args(arguments)
+    for name, command in _COMMANDS.items():
+        command.add_arguments(commands.add_parser(name, help=command.help))
+    options = parser.parse_args(arguments)
     try:
-        status = _COMMANDS[given.command](given)
+        status = _COMMANDS[options.command].run(options)
         sys.stdout.flush()
         return status
     except BrokenPipeError:
@@ -114,34 +58,60 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _CLOSED_PIPE
 
 
-def _add_export(exporting: argparse.ArgumentParser) -> None:
-    exporting.add_argument("results", type=Path, help="folder of the results of a run")
-    exporting.add_argument("--sensor", required=True, help="name of the sensor file")
-    exporting.add_argument(
+def _add_schema(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", choices=sorted(SCHEMAS), help="which configuration file")
+    parser.add_argument("--output", type=Path, help="where to write it; default: the terminal")
+
+
+def _add_check(parser: argparse.ArgumentParser) -> None:
+    parser.description = "Exit status: 0 all good, 1 warnings or rejected logs, 2 wrong settings."
+    parser.add_argument("logs", type=Path, help="folder that holds <sensor>/<recording>")
+    parser.add_argument("--sensors", type=Path, help="folder of the sensor files")
+    parser.add_argument(
+        "--config", type=Path, default=Path("config/config.yaml"), help="settings of the findings"
+    )
+
+
+def _add_inspect(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Exit status: 0 the sensor file is complete, 1 something is left to fill in, "
+        "2 the log cannot be read."
+    )
+    parser.add_argument("log", type=Path, help="log file, or folder or archive of a recording")
+    parser.add_argument(
+        "--block", action="store_true", help="print the sensor file alone, and no listing"
+    )
+    parser.add_argument(
+        "--output", type=Path, help="where to write the sensor file; default: the terminal"
+    )
+
+
+def _add_export(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("results", type=Path, help="folder of the results of a run")
+    parser.add_argument("--sensor", required=True, help="name of the sensor file")
+    parser.add_argument(
         "--target", required=True, help="program, such as kalibr; a wrong name lists them all"
     )
-    exporting.add_argument(
+    parser.add_argument(
         "--axis", default="worst", help="worst, median, a device or a recording; default: worst"
     )
-    exporting.add_argument(
+    parser.add_argument(
         "--horizon",
-        type=_seconds,
+        type=nightly.seconds,
         default="60 s",
         metavar="TIME",
         help="of coasting, for which terms that the program lacks are mapped; default: 60 s",
     )
-    exporting.add_argument(
+    parser.add_argument(
         "--inflate", type=float, default=1.0, metavar="FACTOR", help="multiplies every deviation"
     )
-    exporting.add_argument(
-        "--because", help="reason of --inflate, or of the use of unfit recordings"
-    )
-    exporting.add_argument(
+    parser.add_argument("--because", help="reason of --inflate, or of the use of unfit recordings")
+    parser.add_argument(
         "--overbound",
         action="store_true",
         help="the smallest model above the upper 95 %% limit of the measured curve up to --horizon",
     )
-    exporting.add_argument(
+    parser.add_argument(
         "--excess",
         type=float,
         default=3.0,
@@ -149,82 +119,70 @@ def _add_export(exporting: argparse.ArgumentParser) -> None:
         help="an overbound whose Allan deviation must be more times its limit is refused; "
         "default: 3",
     )
-    exporting.add_argument("--method", help="of the estimates; default: the recommended one")
-    exporting.add_argument("--latitude", type=float, metavar="DEG", help="for gravity")
-    exporting.add_argument("--rate", type=float, metavar="HZ", help="default: the recording's")
-    exporting.add_argument("--output", type=Path, help="where to write; default: the terminal")
+    parser.add_argument("--method", help="of the estimates; default: the recommended one")
+    parser.add_argument("--latitude", type=float, metavar="DEG", help="for gravity")
+    parser.add_argument("--rate", type=float, metavar="HZ", help="default: the recording's")
+    parser.add_argument("--output", type=Path, help="where to write; default: the terminal")
 
 
-def _seconds(text: str) -> float:
-    """Return a time in s, written with its unit or without."""
-    try:
-        return float(text)
-    except ValueError:
-        try:
-            return quantity_to_si(text, "time")
-        except UnitError as error:
-            raise argparse.ArgumentTypeError(str(error)) from None
-
-
-def _export(given: argparse.Namespace) -> int:
+def _export(options: argparse.Namespace) -> int:
     from imubench_pipeline.export.imu import ExportError
     from imubench_pipeline.export.request import Request, load, made, recordings_of
 
-    if given.inflate != 1.0 and not given.because:
+    if options.inflate != 1.0 and not options.because:
         print("--inflate needs its reason; expected --because '...'", file=sys.stderr)
         return 2
     asked = Request(
-        sensor=given.sensor,
-        target=given.target,
-        axis=given.axis,
-        horizon=given.horizon,
-        inflation=given.inflate,
-        because=given.because,
-        overbound=given.overbound,
-        most_excess=given.excess,
-        method=given.method,
-        latitude=given.latitude,
-        rate=given.rate,
+        sensor=options.sensor,
+        target=options.target,
+        axis=options.axis,
+        horizon=options.horizon,
+        inflation=options.inflate,
+        because=options.because,
+        overbound=options.overbound,
+        most_excess=options.excess,
+        method=options.method,
+        latitude=options.latitude,
+        rate=options.rate,
     )
     try:
-        content = made(load(given.results), asked, recordings_of(given.results))
+        content = made(load(options.results), asked, recordings_of(options.results))
     except ExportError as error:
         print(error, file=sys.stderr)
         return 2
-    if given.output is not None:
-        write_content(content, given.output)
+    if options.output is not None:
+        write_content(content, options.output)
     elif isinstance(content, bytes):
-        print(f"{given.target} is no text; expected --output FILE", file=sys.stderr)
+        print(f"{options.target} is no text; expected --output FILE", file=sys.stderr)
         return 2
     else:
         print(content, end="")
     return 0
 
 
-def _schema(given: argparse.Namespace) -> int:
-    found = SCHEMAS[given.file].model_json_schema()
-    found["$schema"] = "https://json-schema.org/draft/2020-12/schema"
-    if given.output:
-        write_json(found, given.output)
+def _schema(options: argparse.Namespace) -> int:
+    schema = SCHEMAS[options.file].model_json_schema()
+    schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
+    if options.output:
+        write_json(schema, options.output)
     else:
-        json.dump(found, sys.stdout, indent=1)
+        json.dump(schema, sys.stdout, indent=1)
         sys.stdout.write("\n")
     return 0
 
 
-def _check(given: argparse.Namespace) -> int:
+def _check(options: argparse.Namespace) -> int:
     # Numerics are loaded for this command only: the others answer at once.
     from imubench_pipeline.run.checking import check
     from imubench_pipeline.run.plan import Plan
 
     try:
-        config = read_yaml(given.config) if given.config.is_file() else None
-        over: dict[str, object] = {"logs": str(given.logs), "simulated": None}
-        if given.sensors:
-            over["sensors"] = str(given.sensors)
-        plan = Plan({**(config if isinstance(config, dict) else {}), **over})
+        over: dict[str, object] = {"logs": str(options.logs), "simulated": None}
+        if options.sensors:
+            over["sensors"] = str(options.sensors)
+        plan = Plan(read_config(options.config) | over)
         if not plan.recordings:
-            raise ConfigError(f"{given.logs}: no log found; expected <sensor>/<recording> in it")
+            raise ConfigError(f"{options.logs}: no log found; expected <sensor>/<recording> in it")
     except ConfigError as error:
         print(error, file=sys.stderr)
         return 2
@@ -244,7 +202,7 @@ INSPECTED_S, INSPECTED_BYTES = 10.0, 1 << 29
 """Time and memory in which a log is listed, or rejected."""
 
 
-def _inspect(given: argparse.Namespace) -> int:
+def _inspect(options: argparse.Namespace) -> int:
     from imubench_pipeline.readers.bounded import BoundError, bounded
     from imubench_pipeline.readers.inspection import inspect
     from imubench_pipeline.tables.findings import RecordingError
@@ -252,19 +210,19 @@ def _inspect(given: argparse.Namespace) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         # Names in a log may be in any script, and sensor files are UTF-8.
         sys.stdout.reconfigure(encoding="utf-8", errors="backslashreplace")
-    output: Path | None = given.output
+    output: Path | None = options.output
     if output is not None and output.exists():
         print(f"{output}: exists already; expected a new name", file=sys.stderr)
         return 2
     try:
         model = output.stem if output is not None else None
-        found = bounded(INSPECTED_S, INSPECTED_BYTES, inspect, given.log, model)
+        inspected = bounded(INSPECTED_S, INSPECTED_BYTES, inspect, options.log, model)
         if output is not None:
             with replacing(output) as temporary:
-                temporary.write_text(found.block, encoding="utf-8")
+                temporary.write_text(inspected.block, encoding="utf-8")
     except BoundError as error:
         print(
-            f"{given.log.name}: to list it {error}; expected the log of an inertial sensor: copy "
+            f"{options.log.name}: to list it {error}; expected the log of an inertial sensor: copy "
             "what it measured into a file of its own",
             file=sys.stderr,
         )
@@ -272,25 +230,59 @@ def _inspect(given: argparse.Namespace) -> int:
     except (RecordingError, OSError) as error:
         print(error, file=sys.stderr)
         return 2
-    if not given.block:
-        print(found.listing)
+    if not options.block:
+        print(inspected.listing)
     if output is None:
-        sys.stdout.write(found.block)
-    print(found.proof.said, file=sys.stderr if given.block else sys.stdout)
-    return 0 if found.complete else 1
+        sys.stdout.write(inspected.block)
+    print(inspected.proof.said, file=sys.stderr if options.block else sys.stdout)
+    return 0 if inspected.complete else 1
+
+
+class _Command(NamedTuple):
+    help: str
+    add_arguments: Callable[[argparse.ArgumentParser], None]
+    run: Callable[[argparse.Namespace], int]
 
 
 _COMMANDS = {
-    "schema": _schema,
-    "check": _check,
-    "inspect": _inspect,
-    "formats": formats.run,
-    "export": _export,
-    "show": show.run,
-    "shortlist": shortlist.run,
-    "report": report.run,
-    "figures": figures.run,
-    "simulate": simulation.run,
-    "nightly": nightly.run,
-    "verify": verification.run,
+    "schema": _Command(
+        "write the JSON Schema of a configuration file, for editors", _add_schema, _schema
+    ),
+    "check": _Command("say what is wrong with logs, without analysing them", _add_check, _check),
+    "inspect": _Command(
+        "show what a log holds, and draft a sensor file for it", _add_inspect, _inspect
+    ),
+    "formats": _Command(
+        "list the logs that are read, and the exports", lambda _: None, formats.run
+    ),
+    "export": _Command("write what a filter or simulator loads", _add_export, _export),
+    "show": _Command(
+        "show the comparison of the sensors in the terminal", show.add_arguments, show.run
+    ),
+    "shortlist": _Command(
+        "say by datasheets alone which sensors are worth logging",
+        shortlist.add_arguments,
+        shortlist.run,
+    ),
+    "report": _Command(
+        "write the report again, elsewhere or in one file", report.add_arguments, report.run
+    ),
+    "figures": _Command(
+        "draw the figures of channels for print", figures.add_arguments, figures.run
+    ),
+    "simulate": _Command(
+        "write a simulated log of a sensor, to test filters on",
+        simulation.add_arguments,
+        simulation.run,
+    ),
+    "nightly": _Command(
+        "run on the logs that are complete, and say what is new: for timers",
+        nightly.add_arguments,
+        nightly.run,
+    ),
+    "verify": _Command(
+        "say whether all results are as runs left them",
+        verification.add_arguments,
+        verification.run,
+    ),
 }

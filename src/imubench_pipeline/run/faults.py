@@ -13,6 +13,7 @@ from imubench_pipeline.recordings.quality_file import Quality
 from imubench_pipeline.tables.digests import read_sealed_json, write_sealed_json
 from imubench_pipeline.tables.failures import Failure
 from imubench_pipeline.tables.findings import RecordingError
+from imubench_pipeline.tables.seals import place_of
 
 Of = tuple[str, str, str | None]
 """Step, sensor and recording; None: a step of the whole sensor."""
@@ -29,10 +30,6 @@ class Faults:
     What was there when this was made says how often each step was tried; a step that failed at
     its last attempt has another one now. So has an ingest of which the samples are no longer as it
     left them: no rule declares them, as what there will be of them is known by the log alone.
-
-    Parameters
-    ----------
-    results : Path
     """
 
     def __init__(self, results: Path) -> None:
@@ -45,11 +42,7 @@ class Faults:
     def attempt(self, of: Of, *, again: bool = True) -> int:
         """Return the number of the attempt of this run, 0 where none has ever failed.
 
-        Parameters
-        ----------
-        of : tuple of str, str and str or None
-        again : bool
-            False: a step that failed is not tried again.
+        Without `again` a step that failed is not tried again.
         """
         record = self._before.get(of)
         tried, failed = (record["attempt"], record["failed"]) if record else (0, False)
@@ -76,16 +69,7 @@ class Faults:
         return self._lost[of]
 
     def failed(self, failure: Failure, attempt: int, log: Path) -> None:
-        """Keep that a step failed.
-
-        Parameters
-        ----------
-        failure : Failure
-        attempt : int
-            Its number.
-        log : Path
-            Of the step, which is told, too.
-        """
+        """Keep that a step failed at an attempt; its log is told, too."""
         path = self._path((failure.step, failure.sensor, failure.recording))
         record = {"attempt": attempt, "failed": True, "log": str(log), **asdict(failure)}
         write_sealed_json(record, path)
@@ -112,19 +96,17 @@ class Faults:
         """Return what a run says that left something out; nothing where its caller looks itself."""
         from imubench_pipeline.report.run_summary import one_line
 
-        told = [
-            f"  {one_line(f'{found.name}: {found.reason}')}\n    log: {log}"
-            for found, log in self.now()
+        failures = [
+            f"  {one_line(f'{failure.name}: {failure.reason}')}\n    log: {log}"
+            for failure, log in self.now()
         ]
-        if not told or TOLD in os.environ:
+        if not failures or TOLD in os.environ:
             return ""
         title = "what failed is left out, and tried again by the next run; the report is there"
-        return "\n".join([title, *told])
+        return "\n".join([title, *failures])
 
     def _path(self, of: Of) -> Path:
-        step, sensor, recording = of
-        place = Path("recordings", sensor, recording) if recording else Path("sensors", sensor)
-        return self._folder / place / f"{step}.json"
+        return self._folder / f"{place_of(*of)}.json"
 
     def _records(self) -> Iterator[tuple[Of, dict[str, Any]]]:
         for path in sorted(self._folder.glob("*/**/*.json")):
@@ -133,11 +115,11 @@ class Faults:
                     yield (record["step"], record["sensor"], record["recording"]), record
 
 
-def _is_record(found: Any) -> bool:
+def _is_record(record: Any) -> bool:
     """Return whether what was read has all that is asked of a record."""
-    if not isinstance(found, dict) or not isinstance(found.get("recording", 0), str | None):
+    if not isinstance(record, dict) or not isinstance(record.get("recording", 0), str | None):
         return False
-    failed = found.get("failed")
+    failed = record.get("failed")
     texts = ("step", "sensor", *(("cause", "reason", "log") if failed else ()))
-    counted = isinstance(failed, bool) and isinstance(found.get("attempt"), int)
-    return counted and all(isinstance(found.get(name), str) for name in texts)
+    counted = isinstance(failed, bool) and isinstance(record.get("attempt"), int)
+    return counted and all(isinstance(record.get(name), str) for name in texts)

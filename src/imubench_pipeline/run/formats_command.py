@@ -23,14 +23,14 @@ def log_formats() -> Iterator[Line]:
     from imubench_pipeline.readers.formats import FILE_FORMATS
 
     yield "reader", "format", "files", "compressed", "columns of time", "settings of its own"
-    for name, known in FILE_FORMATS.items():
+    for name, log_format in FILE_FORMATS.items():
         yield (
             name,
-            known.title,
-            " ".join(known.endings),
-            "yes" if known.streamed else "no",
-            ", ".join(known.time_columns) or "any",
-            ", ".join(known.settings) or "none",
+            log_format.title,
+            " ".join(log_format.endings),
+            "yes" if log_format.streamed else "no",
+            ", ".join(log_format.time_columns) or "any",
+            ", ".join(log_format.settings) or "none",
         )
 
 

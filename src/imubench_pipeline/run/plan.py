@@ -22,6 +22,7 @@ from imubench_pipeline.settings.config import Run, given_beside, read_run
 from imubench_pipeline.settings.printed import IN_USE
 from imubench_pipeline.settings.requirements import Requirement, read_requirements
 from imubench_pipeline.settings.sensor import (
+    EXPERIMENTS,
     Kind,
     LogFormat,
     RecordingNotes,
@@ -44,11 +45,17 @@ from imubench_pipeline.tables.provenance import source_digest
 from imubench_pipeline.units import quantity_to_si
 
 _OF_INGEST = ("quality.json", "envelope.parquet", "histogram.parquet")
-_EXPERIMENTS = ("two_position", "rate_table", "pointing")
-"""Keys of the notes that the ingest does not depend on."""
+_PUBLISHED = {"channels": {"__all__": {"published", "figures"}}}
+"""Keys of a simulated recording that its samples do not depend on."""
 
 _OF_RANKING = ("price_class", "must")
 """Keys of a requirement that no error follows from."""
+
+_SHOWN = {
+    *("allan", "estimate", "reconstruction", "quality"),
+    *("datasheet", "error_budget", "fusion", "earth_rate"),
+}
+"""Sections of the settings that the report shows."""
 
 _ANY_LOG = {"rate": "1 Hz", "channels": {"gyro_x": {"column": 1, "unit": "rad/s"}}}
 """Stands for the layout of a sensor's logs where that does not matter."""
@@ -75,12 +82,12 @@ class Plan:
         self._of_ingest: dict[tuple[str, str], str] = {}
         self._read_notes: dict[Path, object] = {}
         self.recordings: dict[tuple[str, str], Recording] = {}
-        for found in [*self._found_logs(), *self._to_simulate()]:
-            other = self.recordings.setdefault((found.sensor, found.name), found)
-            if other is not found:
+        for recording in [*self._found_logs(), *self._to_simulate()]:
+            other = self.recordings.setdefault((recording.sensor, recording.name), recording)
+            if other is not recording:
                 raise ConfigError(
-                    f"{other.path} and {found.path} would both be the recording "
-                    f"{found.sensor}/{found.name}; rename or remove one"
+                    f"{other.path} and {recording.path} would both be the recording "
+                    f"{recording.sensor}/{recording.name}; rename or remove one"
                 )
 
     def _found_logs(self) -> list[Recording]:
@@ -91,12 +98,12 @@ class Plan:
                     "that holds <sensor>/<recording>"
                 )
             return []
-        found: dict[str, list[Recording]] = {}
+        by_name: dict[str, list[Recording]] = {}
         for log in found_logs(self.run.logs):
-            found.setdefault(f"{log.sensor}/{log.name}", []).append(log)
+            by_name.setdefault(f"{log.sensor}/{log.name}", []).append(log)
         for key in self.run.held_back:
-            found[key] = self._as_it_is(key, found.get(key, []))
-        return sorted(chain.from_iterable(found.values()), key=lambda log: log.path)
+            by_name[key] = self._as_it_is(key, by_name.get(key, []))
+        return sorted(chain.from_iterable(by_name.values()), key=lambda log: log.path)
 
     def _as_it_is(self, key: str, logs: list[Recording]) -> list[Recording]:
         """Return a recording that is held back, if its results are there; its log may be not."""
@@ -108,14 +115,13 @@ class Plan:
             return []
         path = logs[0].path if logs else self.run.logs / sensor / name
         notes = logs[0].notes if logs else path.with_name(f"{name}.yaml")
-        there = notes if notes and notes.is_file() else None
-        return [Recording(sensor, name, path, there, simulated=False, held_back=True)]
+        readable = notes if notes and notes.is_file() else None
+        return [Recording(sensor, name, path, readable, simulated=False, held_back=True)]
 
     def _to_simulate(self) -> list[Recording]:
+        folder = self.run.results / "simulated"
         return [
-            Recording(
-                sensor, name, self.run.results / "simulated" / sensor / name, None, simulated=True
-            )
+            Recording(sensor, name, folder / sensor / name, None, simulated=True)
             for sensor, name in self._simulated
         ]
 
@@ -152,9 +158,9 @@ class Plan:
             if settings["kind"] != "rate_table":
                 log = log.model_copy(update={"table_rate": None})
             written = log.model_dump(mode="json", exclude={"bandwidth"})
-            said = notes.model_dump(mode="json", exclude={"log", *_EXPERIMENTS})
+            stated = notes.model_dump(mode="json", exclude={"log", *EXPERIMENTS})
             files = versions_of(recording, self.run.results)
-            return settings | {"notes": said, "log": written, "files": files}
+            return settings | {"notes": stated, "log": written, "files": files}
         except ConfigError as error:
             return settings | {"error": str(error)}
 
@@ -163,10 +169,13 @@ class Plan:
         recording = self.recordings[sensor, name]
         if recording.simulated:
             return self._simulated[sensor, name].kind
+        return kind_of(self._readable_notes(recording))
+
+    def _readable_notes(self, recording: Recording) -> object:
         try:
-            return kind_of(self._notes(recording))
+            return self._notes(recording)
         except ConfigError:
-            return "static"
+            return {}
 
     def _notes(self, recording: Recording) -> object:
         """Return what the file of notes beside a log holds, which is read once a run."""
@@ -187,11 +196,11 @@ class Plan:
 
     @cached_property
     def _at_rest(self) -> dict[str, list[str]]:
-        found: dict[str, list[str]] = {}
+        by_sensor: dict[str, list[str]] = {}
         for sensor, name in self.recordings:
             if self.kind(sensor, name) == "static":
-                found.setdefault(sensor, []).append(name)
-        return found
+                by_sensor.setdefault(sensor, []).append(name)
+        return by_sensor
 
     @cached_property
     def calibrated(self) -> list[tuple[str, str]]:
@@ -204,47 +213,39 @@ class Plan:
         recording = self.recordings[sensor, name]
         if recording.simulated:
             return self._simulated[sensor, name].pointing is not None
-        try:
-            notes = self._notes(recording)
-        except ConfigError:
-            return False
+        notes = self._readable_notes(recording)
         return isinstance(notes, Mapping) and notes.get("pointing") is not None
 
     def experiment_settings(self, sensor: str, name: str) -> str:
         """Return what is found of a turned or a stated axis depends on beside the samples."""
         recording = self.recordings[sensor, name]
-        known = self.sensors.get(sensor)
+        declared = self.sensors.get(sensor)
         settings: dict[str, object] = {
             "earth_rate": self.run.earth_rate.model_dump(mode="json"),
-            "sensor": known.model_dump(mode="json", exclude_unset=True) if known else None,
+            "sensor": declared.model_dump(mode="json", exclude_unset=True) if declared else None,
         }
         if recording.simulated:
             entry = self._simulated[sensor, name]
-            published = {"channels": {"__all__": {"published", "figures"}}}
-            return _text(settings | {"simulated": entry.model_dump(mode="json", exclude=published)})
+            return _text(
+                settings | {"simulated": entry.model_dump(mode="json", exclude=_PUBLISHED)}
+            )
         try:
             notes = self._written(recording)[1]
         except ConfigError:
             return _text(settings)  # it is rejected, and says why
-        told = notes.model_dump(mode="json", include=set(_EXPERIMENTS), exclude_none=True)
-        return _text(settings | told)
+        experiments = notes.model_dump(mode="json", include=set(EXPERIMENTS), exclude_none=True)
+        return _text(settings | experiments)
 
     def outlook_settings(self, sensor: str) -> str:
         """Return what is predicted of a sensor at rest depends on beside its noise."""
-        known = self.sensors.get(sensor)
+        declared = self.sensors.get(sensor)
         biases = {key: {"bias_repeatability", "offset"} for key in ("gyro", "accel")}
-        printed = known.datasheet.model_dump(mode="json", include=biases) if known else {}
+        printed = declared.datasheet.model_dump(mode="json", include=biases) if declared else {}
         settings = self.run.earth_rate.model_dump(mode="json")
         return _text({"earth_rate": settings, "datasheet": printed})
 
     def _written(self, recording: Recording) -> tuple[LogFormat, RecordingNotes]:
-        """Return how the log of a recording is written, and the notes beside it.
-
-        Raises
-        ------
-        ConfigError
-            If it cannot be used.
-        """
+        """Return how a log is written, and the notes beside it; ConfigError if it is of no use."""
         if recording.error:
             raise ConfigError(recording.error)
         notes = RecordingNotes()
@@ -261,12 +262,8 @@ class Plan:
 
     def estimate_settings(self, sensor: str, name: str) -> str:
         """Return what the estimates of a recording depend on."""
-        return _text(
-            {
-                "estimate": self.run.estimate.model_dump(mode="json"),
-                "bandwidth": self.bandwidth(sensor, name),
-            }
-        )
+        settings = self.run.estimate.model_dump(mode="json")
+        return _text({"estimate": settings, "bandwidth": self.bandwidth(sensor, name)})
 
     def bandwidth(self, sensor: str, name: str) -> float | None:
         """Return the stated cut-off of the sensor's own filter, Hz."""
@@ -282,9 +279,7 @@ class Plan:
         written = layout(recording, self.sensors[sensor].log)
         return _text(
             {
-                "recording": recording.model_dump(
-                    mode="json", exclude={"channels": {"__all__": {"published", "figures"}}}
-                ),
+                "recording": recording.model_dump(mode="json", exclude=_PUBLISHED),
                 "log": written.model_dump(mode="json", exclude={"bandwidth"}),
                 "profiles": self._profiles(recording),
             }
@@ -307,10 +302,10 @@ class Plan:
 
     def datasheet_settings(self, sensor: str) -> str:
         """Return what the comparison with the datasheet of a sensor depends on."""
-        known = self.sensors.get(sensor)
+        declared = self.sensors.get(sensor)
         return _text(
             {
-                "datasheet": known.datasheet.model_dump(mode="json") if known else {},
+                "datasheet": declared.datasheet.model_dump(mode="json") if declared else {},
                 "tolerance": self.run.datasheet.tolerance,
                 "longest": self.run.estimate.longest,
             }
@@ -318,12 +313,12 @@ class Plan:
 
     def error_budget_settings(self, sensor: str) -> str:
         """Return the errors that are asked of a sensor's recordings, and what is printed of it."""
-        known = self.sensors.get(sensor)
+        declared = self.sensors.get(sensor)
         return _text(
             {
                 "error_budget": self.run.error_budget.model_dump(mode="json"),
                 "requirements": self._requirements(*_OF_RANKING, "title", "note", "example"),
-                "datasheet": known.datasheet.only(IN_USE) if known else {},
+                "datasheet": declared.datasheet.only(IN_USE) if declared else {},
             }
         )
 
@@ -338,8 +333,8 @@ class Plan:
     def _requirements(self, *unused: str) -> dict[str, object]:
         """Return what applications need, without what a step does not use of it."""
         return {
-            name: {"title": name} | one.model_dump(mode="json", exclude=set(unused))
-            for name, one in self.requirements.items()
+            name: {"title": name} | requirement.model_dump(mode="json", exclude=set(unused))
+            for name, requirement in self.requirements.items()
         }
 
     def _described(self, *keys: str) -> dict[str, dict[str, object]]:
@@ -358,19 +353,7 @@ class Plan:
                 "report": self.run.report.model_dump(mode="json"),
                 "results": str(self.run.results),
                 "given": given_beside(self.run, Path("config/config.yaml")),
-                "settings": {
-                    section: getattr(self.run, section).model_dump(mode="json")
-                    for section in (
-                        "allan",
-                        "estimate",
-                        "reconstruction",
-                        "quality",
-                        "datasheet",
-                        "error_budget",
-                        "fusion",
-                        "earth_rate",
-                    )
-                },
+                "settings": self.run.model_dump(mode="json", include=_SHOWN),
                 "sensors": self._described("vendor", "model", "price_class"),
                 "boards": {name: self._board(board) for name, board in self.boards.items()},
                 "requirements": self._requirements(),
@@ -384,7 +367,7 @@ class Plan:
             "title": board.title,
             "note": board.note,
             "sensors": {
-                sensor.sensor: {name: one.figures for name, one in sensor.channels.items()}
+                sensor.sensor: {name: channel.figures for name, channel in sensor.channels.items()}
                 for sensor in board.sensors
             },
             "temperature": board.temperature is not None,

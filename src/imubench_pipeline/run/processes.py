@@ -80,7 +80,6 @@ class Job:
 
     Attributes
     ----------
-    script : Path
     input, output, params, wildcards : object
         What the script sees as ``snakemake.input`` and so on. They are pickled.
     log : Path
@@ -138,11 +137,11 @@ class Processes:
         with ours:
             with theirs:
                 self._hand_over(theirs)
-            how, told = _answer(ours, len(request).to_bytes(8, "big") + request, seconds)
+            how, details = _answer(ours, len(request).to_bytes(8, "big") + request, seconds)
         if how != DONE:
-            raise _error(job.name, how, told, seconds)
+            raise _error(job.name, how, details, seconds)
         if COSTS in os.environ:
-            about = {"step": job.name, "of": "/".join(map(str, job.wildcards))} | told
+            about = {"step": job.name, "of": "/".join(map(str, job.wildcards))} | details
             with self._lock, Path(os.environ[COSTS]).open("a", encoding="utf-8") as file:
                 file.write(json.dumps(about) + "\n")
 
@@ -206,16 +205,16 @@ def _received(connection: socket.socket, size: int) -> bytes:
     return received
 
 
-def _error(name: str, how: bytes, told: Mapping[str, Any], seconds: float | None) -> StepError:
-    if "time" in told:
+def _error(name: str, how: bytes, details: Mapping[str, Any], seconds: float | None) -> StepError:
+    if "time" in details:
         reason = f"ran for longer than {seconds:.4g} s"
         return StepError(f"{name}.py {reason}", "time", reason)
     if how == FAILED:
-        alone = told["imported"] and told["errno"] not in _OF_THE_DISK
+        alone = details["imported"] and details["errno"] not in _OF_THE_DISK
         cause: Cause | None = "error" if alone else None
-        return StepError(f"{name}.py failed", cause, told["error"], told["trace"])
-    if how == KILLED and told["signal"] not in _TO_STOP:
-        with_it = signal.Signals(told["signal"]).name
+        return StepError(f"{name}.py failed", cause, details["error"], details["trace"])
+    if how == KILLED and details["signal"] not in _TO_STOP:
+        with_it = signal.Signals(details["signal"]).name
         reason = with_it + ", perhaps for want of memory" * (with_it == "SIGKILL")
         return StepError(f"{name}.py was killed", "killed", reason)
     return StepError(f"{name}.py was killed")

@@ -133,8 +133,8 @@ class _OneLine(logging.Handler):
         if room >= _ROOM_FOR_BAR:
             line.add_column(width=_BAR)
             cells.append(ProgressBar(self._total or 1, self._done, width=_BAR))
-        taken = sum(column.width or 0 for column in line.columns) + len(cells)
-        line.add_column(width=room - taken, no_wrap=True, overflow="ellipsis")
+        width = sum(column.width or 0 for column in line.columns) + len(cells)
+        line.add_column(width=room - width, no_wrap=True, overflow="ellipsis")
         line.add_row(*cells, Text(self._said()))
         return line
 

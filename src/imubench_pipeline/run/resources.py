@@ -53,15 +53,9 @@ Asked = Callable[[Mapping[str, str], int], int]
 
 @dataclass(frozen=True)
 class Extent:
-    """How much there is to compute.
+    """How much there is to compute, of one recording, a sensor or the run.
 
-    Attributes
-    ----------
-    million_samples : float
-        Of one channel.
-    channels : int
-    recordings : int
-        Of the run, or of one sensor.
+    ``million_samples`` are those of one channel.
     """
 
     million_samples: float = 0.0
@@ -73,18 +67,8 @@ class Extent:
 class OfRecording:
     """What a step of one recording takes.
 
-    Attributes
-    ----------
-    memory : float
-        MB.
-    memory_of_samples : float
-        MB a million samples of a channel.
-    time : float
-        s.
-    time_of_channels : float
-        s a channel.
-    time_of_values : float
-        s a million values of all channels.
+    Memory in MB, and MB a million samples of a channel; time in s, s a channel, and s a million
+    values of all channels.
     """
 
     memory: float
@@ -104,20 +88,9 @@ class OfRecording:
 
 @dataclass(frozen=True, kw_only=True)
 class OfMany:
-    """What a step of many recordings takes, of one sensor or of all.
+    """What a step of many recordings takes, of one sensor or of all: memory in MB, and time in s.
 
-    Attributes
-    ----------
-    memory : float
-        MB.
-    memory_of_each : float
-        MB a recording.
-    time : float
-        s.
-    time_of_each : float
-        s a recording.
-    many_jobs : bool
-        One group has so many of them that each cannot ask for a start of its own.
+    ``many_jobs``: one group has so many of them that each cannot ask for a start of its own.
     """
 
     memory: float
@@ -139,16 +112,7 @@ Cost = OfRecording | OfMany
 
 
 def resources_of(cost: Cost, extent: Extent, attempt: int = 1) -> Resources:
-    """Return what a job asks for; each attempt asks for twice as much as the one before.
-
-    Parameters
-    ----------
-    cost : OfRecording or OfMany
-        Of its rule.
-    extent : Extent
-    attempt : int
-        Counted from 1.
-    """
+    """Return what a job asks for; each attempt, counted from 1, for twice as much as the last."""
     memory, seconds = cost.of(extent)
     times: int = 2 ** (attempt - 1)
     return {
@@ -158,18 +122,13 @@ def resources_of(cost: Cost, extent: Extent, attempt: int = 1) -> Resources:
 
 
 def asked(plan: Plan) -> Callable[[Cost], dict[str, Asked]]:
-    """Return what makes of the cost of a rule what it states as its resources.
-
-    Parameters
-    ----------
-    plan : Plan
-    """
+    """Return what makes of the cost of a rule what it states as its resources."""
     extent = _extents(plan)
 
     def stated(cost: Cost) -> dict[str, Asked]:
         def of_job(wildcards: Mapping[str, str], attempt: int) -> Resources:
-            known = extent(wildcards.get("sensor"), wildcards.get("recording"))
-            return resources_of(cost, known, attempt)
+            size = extent(wildcards.get("sensor"), wildcards.get("recording"))
+            return resources_of(cost, size, attempt)
 
         # Snakemake knows by their names what its functions take.
         def mem_mb(wildcards: Mapping[str, str], attempt: int) -> int:
@@ -184,16 +143,11 @@ def asked(plan: Plan) -> Callable[[Cost], dict[str, Asked]]:
 
 
 def limits_of_steps(plan: Plan) -> Limits:
-    """Return what each step of a recording or a sensor may take, as the plan sets it.
-
-    Parameters
-    ----------
-    plan : Plan
-    """
+    """Return what each step of a recording or a sensor may take, as the plan sets it."""
     extent = _extents(plan)
-    given = plan.run.limits
+    limits = plan.run.limits
     seconds = {
-        key: quantity_to_si(getattr(given, key), "time")
+        key: quantity_to_si(getattr(limits, key), "time")
         for key in ("recording", "million_values", "sensor", "each_recording")
     }
 
@@ -201,12 +155,12 @@ def limits_of_steps(plan: Plan) -> Limits:
         of = extent(sensor, recording)
         if recording is None:
             time = seconds["sensor"] + seconds["each_recording"] * of.recordings
-            memory = given.memory + given.memory_of_each_recording * of.recordings
+            memory = limits.memory + limits.memory_of_each_recording * of.recordings
             words = "limits.sensor, limits.each_recording"
         else:
             values = of.million_samples * of.channels
             time = seconds["recording"] + seconds["million_values"] * values
-            memory = given.memory + math.ceil(given.memory_of_million_values * values)
+            memory = limits.memory + math.ceil(limits.memory_of_million_values * values)
             words = "limits.recording, limits.million_values"
         return Limit(time, words, memory * _MB)
 
@@ -244,12 +198,9 @@ def _extent(plan: Plan, recording: Recording) -> Extent:
 
 
 def size_as_text(path: Path) -> int:
-    """Return the size that a file might have as text, in bytes; 0 if there is none.
+    """Return the size that a file of a log might have as text, in bytes; 0 if there is none.
 
-    Parameters
-    ----------
-    path : Path
-        A file of a log. Its samples may be packed: counts in binary, compressed text.
+    Its samples may be packed: counts in binary, compressed text.
     """
     if not path.is_file():
         return 0

@@ -14,20 +14,14 @@ from imubench_pipeline.run.faults import Faults, Of
 from imubench_pipeline.run.nightly.recovery import remove_unfinished
 from imubench_pipeline.run.processes import Job, Processes, StepError
 from imubench_pipeline.run.sealing import sealed
-from imubench_pipeline.tables.failures import Failure
+from imubench_pipeline.tables.failures import QUALITY, Failure, failure_of, write_empty
 
 
 @dataclass(frozen=True)
 class Limit:
-    """What a step may take.
+    """What a step may take: time in s, and memory in bytes beside what the process that forks has.
 
-    Attributes
-    ----------
-    seconds : float
-    words : str
-        Where that is set.
-    memory : int
-        Bytes beside what the process that forks has.
+    ``words``: where that is set.
     """
 
     seconds: float
@@ -76,14 +70,8 @@ class Scripts:
     ) -> None:
         """Run a script to its end, or leave its outputs empty.
 
-        Parameters
-        ----------
-        path, basedir : str
-            The script, and the folder of the rule.
-        input, output, params, wildcards, threads, resources, log : object
-            As Snakemake has them.
-        *others
-            Likewise; the last but two and the last but one are where it keeps what it fetches.
+        `path` and `basedir` are the script and the folder of the rule, the others as Snakemake has
+        them; of `others` the last but two and the last but one are where it keeps what it fetches.
 
         Raises
         ------
@@ -144,25 +132,21 @@ class Scripts:
 _VERBS = {"error": "failed: ", "killed": "was killed twice: ", "time": ""}
 
 
-def _fetched(path: str, basedir: str, *kept: Any) -> Path:
+def _fetched(path: str, basedir: str, *caches: Any) -> Path:
     """Return where a script lies, which may be that of a workflow from elsewhere."""
     source = infer_source_file(path, infer_source_file(basedir))
     if isinstance(source, LocalSourceFile):
         return Path(source.get_path_or_uri(secret_free=True))
-    return Path(SourceCache(*kept).get_path(source))
+    return Path(SourceCache(*caches).get_path(source))
 
 
 def _before(inputs: Any, folder: Path) -> Failure | None:
     """Return which earlier step of the same recording failed, by the inputs of a job."""
-    from imubench_pipeline.tables.failures import failure_of
-
     own = (Path(path) for path in inputs if Path(path).parent == folder)
     return next((failure for path in own if (failure := failure_of(path))), None)
 
 
 def _leave_out(outputs: list[Path], params: Any, failure: Failure) -> None:
-    from imubench_pipeline.tables.failures import QUALITY, write_empty
-
     write_empty((path for path in outputs if path.name != QUALITY), failure)
     for path in outputs:
         if path.name == QUALITY:

@@ -25,10 +25,7 @@ from imubench_pipeline.tables.seals import (
 def sealed(job: Job) -> Iterator[None]:
     """Seal what a job leaves when the block ends without error, with what it read.
 
-    Parameters
-    ----------
-    job : Job
-        One without ``results`` is not sealed.
+    A job without ``results`` is not sealed.
     """
     if job.results is None:
         yield
@@ -41,15 +38,9 @@ def sealed(job: Job) -> Iterator[None]:
 
 
 def settings_digest(params: Mapping[str, object]) -> str:
-    """Return a digest of the parameters of a job, how often it was tried apart.
-
-    Parameters
-    ----------
-    params : mapping of str to object
-        Texts and numbers.
-    """
-    told = {name: value for name, value in params.items() if name != "attempt"}
-    return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
+    """Return a digest of the parameters of a job, how often it was tried apart."""
+    settings = {name: value for name, value in params.items() if name != "attempt"}
+    return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()
 
 
 def left_by(step: str, outputs: Sequence[Path]) -> list[Path]:
@@ -69,16 +60,7 @@ def unsound(results: Path, jobs: Mapping[str, str]) -> Iterator[str]:
     backup, or from a run elsewhere. A file that has its size and its date is taken as it is:
     `imubench verify` reads all of it.
 
-    Parameters
-    ----------
-    results : Path
-    jobs : mapping of str to str
-        The `settings_digest` of each job of a run, by the place of its seal.
-
-    Yields
-    ------
-    str
-        The place.
+    A job is named by the place of its seal; `jobs` has the `settings_digest` of each.
     """
     seals: dict[str, Seal] = {}
     for place in jobs:

@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run(given: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     """Print the shortlist; return the exit status."""
     # Only this command draws and computes: the others answer at once.
     from rich.console import Console
@@ -40,25 +40,25 @@ def run(given: argparse.Namespace) -> int:
     from imubench_pipeline.report.terminal_table import fitting
     from imubench_pipeline.settings.requirements import Requirement, read_requirements
     from imubench_pipeline.settings.sensor import read_sensors
-    from imubench_pipeline.settings.validation import ConfigError, parse
-    from imubench_pipeline.settings.yaml_files import read_yaml
+    from imubench_pipeline.settings.validation import ConfigError
+    from imubench_pipeline.settings.yaml_files import read_settings
     from imubench_pipeline.steps.shortlist import NEEDED, rows_of_run
 
     try:
-        path = Path(given.requirement)
+        path = Path(options.requirement)
         if path.suffix in (".yaml", ".yml"):
-            name, asked = path.stem, parse(Requirement, read_yaml(path), str(path))
+            name, asked = path.stem, read_settings(Requirement, path)
         else:
-            known = read_requirements(given.requirements)
-            if given.requirement not in known:
-                there = ", ".join(known) or "none"
-                raise ConfigError(f"no requirement {given.requirement!r}; there are: {there}")
-            name, asked = given.requirement, known[given.requirement]
-        sensors = read_sensors(given.sensors)
+            requirements = read_requirements(options.requirements)
+            if options.requirement not in requirements:
+                names = ", ".join(requirements) or "none"
+                raise ConfigError(f"no requirement {options.requirement!r}; there are: {names}")
+            name, asked = options.requirement, requirements[options.requirement]
+        sensors = read_sensors(options.sensors)
         tables = {}
-        if given.results is not None:
-            folder = given.results / "tables"
-            folder = folder if folder.is_dir() else given.results
+        if options.results is not None:
+            folder = options.results / "tables"
+            folder = folder if folder.is_dir() else options.results
             tables = {table: folder / f"{table}.parquet" for table in NEEDED}
         rows = list(rows_of_run({name: asked}, sensors, tables))
     except (ConfigError, OSError, ValueError) as error:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from imubench_pipeline.settings.validation import ConfigError, parse
-from imubench_pipeline.settings.yaml_files import read_yaml
+from imubench_pipeline.settings.yaml_files import read_settings, read_yaml
 from imubench_pipeline.units import UnitError, naming, quantity_to_si
 
 if TYPE_CHECKING:
@@ -61,34 +61,34 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--channels", help="comma between them; default: all of the sensor")
 
 
-def run(given: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     """Simulate the log; return the exit status."""
     try:
-        _run(given)
+        _run(options)
     except (ConfigError, UnitError) as error:
         print(error, file=sys.stderr)
         return 2
     except OSError as error:
-        print(f"{given.out}: {error.strerror or error}", file=sys.stderr)
+        print(f"{options.out}: {error.strerror or error}", file=sys.stderr)
         return 2
     return 0
 
 
-def _run(given: argparse.Namespace) -> None:
+def _run(options: argparse.Namespace) -> None:
     # Numerics are loaded for this command only: the others answer at once.
     from imubench_pipeline.settings.sensor import TEMPERATURE
     from imubench_pipeline.simulate.imu import simulate_imu
     from imubench_pipeline.simulate.writing import MARK, layout, notes_path, write_log, write_notes
 
-    origin, sensor = _origin(given)
+    origin, sensor = _origin(options)
     log = None if sensor is None else sensor.log
-    rate = _rate(given.rate, log)
-    duration = _duration(given.duration, given.hours, rate)
+    rate = _rate(options.rate, log)
+    duration = _duration(options.duration, options.hours, rate)
     samples = round(duration * rate)
-    motion, temperature = _profiles(given, origin)
+    motion, temperature = _profiles(options, origin)
     columns = [*origin.imu.axes, *([TEMPERATURE] if temperature is not None else [])]
-    form = layout(given.out, columns, rate, log)
-    notes_path(given.out)
+    form = layout(options.out, columns, rate, log)
+    notes_path(options.out)
     if temperature is None and any(axis.drift for axis in origin.imu.axes.values()):
         origin.assume("drift", "no drift with temperature: none is given (--temperature)")
     for text in (*_ended(duration, motion, temperature), *_folded(origin, rate)):
@@ -96,19 +96,55 @@ def _run(given: argparse.Namespace) -> None:
     if not motion:
         origin.assume("log", "at rest, and no gravity (--motion)")
     remarks = [MARK, f"from {origin.source}"]
-    figures = {name: [one.text for one in said] for name, said in origin.figures.items()}
-    assumed = [one.text for one in origin.assumed]
+    figures = {
+        name: [figure.text for figure in of_channel] for name, of_channel in origin.figures.items()
+    }
+    assumed = [assumption.text for assumption in origin.assumed]
     remarks += [f"{name}: {line}" for name, lines in figures.items() for line in lines]
     remarks += [f"assumed: {line}" for line in _short(assumed)]
     print(f"{remarks[0]}: {samples:,} samples of {', '.join(columns)} at {rate:g} Hz")
     print("\n".join(_short(remarks[1:])), flush=True)
-    name = given.out.stem
-    known = origin.sensor or Path(given.sensor).stem
-    metadata = {
-        "sensor": known,
+    sensor_name = origin.sensor or Path(options.sensor).stem
+    about = {
+        "from": origin.source,
+        "figures": figures,
+        "assumed": assumed,
+        "seed": options.seed,
+        "model": {channel: repr(axis) for channel, axis in origin.imu.axes.items()},
+        "temperature": options.temperature,
+        "motion": None if options.motion is None else str(options.motion),
+    }
+    kind = "static" if not motion else "in_motion"
+    metadata = _metadata(sensor_name, options.out.stem, kind, rate, columns) | {"simulation": about}
+    # A name of its own in the stream: the same seed gives every sensor its own noise.
+    blocks = simulate_imu(
+        origin.imu,
+        rate,
+        samples,
+        options.seed,
+        (sensor_name,),
+        motion=motion,
+        temperature=temperature,
+        threads=os.cpu_count() or 1,
+    )
+    with _progress(samples) as report:
+        write_log(options.out, blocks, columns, form, metadata, remarks, report)
+    write_notes(options.out, form, log, f"from {origin.source}")
+    size = options.out.stat().st_size / 1e6
+    print(
+        f"{options.out}: {size:.1f} MB; {options.out.with_suffix('.yaml')} says how it is written"
+    )
+
+
+def _metadata(
+    sensor: str, recording: str, kind: str, rate: float, columns: list[str]
+) -> dict[str, Any]:
+    """Return what a log says of itself, as one that was ingested does."""
+    return {
+        "sensor": sensor,
         "device": "simulated",
-        "recording": name,
-        "kind": "static" if not motion else "in_motion",
+        "recording": recording,
+        "kind": kind,
         "simulated": True,
         "sources": [],
         "reader": None,
@@ -119,35 +155,10 @@ def _run(given: argparse.Namespace) -> None:
         "uniform": True,
         "holes": dict.fromkeys(columns, False),
         "unusable": [],
-        "simulation": {
-            "from": origin.source,
-            "figures": figures,
-            "assumed": assumed,
-            "seed": given.seed,
-            "model": {channel: repr(axis) for channel, axis in origin.imu.axes.items()},
-            "temperature": given.temperature,
-            "motion": None if given.motion is None else str(given.motion),
-        },
     }
-    # A name of its own in the stream: the same seed gives every sensor its own noise.
-    blocks = simulate_imu(
-        origin.imu,
-        rate,
-        samples,
-        given.seed,
-        (known,),
-        motion=motion,
-        temperature=temperature,
-        threads=os.cpu_count() or 1,
-    )
-    with _progress(samples) as said:
-        write_log(given.out, blocks, columns, form, metadata, remarks, said)
-    write_notes(given.out, form, log, f"from {origin.source}")
-    size = given.out.stat().st_size / 1e6
-    print(f"{given.out}: {size:.1f} MB; {given.out.with_suffix('.yaml')} says how it is written")
 
 
-def _origin(given: argparse.Namespace) -> tuple[Origin, Any]:
+def _origin(options: argparse.Namespace) -> tuple[Origin, Any]:
     """Return the model, and the sensor file where there is one."""
     from imubench_pipeline.settings.sensor import CHANNELS, Sensor
     from imubench_pipeline.simulate import sources
@@ -155,32 +166,33 @@ def _origin(given: argparse.Namespace) -> tuple[Origin, Any]:
     from imubench_pipeline.simulate.from_estimates import with_estimates
     from imubench_pipeline.simulate.imu import ImuModel
 
-    asked = [name.strip() for name in given.channels.split(",")] if given.channels else None
+    asked = [name.strip() for name in options.channels.split(",")] if options.channels else None
     if unknown := [name for name in asked or [] if name not in CHANNELS]:
         raise ConfigError(f"no channel {unknown[0]!r}; expected of {', '.join(CHANNELS)}")
-    path = Path(given.sensor)
+    path = Path(options.sensor)
     if path.suffix in _YAML:
-        if given.results:
+        if options.results:
             raise ConfigError("--results are for a sensor by name; the file of models has its own")
         origin = sources.from_file(path)
-        own = origin.sensor and given.sensors / f"{origin.sensor}.yaml"
-        sensor = parse(Sensor, read_yaml(own), str(own)) if own else None
+        own = origin.sensor and options.sensors / f"{origin.sensor}.yaml"
+        sensor = read_settings(Sensor, own) if own else None
     else:
-        file = given.sensors / f"{given.sensor}.yaml"
+        file = options.sensors / f"{options.sensor}.yaml"
         if not file.is_file():
-            there = ", ".join(sorted(one.stem for one in given.sensors.glob("*.yaml"))) or "none"
+            names = sorted(path.stem for path in options.sensors.glob("*.yaml"))
             raise ConfigError(
-                f"{file}: no such sensor file; there are: {there}; or name a file of models"
+                f"{file}: no such sensor file; there are: {', '.join(names) or 'none'}; or name a "
+                "file of models"
             )
-        sensor = parse(Sensor, read_yaml(file), str(file))
+        sensor = read_settings(Sensor, file)
         try:
-            origin = from_datasheet(given.sensor, sensor, given.seed)
+            origin = from_datasheet(options.sensor, sensor, options.seed)
         except ConfigError:
-            if not given.results:
+            if not options.results:
                 raise
-            origin = sources.Origin(ImuModel(axes={}), "", sensor=given.sensor)
-        if given.results:
-            origin = with_estimates(origin, given.results, given.sensor, given.recording)
+            origin = sources.Origin(ImuModel(axes={}), "", sensor=options.sensor)
+        if options.results:
+            origin = with_estimates(origin, options.results, options.sensor, options.recording)
     if asked:
         origin = sources.select_channels(origin, asked)
     return origin, sensor
@@ -218,7 +230,7 @@ def _duration(text: str | None, hours: float | None, rate: float) -> float:
 
 
 def _profiles(
-    given: argparse.Namespace, origin: Origin
+    options: argparse.Namespace, origin: Origin
 ) -> tuple[dict[str, Profile], Profile | None]:
     from imubench_pipeline.settings.profile_forms import Surroundings
     from imubench_pipeline.simulate.profile_files import FileSeries
@@ -226,33 +238,39 @@ def _profiles(
 
     forms: dict[str, Any] = {}
     folder = Path()
-    if given.motion is not None:
-        if given.motion.suffix in _YAML:
-            read = read_yaml(given.motion)
-            forms["motion"] = read.get("motion", read) if isinstance(read, dict) else read
-            folder = given.motion.parent
+    if options.motion is not None:
+        if options.motion.suffix in _YAML:
+            forms["motion"] = _section(options.motion, "motion")
+            folder = options.motion.parent
         else:
-            names = [n for n in FileSeries(given.motion).names if n.startswith(("gyro_", "accel_"))]
+            columns = FileSeries(options.motion).names
+            names = [name for name in columns if name.startswith(("gyro_", "accel_"))]
             if not names:
-                raise ConfigError(f"{given.motion}: no column gyro_x to accel_z")
-            forms["motion"] = {n: {"form": "file", "file": str(given.motion)} for n in names}
-    motion, _ = profiles_of(parse(Surroundings, forms, str(given.motion)), folder)
-    if given.temperature is None:
+                raise ConfigError(f"{options.motion}: no column gyro_x to accel_z")
+            form = {"form": "file", "file": str(options.motion)}
+            forms["motion"] = {name: form for name in names}
+    motion, _ = profiles_of(parse(Surroundings, forms, str(options.motion)), folder)
+    if options.temperature is None:
         return motion, None
-    path, folder = Path(given.temperature), Path()
+    path, folder = Path(options.temperature), Path()
     if path.suffix in _YAML:
-        read = read_yaml(path)
-        warm = read.get("temperature", read) if isinstance(read, dict) else read
+        warm = _section(path, "temperature")
         folder = path.parent
     elif path.suffix in (".csv", ".parquet", ".txt"):
         warm = {"form": "file", "file": str(path)}
     else:
         with naming("--temperature: "):
-            quantity_to_si(given.temperature, "temperature")
-        warm = given.temperature
-    around = parse(Surroundings, {"temperature": warm}, given.temperature)
+            quantity_to_si(options.temperature, "temperature")
+        warm = options.temperature
+    around = parse(Surroundings, {"temperature": warm}, options.temperature)
     _, temperature = profiles_of(around, folder)
     return motion, temperature
+
+
+def _section(path: Path, key: str) -> Any:
+    """Return what a YAML file has under a key, or all of it."""
+    content = read_yaml(path)
+    return content.get(key, content) if isinstance(content, dict) else content
 
 
 def _ended(
@@ -262,8 +280,10 @@ def _ended(
     from imubench_pipeline.simulate.profiles import FileColumn
 
     profiles = [*motion.values(), *([] if temperature is None else [temperature])]
-    series = dict.fromkeys(one.series for one in profiles if isinstance(one, FileColumn))
-    spans = {one.path: one.span() for one in series}
+    series = dict.fromkeys(
+        profile.series for profile in profiles if isinstance(profile, FileColumn)
+    )
+    spans = {file.path: file.span() for file in series}
     return [
         f"{path} is from {first:g} to {last:g} s: its ends are held before and after"
         for path, (first, last) in spans.items()
@@ -275,27 +295,27 @@ def _folded(origin: Origin, rate: float) -> list[str]:
     """Say how much of the white noise beyond Nyquist sampling folds into the log."""
     from imubench_pipeline.simulate.model import folding
 
-    found = []
+    statements = []
     for channel, axis in origin.imu.axes.items():
         more = folding(axis, rate)
         if more > _WORTH_SAYING:
-            found.append(
+            statements.append(
                 f"{channel}: N is the density before the low-pass; sampled at {rate:g} Hz the log "
                 f"shows {math.sqrt(more):.3g} N, for noise beyond {rate / 2:g} Hz is folded into it"
             )
-    return found
+    return statements
 
 
 def _short(lines: list[str]) -> list[str]:
     """Say once what holds for several channels."""
-    found: dict[str, list[str]] = {}
+    channels: dict[str, list[str]] = {}
     for line in lines:
         name, colon, rest = line.partition(": ")
         if colon and name.startswith(("gyro_", "accel_")) and " " not in name:
-            found.setdefault(rest, []).append(name)
+            channels.setdefault(rest, []).append(name)
         else:
-            found[line] = []
-    return [f"{', '.join(names)}: {line}" if names else line for line, names in found.items()]
+            channels[line] = []
+    return [f"{', '.join(names)}: {line}" if names else line for line, names in channels.items()]
 
 
 @contextmanager
@@ -311,10 +331,10 @@ def _progress(samples: int) -> Iterator[Callable[[int], None]]:
         return
     last = time.monotonic()
 
-    def said(done: int) -> None:
+    def report(done: int) -> None:
         nonlocal last
         if time.monotonic() - last >= _PATIENCE and done < samples:
             last = time.monotonic()
             print(f"{100 * done / samples:.0f} % simulated", file=sys.stderr, flush=True)
 
-    yield said
+    yield report

@@ -35,10 +35,7 @@ _LONGEST = 300
 def serve(requests: socket.socket) -> None:
     """Fork for each connection that comes through a socket, until the other end is closed.
 
-    Parameters
-    ----------
-    requests : socket
-        Brings a connection for each step: through it comes the job, and it is told how that ended.
+    A connection brings the job of a step, and is told how that ended.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the forks end, and that the run ends is seen
     signal.signal(signal.SIGCHLD, _reap)
@@ -84,8 +81,8 @@ def _reap(signal_number: int, frame: FrameType | None) -> None:
                     connection.sendall(_message(KILLED, {"signal": os.WTERMSIG(status)}))
 
 
-def _message(how: bytes, told: Mapping[str, Any]) -> bytes:
-    text = json.dumps(told).encode()
+def _message(how: bytes, details: Mapping[str, Any]) -> bytes:
+    text = json.dumps(details).encode()
     return how + len(text).to_bytes(LENGTH, "big") + text
 
 
@@ -111,7 +108,7 @@ def _nothing() -> None:
 def _run(connection: socket.socket, job: Job, *, imported: bool) -> None:
     """Run a script in this fork, say how it ended, and end."""
     how = FAILED
-    told: dict[str, Any] = {"imported": imported, "error": "", "trace": "", "errno": None}
+    details: dict[str, Any] = {"imported": imported, "error": "", "trace": "", "errno": None}
     try:
         for other in _running.values():
             other.close()
@@ -131,19 +128,19 @@ def _run(connection: socket.socket, job: Job, *, imported: bool) -> None:
             sys.stderr.flush()
         how = DONE
     except BaseException as error:
-        told["trace"] = _trace(error, str(job.script))
-        told["error"] = one_line("".join(traceback.format_exception_only(error)), _LONGEST)
+        details["trace"] = _trace(error, str(job.script))
+        details["error"] = one_line("".join(traceback.format_exception_only(error)), _LONGEST)
         if isinstance(error, MemoryError):
-            told["error"] += f"; limits.memory allows {(job.memory or 0) // 10**6} MB"
-        told["errno"] = error.errno if isinstance(error, OSError) else None
+            details["error"] += f"; limits.memory allows {(job.memory or 0) // 10**6} MB"
+        details["errno"] = error.errno if isinstance(error, OSError) else None
     finally:
         with suppress(OSError):  # a disk that is full takes no words either
-            sys.stderr.write(told["trace"])
+            sys.stderr.write(details["trace"])
             sys.stdout.flush()
             sys.stderr.flush()
         used = resource.getrusage(resource.RUSAGE_SELF)
         cost = {"cpu": used.ru_utime + used.ru_stime, "memory": used.ru_maxrss * 1024 / 1e6}  # KiB
-        connection.sendall(_message(how, cost if how == DONE else told))
+        connection.sendall(_message(how, cost if how == DONE else details))
         os._exit(how != DONE)
 
 

@@ -23,7 +23,7 @@ from imubench_pipeline.settings.validation import (
     Text,
     parse,
 )
-from imubench_pipeline.settings.yaml_files import read_yaml
+from imubench_pipeline.settings.yaml_files import read_settings, read_yaml
 
 _OF_NO_RECORDING = {"held_back", "exports", "limits", "report"}
 
@@ -267,36 +267,40 @@ def read_run(config: Mapping[str, object], file: str = "config/config.yaml or --
     return parse(Run, config, file)
 
 
+def read_config(file: Path) -> dict[str, Any]:
+    """Return the settings that stand in a configuration, unchecked; none where it is not there."""
+    content = read_yaml(file) if file.is_file() else None
+    return content if isinstance(content, dict) else {}
+
+
 def given_beside(run: Run, file: Path) -> list[str]:
     """Return what a run was given beside its file, as ``snakemake --config`` takes it.
 
-    What does not matter to the results of a recording is left out.
-
-    Parameters
-    ----------
-    run : Run
-    file : Path
-        The configuration that Snakemake reads by itself.
+    What does not matter to the results of a recording is left out. `file` is the configuration that
+    Snakemake reads by itself.
     """
     try:
-        written = parse(Run, read_yaml(file), str(file))
+        written = read_settings(Run, file)
     except ConfigError:
         written = Run()
-    here, there = (one.model_dump(mode="json", exclude=_OF_NO_RECORDING) for one in (run, written))
-    return [f"{key}={_as_given(value)}" for key, value in _differing(here, there).items()]
+    in_run, in_file = (
+        run_settings.model_dump(mode="json", exclude=_OF_NO_RECORDING)
+        for run_settings in (run, written)
+    )
+    return [f"{key}={_as_given(value)}" for key, value in _differing(in_run, in_file).items()]
 
 
-def _differing(here: Mapping[str, Any], there: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what is not there, or otherwise."""
-    found: dict[str, Any] = {}
-    for key, value in here.items():
-        other = there.get(key)
+def _differing(settings: Mapping[str, Any], other_settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the settings that the other ones lack, or have otherwise."""
+    differing: dict[str, Any] = {}
+    for key, value in settings.items():
+        other = other_settings.get(key)
         if isinstance(value, Mapping) and isinstance(other, Mapping):
             if inner := _differing(value, other):
-                found[key] = inner
+                differing[key] = inner
         elif value != other:
-            found[key] = value
-    return found
+            differing[key] = value
+    return differing
 
 
 def _as_given(value: object) -> str:

@@ -1,8 +1,8 @@
 """White noise as vendors and papers state it -> N.
 
-Everything is SI. N is two-sided, S(f) = N² at positive and negative frequencies, so that
-σ²(τ) = N²/τ; the angle or velocity random walk that vendors print is N. A one-sided density has
-all the power at positive frequencies, √2 N.
+Everything is SI: N is in rad/√s or m/s^1.5. It is two-sided, S(f) = N² at positive and negative
+frequencies, so that σ²(τ) = N²/τ; the angle or velocity random walk that vendors print is N. A
+one-sided density has all the power at positive frequencies, √2 N.
 
 IEEE Std 952 and Engers (2021, eq. 6-8) give the angle random walk in °/√h as 1/60 of a figure in
 °/h and Hz. The 60 is nothing but the change of units: 1 °/h/√Hz is 1/60 °/√h. What the equations
@@ -26,44 +26,20 @@ _NOISE_OVER_CUT_OFF: dict[Filter, float] = {
 
 
 def noise_of_density(density: float, sidedness: Sidedness) -> float:
-    """Return N of an amplitude density.
+    """Return N of an amplitude density in rad/s/√Hz or m/s²/√Hz.
 
     N = density, or density / √2 where it is one-sided. (Engers, eq. 7, for the ordinate of an
     FFT; as printed it holds for a two-sided one. His section 3 divides a datasheet's density by
     √500 to have the noise of a sample: it is multiplied, σ = N √rate.)
-
-    Parameters
-    ----------
-    density : float
-        rad/s/√Hz or m/s²/√Hz.
-    sidedness : str
-        ``one-sided`` or ``two-sided``.
-
-    Returns
-    -------
-    float
-        N, rad/√s or m/s^1.5.
     """
     return density / math.sqrt(2.0) if sidedness == "one-sided" else density
 
 
 def noise_of_power_density(density: float, sidedness: Sidedness) -> float:
-    """Return N of a power spectral density.
+    """Return N of a power spectral density in (rad/s)²/Hz or (m/s²)²/Hz.
 
     N = √S, or √(S/2) where it is one-sided (Engers, eq. 6, as printed for a two-sided one; the
     columns that he heads "PSD" hold amplitudes).
-
-    Parameters
-    ----------
-    density : float
-        (rad/s)²/Hz or (m/s²)²/Hz.
-    sidedness : str
-        ``one-sided`` or ``two-sided``.
-
-    Returns
-    -------
-    float
-        N, rad/√s or m/s^1.5.
 
     Raises
     ------
@@ -76,25 +52,11 @@ def noise_of_power_density(density: float, sidedness: Sidedness) -> float:
 
 
 def noise_of_rms(rms: float, bandwidth: float, sidedness: Sidedness = "one-sided") -> float:
-    """Return N of a standard deviation over a noise bandwidth.
+    """Return N of a standard deviation, rad/s or m/s², over a noise bandwidth, Hz.
 
-    N = rms / √(2 bandwidth): a band from 0 to its end holds the power of both signs of
-    frequency, rms² = 2 N² bandwidth. Engers' eq. 8 prints rms / √bandwidth, which is the
-    one-sided density; it is N where the bandwidth counts both signs (``two-sided``).
-
-    Parameters
-    ----------
-    rms : float
-        rad/s or m/s².
-    bandwidth : float
-        Noise bandwidth, Hz (see `noise_bandwidth`).
-    sidedness : str
-        ``one-sided``: the bandwidth is counted from 0, as vendors do.
-
-    Returns
-    -------
-    float
-        N, rad/√s or m/s^1.5.
+    N = rms / √(2 bandwidth): a band from 0 to its end, as vendors count it, holds the power of
+    both signs of frequency, rms² = 2 N² bandwidth. Engers' eq. 8 prints rms / √bandwidth, which is
+    the one-sided density; it is N where the bandwidth counts both signs (``two-sided``).
 
     Raises
     ------
@@ -107,23 +69,11 @@ def noise_of_rms(rms: float, bandwidth: float, sidedness: Sidedness = "one-sided
 
 
 def noise_bandwidth(cut_off: float, filter_: Filter = "stated") -> float:
-    """Return the noise bandwidth of a low-pass filter.
+    """Return the noise bandwidth of a low-pass filter by its -3 dB frequency, both in Hz.
 
     That of the ideal filter which lets the same power of white noise through: π/2 = 1.571 times
     the -3 dB cut-off with one pole, π/(2√2) = 1.111 times with a Butterworth filter of second
     order. Bosch and TDK compute with the stated bandwidth itself, ST with half the output rate:
     ``stated``.
-
-    Parameters
-    ----------
-    cut_off : float
-        -3 dB frequency, Hz.
-    filter_ : str
-        ``stated``, ``first-order`` or ``second-order``.
-
-    Returns
-    -------
-    float
-        Hz.
     """
     return cut_off * _NOISE_OVER_CUT_OFF[filter_]

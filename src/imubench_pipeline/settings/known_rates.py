@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
 from imubench_pipeline.settings.pointing import Pointing
 from imubench_pipeline.settings.requirements import Latitude, Time
-from imubench_pipeline.settings.stated_gyro import Gyro, stated_gyro
 from imubench_pipeline.settings.validation import Strict, Text, checked
 from imubench_pipeline.units import quantity_to_si
+
+Gyro = Literal["gyro_x", "gyro_y", "gyro_z"]
 
 _NO_EARTH = 1e-9
 """rad/s of the Earth's rate that may be open."""
@@ -28,6 +29,30 @@ AngleFromZero = Annotated[Text, _from_zero("angle"), Field(examples=["0.5 deg"])
 Rate = Annotated[Text, checked("angular_rate"), Field(examples=["-10 deg/s"])]
 RateFromZero = Annotated[Text, _from_zero("angular_rate"), Field(examples=["0.05 deg/s"])]
 AccelerationFromZero = Annotated[Text, _from_zero("acceleration"), Field(examples=["20 mg"])]
+
+
+def stated_gyro(stated: Gyro | None, channels: Sequence[str], what: str) -> str:
+    """Return the gyro that an experiment is about: the one that its notes state, or the only one.
+
+    `what` completes "the gyro whose axis ..." of the error.
+
+    Raises
+    ------
+    ValueError
+        If it is not among the channels of the log, or is not stated and the log has another number
+        of gyros than one; the text begins with the key.
+    """
+    gyros = [name for name in channels if name.startswith("gyro_")]
+    if stated in gyros:
+        return stated
+    in_log = ", ".join(gyros) or "no gyro"
+    if stated is not None:
+        raise ValueError(f"channel: found {stated!r}; the log has {in_log}")
+    if len(gyros) != 1:
+        raise ValueError(
+            f"channel: missing; expected the gyro whose axis {what}, the log has {in_log}"
+        )
+    return gyros[0]
 
 
 class Direction(Strict):
@@ -80,18 +105,7 @@ class AtRest(Direction):
     )
 
     def gyro(self, channels: Sequence[str]) -> str:
-        """Return the channel whose axis is stated.
-
-        Parameters
-        ----------
-        channels : sequence of str
-            Those that the log has.
-
-        Raises
-        ------
-        ValueError
-            As `imubench_pipeline.settings.stated_gyro.stated_gyro`.
-        """
+        """Return the one of the log's channels whose axis is stated, as of `stated_gyro`."""
         return stated_gyro(self.channel, channels, "points there")
 
 
@@ -184,20 +198,14 @@ class OnRateTable(Strict):
         return quantity_to_si(getattr(self, name), dimension)
 
     def gyro(self, channels: Sequence[str], *, column: bool) -> str:
-        """Return the channel that is along the axis of the table.
+        """Return the one of the log's channels that is along the axis of the table.
 
-        Parameters
-        ----------
-        channels : sequence of str
-            Those that the log has.
-        column : bool
-            The log has a column with the rate of the table.
+        `column`: the log has a column with the rate of the table.
 
         Raises
         ------
         ValueError
-            As `settings.stated_gyro.stated_gyro`; and if the rates of the table are
-            stated nowhere, or twice.
+            As `stated_gyro`; and if the rates of the table are stated nowhere, or twice.
         """
         if not self.steps and not column:
             raise ValueError(

@@ -21,18 +21,18 @@ from imubench_pipeline.earth import EARTH_RATE
 
 @dataclass(frozen=True, kw_only=True)
 class Pointing:
-    """How a sensitive axis stands on the Earth.
+    """How a sensitive axis stands on the Earth, in rad.
 
     Parameters
     ----------
     latitude : float
-        rad, north positive.
+        North positive.
     heading : float or None
-        Of the axis' horizontal part, from north towards east, rad; None: not known.
+        Of the axis' horizontal part, from north towards east; None: not known.
     elevation : float
-        Of the axis above the horizon, rad: 0 level, pi/2 up, -pi/2 down.
+        Of the axis above the horizon: 0 level, pi/2 up, -pi/2 down.
     heading_sigma, elevation_sigma : float
-        Standard deviations of these, rad.
+        Standard deviations of these.
 
     Raises
     ------

@@ -46,9 +46,9 @@ def _printed_value(value: object) -> Value | None:
             return tuple(_number(number) for number in value)
         return _number(value)
     except ValueError:
-        found = f"found {dict(value)}; " if isinstance(value, Mapping) else ""
+        shown = f"found {dict(value)}; " if isinstance(value, Mapping) else ""
         raise ValueError(
-            f"{found}expected a number, one for each axis such as {{xy: 60, z: 80}}, a list "
+            f"{shown}expected a number, one for each axis such as {{xy: 60, z: 80}}, a list "
             "[low, high], or null: not published"
         ) from None
 
@@ -294,18 +294,11 @@ class Datasheet(Strict):
         return self
 
     def only(self, names: Collection[str]) -> dict[str, Any]:
-        """Return what the file says of some figures, and of the options that they hold for.
-
-        Parameters
-        ----------
-        names : collection of str
-            Such as `IN_USE`.
-        """
+        """Return what the file says of some figures, such as `IN_USE`, and of the options."""
         written = self.model_dump(mode="json", include={"options", *FIGURE_DIMENSIONS})
         for quantity in FIGURE_DIMENSIONS:
-            sheet = written[quantity] or {}
-            kept = {name: figures for name, figures in sheet.items() if name in names}
-            written[quantity] = kept if written[quantity] is not None else None
+            if (sheet := written[quantity]) is not None:
+                written[quantity] = {name: sheet[name] for name in sheet if name in names}
         return written
 
     def _figures(self) -> Iterator[tuple[str, str, str, PrintedFigure]]:

@@ -12,7 +12,7 @@ nothing that computes: the configuration of a run, which has such forms, is read
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
@@ -166,13 +166,3 @@ def _check_units(form: Form, dimension: str) -> None:
         case SumForm():
             for part in form.parts:
                 _check_units(part, dimension)
-
-
-FormOrNone = TypeVar("FormOrNone", bound=Form | None)
-
-
-def found_from(form: FormOrNone, folder: Path) -> FormOrNone:
-    """Return the same form, whose file is named from a folder."""
-    if isinstance(form, FileForm):
-        return form.model_copy(update={"file": folder / form.file})
-    return form

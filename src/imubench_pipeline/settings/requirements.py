@@ -10,17 +10,8 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from imubench_pipeline.settings.validation import (
-    Between,
-    ConfigError,
-    Frequency,
-    Strict,
-    Text,
-    checked,
-    of_size,
-    parse,
-)
-from imubench_pipeline.settings.yaml_files import read_yaml
+from imubench_pipeline.settings.validation import Between, Frequency, Strict, Text, checked, of_size
+from imubench_pipeline.settings.yaml_files import read_folder
 from imubench_pipeline.units import difference_to_si, quantity_to_si
 
 Error = Literal["attitude", "heading", "velocity", "position", "north"]
@@ -204,16 +195,11 @@ class Requirement(Strict):
 def read_requirements(folder: Path | None) -> dict[str, Requirement]:
     """Read every requirement of a folder, by the name of its file; none without a folder.
 
-    Raises
-    ------
-    ConfigError
-        If the folder is not there or a file cannot be used.
+    Raises `ConfigError`.
     """
-    if folder is None:
-        return {}
-    if not folder.is_dir():
-        raise ConfigError(f"{folder}: no such folder; expected one YAML file a requirement")
-    return {
-        path.stem: parse(Requirement, read_yaml(path), str(path))
-        for path in sorted(folder.glob("*.yaml"))
-    }
+    return {} if folder is None else read_folder(Requirement, folder, "requirement")
+
+
+def requirements_of(sections: Mapping[str, object]) -> dict[str, Requirement]:
+    """Return the requirements as the plan wrote them."""
+    return {name: Requirement.model_validate(section) for name, section in sections.items()}

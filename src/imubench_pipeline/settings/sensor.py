@@ -13,16 +13,8 @@ from pydantic import Field, model_validator
 from imubench_pipeline.settings.known_rates import AtRest, OnRateTable
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.two_position import TwoPosition
-from imubench_pipeline.settings.validation import (
-    Between,
-    ConfigError,
-    Frequency,
-    Strict,
-    Text,
-    of_size,
-    parse,
-)
-from imubench_pipeline.settings.yaml_files import read_yaml
+from imubench_pipeline.settings.validation import Between, Frequency, Strict, Text, of_size, parse
+from imubench_pipeline.settings.yaml_files import read_folder
 from imubench_pipeline.units import UnitError, conversion, quantity_to_si
 
 QUANTITIES: dict[str, str] = {"gyro": "angular_rate", "accel": "acceleration"}
@@ -42,6 +34,9 @@ TABLE_RATE = "table_rate"
 
 Kind = Literal["static", "two_position", "rate_table"]
 """What was done with a sensor during a recording."""
+
+EXPERIMENTS = ("two_position", "rate_table", "pointing")
+"""Keys of the notes that the ingest does not depend on; a recording has one at most."""
 
 Channel = Literal["gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"]
 
@@ -213,7 +208,7 @@ class LogFormat(Strict):
         if self.table_rate is not None:
             _check_unit(self.table_rate.unit, "angular_rate", "table_rate.unit")
         beside = (self.temperature, self.position, self.table_rate)
-        sources = [*self.channels.values(), *(one for one in beside if one is not None)]
+        sources = [*self.channels.values(), *(source for source in beside if source is not None)]
         if any(source.file for source in sources) and not all(source.file for source in sources):
             raise ValueError("some channels name a 'file' and others do not; expected all or none")
         return self
@@ -297,11 +292,7 @@ class RecordingNotes(Strict):
 
     @model_validator(mode="after")
     def _one_kind(self) -> RecordingNotes:
-        stated = [
-            key
-            for key in ("two_position", "rate_table", "pointing")
-            if getattr(self, key) is not None
-        ]
+        stated = [key for key in EXPERIMENTS if getattr(self, key) is not None]
         if len(stated) > 1:
             raise ValueError(
                 f"found {' and '.join(stated)}; expected one of them: a recording is of one kind"
@@ -311,18 +302,13 @@ class RecordingNotes(Strict):
     def check_gyro(self, log: LogFormat) -> None:
         """Check that the gyro of an experiment is in the log, and all that it takes.
 
-        Parameters
-        ----------
-        log : LogFormat
-            How the log is written.
-
         Raises
         ------
         ValueError
             If it is not; the text begins with the key.
         """
         channels = [str(name) for name in log.channels]
-        for key in ("two_position", "rate_table", "pointing"):
+        for key in EXPERIMENTS:
             try:
                 if key == "two_position" and self.two_position is not None:
                     self.two_position.turned(channels)
@@ -335,13 +321,7 @@ class RecordingNotes(Strict):
 
 
 def kind_of(notes: object) -> Kind:
-    """Return what notes make of a recording, though they may be wrong otherwise.
-
-    Parameters
-    ----------
-    notes : object
-        What the file beside the log holds.
-    """
+    """Return what the notes make of a recording, though they may be wrong otherwise."""
     if isinstance(notes, Mapping):
         if notes.get("two_position") is not None:
             return "two_position"
@@ -351,24 +331,13 @@ def kind_of(notes: object) -> Kind:
 
 
 def read_sensors(folder: Path) -> dict[str, Sensor]:
-    """Read every sensor file of a folder, by name.
-
-    Raises
-    ------
-    ConfigError
-        If the folder is not there or a file cannot be used.
-    """
-    if not folder.is_dir():
-        raise ConfigError(f"{folder}: no such folder; expected one YAML file a sensor")
-    return {
-        path.stem: parse(Sensor, read_yaml(path), str(path))
-        for path in sorted(folder.glob("*.yaml"))
-    }
+    """Read every sensor file of a folder, by name; raises `ConfigError`."""
+    return read_folder(Sensor, folder, "sensor")
 
 
 def sensors_of(catalogue: str) -> dict[str, Sensor]:
     """Return the sensors as the plan wrote them."""
-    return {name: Sensor.model_validate(one) for name, one in json.loads(catalogue).items()}
+    return {name: Sensor.model_validate(section) for name, section in json.loads(catalogue).items()}
 
 
 def merged_log(sensor: Sensor, notes: RecordingNotes, file: str) -> LogFormat:

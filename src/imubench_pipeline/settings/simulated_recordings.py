@@ -1,4 +1,7 @@
-"""What is simulated before a run: single recordings, and boards of sensors that share a place."""
+"""What is simulated before a run: recordings, boards of sensors that share a place, experiments.
+
+An experiment has what its notes would say, and what is true of it.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +9,15 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, Self, TypeVar
+from typing import Annotated, Literal, Self, TypeVar
 
 from pydantic import Field, model_validator
 
-from imubench_pipeline.settings.profile_forms import FileForm, Surroundings, found_from
+from imubench_pipeline.settings.known_rates import Angle, AtRest, OnRateTable
+from imubench_pipeline.settings.pointing import Pointing
+from imubench_pipeline.settings.profile_forms import FileForm, Form, Surroundings
 from imubench_pipeline.settings.sensor import (
+    EXPERIMENTS,
     QUANTITIES,
     Channel,
     ColumnSource,
@@ -22,27 +28,91 @@ from imubench_pipeline.settings.sensor import (
     kind_of,
     quantity_of,
 )
-from imubench_pipeline.settings.simulated_experiments import (
-    SimulatedRest,
-    SimulatedTable,
-    SimulatedTurns,
-)
 from imubench_pipeline.settings.simulated_sensor import AxisSettings, ImuSettings, check_axes
+from imubench_pipeline.settings.two_position import TwoPosition
 from imubench_pipeline.settings.validation import (
     ConfigError,
     Duration,
     Frequency,
     Strict,
     Text,
-    parse,
+    checked,
 )
-from imubench_pipeline.settings.yaml_files import read_yaml
+from imubench_pipeline.settings.yaml_files import read_settings
 from imubench_pipeline.units import naming, quantity_to_si
 
 _Around = TypeVar("_Around", bound=Surroundings)
 
+_Rate = Annotated[Text, checked("angular_rate")]
 _NAMES = r"^sim_[A-Za-z0-9_.-]+$"
 _MOST_SAMPLES = 1e10  # 80 GB a channel: whoever states more has mistaken a unit
+
+
+class PublishedRate(Strict):
+    """What a source prints of the Earth's rate that it found."""
+
+    where: Text = Field(description="such as section 6")
+    printed: _Rate = Field(description="with its unit, as printed")
+    part: Text = Field("whole", description="of the run: whole, or such as 'last 13 min'")
+
+
+class SimulatedTurns(TwoPosition):
+    """A gyro that is turned between north and south, by the clock."""
+
+    transient: _Rate = Field("0 deg/s", description="largest rate that is sensed of a turn, about")
+    assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
+    published: tuple[PublishedRate, ...] = ()
+
+    @model_validator(mode="after")
+    def _parts_are_there(self) -> Self:
+        parts = {"whole", *(f"last {text}" for text in self.last)}
+        for rate in self.published:
+            if rate.part not in parts:
+                raise ValueError(f"published: part is {rate.part!r}; expected one of {parts}")
+        return self
+
+    @property
+    def declared(self) -> TwoPosition:
+        """What would stand beside such a log."""
+        return TwoPosition(**{name: getattr(self, name) for name in TwoPosition.model_fields})
+
+
+class SimulatedTable(OnRateTable):
+    """A gyro on a rate table that keeps to its steps, with ramps between them."""
+
+    scale_factor: float = Field(1.0, gt=0, description="true one: indicated over true rate")
+    assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
+
+    @model_validator(mode="after")
+    def _has_steps(self) -> Self:
+        if not self.steps:
+            raise ValueError("steps is missing; expected the steady rates of the table")
+        return self
+
+    @property
+    def declared(self) -> OnRateTable:
+        """What would stand beside such a log."""
+        return OnRateTable(**{name: getattr(self, name) for name in OnRateTable.model_fields})
+
+
+class SimulatedRest(AtRest):
+    """A gyro at rest that senses its part of the Earth's rate."""
+
+    true_heading: Angle = Field("0 deg", description="of the axis, where heading is null")
+    assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
+
+    @property
+    def declared(self) -> AtRest:
+        """What would stand beside such a log."""
+        return AtRest(**{name: getattr(self, name) for name in AtRest.model_fields})
+
+    @property
+    def true(self) -> Pointing:
+        """Where the axis points, exactly."""
+        stated, heading = self.pointing, self.pointing.heading
+        if heading is None:
+            heading = quantity_to_si(self.true_heading, "angle")
+        return Pointing(latitude=stated.latitude, heading=heading, elevation=stated.elevation)
 
 
 class PublishedFigure(Strict):
@@ -100,8 +170,8 @@ class OfASensor(ImuSettings):
     def _samples_and_units(self) -> Self:
         length = quantity_to_si(self.duration, "time") * quantity_to_si(self.rate, "frequency")
         if not 0.5 < length <= _MOST_SAMPLES:
-            held = "no sample" if length < 1.0 else f"more than {_MOST_SAMPLES:g} samples"
-            raise ValueError(f"duration: {self.duration} at {self.rate} hold {held}")
+            content = "no sample" if length < 1.0 else f"more than {_MOST_SAMPLES:g} samples"
+            raise ValueError(f"duration: {self.duration} at {self.rate} hold {content}")
         check_axes(self.channels, "channels")
         return self
 
@@ -123,7 +193,7 @@ class SimulatedRecording(OfASensor, Surroundings):
 
     @model_validator(mode="after")
     def _one_experiment(self) -> Self:
-        stated = [key for key, one in self._experiments.items() if one is not None]
+        stated = [key for key, experiment in self._experiments.items() if experiment is not None]
         if len(stated) > 1:
             raise ValueError(f"found {' and '.join(stated)}; expected one of them")
         for key in stated:
@@ -137,11 +207,7 @@ class SimulatedRecording(OfASensor, Surroundings):
 
     @property
     def _experiments(self) -> dict[str, object]:
-        return {
-            "two_position": self.two_position,
-            "rate_table": self.rate_table,
-            "pointing": self.pointing,
-        }
+        return {key: getattr(self, key) for key in EXPERIMENTS}
 
     @property
     def experimental(self) -> str | None:
@@ -186,7 +252,7 @@ class Board(Surroundings):
 
     @model_validator(mode="after")
     def _explains_what_there_is(self) -> Self:
-        channels = (one for sensor in self.sensors for one in sensor.channels.values())
+        channels = (channel for sensor in self.sensors for channel in sensor.channels.values())
         figures = {figure.figure for channel in channels for figure in channel.published}
         if unknown := self.why.keys() - figures:
             expected = ", ".join(sorted(figures)) or "none: nothing is published"
@@ -196,17 +262,13 @@ class Board(Surroundings):
         return self
 
     def recordings(self, name: str) -> Iterator[SimulatedRecording]:
-        """Yield the recording of each sensor.
-
-        Parameters
-        ----------
-        name : str
-            Of the board.
-        """
+        """Yield the recording of each sensor of the board of this name."""
         around = {key: getattr(self, key) for key in Surroundings.model_fields}
         for sensor in self.sensors:
             own = {key: getattr(sensor, key) for key in OfASensor.model_fields}
-            own["channels"] = {key: self._explained(one) for key, one in sensor.channels.items()}
+            own["channels"] = {
+                key: self._explained(channel) for key, channel in sensor.channels.items()
+            }
             yield SimulatedRecording(**own, **around, recording=f"sim_{name}", seed=self.seed)
 
     def _explained(self, channel: SimulatedChannel) -> SimulatedChannel:
@@ -219,37 +281,23 @@ class Board(Surroundings):
 
 @dataclass(frozen=True)
 class ToSimulate:
-    """What a run simulates.
-
-    Attributes
-    ----------
-    recordings : list of SimulatedRecording
-        Those of the boards are among them.
-    boards : dict of str to Board
-        By name.
-    """
+    """What a run simulates: recordings, those of the boards among them, and the boards by name."""
 
     recordings: list[SimulatedRecording]
     boards: dict[str, Board]
 
 
 def read_simulated(path: Path | None, sensors: Mapping[str, Sensor]) -> ToSimulate:
-    """Read what is simulated; nothing where ``path`` is None.
-
-    Raises
-    ------
-    ConfigError
-        If the file or a board's cannot be used.
-    """
+    """Read what is simulated; nothing where ``path`` is None. Raises `ConfigError`."""
     if path is None:
         return ToSimulate([], {})
-    given = parse(Simulated, read_yaml(path), str(path))
+    declared = read_settings(Simulated, path)
     recordings = []
-    for number, entry in enumerate(given.recordings):
+    for number, entry in enumerate(declared.recordings):
         _check(entry, sensors, f"{path}: recordings.{number}")
         recordings.append(_found_from(entry, path, f"recordings.{number}."))
     boards: dict[str, Board] = {}
-    for file in given.boards:
+    for file in declared.boards:
         if not (path.parent / file).is_file():
             raise ConfigError(
                 f"{path}: boards: {path.parent / file}: no such file; expected the file of a "
@@ -271,7 +319,7 @@ def read_simulated(path: Path | None, sensors: Mapping[str, Sensor]) -> ToSimula
 
 
 def _board(path: Path, sensors: Mapping[str, Sensor]) -> Board:
-    board = parse(Board, read_yaml(path), str(path))
+    board = read_settings(Board, path)
     for number, entry in enumerate(board.sensors):
         _check(entry, sensors, f"{path}: sensors.{number}")
     names = [entry.sensor for entry in board.sensors]
@@ -296,21 +344,21 @@ def _check(entry: OfASensor, sensors: Mapping[str, Sensor], key: str) -> None:
 
 def _found_from(around: _Around, path: Path, key: str = "") -> _Around:
     """Return the same, with the files of its profiles named from the folder of its own file."""
-    forms = {"temperature": around.temperature} | {
-        f"motion.{c}": f for c, f in around.motion.items()
-    }
-    for name, form in forms.items():
-        if isinstance(form, FileForm) and not (path.parent / form.file).is_file():
+
+    def placed(form: Form | None, name: str) -> Form | None:
+        if not isinstance(form, FileForm):
+            return form
+        file = path.parent / form.file
+        if not file.is_file():
             raise ConfigError(
-                f"{path}: {key}{name}.file: {path.parent / form.file}: no such file; expected a "
-                "CSV or Parquet file, named from the folder of the file that names it"
+                f"{path}: {key}{name}.file: {file}: no such file; expected a CSV or Parquet file, "
+                "named from the folder of the file that names it"
             )
-    return around.model_copy(
-        update={
-            "temperature": found_from(around.temperature, path.parent),
-            "motion": {name: found_from(form, path.parent) for name, form in around.motion.items()},
-        }
-    )
+        return form.model_copy(update={"file": file})
+
+    temperature = placed(around.temperature, "temperature")
+    motion = {name: placed(form, f"motion.{name}") for name, form in around.motion.items()}
+    return around.model_copy(update={"temperature": temperature, "motion": motion})
 
 
 def profile_files(recording: SimulatedRecording) -> list[Path]:
@@ -322,12 +370,8 @@ def profile_files(recording: SimulatedRecording) -> list[Path]:
 def layout(recording: SimulatedRecording, log: LogFormat) -> LogFormat:
     """Return how the log of a simulated recording is written: with its columns and its rate.
 
-    Parameters
-    ----------
-    recording : SimulatedRecording
-    log : LogFormat
-        The sensor's. Where it has no temperature, and the recording has one, that gets a column
-        (or a file, where each channel has one) of its own, in degC.
+    Where the sensor's `log` has no temperature, and the recording has one, that gets a column (or a
+    file, where each channel has one) of its own, in degC.
     """
     channels = {name: log.channels[name] for name in recording.channels}
     temperature = None

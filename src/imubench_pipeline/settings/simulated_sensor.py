@@ -193,9 +193,9 @@ def check_axes(axes: Mapping[Channel, AxisSettings], key: str) -> None:
 
 def _in_si(figures: Mapping[str, tuple[str | None, str]]) -> dict[str, float]:
     """Return the figures that are there in SI, of text and dimension by their keys."""
-    found = {}
+    in_si = {}
     for key, (text, dimension) in figures.items():
         if text is not None:
             with naming(f"{key}: "):
-                found[key] = quantity_to_si(text, dimension)
-    return found
+                in_si[key] = quantity_to_si(text, dimension)
+    return in_si

@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
+from imubench_pipeline.settings.known_rates import Gyro, stated_gyro
 from imubench_pipeline.settings.requirements import Latitude, Time
-from imubench_pipeline.settings.stated_gyro import Gyro, stated_gyro
 from imubench_pipeline.settings.validation import Strict, Text, checked
 from imubench_pipeline.units import quantity_to_si
 
@@ -117,17 +117,5 @@ class TwoPosition(Strict):
         return quantity_to_si(self.drift, "gyro_ramp") if self.drift else 0.0
 
     def turned(self, channels: list[str]) -> str:
-        """Return the channel that was turned.
-
-        Parameters
-        ----------
-        channels : list of str
-            Those that the log has.
-
-        Raises
-        ------
-        ValueError
-            If it is not among them, or is not stated and the log has another number of gyros
-            than one; the text begins with the key.
-        """
+        """Return the one of the log's channels that was turned, as of `stated_gyro`."""
         return stated_gyro(self.channel, channels, "was turned")

@@ -48,13 +48,8 @@ _BRIEF.maxstring = _BRIEF.maxother = _BRIEF.maxlong = _SHORT
 def cut(value: object, words: Callable[[object], str] = _BRIEF.repr, most: int = _SHORT) -> str:
     """Return what a file holds as it may be printed: a line of it at most.
 
-    Parameters
-    ----------
-    value : object
-    words : callable
-        Makes text of it; by default, as Python writes it, the beginning of each list alone.
-    most : int
-        Letters.
+    `words` makes text of it; by default, as Python writes it, the beginning of each list alone.
+    `most`: letters.
     """
     text = words(value)
     return text if len(text) <= most else f"{text[: most - 3]}..."
@@ -150,18 +145,18 @@ def _first_faults(faults: list[Any]) -> list[Any]:
 
 def _fault(file: str, fault: Any, model: type[BaseModel]) -> str:
     key = ".".join(cut(part, str) for part in fault["loc"]) or "(top level)"
-    found = fault["input"]
+    value = fault["input"]
     message = cut(re.sub(r"^(Value error|Assertion failed), ", "", fault["msg"]), str, _LONG)
     if fault["type"] == "extra_forbidden":
-        known = _known_keys(model, fault["loc"][:-1])
-        close = difflib.get_close_matches(cut(fault["loc"][-1], str), known, n=1)
+        known_keys = _known_keys(model, fault["loc"][:-1])
+        close = difflib.get_close_matches(cut(fault["loc"][-1], str), known_keys, n=1)
         hint = f"did you mean {close[0]!r}? " if close else ""
-        return f"{file}: {key}: unknown key; {hint}expected one of {', '.join(known)}"
+        return f"{file}: {key}: unknown key; {hint}expected one of {', '.join(known_keys)}"
     if fault["type"] == "missing":
         return f"{file}: {key}: missing; expected a value here"
-    if fault["type"] == "value_error" and isinstance(found, Mapping):
+    if fault["type"] == "value_error" and isinstance(value, Mapping):
         return f"{file}: {key}: {message}"
-    return f"{file}: {key}: found {cut(found)}; {message[0].lower()}{message[1:]}"
+    return f"{file}: {key}: found {cut(value)}; {message[0].lower()}{message[1:]}"
 
 
 def _known_keys(model: type[BaseModel], path: tuple[Any, ...]) -> list[str]:

@@ -10,11 +10,12 @@ import os
 import stat
 from collections.abc import Hashable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import yaml
+from pydantic import BaseModel
 
-from imubench_pipeline.settings.validation import ConfigError, cut
+from imubench_pipeline.settings.validation import ConfigError, cut, parse
 
 LARGEST = 4 << 20
 """Bytes of a file."""
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 else:
     # The same loader, ten times as fast where it is compiled.
     _SAFE = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+_Model = TypeVar("_Model", bound=BaseModel)
 
 _MERGED = "tag:yaml.org,2002:merge"
 
@@ -90,6 +93,18 @@ def read_yaml(path: Path) -> object:
         raise ConfigError(f"{path}{line}: not readable as YAML: {problem}") from None
     except (yaml.YAMLError, ValueError) as error:
         raise ConfigError(f"{path}: not readable as YAML: {cut(error, str)}") from None
+
+
+def read_settings(model: type[_Model], path: Path) -> _Model:
+    """Read one YAML file as a model; raises `ConfigError`."""
+    return parse(model, read_yaml(path), str(path))
+
+
+def read_folder(model: type[_Model], folder: Path, each: str) -> dict[str, _Model]:
+    """Read every ``.yaml`` file of a folder, by name; raises `ConfigError`."""
+    if not folder.is_dir():
+        raise ConfigError(f"{folder}: no such folder; expected one YAML file a {each}")
+    return {path.stem: read_settings(model, path) for path in sorted(folder.glob("*.yaml"))}
 
 
 def _text_of(path: Path) -> str:

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Literal
 
 from imubench_pipeline.settings.simulated_sensor import ModelSettings
-from imubench_pipeline.settings.validation import ConfigError, parse
-from imubench_pipeline.settings.yaml_files import read_yaml
+from imubench_pipeline.settings.validation import ConfigError
+from imubench_pipeline.settings.yaml_files import read_settings
 from imubench_pipeline.simulate.imu import ImuModel
 from imubench_pipeline.simulate.models import imu_model
 
@@ -63,7 +63,7 @@ def from_file(path: Path) -> Origin:
     ConfigError
         If it is not there, or a figure cannot be used.
     """
-    settings = parse(ModelSettings, read_yaml(path), str(path))
+    settings = read_settings(ModelSettings, path)
     named = f"{path.name}" + (f" ({settings.source})" if settings.source else "")
     as_given = Remark("noise", f"as {path.name} has it")
     figures = {str(name): [as_given] for name in settings.axes}

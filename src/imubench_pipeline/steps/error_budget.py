@@ -13,7 +13,7 @@ from imubench_pipeline.navigation.expected_errors import error_rows, of_requirem
 from imubench_pipeline.recordings.kept import kept_static_logs
 from imubench_pipeline.settings.config import ErrorBudgetSettings
 from imubench_pipeline.settings.printed import Datasheet
-from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.settings.requirements import requirements_of
 from imubench_pipeline.tables import read
 from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si
@@ -26,14 +26,9 @@ def error_tables(
     sections = json.loads(settings)
     how = ErrorBudgetSettings.model_validate(sections["error_budget"])
     times = [quantity_to_si(time, "time") for time in how.times]
-    window, latitude = (
-        quantity_to_si(how.static_window, "time"),
-        quantity_to_si(how.latitude, "angle"),
-    )
-    requirements = {
-        name: Requirement.model_validate(section)
-        for name, section in sections["requirements"].items()
-    }
+    window = quantity_to_si(how.static_window, "time")
+    latitude = quantity_to_si(how.latitude, "angle")
+    requirements = requirements_of(sections["requirements"])
     questions = list(standard(times, window, latitude, how.axes))
     for name, requirement in requirements.items():
         questions += of_requirement(name, requirement)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,30 +19,22 @@ from imubench_pipeline.estimators.agreement import disagreements, doubt_contradi
 from imubench_pipeline.estimators.curve_limits import with_fitted_limits
 from imubench_pipeline.estimators.deterministic.courses import find_courses
 from imubench_pipeline.estimators.deterministic.verdict import deterministic_rows, verdict_of
-from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate, not_shown
+from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate, Parameter, not_shown
 from imubench_pipeline.estimators.least_squares import UnfitCurveError
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.missing_slow import slow_noise_missing
 from imubench_pipeline.estimators.model_choice import disagreement
-from imubench_pipeline.estimators.rows import allan_rows, draw_rows, parameter_rows
+from imubench_pipeline.estimators.rows import allan_rows, draw_rows, limit_rows, parameter_rows
+from imubench_pipeline.estimators.thermal.fit import fit_temperature
 from imubench_pipeline.estimators.thermal.path import TemperaturePath, temperature_path
-from imubench_pipeline.estimators.thermal.result import ThermalFit
+from imubench_pipeline.estimators.thermal.register import step_of
+from imubench_pipeline.estimators.thermal.result import ThermalFit, shift_by_effect
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.recordings.kept import kept_static_logs
 from imubench_pipeline.recordings.quality_file import Quality
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.config import EstimateSettings
 from imubench_pipeline.settings.sensor import quantity_of
-from imubench_pipeline.steps.compensation import (
-    compensated_curve,
-    compensated_estimate,
-    compensated_rows,
-    low_pass_rows,
-    resolution_of,
-    temperature_curve,
-    temperature_of,
-    temperature_rows,
-)
 from imubench_pipeline.steps.kept_curves import curves
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.tables.keys import Key
@@ -82,19 +75,10 @@ def estimate_channel(
     bandwidth: float | None,
     into: Estimation,
 ) -> None:
-    """Estimate the noise of a channel by every method of the settings.
+    """Estimate the noise of a channel by every method of the settings; `into` takes the rows.
 
-    Parameters
-    ----------
-    key : Key
-    log : ChannelLog
-    curve : AllanCurve
-        Of the log, with limits by the identified power laws.
-    settings : EstimateSettings
-    bandwidth : float or None
-        Cut-off of the sensor's own filter, where it is known, Hz.
-    into : Estimation
-        Takes the rows.
+    `curve` is of the log, with limits by the identified power laws; `bandwidth` the cut-off of the
+    sensor's own filter, where it is known, Hz.
     """
     channel = _Channel(key, log, curve, settings, bandwidth)
     verdict = verdict_of(key.channel, channel.unit, channel.courses)
@@ -148,14 +132,7 @@ class _Channel:
         """Return the estimates that are read from the Allan variance, or fitted to it."""
         settings, curve = self.settings, self.curve
         if self.courses.courses:
-            curve = of_blocks(
-                self._blocks(),
-                self.log.grid,
-                self.log.rate,
-                curve.cluster_size,
-                holes=self.log.holes,
-                segments=self.log.segments,
-            )
+            curve = self._curve_of(self._blocks(), holes=self.log.holes)
         estimates: dict[str, Estimate] = {}
         if "curve" in settings.methods:
             estimates["curve"] = reading.read(curve, longest=settings.longest)
@@ -182,18 +159,26 @@ class _Channel:
         into.models += _model_rows(key, fitted)
         into.lines += _line_rows(key, fitted)
         into.spectrum += _spectrum_rows(key, fitted)
-        into.low_pass += low_pass_rows(key, fitted)
+        into.low_pass += _low_pass_rows(key, fitted)
         estimates = {estimate.method: estimate for estimate in fitted.estimates}
         if log.temperature and "compensated" in self.settings.methods:
             warm = self._temperature(fitted, into)
-            into.temperature += temperature_rows(key, warm)
+            into.temperature += _temperature_rows(key, warm)
             if warm.compensated:
-                estimates["compensated"] = compensated_estimate(warm)
-                left = compensated_curve(log, warm, self.curve)
-                added = temperature_curve(log, warm, self.curve)
-                left = limited(left, warm.without_temperature)
-                into.allan_compensated += compensated_rows(key, left, added)
+                without = warm.without_temperature
+                estimates["compensated"] = replace(without.estimates[0], method="compensated")
+                left = self._curve_of(warm.compensate(log.blocks()), holes=log.holes)
+                nothing = (np.zeros(len(values)) for values in log.blocks())
+                added = shift_by_effect(nothing, warm.path, warm.effect, 1.0)
+                into.allan_compensated += _compensated_rows(
+                    key, limited(left, without), self._curve_of(added, holes=False)
+                )
         return estimates
+
+    def _curve_of(self, blocks: Iterator[Array], *, holes: bool) -> AllanCurve:
+        """Return the Allan variance of what stands in place of the log, at the same clusters."""
+        log, sizes = self.log, self.curve.cluster_size
+        return of_blocks(blocks, log.grid, log.rate, sizes, holes=holes, segments=log.segments)
 
     def _temperature(self, fitted: Likelihood, into: Estimation) -> ThermalFit:
         """Return what temperature explains of the channel."""
@@ -203,8 +188,18 @@ class _Channel:
             into.paths[log.path] = temperature_path(log.temperatures(), log.segments, rng)
         # A warm-up is what temperature explains: it stays in the log that they are fitted to.
         plain = self._fitted(log.blocks) if self.courses.courses else fitted
-        rng = self._stream("temperature")
-        return temperature_of(log, into.paths[log.path], plain, self._band, self._bandwidth, rng)
+        return fit_temperature(
+            log.blocks,
+            log.grid,
+            log.rate,
+            into.paths[log.path],
+            holes=log.holes,
+            band=self._band,
+            bandwidth=self._bandwidth,
+            resolution=resolution_of(log),
+            plain=plain,
+            rng=self._stream("temperature"),
+        )
 
     def _fitted(self, blocks: Callable[[], Iterator[Array]]) -> Likelihood:
         log = self.log
@@ -230,11 +225,12 @@ class _Channel:
 
 def _unfiltered(band: float | None, bandwidth: float | None) -> float | None:
     """Return the frequency up to which a log shows its noise as it is, Hz; None: not known."""
-    limits = [
-        frequency for frequency in (band, 0.5 * bandwidth if bandwidth else None) if frequency
-    ]
-    return min(limits) if limits else None
+    limits = (band, 0.5 * bandwidth if bandwidth else None)
+    return min((frequency for frequency in limits if frequency), default=None)
 
+
+_ENOUGH = 1 << 16
+"""Samples that show the step of a register."""
 
 _BY_LIKELIHOOD = {"likelihood", "likelihood_gm", "compensated"}
 
@@ -248,11 +244,10 @@ _BEST_FIRST = ("likelihood", "likelihood_gm", "weighted", "paper", "curve")
 def _model_rows(key: Key, fit: Likelihood) -> Iterator[Row]:
     """Yield the rows of the table ``models``, the chosen model first."""
     for place, candidate in enumerate(fit.candidates):
-        terms = candidate.terms
         yield asdict(key) | {
-            "model": terms.name,
+            "model": candidate.terms.name,
             "chosen": place == 0,
-            "free": terms.parameters,
+            "free": candidate.terms.parameters,
             "log_likelihood": -candidate.maximum.cost,
             "bic": candidate.bic,
             "aic": candidate.aic,
@@ -294,6 +289,57 @@ def _spectrum_rows(key: Key, fit: Likelihood) -> Iterator[Row]:
                 "used": bool(fit.used[i]),
             }
         )
+
+
+def _compensated_rows(key: Key, left: AllanCurve, added: AllanCurve) -> Iterator[Row]:
+    """Yield the rows of the table ``allan_compensated``: of what temperature leaves, and adds."""
+    for about, deviation in zip(limit_rows(left), added.deviation, strict=True):
+        yield asdict(key) | about | {"temperature": float(deviation)}
+
+
+def _temperature_rows(key: Key, fit: ThermalFit) -> Iterator[Row]:
+    """Yield the rows of the table ``temperature``."""
+    unit = SI_UNITS[quantity_of(key.channel)]["B"]
+    figures = {
+        "T_0": (Parameter(fit.reference), "degC"),
+        "sensitivity": (fit.sensitivity, f"{unit}/K"),
+        "quadratic": (fit.quadratic, f"{unit}/K^2"),
+        "lag": (fit.lag, "s"),
+        "bias": (fit.bias, unit),
+    }
+    about = asdict(key) | {"compensated": fit.compensated}
+    for name, (parameter, its_unit) in figures.items():
+        reason = parameter.reason or (fit.reason if name == "sensitivity" else None)
+        yield about | _figure(name, parameter, its_unit) | {"reason": reason}
+
+
+def _low_pass_rows(key: Key, fit: Likelihood) -> Iterator[Row]:
+    """Yield the rows of the table ``low_pass``: none where a band was asked for.
+
+    N is that of the estimate, the density before the filter.
+    """
+    low_pass = fit.low_pass
+    if low_pass is None:
+        return
+    density = SI_UNITS[quantity_of(key.channel)]["N"]
+    about = asdict(key) | {"kind": low_pass.kind, "order": low_pass.order}
+    yield about | _figure("cutoff", low_pass.frequency, "Hz")
+    yield about | _figure("N", fit.estimates[0].parameters["N"], density)
+    if low_pass.order is not None:
+        yield about | _figure("floor", Parameter(low_pass.floor), density)
+
+
+def resolution_of(log: ChannelLog) -> float:
+    """Return the step of the register that a log shows at its beginning, SI; 0 where none shows."""
+    values = next((block for block in log.blocks() if np.isfinite(block).any()), np.empty(0))
+    present = values[np.isfinite(values)][:_ENOUGH]
+    return step_of(np.unique(present), len(present))
+
+
+def _figure(name: str, parameter: Parameter, unit: str) -> dict[str, Any]:
+    values = asdict(parameter)
+    values.pop("duration_needed")
+    return {"parameter": name, "unit": unit, **values}
 
 
 def estimation(

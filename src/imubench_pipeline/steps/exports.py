@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -23,19 +22,9 @@ def exports(
 ) -> Iterator[tuple[Path, str | bytes]]:
     """Yield the files of a run, each with its place in the folder of the exports.
 
-    Parameters
-    ----------
-    tables : mapping of str to pyarrow.Table
-        Those of `imubench_pipeline.export.request.NEEDED`.
-    settings : ExportSettings
-    recordings : Path, optional
-        As `imubench_pipeline.export.request.made` takes it.
-
-    Yields
-    ------
-    (Path, str or bytes)
-        ``<sensor>/<target>/<file of the program>``; ``<sensor>/not_made.txt`` for what a program
-        cannot hold.
+    A place is ``<sensor>/<target>/<file of the program>``; ``<sensor>/not_made.txt`` is for what a
+    program cannot hold. `tables` and `recordings` are as
+    `imubench_pipeline.export.request.made` takes them.
     """
     for sensor in dict.fromkeys(tables["parameters"]["sensor"].to_pylist()):
         refused = []
@@ -62,7 +51,7 @@ def exports(
 
 def write_exports(tables: Path, settings: str, folder: Path) -> None:
     """Write a folder a sensor, with a file a program; all appear together."""
-    how = ExportSettings.model_validate(json.loads(settings))
+    how = ExportSettings.model_validate_json(settings)
     with making(folder) as made:
         for place, content in exports(load(tables), how, recordings_of(tables)):
             write_content(content, made / place)

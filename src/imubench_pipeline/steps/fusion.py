@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from functools import cache, partial
 from pathlib import Path
@@ -30,7 +29,7 @@ NEEDED = ("recordings", "parameters", "allan_compensated", "temperature")
 
 
 def candidates(
-    tables: Mapping[str, pa.Table], joint: Mapping[tuple[str, str], Path] | None = None
+    tables: Mapping[str, pa.Table], joint: Mapping[tuple[str, str], Path] | None
 ) -> Iterator[FusionChannel]:
     """Yield the channels of recordings that decide, each with the estimate of the method to use.
 
@@ -104,16 +103,7 @@ def fusion_rows(
     how: FusionSettings,
     joint: Mapping[tuple[str, str], Path] | None = None,
 ) -> Iterator[Row]:
-    """Return the rows of the table ``fusion``.
-
-    Parameters
-    ----------
-    tables : mapping of str to pyarrow.Table
-        Those of `NEEDED`, of a run.
-    how : FusionSettings
-    joint : mapping of (str, str) to Path, optional
-        As `candidates` takes it.
-    """
+    """Return the rows of the table ``fusion``; `tables` and `joint` are as of `candidates`."""
     rows = equivalence_rows(
         candidates(tables, joint),
         [quantity_to_si(tau, "time") for tau in how.tau],
@@ -130,7 +120,7 @@ def write_fusion(
     inputs: Mapping[str, str], joint: list[Path], settings: str, outputs: list[Path]
 ) -> None:
     """Write the table ``fusion``, as Parquet and CSV; ``joint``: tables ``draws`` of recordings."""
-    how = FusionSettings.model_validate(json.loads(settings))
+    how = FusionSettings.model_validate_json(settings)
     tables = {name: read(name, [Path(inputs[name])]) for name in NEEDED}
     of_recording = {(path.parts[-3], path.parts[-2]): path for path in joint}
     table = build("fusion", fusion_rows(tables, how, of_recording))

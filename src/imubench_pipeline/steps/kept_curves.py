@@ -45,11 +45,7 @@ def degrees_of(table: pa.Table) -> dict[str, Any]:
 def compensated_curves(path: Path, measured: Mapping[str, AllanCurve]) -> dict[str, AllanCurve]:
     """Read the table ``allan_compensated`` of a recording, by channel.
 
-    Parameters
-    ----------
-    path : Path
-    measured : mapping of str to AllanCurve
-        Of the log as it is, with the same clusters.
+    `measured`: the curves of the log as it is, with the same clusters.
     """
     by_channel = divided(read("allan_compensated", [path]), "channel")
     return {

@@ -8,7 +8,7 @@ several; without any, that of the typical figures of its datasheet.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -58,40 +58,24 @@ class NoiseSource:
     words: str
     drawn: tuple[NoiseModel, ...] = ()
 
-    def with_drift(self, drift: float) -> NoiseModel:
-        """Return the model with a steady drift of a standard deviation beside its own, rad/s^2."""
-        return _drifting(self.model, drift)
-
-    def drawn_with_drift(self, drift: float) -> list[NoiseModel]:
-        """Return the drawn models with the same drift beside their own, rad/s^2."""
-        return [_drifting(model, drift) for model in self.drawn]
-
-
-def _drifting(model: NoiseModel, drift: float) -> NoiseModel:
-    return replace(model, R=(model.R**2 + drift**2) ** 0.5) if drift else model
-
 
 def from_static(
     folders: Sequence[Path], own: Mapping[str, Any], channel: str, draws: int = 0
 ) -> NoiseSource | None:
     """Return the noise of a gyro from the static recordings of its sensor.
 
+    None where no recording has an estimate of a gyro with white noise in it.
+
     Parameters
     ----------
     folders : sequence of Path
-        Of those recordings, with their ``quality.json``, ``parameters.parquet`` and, where models
-        are drawn, ``draws.parquet``.
+        Of those recordings.
     own : mapping
         Row of the table ``recordings`` of the recording that was turned.
     channel : str
         The gyro that was turned; another gyro of the sensor answers where it has no estimate.
     draws : int
         Models that are drawn from what the log leaves open of the estimate.
-
-    Returns
-    -------
-    NoiseSource or None
-        None where no recording has an estimate of a gyro with white noise in it.
     """
 
     def far(row: Row) -> tuple[bool, bool]:
@@ -118,12 +102,7 @@ def static_recordings(
 ) -> list[Kept]:
     """Return the static recordings that can be used: the nearest first, of these the longest.
 
-    Parameters
-    ----------
-    folders : sequence of Path
-        With their ``quality.json``.
-    far : callable
-        What speaks against a recording, from its row.
+    `far` tells from a recording's row what speaks against it.
     """
 
     def order(recording: Kept) -> tuple[Any, ...]:
@@ -140,18 +119,8 @@ def noise_source(
 ) -> NoiseSource | None:
     """Return the noise of a gyro: `from_static`, or else `from_printed`.
 
-    Parameters
-    ----------
-    folder : Path
-        Of the recording that was turned.
-    static : sequence of Path
-        Folders of the static recordings of its sensor.
-    key : Key
-        Of the recording, and the gyro.
-    sensor : Sensor
-        Its file.
-    draws : int
-        Models that are drawn from what a static log leaves open.
+    `folder` is that of the recording that was turned, `static` those of the static recordings of
+    its sensor; `draws`: models that are drawn from what a static log leaves open.
     """
     own = Quality.read(folder / "quality.json").recording
     return from_static(static, own, key.channel, draws) or from_printed(
@@ -160,20 +129,7 @@ def noise_source(
 
 
 def from_printed(name: str, sensor: Sensor, channel: str) -> NoiseSource | None:
-    """Return the noise of a gyro as its datasheet prints it.
-
-    Parameters
-    ----------
-    name : str
-        Of the sensor file.
-    sensor : Sensor
-    channel : str
-
-    Returns
-    -------
-    NoiseSource or None
-        None where no noise of it is printed.
-    """
+    """Return the noise of a gyro as its datasheet prints it; None where none is printed."""
     try:
         origin = from_datasheet(name, sensor, 0)
     except ConfigError:

@@ -46,31 +46,16 @@ _TYPICAL = ("1sigma", "typ")
 
 @dataclass(frozen=True)
 class Noise:
-    """The noise of a sensor at rest.
-
-    Attributes
-    ----------
-    recording : str
-        That it is from.
-    rate : float
-        Hz.
-    models : dict of str to NoiseModel
-        By channel.
-    """
+    """The noise of a sensor at rest: the recording that it is from, Hz, and models by channel."""
 
     recording: str
     rate: float
     models: dict[str, NoiseModel]
 
     def three(self, quantity: str) -> dict[str, NoiseModel]:
-        """Return the models of the axes x, y and z, and of which channel each is.
+        """Return the models of the axes x, y and z of a quantity, and of which channel each is.
 
-        An axis that is not in the log has the noise of the next one that is.
-
-        Parameters
-        ----------
-        quantity : str
-            ``gyro`` or ``accel``; at least one axis of it is there.
+        An axis that is not in the log has the noise of the next one that is; one is.
         """
         names = [name for name in self.models if name.startswith(quantity)]
         models = {}
@@ -95,13 +80,7 @@ class Noise:
 
 
 def noise_at_rest(folders: Sequence[Path]) -> Noise | None:
-    """Return the noise of a sensor from its static recordings; None where none tells it.
-
-    Parameters
-    ----------
-    folders : sequence of Path
-        Of those recordings, with their ``quality.json`` and ``parameters.parquet``.
-    """
+    """Return the noise of a sensor from its static recordings; None where none tells it."""
     for row, folder in static_recordings(folders, lambda row: (row["simulated"],)):
         best = recommended_estimates(folder / "parameters.parquet")
         models = {name: estimate.model for name, estimate in best.items() if estimate.model.N}
@@ -113,19 +92,9 @@ def noise_at_rest(folders: Sequence[Path]) -> Noise | None:
 def outlook_tables(folders: Sequence[Path], sensor: str, settings: str) -> dict[str, list[Row]]:
     """Return the rows of ``alignment`` and ``earth_rate_prediction`` of a sensor at rest.
 
-    Parameters
-    ----------
-    folders : sequence of Path
-        Of its static recordings.
-    sensor : str
-    settings : str
-        As `imubench_pipeline.run.plan.Plan.outlook_settings` gives them.
-
-    Returns
-    -------
-    dict
-        By table; no rows where no recording tells the noise of a gyro, and none of ``alignment``
-        where there is no accelerometer.
+    `folders` are those of its static recordings; `settings`: of
+    `imubench_pipeline.run.plan.Plan.outlook_settings`. There are no rows where no recording tells
+    the noise of a gyro, and none of ``alignment`` without an accelerometer.
     """
     rows: dict[str, list[Row]] = {"alignment": [], "earth_rate_prediction": []}
     sections = json.loads(settings)

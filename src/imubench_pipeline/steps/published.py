@@ -34,14 +34,9 @@ def published_rows(
 ) -> Iterator[Row]:
     """Yield the rows of the table ``published``.
 
-    Parameters
-    ----------
-    truths : str
-        The simulated recordings, as the plan wrote them.
-    truth : iterable of mapping
-        The table ``simulated_truth``.
-    tables : mapping of str to pyarrow.Table
-        ``parameters``, ``fixed_bias``, ``temperature`` and ``datasheet`` of the same sensor.
+    `truths`: the simulated recordings, as the plan wrote them; `truth`: the table
+    ``simulated_truth``; `tables`: ``parameters``, ``fixed_bias``, ``temperature`` and
+    ``datasheet`` of the same sensor.
     """
     entries = [SimulatedRecording.model_validate(entry) for entry in json.loads(truths)]
     if not any(settings.published for entry in entries for settings in entry.channels.values()):
@@ -63,10 +58,7 @@ def published_rows(
                     "recording": entry.recording,
                     "channel": channel,
                     "place": figure.where,
-                    "figure": figure.figure,
-                    "printed": figure.printed,
-                    "of": figure.of,
-                    "parameter": figure.parameter,
+                    **figure.model_dump(include={"figure", "printed", "of", "parameter"}),
                     "means": figure.si(quantity),
                     "unit": units.get(
                         figure.parameter,

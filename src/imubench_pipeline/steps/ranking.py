@@ -11,17 +11,14 @@ from imubench_pipeline.navigation.selection import ranked
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.judgement import judgements
 from imubench_pipeline.navigation.verdicts.next_steps import next_step_rows
-from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.settings.requirements import requirements_of
 from imubench_pipeline.tables import build, read, write_arrow
 
 
 def write_ranking(tables: dict[str, Path], settings: str, outputs: list[Path]) -> None:
     """Write the tables ``ranking`` and ``next_steps``, as Parquet and CSV."""
     sections = json.loads(settings)
-    requirements = {
-        name: Requirement.model_validate(section)
-        for name, section in sections["requirements"].items()
-    }
+    requirements = requirements_of(sections["requirements"])
     joined = {name: read(name, [path]) for name, path in tables.items()}
     asked = joined.pop("error_budget").filter(pc.field("requirement").is_valid())
     columns = ["sensor", "recording", "channel", "recommended", "value"]

@@ -48,17 +48,8 @@ def reconstruct(
 ) -> Reconstruction:
     """Simulate full-length logs and an ensemble from an estimate, and score them.
 
-    Parameters
-    ----------
-    key : Key
-    estimate : Estimate
-    measured : AllanCurve
-        Of the log; the reconstruction has its length and its tau.
-    rate : float
-        Hz.
-    settings : ReconstructionSettings
-    series : Path
-        Where the first full-length log goes, if it is to be kept.
+    The reconstruction has the length and the tau of `measured`; `rate` in Hz; `series` is where
+    the first full-length log goes, if it is to be kept.
     """
     names = asdict(key) | {"method": estimate.method}
     model = estimate.model

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 from imubench_pipeline.navigation.repeatability import repeatability_rows
@@ -15,7 +14,7 @@ def write_repeatability(
     biases: Path, recordings: Path, settings: str, catalogue: str, outputs: list[Path]
 ) -> None:
     """Write the table ``repeatability``, as Parquet and CSV."""
-    how = DatasheetSettings.model_validate(json.loads(settings))
+    how = DatasheetSettings.model_validate_json(settings)
     fixed = read("fixed_bias", [biases]).to_pylist()
     about = read("recordings", [recordings]).to_pylist()
     rows = repeatability_rows(fixed, about, sensors_of(catalogue), how.tolerance)

@@ -33,25 +33,18 @@ from imubench_pipeline.typing import Row
 
 
 def joined_tables(
-    parts: Mapping[str, list[Path]], truths: str, catalogue: str, decide: str = "{}"
+    parts: Mapping[str, list[Path]], truths: str, catalogue: str, decide: str
 ) -> dict[str, pa.Table]:
-    """Join the results of the recordings of a sensor.
+    """Return every table of recordings, joined of those of a sensor.
 
     Parameters
     ----------
     parts : mapping of str to list of Path
         Files of each table, in the order of the recordings; ``quality`` for the JSON files.
-    truths : str
-        Those that are simulated, as the plan wrote them.
-    catalogue : str
-        The sensor files, likewise.
+    truths, catalogue : str
+        Those that are simulated, and the sensor files, as the plan wrote them.
     decide : str
         The section of the configuration that says which recordings decide, as JSON.
-
-    Returns
-    -------
-    dict
-        Every table of recordings.
     """
     qualities = [Quality.read(path) for path in parts["quality"]]
     failed_steps = [Failure(**quality.failure) for quality in qualities if quality.failure]
@@ -117,13 +110,7 @@ def without_doubles(
 ) -> Iterator[Row]:
     """Yield the findings of the ingest that the table ``deterministic`` does not tell better.
 
-    Parameters
-    ----------
-    findings : iterable of mapping
-        Rows of the table ``findings``.
-    deterministic : pyarrow.Table
-    durations : mapping
-        Of each sensor and recording, s.
+    `durations`: of each sensor and recording, s.
     """
     by_place: dict[tuple[str, str, str], list[Row]] = {}
     for row in deterministic.to_pylist():

@@ -10,7 +10,7 @@ from pathlib import Path
 from imubench_pipeline.navigation.shortlist.classes import measured_ranges
 from imubench_pipeline.navigation.shortlist.figures import printed_ranges
 from imubench_pipeline.navigation.shortlist.rows import shortlist_rows
-from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.settings.requirements import Requirement, requirements_of
 from imubench_pipeline.settings.sensor import Sensor, sensors_of
 from imubench_pipeline.tables import build, read, write_arrow
 from imubench_pipeline.typing import Row
@@ -51,8 +51,7 @@ def write_shortlist(
     tables: dict[str, Path], settings: str, catalogue: str, outputs: list[Path]
 ) -> None:
     """Write the table ``shortlist``, as Parquet and CSV."""
-    asked = json.loads(settings)["requirements"]
-    requirements = {name: Requirement.model_validate(section) for name, section in asked.items()}
+    requirements = requirements_of(json.loads(settings)["requirements"])
     table = build("shortlist", rows_of_run(requirements, sensors_of(catalogue), tables))
     for output in outputs:
         write_arrow(table, output)

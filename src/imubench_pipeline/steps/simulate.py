@@ -17,8 +17,11 @@ from imubench_pipeline.experiments.earth_rate.simulation import true_rate
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.readers.text_log import TextLog
 from imubench_pipeline.settings.sensor import TEMPERATURE, ColumnSource, LogFormat
-from imubench_pipeline.settings.simulated_experiments import SimulatedTable, SimulatedTurns
-from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
+from imubench_pipeline.settings.simulated_recordings import (
+    SimulatedRecording,
+    SimulatedTable,
+    SimulatedTurns,
+)
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.simulate.imu import simulate_imu
 from imubench_pipeline.simulate.models import imu_model
@@ -28,15 +31,7 @@ from imubench_pipeline.units import quantity_to_si
 
 
 def write_simulated(recording: SimulatedRecording, log: LogFormat, folder: Path) -> None:
-    """Simulate a recording and write it as text in the layout of its sensor's logs.
-
-    Parameters
-    ----------
-    recording : SimulatedRecording
-    log : LogFormat
-        Its `layout`: the columns, units and files that the reader expects.
-    folder : Path
-        Where the files go.
+    """Simulate a recording and write it as text, by its `layout` of the sensor's logs.
 
     Raises
     ------
@@ -112,10 +107,7 @@ def _sensed(recording: SimulatedRecording, rate: float) -> _Samples:
 
 
 def _on_table(table: SimulatedTable, rate: float, samples: int) -> _Samples:
-    """Return what the gyro indicates of the table, which goes straight from one rate to the next.
-
-    Its scale factor is in it.
-    """
+    """Return what the gyro indicates of the table, which goes straight from rate to rate."""
     times = [time for step in table.steps for time in step.seconds]
     rates = np.repeat([quantity_to_si(step.rate, "angular_rate") for step in table.steps], 2)
     true = np.interp(np.arange(samples) / rate, times, rates)

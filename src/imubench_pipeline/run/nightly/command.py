@@ -28,14 +28,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--settle",
-        type=_seconds,
+        type=_wait,
         default="10 s",
         metavar="TIME",
         help="a log is complete when nothing of it has changed for so long; default: 10 s",
     )
     parser.add_argument(
         "--wait",
-        type=_seconds,
+        type=_wait,
         default="0 s",
         metavar="TIME",
         help="how long to wait for a run that goes on; default: not at all",
@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run(given: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     """Run the workflow on the logs that are complete; return the exit status."""
     try:
         from imubench_pipeline.run.nightly.night import Night, TakenError
@@ -59,8 +59,8 @@ def run(given: argparse.Namespace) -> int:
     from imubench_pipeline.settings.validation import ConfigError
 
     try:
-        night = Night(given.project, given.config, given.flags)
-        summary = night.run(given.cores, given.settle, given.wait)
+        night = Night(options.project, options.config, options.flags)
+        summary = night.run(options.cores, options.settle, options.wait)
     except KeyboardInterrupt:
         print("stopped by a signal before Snakemake began", file=sys.stderr)
         return 2
@@ -68,20 +68,23 @@ def run(given: argparse.Namespace) -> int:
         print(f"imubench nightly: {error}", file=sys.stderr)
         return 2
     status = STATUS[summary.outcome]
-    if status or not given.quiet:
+    if status or not options.quiet:
         print(in_words(summary), end="", file=sys.stderr if status == 2 else sys.stdout)
     return status
 
 
-def _seconds(text: str) -> float:
-    """Return a time in s, written with its unit or without."""
+def seconds(text: str) -> float:
+    """Return the time in s that an option has, with its unit or without."""
     try:
-        found = float(text)
+        return float(text)
     except ValueError:
         try:
-            found = quantity_to_si(text, "time")
+            return quantity_to_si(text, "time")
         except UnitError as error:
             raise argparse.ArgumentTypeError(str(error)) from None
-    if not 0.0 <= found < float("inf"):
+
+
+def _wait(text: str) -> float:
+    if not 0.0 <= (time := seconds(text)) < float("inf"):
         raise argparse.ArgumentTypeError(f"found {text}; expected a time, such as 10 s")
-    return found
+    return time

@@ -10,7 +10,6 @@ import time
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import psutil
@@ -31,11 +30,6 @@ class Lock:
     of the two lives. While it is held, the file has a note of who holds it; one that is still there
     when the lock is free comes from a run that did not reach its end.
 
-    Parameters
-    ----------
-    path : Path
-        The file; its folder is made.
-
     Attributes
     ----------
     descriptor : int
@@ -54,12 +48,7 @@ class Lock:
         self.left_over: Mapping[str, Any] = {}
 
     def acquire(self, wait: float = 0.0) -> None:
-        """Take the lock.
-
-        Parameters
-        ----------
-        wait : float
-            How long to wait for a run that goes on, s.
+        """Take the lock; `wait`: for a run that goes on, s.
 
         Raises
         ------
@@ -98,12 +87,7 @@ class Lock:
     def __enter__(self) -> Lock:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.release()
 
     def _taken(self) -> bool:
@@ -126,18 +110,12 @@ class Lock:
 
 
 def read_note(path: Path) -> Mapping[str, Any]:
-    """Return what stands in the file of a lock; nothing where that cannot be read.
-
-    Parameters
-    ----------
-    path : Path
-        The file of the lock.
-    """
+    """Return what stands in the file of a lock; nothing where that cannot be read."""
     try:
-        found = read_json(path)
+        note = read_json(path)
     except (OSError, ValueError):
         return {}
-    return found if isinstance(found, dict) else {}
+    return note if isinstance(note, dict) else {}
 
 
 def _holder(note: Mapping[str, Any]) -> str:

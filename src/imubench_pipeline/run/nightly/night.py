@@ -18,17 +18,10 @@ from imubench_pipeline.run.nightly import recovery
 from imubench_pipeline.run.nightly.lock import Lock, TakenError
 from imubench_pipeline.run.nightly.running import errors, last_lines, run_snakemake
 from imubench_pipeline.run.nightly.settling import Found, Skip, look, moved, settled
-from imubench_pipeline.run.nightly.state import (
-    State,
-    StateError,
-    load_tables,
-    read_state,
-    state_of,
-)
+from imubench_pipeline.run.nightly.state import State, StateError, load_tables, read_state, state_of
 from imubench_pipeline.run.nightly.summary import Skipped, Summary, compared, in_words
-from imubench_pipeline.settings.config import Run, read_run
+from imubench_pipeline.settings.config import Run, read_config, read_run
 from imubench_pipeline.settings.validation import ConfigError
-from imubench_pipeline.settings.yaml_files import read_yaml
 from imubench_pipeline.tables import write_content, write_json
 from imubench_pipeline.tables.seals import night_place, seal_files
 
@@ -77,20 +70,9 @@ class Night:
         self._put_right: list[str] = []
 
     def run(self, cores: str, settle: float, wait: float) -> Summary:
-        """Run the workflow once.
+        """Run the workflow once; keep the summary in the folder ``nightly`` of the results, too.
 
-        Parameters
-        ----------
-        cores : str
-        settle : float
-            How long nothing of a complete log has changed, s.
-        wait : float
-            For another run that goes on, s.
-
-        Returns
-        -------
-        Summary
-            It is kept in the folder ``nightly`` of the results, too.
+        `settle`: how long nothing of a complete log has changed, s; `wait`: for another run, s.
 
         Raises
         ------
@@ -171,9 +153,9 @@ class Night:
         status = run_snakemake(arguments, self.project, self._log, lock)
         if status == 0:
             return []
-        said = [f"a step said: {error}" for error in errors(self._log)[:_MOST_ERRORS]]
+        messages = [f"a step said: {error}" for error in errors(self._log)[:_MOST_ERRORS]]
         why = f"Snakemake ended with exit status {status}; the last lines of its log:"
-        return [*said, why, *last_lines(self._log)]
+        return [*messages, why, *last_lines(self._log)]
 
     def _held_back(self, skips: Sequence[Skip]) -> list[str]:
         """Return the flags that hold logs back."""
@@ -190,8 +172,8 @@ class Night:
         failure: Sequence[str],
     ) -> tuple[Summary, State | None]:
         finished = datetime.now(UTC)
-        found: dict[str, Any] = {"outcome": "failed"}
-        after, known = None, before.recordings if before else {}
+        fields: dict[str, Any] = {"outcome": "failed"}
+        after, analysed = None, before.recordings if before else {}
         try:
             tables = {} if failure else load_tables(self.results)
         except (OSError, ValueError) as error:
@@ -202,16 +184,16 @@ class Night:
         was_skipped = before.skipped if before else {}
         since = {skip.recording: was_skipped.get(skip.recording, self._began) for skip in skips}
         if not failure:
-            logs = {name: one.files for name, one in seen.items() if name not in held_back}
+            logs = {name: log.files for name, log in seen.items() if name not in held_back}
             after = state_of(tables, finished, logs, since)
-            found = compared(before, after, tables, late)
-            known = after.recordings
+            fields = compared(before, after, tables, late)
+            analysed = after.recordings
             after = after.without(late, before)
-        found["skipped"] = [
+        fields["skipped"] = [
             Skipped(
                 recording=skip.recording,
                 reason=skip.reason,
-                keeps_results=skip.held_back and skip.recording in known,
+                keeps_results=skip.held_back and skip.recording in analysed,
                 since=since[skip.recording],
             )
             for skip in skips
@@ -224,7 +206,7 @@ class Night:
             failure=[*failure, *(self._space() if failure else [])],
             report=str(self.results / "report/index.html"),
             log=str(self._log),
-            **found,
+            **fields,
         )
         return summary, after
 
@@ -237,8 +219,8 @@ class Night:
             files = [self.folder / f"{name}.{kind}" for kind in ("json", "txt")]
             write_content(summary.model_dump_json(indent=1) + "\n", files[0])
             write_content(in_words(summary), files[1])
-            said = [self._log] if name != "latest" and self._log.is_file() else []
-            seal_files(self.results, night_place(name), [*files, *said], {})
+            log = [self._log] if name != "latest" and self._log.is_file() else []
+            seal_files(self.results, night_place(name), [*files, *log], {})
         # Last: what could not be said is said by the next run.
         if after is not None:
             after.write(self._state)
@@ -247,8 +229,7 @@ class Night:
 
 def _settings(file: Path, config: Sequence[str]) -> Run:
     """Return where the logs and the results are; the rest is Snakemake's to read."""
-    found = read_yaml(file) if file.is_file() else {}
-    settings = found if isinstance(found, dict) else {}
+    settings = read_config(file)
     for entry in config:
         key, equals, value = entry.partition("=")
         if not equals:

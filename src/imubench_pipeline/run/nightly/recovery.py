@@ -38,14 +38,7 @@ _PATIENCE = 10.0  # s; for a process to end
 
 
 def snakemake_locks(project: Path, results: Path) -> list[Path]:
-    """Return the locks of Snakemake on files of these results.
-
-    Parameters
-    ----------
-    project : Path
-        Folder of the Snakefile.
-    results : Path
-    """
+    """Return the locks of Snakemake on files of these results; `project` has the Snakefile."""
     # The paths in a lock are as Snakemake was told them: links are not followed.
     inside = os.path.normpath(results) + os.sep
 
@@ -55,23 +48,16 @@ def snakemake_locks(project: Path, results: Path) -> list[Path]:
                 os.path.normpath(project / line.strip()).startswith(inside) for line in lines
             )
 
-    found = []
+    locks = []
     for path in sorted(project.glob(".snakemake/locks/*.lock")):
         with contextlib.suppress(OSError):  # a run that has just ended takes its own away
             if concerns(path):
-                found.append(path)
-    return found
+                locks.append(path)
+    return locks
 
 
 def owner(locks: Iterable[Path], project: Path, results: Path) -> int | None:
-    """Return the process of a Snakemake that these locks may belong to; None: they are stale.
-
-    Parameters
-    ----------
-    locks : iterable of Path
-        As `snakemake_locks` returns them.
-    project, results : Path
-    """
+    """Return the process of a Snakemake that these locks may belong to; None: they are stale."""
     stamps = []
     for lock in locks:
         with contextlib.suppress(OSError):
@@ -102,12 +88,7 @@ def _is_snakemake(process: psutil.Process, project: Path, results: Path) -> bool
 def end_left_over(note: Mapping[str, Any], project: Path) -> int:
     """End the steps that a run left running which was killed; return how many there were.
 
-    Parameters
-    ----------
-    note : mapping
-        What that run left in the lock.
-    project : Path
-        In which steps run.
+    `note` is what that run left in the lock; the steps run in `project`.
     """
     group = note.get("snakemake")
     if note.get("host") != platform.node() or not isinstance(group, int) or restarted(note):
@@ -126,13 +107,7 @@ def end_left_over(note: Mapping[str, Any], project: Path) -> int:
 
 
 def end_group(group: int) -> None:
-    """End what is left of a group of processes that this run has started.
-
-    Parameters
-    ----------
-    group : int
-        Its number, that of the process that was started with it.
-    """
+    """End what is left of a group of processes that this run has started, by the first of them."""
     with contextlib.suppress(ProcessLookupError, PermissionError):
         os.killpg(group, signal.SIGKILL)
 
@@ -140,11 +115,7 @@ def end_group(group: int) -> None:
 def restarted(note: Mapping[str, Any], boot: float | None = None) -> bool:
     """Tell whether the machine has been started anew since a run that left this note began.
 
-    Parameters
-    ----------
-    note : mapping
-    boot : float, optional
-        When the machine was started, s since 1970; default: asked of the system.
+    `boot`: when the machine was started, s since 1970; default: asked of the system.
     """
     try:
         since = datetime.fromisoformat(str(note.get("since"))).timestamp()
@@ -155,19 +126,10 @@ def restarted(note: Mapping[str, Any], boot: float | None = None) -> bool:
     return since < (psutil.boot_time() if boot is None else boot)
 
 
-def remove_temporary(results: Path, taken: float) -> tuple[int, int]:
-    """Remove the temporary files of killed runs.
+def remove_temporary(results: Path, locked: float) -> tuple[int, int]:
+    """Remove the temporary files of killed runs; return how many they were, and their bytes.
 
-    Parameters
-    ----------
-    results : Path
-    taken : float
-        When the lock was taken, s since 1970: what changed shortly before, or later, stays.
-
-    Returns
-    -------
-    number, size : int
-        How many were removed, and their bytes.
+    `locked`: when the lock was, s since 1970: what changed shortly before, or later, stays.
     """
     number = size = 0
     for path in list(_below(results)):
@@ -175,27 +137,21 @@ def remove_temporary(results: Path, taken: float) -> tuple[int, int]:
             continue
         inside = list(path.rglob("*")) if path.is_dir() else []
         with contextlib.suppress(OSError):
-            about = [one.lstat() for one in (path, *inside)]
-            if max(one.st_mtime for one in about) < taken - STILL_WRITTEN:
+            statuses = [status.lstat() for status in (path, *inside)]
+            if max(status.st_mtime for status in statuses) < locked - STILL_WRITTEN:
                 _remove(path)
-                number, size = number + 1, size + sum(one.st_size for one in about)
+                number, size = number + 1, size + sum(status.st_size for status in statuses)
     return number, size
 
 
 def temporary(results: Path) -> list[Path]:
     """Return the files and folders below the results that are not complete."""
-    found = [path for path in _below(results) if _TEMPORARY.fullmatch(path.name)]
-    return [path for path in found if not any(other in path.parents for other in found)]
+    unfinished = [path for path in _below(results) if _TEMPORARY.fullmatch(path.name)]
+    return [path for path in unfinished if not any(other in path.parents for other in unfinished)]
 
 
 def remove_unfinished(outputs: Iterable[Path]) -> None:
-    """Remove what a step that was ended had not completed.
-
-    Parameters
-    ----------
-    outputs : iterable of Path
-        What it was to make.
-    """
+    """Remove what a step that was ended had not completed of its outputs."""
     for path in outputs:
         for left in path.parent.glob(f".{glob.escape(path.name)}.*.part"):
             if _TEMPORARY.fullmatch(left.name):
@@ -208,10 +164,6 @@ def remove_doubtful(results: Path) -> int:
 
     A file that has its name already may have no content then. Snakemake makes anew what is not
     there. Of a folder that one step makes, all goes.
-
-    Parameters
-    ----------
-    results : Path
     """
     stamps: dict[Path, float] = {}
     for path in _below(results):

@@ -29,16 +29,8 @@ _SIGNS = re.compile(rb"\x1b\[[0-9;?]*[A-Za-z]|\r")
 def run_snakemake(arguments: Sequence[str], project: Path, output: Path, lock: Lock) -> int:
     """Run Snakemake; return its exit status, negative where a signal ended it.
 
-    Parameters
-    ----------
-    arguments : sequence of str
-        Of the command line.
-    project : Path
-        Folder of the Snakefile.
-    output : Path
-        File for all that it says.
-    lock : Lock
-        Held by Snakemake, too: it may outlive this process.
+    All that it says goes to the file `output`. Snakemake holds the lock, too: it may outlive this
+    process.
     """
     command = [sys.executable, "-m", "snakemake", *arguments]
     with output.open("ab", buffering=0) as file:
@@ -119,24 +111,12 @@ class _Terminal:
 
 
 def errors(path: Path) -> list[str]:
-    """Return the errors of the steps that failed in a run, each once.
-
-    Parameters
-    ----------
-    path : Path
-        File of what it said.
-    """
+    """Return the errors of the steps that failed in a run, each once, of a file of what it said."""
     return list(dict.fromkeys(_ERROR.findall(_text(path))))
 
 
 def last_lines(path: Path) -> list[str]:
-    """Return the last lines that a run said, without empty ones.
-
-    Parameters
-    ----------
-    path : Path
-        File of what it said.
-    """
+    """Return the last lines that a run said, without empty ones, of such a file."""
     return [line.rstrip() for line in _text(path).splitlines() if line.strip()][-_SHOWN:]
 
 

@@ -63,7 +63,6 @@ class Skip:
     ----------
     recording : str
         Sensor and name, such as ``mti_7/night``.
-    reason : str
     held_back : bool
         False: nothing to hold back. A complete log beside the partial one is read; where there
         is none, the partial one was given up long ago.
@@ -75,38 +74,29 @@ class Skip:
 
 
 def look(logs: Path) -> dict[str, Found]:
-    """Return what is in a drop zone, by sensor and name of the recording.
-
-    Parameters
-    ----------
-    logs : Path
-        Folder that holds ``<sensor>/<recording>``; none is an empty one.
-    """
-    found: dict[str, Found] = {}
+    """Return what is in a drop zone, by sensor and name of the recording; it may be missing."""
+    recordings: dict[str, Found] = {}
     if not logs.is_dir():
-        return found
+        return recordings
     for log in found_logs(logs):
         key = f"{log.sensor}/{log.name}"
-        before = found.get(key, Found())
+        before = recordings.get(key, Found())
         partial = next(_partial_inside(log.path), before.partial)
-        found[key] = Found(before.files + _signature(log), partial, partial is not None)
+        recordings[key] = Found(before.files + _signature(log), partial, partial is not None)
     for path in sorted(logs.glob("*/*")):
         whole = complete_name(path.name)
         if whole is not None and path.is_file():
             key = f"{sensor_of(path.parent)}/{name_of(whole)}"
-            there = found.get(key, Found())
-            if not there.incomplete:
-                found[key] = Found(there.files, _stamped(path, path.parent))
-    return found
+            before = recordings.get(key, Found())
+            if not before.incomplete:
+                recordings[key] = Found(before.files, _stamped(path, path.parent))
+    return recordings
 
 
 def complete_name(name: str) -> str | None:
     """Return the name that a file will have once it is complete; None if it is complete.
 
-    Parameters
-    ----------
-    name : str
-        Such as ``run.csv.part``, ``.run.csv.Xy12Zq`` (rsync) or ``.run.csv``.
+    It may be ``run.csv.part``, ``.run.csv.Xy12Zq`` (rsync) or ``.run.csv``.
     """
     if name.startswith("._"):
         return None  # what macOS keeps beside a file
@@ -120,7 +110,7 @@ def complete_name(name: str) -> str | None:
 
 
 def settled(
-    logs: Path, settle: float, known: Mapping[str, Signature]
+    logs: Path, settle: float, earlier: Mapping[str, Signature]
 ) -> tuple[dict[str, Found], list[Skip]]:
     """Look at a drop zone, twice where logs are new, for what is still being written.
 
@@ -129,19 +119,17 @@ def settled(
     logs : Path
     settle : float
         How long nothing of a complete log has changed, s.
-    known : mapping of str to Signature
+    earlier : mapping of str to Signature
         The logs as they were at an earlier run: one that is as it was then needs no second look.
 
     Returns
     -------
-    found : dict of str to Found
-        The last look.
-    skips : list of Skip
-        What is still being written.
+    dict of str to Found, and list of Skip
+        The last look, and what is still being written.
     """
     first = look(logs)
     second = first
-    if settle and any(known.get(key) != found.files for key, found in first.items()):
+    if settle and any(earlier.get(key) != recording.files for key, recording in first.items()):
         pause = min(settle, _LONGEST_PAUSE)
         time.sleep(pause)
         second = look(logs)
@@ -169,21 +157,21 @@ def unsettled(
         Files that are open for writing, and by what.
     """
     for key in sorted(first.keys() | second.keys()):
-        was, found = first.get(key, Found()), second.get(key, Found())
-        by = next((writing[real] for real in _real(found) if real in writing), None)
-        age = now - max((stamp for _, _, stamp in found.files), default=_GONE) * 1e-9
-        if found.partial and found.incomplete:
-            yield Skip(key, _transferred(found.partial, now))
-        elif was.files != found.files:
+        was, latest = first.get(key, Found()), second.get(key, Found())
+        by = next((writing[real] for real in _real(latest) if real in writing), None)
+        age = now - max((stamp for _, _, stamp in latest.files), default=_GONE) * 1e-9
+        if latest.partial and latest.incomplete:
+            yield Skip(key, _transferred(latest.partial, now))
+        elif was.files != latest.files:
             yield Skip(key, "it changed while it was looked at")
         elif by is not None:
             yield Skip(key, f"{by} has it open for writing")
         # A stamp far in the future comes from a clock that was never set, and says nothing.
         elif abs(age) < settle:
             yield Skip(key, f"last written to {max(age, 0.0):.0f} s ago")
-        elif found.partial:
-            replaces = not found.files and now - found.partial[2] * 1e-9 < _GIVEN_UP
-            yield Skip(key, _transferred(found.partial, now), held_back=replaces)
+        elif latest.partial:
+            replaces = not latest.files and now - latest.partial[2] * 1e-9 < _GIVEN_UP
+            yield Skip(key, _transferred(latest.partial, now), held_back=replaces)
 
 
 def _transferred(partial: tuple[str, int, int], now: float) -> str:
@@ -194,41 +182,29 @@ def _transferred(partial: tuple[str, int, int], now: float) -> str:
     return one_line(f"{path} is not complete, and nothing was written to it for {days:.0f} days")
 
 
-def writers(found: Mapping[str, Found]) -> dict[Path, str]:
+def writers(recordings: Mapping[str, Found]) -> dict[Path, str]:
     """Return the files of recordings that processes have open for writing, and which these are.
 
-    Parameters
-    ----------
-    found : mapping of str to Found
-
-    Returns
-    -------
-    dict
-        Of the processes that may be looked into: one's own, or all for an administrator.
+    They are the processes that may be looked into: one's own, or all for an administrator.
     """
-    looked_for = {real for one in found.values() for real in _real(one)}
+    looked_for = {real for recording in recordings.values() for real in _real(recording)}
     writing: dict[Path, str] = {}
     for process in psutil.process_iter() if looked_for else ():
         with contextlib.suppress(psutil.Error, OSError):
             for file in process.open_files():
                 if getattr(file, "mode", "r") != "r" and Path(file.path) in looked_for:
-                    said = f"process {process.pid} ({process.name()})"
-                    writing[Path(file.path)] = one_line(said)
+                    writer = f"process {process.pid} ({process.name()})"
+                    writing[Path(file.path)] = one_line(writer)
     return writing
 
 
 def moved(before: Mapping[str, Found], after: Mapping[str, Found]) -> set[str]:
-    """Return the recordings whose logs changed, or appeared, between two looks.
-
-    Parameters
-    ----------
-    before, after : mapping of str to Found
-    """
-    return {key for key, one in after.items() if before.get(key, Found()).files != one.files}
+    """Return the recordings whose logs changed, or appeared, between two looks."""
+    return {key for key, log in after.items() if before.get(key, Found()).files != log.files}
 
 
-def _real(found: Found) -> Iterable[Path]:
-    return (Path(path).resolve() for path, _, _ in found.files)
+def _real(recording: Found) -> Iterable[Path]:
+    return (Path(path).resolve() for path, _, _ in recording.files)
 
 
 def _signature(log: Recording) -> Signature:

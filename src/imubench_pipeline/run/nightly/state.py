@@ -68,10 +68,8 @@ class State(BaseModel):
 
     Attributes
     ----------
-    finished : datetime
     logs : dict
         Size and stamps of each log that was read.
-    recordings : dict
     warned, drifted : list
         Findings that put results in doubt, and changes of devices.
     leaders : dict
@@ -95,36 +93,24 @@ class State(BaseModel):
         write_sealed_json(self.model_dump(mode="json"), path)
 
     def without(self, names: Collection[str], before: State | None) -> State:
-        """Return a state in which some recordings are as they were before, if they were.
-
-        Parameters
-        ----------
-        names : collection of str
-        before : State or None
-        """
+        """Return a state in which some recordings are as they were before, if they were."""
         was = before or State(finished=self.finished)
         old = {name: was.recordings[name] for name in names if name in was.recordings}
+        others = {name: row for name, row in self.recordings.items() if name not in names}
         return self.model_copy(
             update={
                 "logs": {name: log for name, log in self.logs.items() if name not in names},
-                "recordings": {
-                    **{name: one for name, one in self.recordings.items() if name not in names},
-                    **old,
-                },
-                "warned": [one for one in self.warned if one.recording not in names]
-                + [one for one in was.warned if one.recording in names],
-                "drifted": [one for one in self.drifted if one.name not in names]
-                + [one for one in was.drifted if one.name in names],
+                "recordings": others | old,
+                "warned": [warning for warning in self.warned if warning.recording not in names]
+                + [warning for warning in was.warned if warning.recording in names],
+                "drifted": [drift for drift in self.drifted if drift.name not in names]
+                + [drift for drift in was.drifted if drift.name in names],
             }
         )
 
 
 def read_state(path: Path) -> State | None:
     """Return the state that a run has kept; None where there is none.
-
-    Parameters
-    ----------
-    path : Path
 
     Raises
     ------
@@ -145,22 +131,18 @@ def read_state(path: Path) -> State | None:
 def load_tables(results: Path) -> dict[str, Rows]:
     """Return the rows of the tables that a state is made of.
 
-    Parameters
-    ----------
-    results : Path
-
     Raises
     ------
     OSError, ValueError
         If one is not there, or is of another form.
     """
-    found: dict[str, Rows] = {}
+    tables: dict[str, Rows] = {}
     for name in (*_OF_A_RECORDING, "failures", "findings", "drift", "ranking"):
         table = read(name, [results / f"tables/{name}.parquet"])
         if name == "parameters":
             table = table.filter(table["recommended"])
-        found[name] = table.to_pylist()
-    return found
+        tables[name] = table.to_pylist()
+    return tables
 
 
 def state_of(
@@ -169,17 +151,7 @@ def state_of(
     logs: Mapping[str, Signature],
     skipped: Mapping[str, datetime],
 ) -> State:
-    """Return the state after a run.
-
-    Parameters
-    ----------
-    tables : mapping
-        As `load_tables` returns them.
-    finished : datetime
-    logs : mapping
-        Of the logs that were read.
-    skipped : mapping
-    """
+    """Return the state after a run, of tables as of `load_tables` and the logs that were read."""
     rejected = {
         name_in(row): row["reason"] for row in tables["recordings"] if row["status"] == "rejected"
     }
@@ -217,13 +189,7 @@ def drifted(row: Mapping[str, Any]) -> Drifted:
 
 
 def leading(ranking: Iterable[Mapping[str, Any]]) -> dict[str, Leader | None]:
-    """Return the sensor that comes first for each requirement; None where none can be ranked.
-
-    Parameters
-    ----------
-    ranking : iterable of mapping
-        The table of this name.
-    """
+    """Return the sensor that comes first for each requirement; None where none can be ranked."""
     first: dict[str, Leader | None] = {}
     margins: dict[str, float] = {}
     for row in ranking:

@@ -8,8 +8,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel
 
-from imubench_pipeline.report.run_summary import leaders, one_line, serious
-from imubench_pipeline.report.run_summary import left_out as told
+from imubench_pipeline.report.run_summary import leaders, left_out, one_line, serious
 from imubench_pipeline.run.nightly.state import (
     Known,
     Leader,
@@ -101,8 +100,6 @@ class Summary(BaseModel):
 
     Attributes
     ----------
-    outcome : {"fine", "flagged", "failed"}
-    began, finished : datetime
     seconds : float
         How long it took.
     since : datetime or None
@@ -113,7 +110,6 @@ class Summary(BaseModel):
         What an earlier run left behind.
     failure : list of str
         Why it failed: the last lines of its log.
-    report, log : str
     """
 
     outcome: Outcome
@@ -140,24 +136,17 @@ class Summary(BaseModel):
 def compared(
     before: State | None, after: State, tables: Mapping[str, Rows], without: Iterable[str]
 ) -> dict[str, Any]:
-    """Return what is new in a state, as fields of the summary.
+    """Return what is new in a state since the last successful run, as fields of the summary.
 
-    Parameters
-    ----------
-    before : State or None
-        At the last successful run.
-    after : State
-    tables : mapping
-        That ``after`` is of.
-    without : iterable of str
-        Recordings of which nothing is said: their logs were written to while they were read.
+    `tables` are those that `after` is of; nothing is said of the recordings `without`, whose logs
+    were written to while they were read.
     """
     was = before or State(finished=after.finished)
-    left_out = set(without)
-    now = {name: known for name, known in after.recordings.items() if name not in left_out}
+    written_to = set(without)
+    now = {name: outcome for name, outcome in after.recordings.items() if name not in written_to}
     both = [name for name in now if name in was.recordings]
     known_warnings, known_drift = set(was.warned), set(was.drifted)
-    found: dict[str, Any] = {
+    fields: dict[str, Any] = {
         "since": before and before.finished,
         "recordings": len(after.recordings),
         "new": [name for name in now if name not in was.recordings],
@@ -170,35 +159,33 @@ def compared(
         "failed": [
             Failed(**row)
             for row in tables["failures"]
-            if row["recording"] is None or name_in(row) not in left_out
+            if row["recording"] is None or name_in(row) not in written_to
         ],
         "rejected": [
             Rejected(
                 recording=name,
-                reason=known.rejected,
-                new=was.recordings.get(name, Known("")).rejected != known.rejected,
+                reason=outcome.rejected,
+                new=was.recordings.get(name, Known("")).rejected != outcome.rejected,
             )
-            for name, known in now.items()
-            if known.rejected is not None
+            for name, outcome in now.items()
+            if outcome.rejected is not None
         ],
         "warnings": [
-            NewWarning(recording=name_in(row), **{name: row[name] for name in _OF_WARNING})
+            NewWarning.model_validate({**row, "recording": name_in(row)})
             for row in serious(tables["findings"])
-            if name_in(row) not in left_out and warned(row) not in known_warnings
+            if name_in(row) not in written_to and warned(row) not in known_warnings
         ],
         "drift": [
-            Drift(**{name: row[name] for name in Drift.model_fields})
+            Drift.model_validate(row)
             for row in changes(tables["drift"])
-            if name_in(row) not in left_out and drifted(row) not in known_drift
+            if name_in(row) not in written_to and drifted(row) not in known_drift
         ],
         "first": list(_first(was, after, tables)),
     }
-    flagged = any(one.new for one in found["rejected"]) or found["warnings"] or found["drift"]
-    outcome = "failed" if found["failed"] else "flagged" if flagged else "fine"
-    return found | {"outcome": outcome}
-
-
-_OF_WARNING = ("channel", "finding", "detail")
+    rejected = any(rejection.new for rejection in fields["rejected"])
+    flagged = rejected or fields["warnings"] or fields["drift"]
+    outcome = "failed" if fields["failed"] else "flagged" if flagged else "fine"
+    return fields | {"outcome": outcome}
 
 
 def _because(name: str, was: State, now: State) -> str:
@@ -225,13 +212,8 @@ def _shown(leader: Leader | None) -> str | None:
 
 
 def in_words(summary: Summary) -> str:
-    """Return a summary as text.
-
-    Parameters
-    ----------
-    summary : Summary
-    """
-    new = sum(one.new for one in summary.rejected)
+    """Return a summary as text."""
+    new = sum(rejection.new for rejection in summary.rejected)
     counts = (
         f"{len(summary.new)} new, {len(summary.changed)} analysed again, "
         f"{len(summary.removed)} removed, {len(summary.skipped)} skipped; "
@@ -248,53 +230,50 @@ def in_words(summary: Summary) -> str:
         lines += ["", "why it failed:", *(f"  {one_line(line, 500)}" for line in summary.failure)]
     else:
         lines.append(f"recordings, {since}: {counts}")
-    failed = [row.model_dump() for row in summary.failed]
-    sections: list[tuple[str, list[str]]] = [
-        ("failed, left out of a report that is there, and tried again next time", [*told(failed)]),
-        ("new", summary.new),
-        ("analysed again", [f"{one.recording}: {one.because}" for one in summary.changed]),
-        ("removed", summary.removed),
-        ("skipped, and looked at again next time", list(map(_skip, summary.skipped))),
-        (
-            f"rejected ({new or 'none'} of them new)",
-            [
-                f"{one.recording}{' (new)' * one.new}: {one.reason}"
-                for one in sorted(summary.rejected, key=lambda one: not one.new)
-            ],
-        ),
-        ("new warnings", [_warning(one) for one in summary.warnings]),
-        ("devices that have changed", list(map(_drift, summary.drift))),
-        (
-            "first for a requirement",
-            [one.said + f" (before: {one.before})" * bool(one.before) for one in summary.first],
-        ),
-        ("put right after an earlier run", summary.put_right),
-    ]
-    for title, found in sections:
-        if found:
-            lines += ["", f"{title}:", *_bounded(found)]
+    failed = "failed, left out of a report that is there, and tried again next time"
+    rejected = sorted(summary.rejected, key=lambda rejection: not rejection.new)
+    sections = {
+        failed: [*left_out([row.model_dump() for row in summary.failed])],
+        "new": summary.new,
+        "analysed again": [f"{change.recording}: {change.because}" for change in summary.changed],
+        "removed": summary.removed,
+        "skipped, and looked at again next time": [_skip(skip) for skip in summary.skipped],
+        f"rejected ({new or 'none'} of them new)": [
+            f"{rejection.recording}{' (new)' * rejection.new}: {rejection.reason}"
+            for rejection in rejected
+        ],
+        "new warnings": [_warning(warning) for warning in summary.warnings],
+        "devices that have changed": [_drift(drift) for drift in summary.drift],
+        "first for a requirement": [
+            lead.said + f" (before: {lead.before})" * bool(lead.before) for lead in summary.first
+        ],
+        "put right after an earlier run": summary.put_right,
+    }
+    for title, entries in sections.items():
+        if entries:
+            lines += ["", f"{title}:", *_bounded(entries)]
     lines += ["", f"report: {summary.report}", f"log: {summary.log}"]
     return "\n".join(lines) + "\n"
 
 
-def _skip(one: Skipped) -> str:
-    kept = "; its results stay" * one.keeps_results
-    return f"{one.recording}: {one.reason}{kept} (since {_time(one.since)})"
+def _skip(skip: Skipped) -> str:
+    stays = "; its results stay" * skip.keeps_results
+    return f"{skip.recording}: {skip.reason}{stays} (since {_time(skip.since)})"
 
 
-def _warning(one: NewWarning) -> str:
-    channel = f"{one.channel}: " if one.channel else ""
-    return f"{one.recording}: {channel}{one.finding.replace('_', ' ')}: {one.detail}"
+def _warning(warning: NewWarning) -> str:
+    channel = f"{warning.channel}: " if warning.channel else ""
+    return f"{warning.recording}: {channel}{warning.finding.replace('_', ' ')}: {warning.detail}"
 
 
-def _drift(one: Drift) -> str:
-    value = f" {one.value:.4g} {one.unit}" if one.value is not None else ""
+def _drift(drift: Drift) -> str:
+    value = f" {drift.value:.4g} {drift.unit}" if drift.value is not None else ""
     expected = ""
-    if one.expected_lower is not None and one.expected_upper is not None:
-        expected = f", expected {one.expected_lower:.4g} to {one.expected_upper:.4g}"
+    if drift.expected_lower is not None and drift.expected_upper is not None:
+        expected = f", expected {drift.expected_lower:.4g} to {drift.expected_upper:.4g}"
     return (
-        f"{one.sensor}, device {one.device}: {one.channel} {one.parameter}{value} in "
-        f"{one.recording}{expected}" + f" ({one.reason})" * bool(one.reason)
+        f"{drift.sensor}, device {drift.device}: {drift.channel} {drift.parameter}{value} in "
+        f"{drift.recording}{expected}" + f" ({drift.reason})" * bool(drift.reason)
     )
 
 

@@ -25,14 +25,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("results", type=Path, help="folder of the results of runs")
 
 
-def run(given: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     """Print what is wrong; return the exit status."""
     # Arrow is loaded for this command only: the others answer at once.
     from imubench_pipeline.run.verification.results import Results
     from imubench_pipeline.tables.seals import FOLDER
     from imubench_pipeline.tables.texts import printable
 
-    folder: Path = given.results
+    folder: Path = options.results
     made = [name for name in ("recordings", "tables", "report") if (folder / name).is_dir()]
     if not made and not (folder / FOLDER).is_dir():
         print(
@@ -75,9 +75,9 @@ def _progress(size: int) -> Iterator[Callable[[int], None]]:
         now = time.monotonic()
         if now - begun >= _PATIENCE and now - last >= (0.2 if terminal else _PATIENCE):
             last = now
-            said = f"{100 * done / max(size, 1):.0f} % of {size / 1e9:.2f} GB read"
-            print(f"\r{said}" if terminal else said, end="" if terminal else "\n", file=sys.stderr)
-            sys.stderr.flush()
+            share = f"{100 * done / max(size, 1):.0f} % of {size / 1e9:.2f} GB read"
+            line = f"\r{share}" if terminal else f"{share}\n"
+            print(line, end="", file=sys.stderr, flush=True)
 
     yield read
     if terminal and last != begun:

@@ -59,14 +59,7 @@ class Fault:
 
 @dataclass
 class Results:
-    """What lies in a folder of results.
-
-    Parameters
-    ----------
-    folder : Path
-    read : callable
-        Is told how many bytes were read.
-    """
+    """What lies in a folder of results; `read` is told how many bytes were read."""
 
     folder: Path
     read: Callable[[int], None] = lambda _: None
@@ -96,20 +89,20 @@ class Results:
     @cached_property
     def run_again(self) -> str:
         """The command of the run, as far as the report says how it was called."""
-        given: list[str] = []
+        config: list[str] = []
         try:
             settings = json.loads((self.folder / "report/settings.json").read_text("utf-8"))
-            given = [str(one) for one in settings["given"]]
+            config = [str(entry) for entry in settings["given"]]
         except (OSError, ValueError, KeyError, TypeError):
             pass  # it is told that this file is damaged
-        return shlex.join(["snakemake", "-c2", *(["--config", *given] if given else [])])
+        return shlex.join(["snakemake", "-c2", *(["--config", *config] if config else [])])
 
     def faults(self) -> Iterator[Fault]:
         """Yield what is not as it was left, each file once."""
-        told = set()
+        named = set()
         for fault in self._every():
-            if fault.path not in told:
-                told.add(fault.path)
+            if fault.path not in named:
+                named.add(fault.path)
                 yield fault
 
     def waiting(self) -> list[str]:
@@ -122,11 +115,11 @@ class Results:
 
     def _every(self) -> Iterator[Fault]:
         for place, error in self._broken.items():
-            found = f"expected the seal of {place}, found one that {error}"
-            yield Fault(seal_file(place), found, self._mended(seal_file(place), place))
+            words = f"expected the seal of {place}, found one that {error}"
+            yield Fault(seal_file(place), words, self._mended(seal_file(place), place))
         if older := sum(seal.form != form() for seal in self.seals.values()):
-            found = f"expected the form {form()}, found {older} steps of another version"
-            yield Fault("seals", found, self.run_again)
+            words = f"expected the form {form()}, found {older} steps of another version"
+            yield Fault("seals", words, self.run_again)
         for place, seal in self.seals.items():
             yield from self._changed(place, seal)
         for path in sorted(self.folder.glob("recordings/*/*/quality.json")):
@@ -137,18 +130,18 @@ class Results:
         yield from self._strange_rows()
         for path in temporary(self.folder):
             place = path.relative_to(self.folder).as_posix()
-            found = "expected nothing, found what a run had not completed that was killed"
-            yield Fault(place, found, f"where no run goes on: rm -r {self._quoted(place)}")
+            words = "expected nothing, found what a run had not completed that was killed"
+            yield Fault(place, words, f"where no run goes on: rm -r {self._quoted(place)}")
 
     def _changed(self, place: str, seal: Seal) -> Iterator[Fault]:
         """Yield the files of a step that are not those that it left."""
-        there = any(os.path.lexists(self.folder / name) for name in seal.outputs)
+        left = any(os.path.lexists(self.folder / name) for name in seal.outputs)
         last = place in (f"{NIGHTS}/latest", f"{NIGHTS}/state")
-        if not (there or last or place in self._current):
+        if not (left or last or place in self._current):
             return  # all of a recording was removed, or of a night that is long past
         for name, file in seal.outputs.items():
-            if found := file.fault(self.folder / name, whole=True):
-                yield Fault(name, found, self._mended(name, place))
+            if words := file.fault(self.folder / name, whole=True):
+                yield Fault(name, words, self._mended(name, place))
             self.read(file.size)
 
     def _samples(self, path: Path) -> Iterator[Fault]:
@@ -165,19 +158,19 @@ class Results:
         if f"recordings/{of}" != place:
             yield Fault(name, f"expected that of {place}, found that of {of}",
                         self._mended(name, step))  # fmt: skip
-        kept = quality.kept or {}
-        for file, stated in kept.items():
+        samples = quality.kept or {}
+        for file, stated in samples.items():
             expected = SealedFile(stated["size"], stated["sha256"], 0)
-            if found := expected.fault(path.with_name(file), whole=True):
-                yield Fault(f"{place}/{file}", found, self._mended(f"{place}/{file}", step))
+            if words := expected.fault(path.with_name(file), whole=True):
+                yield Fault(f"{place}/{file}", words, self._mended(f"{place}/{file}", step))
             self.read(expected.size)
         for other in sorted(path.parent.glob(_SAMPLES)):
-            if other.name not in kept:
+            if other.name not in samples:
                 yield self._stray(f"{place}/{other.name}")
-        known = path.with_name(KNOWN)
-        if kept and not quality.recording["simulated"] and not known.exists():
-            found = "expected what is known of the log, found no such file"
-            yield Fault(f"{place}/{KNOWN}", found, self.run_again)
+        known_log = path.with_name(KNOWN)
+        if samples and not quality.recording["simulated"] and not known_log.exists():
+            words = "expected what is known of the log, found no such file"
+            yield Fault(f"{place}/{KNOWN}", words, self.run_again)
 
     def _own_digests(self) -> Iterator[Fault]:
         """Yield the files with a digest of their own that are not as they were written."""
@@ -195,10 +188,10 @@ class Results:
             others = [name for name, newer in self._others_now(self.seals[place]) if not newer]
             if others:
                 first = next(iter(self.seals[place].outputs), seal_file(place))
-                found = (
+                words = (
                     f"expected it made of the {others[0]} that is there, found it made of another"
                 )
-                yield Fault(first, found, self._mended(first, place))
+                yield Fault(first, words, self._mended(first, place))
 
     def _others_now(self, seal: Seal) -> list[tuple[str, bool]]:
         """Return the inputs of a step that are others by now, and whether they are newer."""
@@ -219,14 +212,14 @@ class Results:
     def _current(self) -> list[str]:
         """The steps that the comparison stands on: not those of logs that were removed."""
         by = {name: place for place, seal in self.seals.items() for name in seal.outputs}
-        found: set[str] = set()
+        current: set[str] = set()
         todo = [place for place in self.seals if "/" not in place]
         while todo:
             place = todo.pop()
-            if place not in found:
-                found.add(place)
+            if place not in current:
+                current.add(place)
                 todo += [by[name] for name in self.seals[place].inputs if name in by]
-        return sorted(found)
+        return sorted(current)
 
     def _unsealed(self) -> Iterator[Fault]:
         """Yield the files that no step is known to have left."""
@@ -234,8 +227,8 @@ class Results:
             for path in sorted((self.folder / folder).rglob("*")):
                 place = path.relative_to(self.folder)
                 own = any(place.match(f"recordings/*/*/{name}") for name in (KNOWN, _SAMPLES))
-                known = own or path.is_dir() or place.as_posix() in self._left
-                if not known and visible(place):
+                declared = own or path.is_dir() or place.as_posix() in self._left
+                if not declared and visible(place):
                     yield self._stray(place.as_posix())
         for path in sorted((self.folder / NIGHTS).glob("[ls]*.*")):  # the latest, and the state
             name = path.relative_to(self.folder).as_posix()
@@ -264,8 +257,8 @@ class Results:
                 continue  # it is told that it is damaged, or of another version
             keys = zip(rows["sensor"].to_pylist(), rows["recording"].to_pylist(), strict=True)
             if strange := {key for key in keys if key[1] is not None} - compared:
-                found = "expected rows of the recordings compared, found some of {}/{}"
-                yield Fault(place, found.format(*min(strange)), self._mended(place, "tables"))
+                words = "expected rows of the recordings compared, found some of {}/{}"
+                yield Fault(place, words.format(*min(strange)), self._mended(place, "tables"))
 
     def _stray(self, name: str) -> Fault:
         return Fault(name, _NO_SEAL, self._removed(name))
