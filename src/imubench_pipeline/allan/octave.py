@@ -15,12 +15,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from imubench_pipeline.allan.full_overlap import enough_present, full_sums
 from imubench_pipeline.allan.phase import (
     Phase,
     accumulate,
     accumulate_present,
+    enough_present,
     finite_mean,
+    full_sums,
     integrate,
     sum_present,
     sum_sizes,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.allan.full_overlap import PRESENT
+from imubench_pipeline.allan.phase import PRESENT
 
 Counts = NDArray[np.int64]
 

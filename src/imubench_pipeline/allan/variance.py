@@ -20,9 +20,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from imubench_pipeline.allan.confidence import deviation_limits, equivalent_degrees, noise_exponent
-from imubench_pipeline.allan.full_overlap import full_sums
 from imubench_pipeline.allan.octave import DECIMATION, SHORTEST, OctaveSums, octave_sizes
-from imubench_pipeline.allan.phase import Phase, integrate, split
+from imubench_pipeline.allan.phase import Phase, full_sums, integrate, split
 from imubench_pipeline.allan.threads import read_ahead
 from imubench_pipeline.typing import Array
 

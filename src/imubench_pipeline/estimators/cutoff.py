@@ -24,16 +24,14 @@ from imubench_pipeline.estimators.filter_fits import (
     FAMILY,
     FEWEST_BINS,
     PROCESSES,
+    Allowed,
     FilterFits,
     FilterTrial,
-    frequencies_in_bins,
-)
-from imubench_pipeline.estimators.filter_readings import (
-    Allowed,
     OfModel,
     Reading,
     also_after_sampling,
     draw_factors,
+    frequencies_in_bins,
 )
 from imubench_pipeline.estimators.low_pass import Filter, Kind
 from imubench_pipeline.estimators.spectrum import Spectrum

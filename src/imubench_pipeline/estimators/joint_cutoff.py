@@ -21,16 +21,14 @@ from imubench_pipeline.estimators.filter_fits import (
     FAMILY,
     HALF_CHI_SQUARED,
     PROCESSES,
-    FilterTrial,
-    explains_bend,
-    gains,
-    highest_cutoff,
-)
-from imubench_pipeline.estimators.filter_readings import (
     Allowed,
+    FilterTrial,
     OfModel,
     Reading,
     also_after_sampling,
+    explains_bend,
+    gains,
+    highest_cutoff,
 )
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.spectrum import Spectrum

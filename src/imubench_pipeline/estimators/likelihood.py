@@ -15,16 +15,15 @@ from numpy.typing import ArrayLike, NDArray
 from imubench_pipeline.allan import of_blocks
 from imubench_pipeline.estimators import least_squares
 from imubench_pipeline.estimators.band import Band
-from imubench_pipeline.estimators.carried_lines import carried_sinusoids
 from imubench_pipeline.estimators.curve_bias import averaging_times, with_curve
 from imubench_pipeline.estimators.cutoff import Cutoff
-from imubench_pipeline.estimators.doubts import add_doubts
+from imubench_pipeline.estimators.doubts import add_doubts, instead_of_walk
 from imubench_pipeline.estimators.draws import drawn_share, joint_draws
 from imubench_pipeline.estimators.estimate import CURVE, FAMILY, Estimate, Parameter
 from imubench_pipeline.estimators.frame import FEWEST_BINS, Frame, frame_of
 from imubench_pipeline.estimators.intervals import describe, papers_only, with_upper_limits
 from imubench_pipeline.estimators.joint_cutoff import worth_joining
-from imubench_pipeline.estimators.lines import Line
+from imubench_pipeline.estimators.lines import Line, carried_sinusoids
 from imubench_pipeline.estimators.missing import (
     block_means,
     divide_at_holes,
@@ -33,7 +32,6 @@ from imubench_pipeline.estimators.missing import (
 )
 from imubench_pipeline.estimators.model_choice import PAPERS, Candidate, compare
 from imubench_pipeline.estimators.posterior import DRAWS, Posterior, sample
-from imubench_pipeline.estimators.smooth_drift import instead_of_walk
 from imubench_pipeline.estimators.spectrum import Spectrum, spectra
 from imubench_pipeline.estimators.whittle import Terms, Whittle, model_of
 from imubench_pipeline.noise import NoiseModel

@@ -1,25 +1,34 @@
-"""Lines: sinusoids that stand out of the fitted spectrum.
+"""Lines: sinusoids that stand out of the fitted spectrum, and those that a noise model carries on.
 
 They are looked for in Hann-windowed Fourier spectra averaged over segments, so a line need not
 keep its phase over the whole log. Under the model the density of a bin over its expectation is
 chi-squared with two degrees of freedom for each segment.
+
+Each line is two states of a Kalman filter and an integral of an error budget; some steps cost the
+square or the cube of their number. So the strongest are carried on as they are. The weaker ones are
+joined in a few groups of neighbours, a floor of the same power: of n sinusoids A_i at f_i,
+
+    A^2 = sum A_i^2,   f^2 = A^2 / sum (A_i / f_i)^2,
+
+which keeps the variance of the signal, and of its integral.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.special import betainc, gammainccinv
 
-from imubench_pipeline.estimators.estimate import SIGMAS
+from imubench_pipeline.estimators.estimate import SI_UNITS, SIGMAS, Parameter
 from imubench_pipeline.estimators.spectrum import LineSpectrum, Spectrum
 from imubench_pipeline.noise import NoiseModel, Sinusoid
+from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.typing import Array
 
 FALSE_ALARM = 0.005
@@ -31,7 +40,7 @@ _LEVEL = 129
 _MEDIAN_KNOWS = 1.0 / (1.94 * 1.57)
 """Independent bins in a bin of the median: neighbours are correlated, and a median wastes some."""
 
-_MOST = 1000
+_MOST_FOUND = 1000
 """Lines of a spectrum, the strongest: what compares them costs the square of their number."""
 
 _DISTURBED = 2
@@ -57,6 +66,15 @@ _LEAKS = 0.3
 _NOISE_POWER, _NOISE_PLACE = 12.6, 50.0
 _CROSS_POWER, _CROSS_PLACE = 35.0 / 18.0, 5.0 / 18.0
 _FLOOR_POWER, _FLOOR_PLACE = 4e-3, 5e-3
+
+STRONGEST = 12
+"""Lines that are carried as they are where there are too many."""
+
+GROUPS = 4
+"""Groups of the weaker ones."""
+
+MOST = STRONGEST + GROUPS
+"""So many lines are carried without being joined."""
 
 
 @dataclass(frozen=True)
@@ -134,8 +152,8 @@ def find(
     for spectrum, (low, high) in zip(spectra, searched, strict=True):
         if high > low:
             new = _lines(spectrum, model, rate, low, high, total)
-            if len(new) > _MOST:
-                new = sorted(new, key=lambda line: -line.ratio)[:_MOST]
+            if len(new) > _MOST_FOUND:
+                new = sorted(new, key=lambda line: -line.ratio)[:_MOST_FOUND]
             lines = _joined(lines, new)
     lines = [_without_alias(line, lines, spectra[0].block, rate) for line in lines]
     return sorted(lines, key=lambda line: line.frequency)
@@ -335,3 +353,85 @@ def without_lines(spectrum: Spectrum, lines: Sequence[Line], density: Array) -> 
             spectrum.lower > line.frequency + reach
         )
     return clear
+
+
+def carried_sinusoids(lines: Sequence[Line]) -> list[dict[str, Parameter]]:
+    """Return amplitude and frequency of the sinusoids that a model carries on, by frequency.
+
+    Parameters
+    ----------
+    lines : sequence of Line
+        All that were found, by frequency; bands of noise and aliases are left out.
+    """
+    narrow = [line for line in lines if line.narrow]
+    if len(narrow) <= MOST:
+        return [_line_parameters(line) for line in narrow]
+    single = set(strongest([line.amplitude for line in narrow]))
+    weaker = [line for place, line in enumerate(narrow) if place not in single]
+    sinusoids = [_line_parameters(narrow[place]) for place in single]
+    sinusoids += [_as_one_line([weaker[i] for i in group]) for group in _groups(len(weaker))]
+    return sorted(sinusoids, key=lambda sinusoid: sinusoid["frequency"].value or 0.0)
+
+
+def strongest(amplitudes: Sequence[float]) -> list[int]:
+    """Return the places of the lines that are carried as they are; all where they are few."""
+    number = len(amplitudes) if len(amplitudes) <= MOST else STRONGEST
+    order = sorted(range(len(amplitudes)), key=lambda place: -amplitudes[place])
+    return sorted(order[:number])
+
+
+def joined_finding(channel: str, quantity: str, sinusoids: Sequence[Mapping[str, Any]]) -> Finding:
+    """Return the warning about a channel with more sinusoids than a model carries on.
+
+    Parameters
+    ----------
+    channel : str
+    quantity : {"gyro", "accel"}
+    sinusoids : sequence of mapping
+        With ``amplitude``, SI; more than `MOST`.
+    """
+    single = set(strongest([sinusoid["amplitude"] for sinusoid in sinusoids]))
+    powers = [0.5 * sinusoid["amplitude"] ** 2 for sinusoid in sinusoids]
+    rest = math.fsum(power for place, power in enumerate(powers) if place not in single)
+    share = rest / math.fsum(powers)
+    number = len(sinusoids) - len(single)
+    detail = (
+        f"{channel} has {len(sinusoids)} sinusoids: the {len(single)} strongest go into error "
+        f"budgets, simulations and filters as they are, the other {number} as {GROUPS} of their "
+        f"power, {100 * share:.3g} % of that of all lines ({math.sqrt(rest):.3g} "
+        f"{SI_UNITS[quantity]['amplitude']} rms)"
+    )
+    return Finding("too_many_lines", "warning", detail, float(len(sinusoids)), channel)
+
+
+def _groups(number: int) -> list[list[int]]:
+    return [part.tolist() for part in np.array_split(np.arange(number), GROUPS)]
+
+
+def _line_parameters(line: Line) -> dict[str, Parameter]:
+    return {
+        "amplitude": Parameter(
+            line.amplitude, lower=line.amplitude_lower, upper=line.amplitude_upper
+        ),
+        "frequency": Parameter(
+            line.frequency, lower=line.frequency_lower, upper=line.frequency_upper
+        ),
+    }
+
+
+def _as_one_line(lines: Sequence[Line]) -> dict[str, Parameter]:
+    amplitude, low, high = (
+        math.hypot(*values)
+        for values in (
+            [line.amplitude for line in lines],
+            [line.amplitude_lower for line in lines],
+            [line.amplitude_upper for line in lines],
+        )
+    )
+    frequency = amplitude / math.hypot(*(line.amplitude / line.frequency for line in lines))
+    first, last = lines[0].frequency, lines[-1].frequency
+    reason = f"{len(lines)} weak lines from {first:.4g} to {last:.4g} Hz together"
+    return {
+        "amplitude": Parameter(amplitude, reason=reason, lower=low, upper=high),
+        "frequency": Parameter(frequency, reason=reason, lower=first, upper=last),
+    }

@@ -16,8 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from imubench_pipeline.estimators.importance import Mixture, sample_adaptively
-from imubench_pipeline.estimators.metropolis import chain
-from imubench_pipeline.estimators.posterior_kernels import log_posteriors, mode_at
+from imubench_pipeline.estimators.posterior_kernels import chain, log_posteriors, mode_at
 from imubench_pipeline.estimators.whittle import Maximum, Whittle
 from imubench_pipeline.estimators.whittle_kernels import Bins, ShapeTable, shape_at
 from imubench_pipeline.typing import Array

@@ -1,10 +1,10 @@
-"""What is asked of every noise term."""
+"""What is asked of every noise term, and what several put into a filter together."""
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar, Self
 
@@ -12,7 +12,14 @@ import numpy as np
 
 from imubench_pipeline.noise.growth import SensorStart, Uncalibrated
 from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace, root_of
-from imubench_pipeline.noise.terms.traits import Drive, Reading, Role, SampleBlocks, TermParameter
+from imubench_pipeline.noise.terms.traits import (
+    Drive,
+    Process,
+    Reading,
+    Role,
+    SampleBlocks,
+    TermParameter,
+)
 from imubench_pipeline.typing import Array
 
 if TYPE_CHECKING:
@@ -308,3 +315,42 @@ class Deterministic(Term):
             Always.
         """
         raise TypeError(f"{self} is deterministic")
+
+
+@dataclass(frozen=True)
+class Drives:
+    """The sum of what terms put into a filter.
+
+    Attributes
+    ----------
+    white : float
+        Density N^2, SI^2/Hz.
+    flicker : float
+        B^2 of flicker noise, SI^2.
+    processes : tuple of Process
+        Gauss-Markov processes.
+    walks : tuple of Process
+        Random walks, whose correlation time is infinite.
+    """
+
+    white: float
+    flicker: float
+    processes: tuple[Process, ...]
+    walks: tuple[Process, ...]
+
+
+def drives_of(terms: Iterable[Term]) -> Drives:
+    """Return what terms put into a filter; those without a density have no part in it.
+
+    Parameters
+    ----------
+    terms : iterable of Term
+    """
+    drives = [term.drive for term in terms if term.drive is not None]
+    processes = [drive.process for drive in drives if drive.process is not None]
+    return Drives(
+        sum(drive.white for drive in drives),
+        sum(drive.flicker**2 for drive in drives),
+        tuple(process for process in processes if math.isfinite(process.T_B)),
+        tuple(process for process in processes if math.isinf(process.T_B)),
+    )

@@ -10,10 +10,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from imubench_pipeline.noise.block_sums import of_scalar
 from imubench_pipeline.noise.exponentials import decay, squared_response
 from imubench_pipeline.noise.growth import SensorStart, Uncalibrated, of_constant
-from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace
+from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace, draw_block_sums
 from imubench_pipeline.noise.terms.base import Term
 from imubench_pipeline.noise.terms.random_walk import RandomWalk
 from imubench_pipeline.noise.terms.traits import (
@@ -191,7 +190,7 @@ class GaussMarkov(Term):
         """Draw them with the states at their ends."""
         interval = 1.0 / rate
         space = self.state_space(interval)
-        return of_scalar(space, self.start(rng, interval), blocks, width, rng)
+        return draw_block_sums(space, self.start(rng, interval), blocks, width, rng)
 
     def reading(self, lowest_tau: float) -> Reading:
         """0.664 B at the peak."""
