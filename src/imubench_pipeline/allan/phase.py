@@ -23,21 +23,13 @@ PRESENT = 0.9
 
 @dataclass(frozen=True)
 class Phase:
-    """Cumulative sums of a log on its uniform grid.
-
-    Attributes
-    ----------
-    theta : ndarray of float64, shape (L + 1,)
-        Cumulative sum of the samples less a constant; missing samples add nothing.
-    present : ndarray of int, shape (L + 1,), or None
-        Cumulative number of samples present; None: all are.
-    segments : tuple of (int, int)
-        Grid points that begin and end each segment.
-    """
+    """Cumulative sums of a log on its uniform grid."""
 
     theta: Array
+    """(L + 1,): cumulative sum of the samples less a constant; missing samples add nothing."""
     present: NDArray[np.integer[Any]] | None
-    segments: tuple[tuple[int, int], ...]
+    """(L + 1,): cumulative number of samples present; None: all are."""
+    segments: tuple[tuple[int, int], ...]  # grid points that begin and end each segment
 
     @property
     def samples(self) -> int:
@@ -185,8 +177,6 @@ def sum_sizes(theta: Array, start: int, stop: int, sizes: NDArray[np.int64], sum
 
     Parameters
     ----------
-    theta : ndarray
-    start, stop : int
     sizes : ndarray of int
         Points in a cluster.
     sums : ndarray
@@ -277,7 +267,6 @@ def full_sums(
 
     Parameters
     ----------
-    phase : Phase
     sizes : ndarray of int
         Points of the phase in a cluster.
     threads : int

@@ -20,33 +20,16 @@ _STEPS = 32
 
 @dataclass(frozen=True)
 class Presence:
-    """Cumulative numbers of samples present.
+    """Cumulative numbers of samples present."""
 
-    Attributes
-    ----------
-    samples : int
-        L, the points of the grid.
-    segments : tuple of (int, int)
-        Grid points that begin and end each segment.
-    first : ndarray of int
-        Samples present before each of the first points.
-    stride : int
-    coarse : ndarray of int
-        Samples present before every ``stride``-th point of the log.
-    """
-
-    samples: int
-    segments: tuple[tuple[int, int], ...]
-    first: Counts
+    samples: int  # L, the points of the grid
+    segments: tuple[tuple[int, int], ...]  # grid points that begin and end each segment
+    first: Counts  # samples present before each of the first points
     stride: int
-    coarse: Counts
+    coarse: Counts  # samples present before every ``stride``-th point of the log
 
     def differences(self, n: int) -> tuple[NDArray[np.bool_], int] | None:
         """Tell which differences of two adjacent cluster means of n samples there are.
-
-        Parameters
-        ----------
-        n : int
 
         Returns
         -------

@@ -23,8 +23,6 @@ def in_threads(
     work : callable
         Takes the first and one-past-last piece; returns arrays with one row a piece. It must let
         other threads run.
-    pieces : int
-    threads : int
 
     Returns
     -------

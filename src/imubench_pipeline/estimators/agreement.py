@@ -78,7 +78,6 @@ def disagreements(channel: str, estimates: Mapping[str, Estimate]) -> Iterator[F
 
     Parameters
     ----------
-    channel : str
     estimates : mapping of str to Estimate
         By method, as they were found.
     """

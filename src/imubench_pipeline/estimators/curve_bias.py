@@ -47,23 +47,12 @@ _PEAK_SHAPE = float(gauss_markov_shape(np.array([PEAK_TAU]), 1.0)[0])
 
 @dataclass(frozen=True)
 class Models:
-    """Parameters of many models that have the same terms.
-
-    Attributes
-    ----------
-    terms : Terms
-    parameters : ndarray, shape (d, p)
-        The linear parameters in their order, then B of each process; SI.
-    times : ndarray, shape (d, g)
-        T_B of each process, s.
-    weight : float
-        Of all of them together, among those of other terms.
-    """
+    """Parameters of many models that have the same terms."""
 
     terms: Terms
-    parameters: Array
-    times: Array
-    weight: float = 1.0
+    parameters: Array  # (d, p): the linear parameters in their order, then B of each process; SI
+    times: Array  # (d, g): T_B of each process, s
+    weight: float = 1.0  # of all of them together, among those of other terms
 
     def parameter(self, letter: str) -> Array:
         """Return Q, N, B of flicker noise (F) or K, shape (d,); zeros where there is none."""
@@ -105,7 +94,6 @@ def bias_of_curve(models: Models, longest: float) -> tuple[Array, Array]:
 
     Parameters
     ----------
-    models : Models
     longest : float
         Averaging time up to which it is looked for, s.
 
@@ -154,7 +142,6 @@ def lowest_point(models: Models, tau: Array) -> tuple[Array, Array, NDArray[np.b
 
     Parameters
     ----------
-    models : Models
     tau : ndarray, shape (m,)
         Rising evenly in the logarithm, s; between them a parabola is taken.
 
@@ -203,7 +190,6 @@ def with_curve(
 
     Parameters
     ----------
-    estimate : Estimate
     alike : sequence of Candidate
         The models that the log does not rule out, the chosen one first.
     wider : sequence of Candidate
@@ -270,7 +256,6 @@ def of_model(model: NoiseModel, tau: Array) -> dict[str, Parameter]:
 
     Parameters
     ----------
-    model : NoiseModel
     tau : ndarray, shape (m,)
         As `averaging_times` gives them.
     """

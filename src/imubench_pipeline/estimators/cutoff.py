@@ -89,57 +89,27 @@ _AS_STATED = 1.6
 
 @dataclass(frozen=True)
 class Cutoff:
-    """The low-pass that a spectrum shows.
+    """The low-pass that a spectrum shows."""
 
-    Attributes
-    ----------
-    frequency : Parameter
-        f_c (-3 dB), Hz.
-    order : int or None
-        n; None where no filter shows.
-    N : Parameter
-        Density of white noise before the filter, SI.
-    floor : float
-        Density of white noise after it, that of rounding and what else shows, SI.
-    gained : float
-        BIC of the noise without a filter, less that with it.
-    or_quantization : bool
-        Quantization noise would explain the spectrum as well.
-    kind : str or None
-        ``analogue``, ``bilinear`` or ``boxcar``; None where no filter shows.
-    or_process : str or None
-        Why what bends the spectrum may be a process or a filter, and is not told.
-    N_behind : float or None
-        N before the filter, if it is one, where that is not told; SI.
-    behind : Behind or None
-        What the filter leaves of noise in each bin of the whole spectrum.
-    ruled : ndarray of bool, shape (b,), or None
-        Bins in which the ends of the transform rule, and not the noise.
-    readings : sequence of Reading
-        Of all filters that the log does not rule out.
-    allowed : sequence of Allowed
-        Those filters, the chosen one first.
-    rounded : float
-        Density of rounding, parts of N^2.
-    models : mapping of Terms to OfModel
-        Where the cut-off was fitted together with models of the noise.
-    """
-
-    frequency: Parameter
-    order: int | None
-    N: Parameter
-    floor: float
-    gained: float
-    or_quantization: bool = False
-    kind: Kind | None = None
+    frequency: Parameter  # f_c (-3 dB), Hz
+    order: int | None  # n; None where no filter shows
+    N: Parameter  # density of white noise before the filter, SI
+    floor: float  # density of white noise after it, that of rounding and what else shows, SI
+    gained: float  # BIC of the noise without a filter, less that with it
+    or_quantization: bool = False  # quantization noise would explain the spectrum as well
+    kind: Kind | None = None  # ``analogue``, ``bilinear`` or ``boxcar``; None where no filter shows
     or_process: str | None = None
-    N_behind: float | None = None
+    """Why what bends the spectrum may be a process or a filter, and is not told."""
+    N_behind: float | None = None  # N before the filter, if it is one, where that is not told; SI
     behind: Behind | None = None
+    """What the filter leaves of noise in each bin of the whole spectrum."""
     ruled: NDArray[np.bool_] | None = None
-    readings: Sequence[Reading] = ()
-    allowed: Sequence[Allowed] = ()
-    rounded: float = 0.0
+    """(b,): bins in which the ends of the transform rule, and not the noise."""
+    readings: Sequence[Reading] = ()  # of all filters that the log does not rule out
+    allowed: Sequence[Allowed] = ()  # those filters, the chosen one first
+    rounded: float = 0.0  # density of rounding, parts of N^2
     models: Mapping[Terms, OfModel] = field(default_factory=dict)
+    """Where the cut-off was fitted together with models of the noise."""
 
     @property
     def words(self) -> str:
@@ -162,8 +132,6 @@ class Cutoff:
 
         Parameters
         ----------
-        number : int
-        rng : numpy.random.Generator
         terms : Terms
             The model of the noise.
         """

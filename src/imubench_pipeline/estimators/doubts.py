@@ -93,7 +93,6 @@ def add_doubts(
     ----------
     estimate, papers : Estimate
         Of the model that the data favour, and of the papers' model.
-    spectrum : Spectrum
     frame : Frame
         What of it was fitted.
     candidates : sequence of Candidate
@@ -252,10 +251,8 @@ def cast_doubt(
 
     Parameters
     ----------
-    estimate : Estimate
     names : sequence of str
         Of its parameters; what has no plain value stays as it is.
-    reason : str
     of_curve : bool
         With B go the figures of the curve.
     """
@@ -406,7 +403,6 @@ def instead_of_walk(whittle: Whittle, chosen: Maximum) -> str | None:
 
     Parameters
     ----------
-    whittle : Whittle
     chosen : Maximum
         The model that the data favour, fitted to it.
 

@@ -34,7 +34,6 @@ def drawn_share(candidate: Candidate, bins: int) -> float:
 
     Parameters
     ----------
-    candidate : Candidate
     bins : int
         Bins of the spectrum that it was fitted to.
     """
@@ -61,10 +60,6 @@ def joint_draws(
         The longest correlation time that the log can show, s.
     number : int
         Draws of all together.
-
-    Returns
-    -------
-    JointDraws
 
     Raises
     ------

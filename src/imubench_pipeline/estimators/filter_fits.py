@@ -116,28 +116,14 @@ def gains(spectrum: Spectrum, trial: FilterTrial) -> tuple[Array, Array, Array]:
 
 @dataclass(frozen=True)
 class FilterTrial:
-    """A filter, where its likelihood has a maximum.
+    """A filter, where its likelihood has a maximum."""
 
-    Attributes
-    ----------
-    score : float
-        Half its BIC.
-    cost : float
-        -log L.
-    kind : str
-    order : int
-    cutoff : float
-        Hz.
-    floor : bool
-        White noise stands behind it beside that of rounding.
-    """
-
-    score: float
-    cost: float
+    score: float  # half its BIC
+    cost: float  # -log L
     kind: Kind
     order: int
-    cutoff: float
-    floor: bool
+    cutoff: float  # Hz
+    floor: bool  # white noise stands behind it beside that of rounding
 
     @property
     def low_pass(self) -> Filter:
@@ -159,7 +145,6 @@ def explains_bend(spectrum: Spectrum, fitted: Array, trial: FilterTrial) -> bool
 
     Parameters
     ----------
-    spectrum : Spectrum
     fitted : ndarray, shape (b,)
         Density of the fit in each bin.
     trial : FilterTrial
@@ -403,37 +388,22 @@ class FilterFits:
 
 @dataclass(frozen=True)
 class Reading:
-    """What a filter that the log allows makes of N.
+    """What a filter that the log allows makes of N."""
 
-    Attributes
-    ----------
-    weight : float
-        Of the filter, by its likelihood.
-    below, at, above : float
-        Logarithm of N at the lower limit of the cut-off, at its best and at its upper limit, less
-        that of the filter that was chosen.
-    """
-
-    weight: float
+    weight: float  # of the filter, by its likelihood
     below: float
     at: float
     above: float
+    """Logarithm of N at the lower limit of the cut-off, at its best and at its upper limit, less
+    that of the filter that was chosen."""
 
 
 @dataclass(frozen=True)
 class Allowed:
-    """A filter that the log does not rule out.
+    """A filter that the log does not rule out."""
 
-    Attributes
-    ----------
-    filter : FilterTrial
-        At its best cut-off.
-    half_width : float
-        Half of the 95 % interval of the logarithm of its cut-off.
-    """
-
-    filter: FilterTrial
-    half_width: float
+    filter: FilterTrial  # at its best cut-off
+    half_width: float  # half of the 95 % interval of the logarithm of its cut-off
 
     def at(self, x: float) -> FilterTrial:
         """Return it at a logarithm of the cut-off, Hz."""
@@ -442,18 +412,11 @@ class Allowed:
 
 @dataclass(frozen=True)
 class OfModel:
-    """What the filters make of N in a model of the noise, each fitted together with it.
+    """What the filters make of N in a model of the noise, each fitted together with it."""
 
-    Attributes
-    ----------
-    readings : sequence of Reading
-        Over N at the cut-off that was chosen, in the same model.
-    gained : float
-        Log likelihood of the model with a cut-off of its own, less that with the chosen one.
-    """
-
-    readings: Sequence[Reading]
+    readings: Sequence[Reading]  # over N at the cut-off that was chosen, in the same model
     gained: float
+    """Log likelihood of the model with a cut-off of its own, less that with the chosen one."""
 
 
 def also_after_sampling(reading: Reading, trial: FilterTrial, rate: float) -> Reading:
@@ -463,7 +426,6 @@ def also_after_sampling(reading: Reading, trial: FilterTrial, rate: float) -> Re
 
     Parameters
     ----------
-    reading : Reading
     trial : FilterTrial
         An analogue filter of first order.
     rate : float
@@ -482,8 +444,6 @@ def draw_factors(readings: Sequence[Reading], number: int, rng: np.random.Genera
     ----------
     readings : sequence of Reading
         At least one.
-    number : int
-    rng : numpy.random.Generator
     """
     weight = np.array([reading.weight for reading in readings])
     which = rng.choice(len(weight), number, p=weight / weight.sum())

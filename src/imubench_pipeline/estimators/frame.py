@@ -53,33 +53,19 @@ FEWEST_BINS = 20
 
 @dataclass(frozen=True)
 class Frame:
-    """What of a spectrum is fitted.
-
-    Attributes
-    ----------
-    lines : sequence of Line
-    clear, used : ndarray of bool, shape (b,)
-        The bins clear of lines, and those of them that are fitted.
-    band : Band
-        Highest frequency that is fitted, and why.
-    low_pass : Cutoff or None
-        The sensor's low-pass; None where a band is asked for, which is taken as it is.
-    shortest : float or None
-        Shortest correlation time of a process, s; None: as `whittle_of` has it.
-    stated : float or None
-        Cut-off of the sensor's own filter, where it is stated, Hz.
-    cut : bool
-        Frequencies are left out that neither a process nor a filter explains.
-    """
+    """What of a spectrum is fitted."""
 
     lines: Sequence[Line]
     clear: Mask
     used: Mask
-    band: Band
+    """(b,): the bins clear of lines, and those of them that are fitted."""
+    band: Band  # highest frequency that is fitted, and why
     low_pass: Cutoff | None = None
+    """The sensor's low-pass; None where a band is asked for, which is taken as it is."""
     shortest: float | None = None
-    stated: float | None = None
-    cut: bool = False
+    """Shortest correlation time of a process, s; None: as `whittle_of` has it."""
+    stated: float | None = None  # cut-off of the sensor's own filter, where it is stated, Hz
+    cut: bool = False  # frequencies are left out that neither a process nor a filter explains
 
     def whittle(self, spectrum: Spectrum, shapes: int = SHAPES) -> Whittle:
         """Return the likelihood of the bins that are fitted."""
@@ -107,7 +93,6 @@ class Frame:
 
         Parameters
         ----------
-        spectrum : Spectrum
         times : ndarray, shape (g,)
             T_B of each process, s.
         """
@@ -161,7 +146,6 @@ class Frame:
             Of a model behind the low-pass.
         terms : Terms
             The model.
-        rng : numpy.random.Generator
         """
         if self.low_pass is None or not self.low_pass.readings:
             return posterior
@@ -217,7 +201,6 @@ def frame_of(
 
     Parameters
     ----------
-    spectrum : Spectrum
     line_spectra : sequence of LineSpectrum
         As `imubench_pipeline.estimators.spectrum.spectra` gives them.
     band : float, optional
@@ -226,10 +209,6 @@ def frame_of(
         Cut-off of the sensor's own filter, where it is stated, Hz.
     resolution : float
         Step of the register, SI; 0 where none shows.
-
-    Returns
-    -------
-    Frame
     """
     lines, clear = _lines(spectrum, line_spectra, band)
     nyquist = 0.5 * spectrum.rate

@@ -16,24 +16,13 @@ DOUBT = 1e-3
 
 @dataclass(frozen=True)
 class Goodness:
-    """How well a model explains a spectrum.
+    """How well a model explains a spectrum."""
 
-    Attributes
-    ----------
-    deviance : float
-        Mean deviance of a bin; about 1.0 where the model is right.
-    chance : float
-        Chance of so large a deviance, or so long runs of bins on one side, if the model is right.
-    verdict : str
-        ``explained`` or ``not explained``.
-    where : str
-        The frequencies at which the spectrum is furthest from the model.
-    """
-
-    deviance: float
+    deviance: float  # mean deviance of a bin; about 1.0 where the model is right
     chance: float
-    verdict: str
-    where: str
+    """Chance of so large a deviance, or so long runs of bins on one side, if the model is right."""
+    verdict: str  # ``explained`` or ``not explained``
+    where: str  # the frequencies at which the spectrum is furthest from the model
 
 
 def goodness(nu: Array, data: Array, density: Array, frequency: Array, parameters: int) -> Goodness:

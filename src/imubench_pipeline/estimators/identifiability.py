@@ -129,7 +129,6 @@ def durations_needed(
 
     Parameters
     ----------
-    maximum : Maximum
     rate, duration, highest : float
         Of the log: Hz, s, and the highest frequency used, Hz.
 

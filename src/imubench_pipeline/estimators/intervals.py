@@ -51,7 +51,6 @@ def with_upper_limits(
 
     Parameters
     ----------
-    estimate : Estimate
     alike : sequence of Candidate
         The models that the log does not rule out, the chosen one first.
     wider : sequence of Candidate

@@ -86,8 +86,6 @@ def refine_cutoff(
 
     Parameters
     ----------
-    low_pass : Cutoff
-    spectrum : Spectrum
     clear : ndarray of bool, shape (b,)
         Bins that no line touches, and in which the ends of the transform do not rule.
     candidates : sequence of Candidate

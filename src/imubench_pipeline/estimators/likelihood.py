@@ -119,10 +119,6 @@ def fit(
     rng : numpy.random.Generator, optional
         For the posterior draws, and for missing samples; by default always the same.
 
-    Returns
-    -------
-    Likelihood
-
     Raises
     ------
     ValueError
@@ -224,10 +220,8 @@ def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) 
 
     Parameters
     ----------
-    spectrum : Spectrum
     frame : Frame
         What of it is fitted.
-    rng : numpy.random.Generator
     """
     if frame.used.sum() < FEWEST_BINS:
         return _too_short(spectrum, frame)
@@ -340,7 +334,6 @@ def fit_models(spectrum: Spectrum, frame: Frame) -> tuple[Frame, Whittle, list[C
 
     Parameters
     ----------
-    spectrum : Spectrum
     frame : Frame
         As `imubench_pipeline.estimators.frame.frame_of` gives it.
 

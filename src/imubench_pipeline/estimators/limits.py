@@ -57,17 +57,10 @@ _STEP_OF_LOWEST = 0.05
 
 @dataclass(frozen=True)
 class Errors:
-    """Covariance of the logarithms of the parameters of a fit.
+    """Covariance of the logarithms of the parameters of a fit."""
 
-    Attributes
-    ----------
-    names : sequence of str
-        The parameters, m of them.
-    covariance : ndarray, shape (m, m)
-    """
-
-    names: Sequence[str]
-    covariance: Array
+    names: Sequence[str]  # the parameters, m of them
+    covariance: Array  # (m, m)
 
     def of(self, name: str) -> float:
         """Return the relative standard error of a parameter, at most 10."""
@@ -117,7 +110,6 @@ def fit_errors(
 
     Parameters
     ----------
-    curve : AllanCurve
     used : ndarray of bool, shape (m,)
         The tau of the fit.
     model : NoiseModel
@@ -199,7 +191,6 @@ def with_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) 
     ----------
     estimate : Estimate
         A fit in which every term that is there has a value.
-    curve : AllanCurve
     used : ndarray of bool, shape (m,)
         The tau of the fit.
     """

@@ -334,8 +334,6 @@ def without_lines(spectrum: Spectrum, lines: Sequence[Line], density: Array) -> 
 
     Parameters
     ----------
-    spectrum : Spectrum
-    lines : sequence of Line
     density : ndarray, shape (b,)
         Fitted density of each bin: a strong line reaches further, as 1/f², than a weak one.
 
@@ -385,7 +383,6 @@ def joined_finding(channel: str, quantity: str, sinusoids: Sequence[Mapping[str,
 
     Parameters
     ----------
-    channel : str
     quantity : {"gyro", "accel"}
     sinusoids : sequence of mapping
         With ``amplitude``, SI; more than `MOST`.

@@ -38,22 +38,13 @@ _DIFFUSE = 1e4
 
 @dataclass(frozen=True)
 class BlockMeans:
-    """Means over the samples present in blocks of `BLOCK`, no block over two segments.
-
-    Attributes
-    ----------
-    begin, end : ndarray of int, shape (b,)
-        First and one-past-last sample of each block.
-    mean : ndarray, shape (b,)
-        rad/s or m/s²; 0 where no sample is present.
-    count : ndarray of int, shape (b,)
-        Samples present.
-    """
+    """Means over the samples present in blocks of `BLOCK`, no block over two segments."""
 
     begin: NDArray[np.int64]
     end: NDArray[np.int64]
-    mean: Array
-    count: NDArray[np.int64]
+    """(b,): first and one-past-last sample of each block."""
+    mean: Array  # (b,): rad/s or m/s²; 0 where no sample is present
+    count: NDArray[np.int64]  # (b,): samples present
 
     def within(self, start: int, stop: int) -> slice:
         """Return the blocks from one sample to another."""
@@ -63,18 +54,12 @@ class BlockMeans:
 
 @dataclass(frozen=True)
 class SlowPath:
-    """The slow part of the noise, the level of the log included, linear between knots.
-
-    Attributes
-    ----------
-    sample : ndarray, shape (k,)
-        Place of the knots on the grid of the log: the middles of blocks, and the ends of parts.
-    value : ndarray, shape (k,)
-        rad/s or m/s².
-    """
+    """The slow part of the noise, the level of the log included, linear between knots."""
 
     sample: Array
-    value: Array
+    """(k,): place of the knots on the grid of the log: the middles of blocks, and the ends of
+    parts."""
+    value: Array  # (k,): rad/s or m/s²
 
     def at(self, samples: NDArray[np.int64]) -> Array:
         """Return the slow part at samples of the log."""
@@ -139,7 +124,6 @@ def divide_at_holes(
 
     Parameters
     ----------
-    means : BlockMeans
     segments : sequence of (int, int)
         First and one-past-last sample of each, as `block_means` had them.
 
@@ -172,13 +156,10 @@ def slow_part(
 
     Parameters
     ----------
-    means : BlockMeans
     parts : sequence of (int, int)
         First and one-past-last sample of each part of the log (`divide_at_holes`).
-    model : NoiseModel
     rate : float
         Hz.
-    rng : numpy.random.Generator
 
     Returns
     -------
@@ -233,12 +214,10 @@ def fill_missing(
     ----------
     blocks : iterable of ndarray
         The log in order, NaN where a sample is missing.
-    path : SlowPath
     model : NoiseModel
         Its N is the white part.
     rate : float
         Hz.
-    rng : numpy.random.Generator
     """
     reached = 0
     for values in blocks:

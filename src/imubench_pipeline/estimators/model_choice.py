@@ -46,28 +46,17 @@ of simulated logs without a ramp get one beside a random walk, and 1 to 3 % quan
 
 @dataclass(frozen=True)
 class Candidate:
-    """A model, its best fit and its scores.
-
-    Attributes
-    ----------
-    maximum : Maximum
-    bic, aic : float
-        2 (-log L) + p log(number of bins), and + 2 p. Where a Gauss-Markov process or a ramp
-        stands for a random walk, 4 is added to the BIC; for a ramp and for quantization noise, 6
-        each.
-    weight : float
-        Weight of the model among the candidates, proportional to e^(-BIC/2).
-    share : float
-        That of e^(-AIC/2): an interval over models must not hang on a choice that the log
-        hardly makes, and BIC leaves out what is weak.
-    goodness : Goodness
-    """
+    """A model, its best fit and its scores."""
 
     maximum: Maximum
     bic: float
     aic: float
-    weight: float
+    """2 (-log L) + p log(number of bins), and + 2 p. Where a Gauss-Markov process or a ramp stands
+    for a random walk, 4 is added to the BIC; for a ramp and for quantization noise, 6 each."""
+    weight: float  # weight of the model among the candidates, proportional to e^(-BIC/2)
     share: float
+    """That of e^(-AIC/2): an interval over models must not hang on a choice that the log hardly
+    makes, and BIC leaves out what is weak."""
     goodness: Goodness
 
     @property
@@ -81,7 +70,6 @@ def compare(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
 
     Parameters
     ----------
-    whittle : Whittle
     quantization : bool
         Try quantization noise too; the band must reach frequencies that show it.
     """
@@ -151,7 +139,6 @@ def rescore(candidates: Sequence[Candidate], gained: Mapping[Terms, float]) -> l
 
     Parameters
     ----------
-    candidates : sequence of Candidate
     gained : mapping of Terms to float
         Log likelihood that models gain; with a ramp as without it.
     """

@@ -60,24 +60,13 @@ _LEAST_START = 0.3
 
 @dataclass(frozen=True)
 class Posterior:
-    """Draws from the posterior of a model, equally weighted and in random order.
-
-    Attributes
-    ----------
-    parameters : ndarray, shape (draws, p)
-        The linear parameters in their order, then B of each process; SI.
-    times : ndarray, shape (draws, g)
-        T_B of each process, rising, s.
-    ramps : ndarray, shape (draws,)
-        R; zeros where the model has none.
-    effective : float
-        Number of independent draws that they are worth; NaN of a chain.
-    """
+    """Draws from the posterior of a model, equally weighted and in random order."""
 
     parameters: Array
-    times: Array
-    ramps: Array
-    effective: float
+    """(draws, p): the linear parameters in their order, then B of each process; SI."""
+    times: Array  # (draws, g): T_B of each process, rising, s
+    ramps: Array  # (draws,): R; zeros where the model has none
+    effective: float  # number of independent draws that they are worth; NaN of a chain
 
 
 def sample(
@@ -87,16 +76,10 @@ def sample(
 
     Parameters
     ----------
-    whittle : Whittle
     maximum : Maximum
         The best fit of the model; a term that it has at 0 is drawn all the same.
-    rng : numpy.random.Generator
     draws : int
         Draws to keep.
-
-    Returns
-    -------
-    Posterior
     """
     target = _Target(whittle, maximum)
     wanted = draws / _WORTH

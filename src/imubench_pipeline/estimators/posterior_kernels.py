@@ -188,7 +188,6 @@ def chain(
     start : ndarray, shape (d,)
     covariance : ndarray, shape (d, d)
         Of the first proposals.
-    rng : numpy.random.Generator
     draws : int
         Draws to keep, after those in which the chain learns.
     fixed, bins, processes, with_ramp, table

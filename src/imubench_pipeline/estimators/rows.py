@@ -111,7 +111,6 @@ def estimates(path: Path, joint: Path | None = None) -> dict[str, list[Estimate]
 
     Parameters
     ----------
-    path : Path
     joint : Path, optional
         Of its table ``draws``; without it no estimate has joint draws.
     """

@@ -105,7 +105,6 @@ def band_finding(channel: str, highest: float, source: str) -> list[Finding]:
 
     Parameters
     ----------
-    channel : str
     highest : float
         Hz.
     source : str
@@ -131,7 +130,6 @@ def slow_noise_missing(
 
     Parameters
     ----------
-    channel : str
     spectrum : Spectrum
         Of the log as it is, with nothing taken out.
     fitted : ndarray, shape (b,)

@@ -60,26 +60,14 @@ class Terms:
 
 @dataclass(frozen=True)
 class Maximum:
-    """The best fit of a model.
-
-    Attributes
-    ----------
-    terms : Terms
-    powers : ndarray, shape (p,)
-        Squared parameters of the linear terms in their order, then B^2 of each process, SI.
-    times : ndarray, shape (g,)
-        T_B of each process, s, rising.
-    ramp : float
-        R, SI.
-    cost : float
-        -log L, up to a constant that all models of a spectrum share.
-    """
+    """The best fit of a model."""
 
     terms: Terms
     powers: Array
-    times: Array
-    ramp: float
-    cost: float
+    """(p,): squared parameters of the linear terms in their order, then B^2 of each process, SI."""
+    times: Array  # (g,): T_B of each process, s, rising
+    ramp: float  # R, SI
+    cost: float  # -log L, up to a constant that all models of a spectrum share
 
     def parameter(self, letter: str) -> float:
         """Return Q, N, B of flicker noise (F) or K."""
@@ -98,19 +86,14 @@ class Maximum:
 
 @dataclass(frozen=True)
 class Behind:
-    """What a low-pass leaves of the noise in each bin of a spectrum.
-
-    Attributes
-    ----------
-    white : ndarray, shape (b,)
-        Of white noise of N = 1, sampled, with what stands behind the filter in proportion to it.
-    flicker, slow : ndarray, shape (b,)
-        Gain of the power of flicker noise, whose folds show, and of slower noise.
-    """
+    """What a low-pass leaves of the noise in each bin of a spectrum."""
 
     white: Array
+    """(b,): of white noise of N = 1, sampled, with what stands behind the filter in proportion to
+    it."""
     flicker: Array
     slow: Array
+    """(b,): gain of the power of flicker noise, whose folds show, and of slower noise."""
 
     def select(self, chosen: NDArray[np.bool_]) -> Behind:
         """Return that of chosen bins."""

@@ -148,10 +148,6 @@ class LowPass:
         ----------
         frequency : float
             Hz.
-
-        Returns
-        -------
-        complex
         """
         s = 1j * frequency / self.cutoff
         poles = np.exp(

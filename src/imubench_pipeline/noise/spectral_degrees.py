@@ -41,18 +41,10 @@ _ROUNDED = ((0, 6.0), (1, -4.0), (2, 1.0))
 
 @dataclass(frozen=True)
 class Degrees:
-    """Degrees of freedom of an Allan variance over tau.
+    """Degrees of freedom of an Allan variance over tau."""
 
-    Attributes
-    ----------
-    edf : ndarray, shape (m,)
-        Of the chi-squared variate with the same relative variance.
-    upper : ndarray, shape (m,)
-        Of that with the same lower tail, from which the upper limit follows.
-    """
-
-    edf: Array
-    upper: Array
+    edf: Array  # (m,): of the chi-squared variate with the same relative variance
+    upper: Array  # (m,): of that with the same lower tail, from which the upper limit follows
 
 
 def degrees_of_model(

@@ -161,10 +161,8 @@ def draw_block_sums(
         Of one state, seen as it is, without measurement noise.
     start : ndarray, shape (1,)
         The first state.
-    blocks : int
     width : int
         Samples a block.
-    rng : numpy.random.Generator
 
     Returns
     -------

@@ -31,27 +31,17 @@ are held, although they are not known."""
 
 @dataclass(frozen=True)
 class Halves:
-    """The slow noise of the two halves of a log, the other terms held.
+    """The slow noise of the two halves of a log, the other terms held."""
 
-    Attributes
-    ----------
-    of : {"K", "slow noise"}
-        The random walk, or all terms but the white noise together.
-    first, second : float
-        Deviation of each half over that of the whole log.
-    ratio : float
-        Twice the log likelihood ratio of two values against one.
-    begin, middle, end : float
-        Of the halves, s from the first sample.
-    """
-
-    of: Literal["K", "slow noise"]
+    of: Literal["K", "slow noise"]  # the random walk, or all terms but the white noise together
     first: float
     second: float
-    ratio: float
+    """Deviation of each half over that of the whole log."""
+    ratio: float  # twice the log likelihood ratio of two values against one
     begin: float
     middle: float
     end: float
+    """Of the halves, s from the first sample."""
 
     @property
     def differ(self) -> bool:

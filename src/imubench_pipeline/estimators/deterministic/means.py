@@ -57,49 +57,28 @@ _LEAST_SPREAD = 0.05
 
 @dataclass(frozen=True)
 class Part:
-    """Block means of a part of a log without long holes.
+    """Block means of a part of a log without long holes."""
 
-    Attributes
-    ----------
-    start : int
-        First sample.
-    mean : ndarray, shape (n,)
-        rad/s or m/s²; interpolated, with white noise, where a block has few samples.
-    power : ndarray, shape (n,)
-        Half the mean squared difference of neighbouring samples in each block: the variance of
-        white noise, (rad/s)² or (m/s²)². NaN where a block has few samples.
-    kurtosis : float
-        Excess kurtosis of samples that are independent: twice that of their differences.
-    present : float
-        Share of its samples that are there.
-    pauses : tuple of (float, float)
-        Middle and length, in blocks, of holes so long that the sensor may have begun anew; the
-        longest of them, in order.
-    """
-
-    start: int
+    start: int  # first sample
     mean: Array
+    """(n,): rad/s or m/s²; interpolated, with white noise, where a block has few samples."""
     power: Array
+    """(n,): half the mean squared difference of neighbouring samples in each block: the variance of
+    white noise, (rad/s)² or (m/s²)². NaN where a block has few samples."""
     kurtosis: float
-    present: float
+    """Excess kurtosis of samples that are independent: twice that of their differences."""
+    present: float  # share of its samples that are there
     pauses: tuple[tuple[float, float], ...] = ()
+    """Middle and length, in blocks, of holes so long that the sensor may have begun anew; the
+    longest of them, in order."""
 
 
 @dataclass(frozen=True)
 class Means:
-    """Block means of a log.
+    """Block means of a log."""
 
-    Attributes
-    ----------
-    block : int
-        Samples in a block.
-    rate : float
-        Of the samples, Hz.
-    parts : tuple of Part
-    """
-
-    block: int
-    rate: float
+    block: int  # samples in a block
+    rate: float  # of the samples, Hz
     parts: tuple[Part, ...]
 
     @property
@@ -246,26 +225,16 @@ def _bridged(mean: Array, present: NDArray[np.bool_]) -> Array:
 
 @dataclass(frozen=True)
 class Steadiness:
-    """How the density of the fast noise changes over a log.
-
-    Attributes
-    ----------
-    trend, trend_error : float
-        Relative change of the density N from beginning to end, and its standard error.
-    spread : float
-        Relative standard deviation of N over sections of the log beyond chance.
-    chi_squared : float
-        Of the sections about their mean.
-    start, end : float
-        Of the part that was looked at, s.
-    """
+    """How the density of the fast noise changes over a log."""
 
     trend: float
     trend_error: float
-    spread: float
-    chi_squared: float
+    """Relative change of the density N from beginning to end, and its standard error."""
+    spread: float  # relative standard deviation of N over sections of the log beyond chance
+    chi_squared: float  # of the sections about their mean
     start: float
     end: float
+    """Of the part that was looked at, s."""
 
     @property
     def grows(self) -> bool:

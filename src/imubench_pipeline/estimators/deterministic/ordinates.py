@@ -49,34 +49,16 @@ _LEAST_ALONE = 1e-9
 
 @dataclass(frozen=True)
 class Fit:
-    """Noise and regressors fitted together.
-
-    Attributes
-    ----------
-    regressors : tuple of Regressor
-    sizes : ndarray, shape (p,)
-        Amplitudes, SI, in the order of the regressors' columns.
-    covariance : ndarray, shape (p, p)
-        Of the amplitudes, for the noise as fitted.
-    noise : Maximum
-    density : ndarray, shape (k,)
-        Of the noise at each ordinate, SI²/Hz.
-    residual : ndarray, shape (k,)
-        Coefficients less the regressors.
-    leverage : ndarray, shape (k,)
-        Part of each ordinate that the regressors take.
-    log_likelihood : float
-        Up to a constant that all fits of the ordinates share.
-    """
+    """Noise and regressors fitted together."""
 
     regressors: tuple[Regressor, ...]
-    sizes: Array
-    covariance: Array
+    sizes: Array  # (p,): amplitudes, SI, in the order of the regressors' columns
+    covariance: Array  # (p, p): of the amplitudes, for the noise as fitted
     noise: Maximum
-    density: Array
-    residual: Array
-    leverage: Array
-    log_likelihood: float
+    density: Array  # (k,): of the noise at each ordinate, SI²/Hz
+    residual: Array  # (k,): coefficients less the regressors
+    leverage: Array  # (k,): part of each ordinate that the regressors take
+    log_likelihood: float  # up to a constant that all fits of the ordinates share
 
 
 class Ordinates:
@@ -181,7 +163,6 @@ class Ordinates:
 
         Parameters
         ----------
-        regressors : sequence of Regressor
         start : ndarray, shape (k,), optional
             Density of the noise that the first weights are taken from.
         terms : Terms

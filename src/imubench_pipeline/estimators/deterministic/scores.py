@@ -55,20 +55,11 @@ _KNOWN = 1e-3
 
 @dataclass(frozen=True)
 class Score:
-    """The best regressor of a kind.
-
-    Attributes
-    ----------
-    regressor : Regressor
-    gain : float
-        Twice the log likelihood that it adds, for given noise.
-    threshold : float
-        What it must reach (`FALSE_ALARM`).
-    """
+    """The best regressor of a kind."""
 
     regressor: Regressor
-    gain: float
-    threshold: float
+    gain: float  # twice the log likelihood that it adds, for given noise
+    threshold: float  # what it must reach (`FALSE_ALARM`)
 
 
 def best_scores(
@@ -78,7 +69,6 @@ def best_scores(
 
     Parameters
     ----------
-    ordinates : Ordinates
     fit : Fit
         Its regressors are there already.
     density : ndarray, shape (k,)

@@ -97,7 +97,6 @@ def find_candidates(ordinates: Ordinates, fit: Fit) -> list[tuple[Score, Array]]
 
     Parameters
     ----------
-    ordinates : Ordinates
     fit : Fit
         What is there already.
     """
@@ -146,8 +145,6 @@ def with_candidate(
 
     Parameters
     ----------
-    ordinates : Ordinates
-    fit : Fit
     score : Score
         The regressor.
     density : ndarray, shape (k,)
@@ -171,8 +168,6 @@ def polish(
 
     Parameters
     ----------
-    ordinates : Ordinates
-    regressors : sequence of Regressor
     which : int
         Of them, the one that is moved.
     density : ndarray, shape (k,)
@@ -219,24 +214,14 @@ def _level_beside(ordinates: Ordinates, fit: Fit, sinusoid: Regressor) -> float:
 
 @dataclass(frozen=True)
 class Rival:
-    """What explains a log without a random walk, by one course more or by steps at its pauses.
-
-    Attributes
-    ----------
-    fit : Fit
-    courses : tuple of Regressor
-        The course, or the steps.
-    beyond : float
-        Twice the log likelihood over that of the noise with the walk, less what the search for
-        the course makes of noise alone.
-    near : float
-        Below 0 by so much, the course is about as good.
-    """
+    """What explains a log without a random walk, by one course more or by steps at its pauses."""
 
     fit: Fit
-    courses: tuple[Regressor, ...]
+    courses: tuple[Regressor, ...]  # the course, or the steps
     beyond: float
-    near: float = _NEAR
+    """Twice the log likelihood over that of the noise with the walk, less what the search for the
+    course makes of noise alone."""
+    near: float = _NEAR  # below 0 by so much, the course is about as good
 
     @property
     def better(self) -> bool:
@@ -257,7 +242,6 @@ def rival_of_walk(ordinates: Ordinates, fit: Fit) -> Rival | None:
 
     Parameters
     ----------
-    ordinates : Ordinates
     fit : Fit
         What was found so far.
 
@@ -288,8 +272,6 @@ def anew_at_pauses(ordinates: Ordinates, fit: Fit, walk: float = 0.0) -> Rival |
 
     Parameters
     ----------
-    ordinates : Ordinates
-    fit : Fit
     walk : float
         What a random walk in their place gains over the fit, twice the log likelihood.
 
@@ -313,27 +295,13 @@ def anew_at_pauses(ordinates: Ordinates, fit: Fit, walk: float = 0.0) -> Rival |
 
 @dataclass(frozen=True)
 class Searched:
-    """What a search found.
+    """What a search found."""
 
-    Attributes
-    ----------
-    fit : Fit
-        Noise and regressors; pulses and ramps among them.
-    without : Fit
-        Noise alone.
-    gains : tuple of float
-        For each regressor, twice the log likelihood that is lost without it.
-    many : bool
-        There are `MOST` or more.
-    rival : Rival or None
-        Explains the log about as well without a random walk.
-    """
-
-    fit: Fit
-    without: Fit
-    gains: tuple[float, ...]
-    many: bool
-    rival: Rival | None = None
+    fit: Fit  # noise and regressors; pulses and ramps among them
+    without: Fit  # noise alone
+    gains: tuple[float, ...]  # for each regressor, twice the log likelihood that is lost without it
+    many: bool  # there are `MOST` or more
+    rival: Rival | None = None  # explains the log about as well without a random walk
 
 
 def search(ordinates: Ordinates) -> Searched:

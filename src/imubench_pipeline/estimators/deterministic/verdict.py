@@ -25,26 +25,16 @@ _TAKEN_OUT = "it is taken out of the noise"
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a log that changes in time means for its estimates.
-
-    Attributes
-    ----------
-    findings : tuple of Finding
-    caveats : mapping of str to (str, str)
-        Status and reason of the parameters that are not to be relied on.
-    widening : float
-        Times the interval of N that a normal distribution would give.
-    growth : float
-        Logarithm of N at the end of the log over that at its beginning, where it grows.
-    scatter : float
-        Standard deviation of the logarithm of N over the log, where it varies otherwise.
-    """
+    """What a log that changes in time means for its estimates."""
 
     findings: tuple[Finding, ...]
     caveats: Mapping[str, tuple[Status, str]]
-    widening: float = 1.0
+    """Status and reason of the parameters that are not to be relied on."""
+    widening: float = 1.0  # times the interval of N that a normal distribution would give
     growth: float = 0.0
+    """Logarithm of N at the end of the log over that at its beginning, where it grows."""
     scatter: float = 0.0
+    """Standard deviation of the logarithm of N over the log, where it varies otherwise."""
 
     def applied(self, estimate: Estimate) -> Estimate:
         """Return an estimate with the caveats on the parameters that have a value."""
@@ -123,10 +113,8 @@ def verdict_of(channel: str, unit: str, courses: Courses) -> Verdict:
 
     Parameters
     ----------
-    channel : str
     unit : str
         SI unit of its samples.
-    courses : Courses
     """
     findings = [_finding(channel, unit, course) for course in courses.courses]
     caveats: dict[str, tuple[Status, str]] = {}
@@ -176,7 +164,6 @@ def deterministic_rows(key: Mapping[str, str], unit: str, courses: Courses) -> I
         Sensor, recording and channel.
     unit : str
         SI unit of the samples.
-    courses : Courses
     """
     for course in courses.courses:
         yield {

@@ -28,18 +28,14 @@ _LEAST_KNOWN = 0.1
 
 @dataclass(frozen=True)
 class PathErrors:
-    """What the drawn paths of a temperature do.
-
-    Attributes
-    ----------
-    moved : ndarray, shape (d, p + 1)
-        How each draw moves the regressors of temperature (p), SI per K and K², and the lag, s.
-    density : ndarray, shape (b,)
-        Mean density of what they leave in each bin of the spectrum, (rad/s)²/Hz or (m/s²)²/Hz.
-    """
+    """What the drawn paths of a temperature do."""
 
     moved: Array
+    """(d, p + 1): how each draw moves the regressors of temperature (p), SI per K and K², and the
+    lag, s."""
     density: Array
+    """(b,): mean density of what they leave in each bin of the spectrum, (rad/s)²/Hz or
+    (m/s²)²/Hz."""
 
 
 def path_errors(regressors: Regressors, regression: Regression, weights: Array) -> PathErrors:
@@ -47,7 +43,6 @@ def path_errors(regressors: Regressors, regression: Regression, weights: Array) 
 
     Parameters
     ----------
-    regressors : Regressors
     regression : Regression
         Of these regressors.
     weights : ndarray, shape (b,)

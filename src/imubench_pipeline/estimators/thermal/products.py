@@ -85,18 +85,10 @@ class BlockSeries:
 
 @dataclass(frozen=True)
 class Products:
-    """Mean products of coefficients in each bin of a spectrum, as densities.
+    """Mean products of coefficients in each bin of a spectrum, as densities."""
 
-    Attributes
-    ----------
-    cross : ndarray, shape (b, p)
-        Of the log and each of p regressors, SI times its unit, per Hz.
-    gram : ndarray, shape (b, p, p)
-        Of the regressors, in the product of their units, per Hz.
-    """
-
-    cross: Array
-    gram: Array
+    cross: Array  # (b, p): of the log and each of p regressors, SI times its unit, per Hz
+    gram: Array  # (b, p, p): of the regressors, in the product of their units, per Hz
 
 
 class Coefficients:

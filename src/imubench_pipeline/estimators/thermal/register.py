@@ -68,33 +68,20 @@ _LONG = 3.0
 
 @dataclass(frozen=True)
 class Readings:
-    """The readings of a register in blocks.
-
-    Attributes
-    ----------
-    begin, end : ndarray of int, shape (k,)
-        First and one-past-last sample of each block.
-    count : ndarray of int, shape (k,)
-        Readings present.
-    mean, low, high : ndarray, shape (k,)
-        °C; NaN where none is present.
-    step : float
-        Least significant bit of the register, °C; 0: none shows.
-    parts : tuple of slice
-        Blocks of each segment.
-    pieces : tuple of slice
-        Blocks between which the temperature jumps: the parts, where it does not.
-    """
+    """The readings of a register in blocks."""
 
     begin: NDArray[np.int64]
     end: NDArray[np.int64]
-    count: NDArray[np.int64]
+    """(k,): first and one-past-last sample of each block."""
+    count: NDArray[np.int64]  # (k,): readings present
     mean: Array
     low: Array
     high: Array
-    step: float
-    parts: tuple[slice, ...]
+    """(k,): °C; NaN where none is present."""
+    step: float  # least significant bit of the register, °C; 0: none shows
+    parts: tuple[slice, ...]  # blocks of each segment
     pieces: tuple[slice, ...]
+    """Blocks between which the temperature jumps: the parts, where it does not."""
 
     @property
     def centre(self) -> Array:
@@ -305,19 +292,12 @@ def _cut(read: Readings, part: slice, jumps: Sequence[tuple[int, int]]) -> tuple
 
 @dataclass(frozen=True)
 class CellStay:
-    """A long time in one cell.
+    """A long time in one cell."""
 
-    Attributes
-    ----------
-    blocks : slice
-        Of a segment.
-    taper : ndarray, shape (b,)
-        From 0 at the moments when the path crosses an edge of the cell, which say where it is, to
-        1 a crossing time away from them.
-    """
-
-    blocks: slice
+    blocks: slice  # of a segment
     taper: Array
+    """(b,): from 0 at the moments when the path crosses an edge of the cell, which say where it is,
+    to 1 a crossing time away from them."""
 
 
 def dwells(inside: NDArray[np.bool_], level: Array, half: float, q: float) -> Iterator[CellStay]:

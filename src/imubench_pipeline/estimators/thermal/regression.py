@@ -27,25 +27,14 @@ _TOGETHER = 8
 
 @dataclass(frozen=True)
 class Regression:
-    """A fit for given noise.
-
-    Attributes
-    ----------
-    beta : ndarray, shape (p,)
-        s, then q and what the beginning adds to s where they are in the model, then R where there
-        is a ramp; SI per K, K², K and s.
-    information : ndarray, shape (p, p)
-        Inverse of their covariance.
-    lag : float
-        s.
-    log_likelihood_gain : float
-        Log likelihood over that of beta = 0.
-    """
+    """A fit for given noise."""
 
     beta: Array
-    information: Array
-    lag: float
-    log_likelihood_gain: float
+    """(p,): s, then q and what the beginning adds to s where they are in the model, then R where
+    there is a ramp; SI per K, K², K and s."""
+    information: Array  # (p, p): inverse of their covariance
+    lag: float  # s
+    log_likelihood_gain: float  # log likelihood over that of beta = 0
 
     @property
     def covariance(self) -> Array:

@@ -56,18 +56,7 @@ _UPPER_OF_RMS = 2.24
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the log tells.
-
-    Attributes
-    ----------
-    sensitivity, quadratic, lag : Parameter
-    compensated : bool
-    reason : str
-    temperature_error : float
-        Standard deviation of the mean of what temperature adds to the log, SI.
-    path_errors : ndarray, shape (b,)
-        Density of what errors of the path leave in each bin, (rad/s)²/Hz or (m/s²)²/Hz.
-    """
+    """What the log tells."""
 
     sensitivity: Parameter
     quadratic: Parameter
@@ -75,7 +64,9 @@ class Verdict:
     compensated: bool
     reason: str
     temperature_error: float
+    """Standard deviation of the mean of what temperature adds to the log, SI."""
     path_errors: Array
+    """(b,): density of what errors of the path leave in each bin, (rad/s)²/Hz or (m/s²)²/Hz."""
 
 
 def judge(

@@ -164,12 +164,10 @@ class Term(ABC):
 
         Parameters
         ----------
-        blocks : int
         width : int
             Samples a block.
         rate : float
             Hz.
-        rng : numpy.random.Generator
 
         Returns
         -------
@@ -319,33 +317,16 @@ class Deterministic(Term):
 
 @dataclass(frozen=True)
 class Drives:
-    """The sum of what terms put into a filter.
+    """The sum of what terms put into a filter."""
 
-    Attributes
-    ----------
-    white : float
-        Density N^2, SI^2/Hz.
-    flicker : float
-        B^2 of flicker noise, SI^2.
-    processes : tuple of Process
-        Gauss-Markov processes.
-    walks : tuple of Process
-        Random walks, whose correlation time is infinite.
-    """
-
-    white: float
-    flicker: float
-    processes: tuple[Process, ...]
-    walks: tuple[Process, ...]
+    white: float  # density N^2, SI^2/Hz
+    flicker: float  # B^2 of flicker noise, SI^2
+    processes: tuple[Process, ...]  # Gauss-Markov processes
+    walks: tuple[Process, ...]  # random walks, whose correlation time is infinite
 
 
 def drives_of(terms: Iterable[Term]) -> Drives:
-    """Return what terms put into a filter; those without a density have no part in it.
-
-    Parameters
-    ----------
-    terms : iterable of Term
-    """
+    """Return what terms put into a filter; those without a density have no part in it."""
     drives = [term.drive for term in terms if term.drive is not None]
     processes = [drive.process for drive in drives if drive.process is not None]
     return Drives(
