@@ -21,20 +21,10 @@ _TOWARDS_TAIL = 1.4
 def noise_exponent(theta: Array, present: NDArray[np.integer[Any]] | None, n: int) -> int | None:
     """Tell the noise type from the lag-1 autocorrelation of adjacent cluster means.
 
-    Parameters
-    ----------
-    theta : ndarray, shape (m + 1,)
-        Cumulative sums of the samples at the edges of m adjacent clusters.
-    present : ndarray of int, shape (m + 1,), or None
-        Cumulative counts of the samples present at the same edges; None: all are.
-    n : int
-        Samples in a cluster.
-
-    Returns
-    -------
-    int or None
-        Exponent from 2 to -2 (see `imubench_pipeline.allan.variance.AllanCurve`); None where fewer
-        than 30 clusters are left.
+    ``theta``, shape (m + 1,), are cumulative sums of the samples at the edges of m adjacent
+    clusters of n, ``present`` the counts of samples there (None: all are). The exponent goes from 2
+    to -2 (see `imubench_pipeline.allan.variance.AllanCurve`); None where fewer than 30 clusters are
+    left.
 
     References
     ----------

@@ -225,16 +225,10 @@ def _sections(
 ) -> tuple[Array, Array, Array, Integers]:
     """Sum the clusters that begin in sections ``low`` to ``high``.
 
-    Returns
-    -------
-    sums : ndarray, shape (sections, 4, sizes)
-        As `OctaveSums.results`.
-    totals : ndarray, shape (sections,)
-        Sum of the samples less the bias.
-    edges : ndarray, shape (sections, SECTION / DECIMATION)
-        Cumulative sums within the section.
-    counts : ndarray of int
-        Cumulative numbers of samples present at the edges, and of the section; empty: all are.
+    Returned are sums, shape (sections, 4, sizes), as `OctaveSums.results`; totals, the sum of the
+    samples less the bias by section; edges, shape (sections, SECTION / DECIMATION), cumulative sums
+    within the section; and counts, cumulative numbers of samples present at the edges, and of the
+    section (empty: all are).
     """
     theta, tail, present = room
     points = SECTION // DECIMATION

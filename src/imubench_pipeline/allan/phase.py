@@ -175,12 +175,7 @@ def _sum_squares_twice(
 def sum_sizes(theta: Array, start: int, stop: int, sizes: NDArray[np.int64], sums: Array) -> None:
     """Add the squared second differences that begin at points ``start`` to ``stop``, by size.
 
-    Parameters
-    ----------
-    sizes : ndarray of int
-        Points in a cluster.
-    sums : ndarray
-        What is added to, by size.
+    ``sizes`` are points in a cluster; ``sums`` is what is added to.
     """
     j = 0
     while j < sizes.size:
@@ -215,21 +210,10 @@ def sum_present(
 ) -> tuple[float, float, int]:
     """Sum squared differences of adjacent means over the samples present.
 
-    Parameters
-    ----------
-    theta, present : ndarray
-        Cumulative sums, and numbers of samples present, at one stride.
-    m : int
-        Steps of that stride in a cluster.
-    enough : int
-        Samples that a cluster must have.
-    start, stop : int
-        First and one-past-last point at which the first cluster of a pair begins.
-
-    Returns
-    -------
-    (float, float, int)
-        Sum of squares, sum of the mean inverse numbers of samples, and number of pairs.
+    ``theta`` and ``present`` are cumulative sums and numbers of samples at one stride, ``m`` steps
+    of that in a cluster, which must have ``enough`` samples; the first of a pair begins at points
+    ``start`` to ``stop``. Returned are the sum of squares, the sum of the mean inverse numbers of
+    samples, and the number of pairs.
     """
     total = 0.0
     thinned = 0.0
@@ -276,10 +260,9 @@ def full_sums(
 
     Returns
     -------
-    total : ndarray
-        Sum of the squared differences.
-    thinned : ndarray
-        Sum of the mean inverse numbers of samples that the two clusters average.
+    total, thinned : ndarray
+        Sums of the squared differences, and of the mean inverse numbers of samples that the two
+        clusters average.
     terms, possible : ndarray of int
         Number of differences, and what it would be without holes.
     """

@@ -31,11 +31,8 @@ class Presence:
     def differences(self, n: int) -> tuple[NDArray[np.bool_], int] | None:
         """Tell which differences of two adjacent cluster means of n samples there are.
 
-        Returns
-        -------
-        (ndarray of bool, int) or None
-            For differences that begin a stride apart, and the stride; of the whole log, or of
-            its beginning where that has clusters enough. None: neither is fine enough.
+        For differences that begin a stride apart, and the stride; of the whole log, or of its
+        beginning where that has clusters enough. None: neither is fine enough.
         """
         if n >= _STEPS // 2 * self.stride:
             counts, base = self.coarse, self.stride
@@ -65,16 +62,9 @@ def presence(
     samples: int,
     segments: Sequence[tuple[int, int]] | None = None,
 ) -> Presence:
-    """Count the samples that are present.
+    """Count the samples that are present in a log, NaN where one is missing.
 
-    Parameters
-    ----------
-    blocks : iterable of ndarray
-        The log in order; NaN where a sample is missing.
-    samples : int
-        L, the length of all blocks together.
-    segments : sequence of (int, int), optional
-        Grid points that begin and end each segment; one segment by default.
+    ``segments`` are the grid points that begin and end each; one by default.
     """
     stride = 1
     while samples // stride > _POINTS:

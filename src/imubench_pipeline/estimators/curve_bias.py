@@ -90,20 +90,11 @@ def models_of(model: NoiseModel) -> Models:
 
 
 def bias_of_curve(models: Models, longest: float) -> tuple[Array, Array]:
-    """Return the bias instability of the curve of models.
+    """Return the bias instability of the curve of models up to a tau in s, and where it is.
 
-    Parameters
-    ----------
-    longest : float
-        Averaging time up to which it is looked for, s.
-
-    Returns
-    -------
-    bias : ndarray, shape (d,)
-        The largest Allan deviation of the flicker and Gauss-Markov terms over 0.664, rad/s or
-        m/s².
-    at : ndarray, shape (d,)
-        Where it is, s; flicker noise alone has it everywhere, and the longest is given.
+    That is the largest Allan deviation of the flicker and Gauss-Markov terms over 0.664, rad/s or
+    m/s², and its tau, s, both of shape (d,); flicker noise alone has it everywhere, and the longest
+    is given.
     """
     flicker, count = models.parameter("F"), models.terms.gauss_markov
     if count == 0:
@@ -140,19 +131,9 @@ def allan_variance(models: Models, tau: Array) -> Array:
 def lowest_point(models: Models, tau: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Return the lowest point of the Allan deviation of models.
 
-    Parameters
-    ----------
-    tau : ndarray, shape (m,)
-        Rising evenly in the logarithm, s; between them a parabola is taken.
-
-    Returns
-    -------
-    deviation : ndarray, shape (d,)
-        rad/s or m/s².
-    at : ndarray, shape (d,)
-        Its averaging time, s.
-    inside : ndarray of bool, shape (d,)
-        It is a minimum, and not an end of ``tau``.
+    ``tau``, shape (m,), rises evenly in the logarithm, s; between them a parabola is taken.
+    Returned are, each of shape (d,), the deviation, rad/s or m/s², its averaging time, s, and
+    whether it is a minimum, and not an end of ``tau``.
     """
     level = np.log(allan_variance(models, tau))
     rows = np.arange(len(level))
@@ -185,8 +166,7 @@ def with_curve(
 
     Values are the geometric means over the models that the log does not rule out, by their weights
     (BIC), and intervals those of their draws together. (By AIC, two processes of which the slower
-    stands for the random walk count as much as the walk: limits are twice as wide as they need
-    be.)
+    stands for the random walk count as much as the walk: limits are twice as wide as they need be.)
 
     Parameters
     ----------
@@ -195,8 +175,6 @@ def with_curve(
     wider : sequence of Candidate
         Models with one bias instability beside the terms of the chosen one: what is absent is
         below their limits.
-    draws : mapping of Terms to Posterior
-        Of all of them.
     tau : ndarray, shape (m,)
         As `averaging_times` gives them.
     """
@@ -252,13 +230,7 @@ def _weak_bias(drawn: Sequence[Models], as_good: bool, longest: float) -> Parame
 
 
 def of_model(model: NoiseModel, tau: Array) -> dict[str, Parameter]:
-    """Return the figures of the curve of a model as it is, without limits.
-
-    Parameters
-    ----------
-    tau : ndarray, shape (m,)
-        As `averaging_times` gives them.
-    """
+    """Return the figures of the curve of a model as it is, at `averaging_times`, without limits."""
     models = models_of(model)
     if not models.terms.parameters:
         nothing = Parameter(None, "not_shown", "there is no noise")
@@ -272,16 +244,10 @@ def of_model(model: NoiseModel, tau: Array) -> dict[str, Parameter]:
 def lowest_parameters(
     best: Sequence[Models], drawn: Sequence[Models], tau: Array
 ) -> dict[str, Parameter]:
-    """Return ``sigma_min`` and ``tau_min``.
+    """Return ``sigma_min`` and ``tau_min``, at `averaging_times`.
 
-    Parameters
-    ----------
-    best : sequence of Models
-        One model of each set of terms, as it is fitted; the chosen one first.
-    drawn : sequence of Models
-        Draws of them; none where the fit gives no limits.
-    tau : ndarray, shape (m,)
-        As `averaging_times` gives them.
+    ``best`` has one model of each set of terms, as it is fitted, the chosen one first; ``drawn``
+    has draws of them, none where the fit gives no limits.
     """
     points = [lowest_point(models, tau) for models in best]
     weights = [models.weight for models in best]

@@ -39,23 +39,9 @@ def with_fitted_limits(
     """Return a curve with the degrees of freedom that the fitted spectrum implies.
 
     Where the model does not explain the log, and at tau so short that the curve shows frequencies
-    that were not fitted, the fewer of these and those of the identified power law are taken.
-
-    Parameters
-    ----------
-    curve : AllanCurve
-        With the degrees of freedom of the identified power law.
-    likelihood : Likelihood
-        Of the same log.
-    segments : tuple of (int, int), optional
-        First and one-past-last sample of each.
-    presence : Presence, optional
-        Of the samples, where some are missing.
-
-    Returns
-    -------
-    AllanCurve
-        The same where nothing was fitted.
+    that were not fitted, the fewer of these and those of the identified power law, which the curve
+    comes with, are taken. Where nothing was fitted the curve is the same. ``segments`` are first
+    and one-past-last sample of each; ``presence`` is needed where samples are missing.
     """
     if not likelihood.candidates or likelihood.band is None:
         return curve

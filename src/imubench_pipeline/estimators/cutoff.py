@@ -128,13 +128,7 @@ class Cutoff:
         return max((self.floor / N) ** 2 - self.rounded, 0.0)
 
     def factors(self, number: int, rng: np.random.Generator, terms: Terms) -> Array:
-        """Return draws of N over its value for the filter that was chosen, shape (number,).
-
-        Parameters
-        ----------
-        terms : Terms
-            The model of the noise.
-        """
+        """Return draws of N over its value for the chosen filter in a model, shape (number,)."""
         of_model = self.models.get(replace(terms, ramp=False))
         readings = self.readings if of_model is None else of_model.readings
         if not readings:

@@ -89,18 +89,8 @@ def add_doubts(
 ) -> tuple[Estimate, Estimate]:
     """Return the two estimates of a likelihood with their doubts.
 
-    Parameters
-    ----------
-    estimate, papers : Estimate
-        Of the model that the data favour, and of the papers' model.
-    frame : Frame
-        What of it was fitted.
-    candidates : sequence of Candidate
-        The best first.
-    papers_candidate : Candidate
-        The papers' model among them.
-    drift : str, optional
-        Why the random walk may be a smooth drift.
+    They are by the model that the data favour, the first of the candidates, and by the papers'
+    model, which is among them; ``drift`` says why the random walk may be a smooth drift.
     """
     chosen = candidates[0]
     doubt = _of_white_noise(spectrum, frame, chosen)
@@ -247,14 +237,9 @@ def _with_one_bias(estimate: Estimate) -> Estimate:
 def cast_doubt(
     estimate: Estimate, names: Sequence[str], reason: str, *, of_curve: bool = True
 ) -> Estimate:
-    """Return an estimate whose values of some parameters are doubtful.
+    """Return an estimate whose values of some parameters are doubtful, where they are plain ones.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Of its parameters; what has no plain value stays as it is.
-    of_curve : bool
-        With B go the figures of the curve.
+    With B go the figures of the curve, unless ``of_curve`` is False.
     """
 
     def doubted_in(
@@ -399,18 +384,7 @@ def _with_unknown_white_noise(
 
 
 def instead_of_walk(whittle: Whittle, chosen: Maximum) -> str | None:
-    """Say so where a drift explains a spectrum about as well as its random walk does.
-
-    Parameters
-    ----------
-    chosen : Maximum
-        The model that the data favour, fitted to it.
-
-    Returns
-    -------
-    str or None
-        None where the model has no random walk, or only that explains as much.
-    """
+    """Say so where a drift explains a spectrum about as well as its random walk does."""
     terms = chosen.terms
     if "K" not in terms.linear or chosen.parameter("K") == 0.0:
         return None

@@ -143,12 +143,7 @@ class FilterTrial:
 def explains_bend(spectrum: Spectrum, fitted: Array, trial: FilterTrial) -> bool:
     """Return whether a fit behind a filter gives the spectrum where that bends it.
 
-    Parameters
-    ----------
-    fitted : ndarray, shape (b,)
-        Density of the fit in each bin.
-    trial : FilterTrial
-        The filter.
+    ``fitted``, shape (b,), is the density of the fit in each bin.
     """
     bent = spectrum.frequency > min(0.1 * trial.cutoff, spectrum.frequency[-FEWEST_BINS])
     shown = spectrum.select(bent)
@@ -260,14 +255,9 @@ class FilterFits:
     def try_filters(
         self, filters: Sequence[tuple[Kind, int]], within: float = 1e-5
     ) -> list[FilterTrial]:
-        """Return the maxima of the likelihood, the best by BIC first.
+        """Return the maxima of the likelihood over kinds and orders, the best by BIC first.
 
-        Parameters
-        ----------
-        filters : sequence of (str, int)
-            Kinds and orders.
-        within : float
-            Error up to which a cut-off is found, parts of it.
+        ``within``: error up to which a cut-off is found, parts of it.
         """
         maxima = [trial for kind, order in filters for trial in self._of(kind, order, within)]
         # A floor that gains next to nothing is none. Of first order, with a floor, digital and
@@ -420,16 +410,9 @@ class OfModel:
 
 
 def also_after_sampling(reading: Reading, trial: FilterTrial, rate: float) -> Reading:
-    """Return the reading of the same first-order filter applied to the samples.
+    """Return the reading of the same filter, analogue of first order, applied to the samples.
 
     Its shape is the same, and it folds nothing into N.
-
-    Parameters
-    ----------
-    trial : FilterTrial
-        An analogue filter of first order.
-    rate : float
-        Hz.
     """
     gain = 0.5 * math.log(float(LowPass(trial.cutoff).folded_power(0.0, rate)))
     return Reading(
@@ -438,13 +421,7 @@ def also_after_sampling(reading: Reading, trial: FilterTrial, rate: float) -> Re
 
 
 def draw_factors(readings: Sequence[Reading], number: int, rng: np.random.Generator) -> Array:
-    """Return draws of N over its value for the filter that was chosen, shape (number,).
-
-    Parameters
-    ----------
-    readings : sequence of Reading
-        At least one.
-    """
+    """Return draws of N over its value for the filter that was chosen, shape (number,)."""
     weight = np.array([reading.weight for reading in readings])
     which = rng.choice(len(weight), number, p=weight / weight.sum())
     below, at, above = (

@@ -86,15 +86,10 @@ class Frame:
         )
 
     def has_a_bend_of_each_model(self, spectrum: Spectrum, times: Array) -> bool:
-        """Return whether each model of the noise has a cut-off of its own.
+        """Return whether each model of the noise, of given T_B in s, has a cut-off of its own.
 
         So it is where the low-pass bends the spectrum well below Nyquist; higher up, what folds
         decides, unless a process is as fast as the low-pass, or nearly.
-
-        Parameters
-        ----------
-        times : ndarray, shape (g,)
-            T_B of each process, s.
         """
         if self.low_pass is None or self.low_pass.behind is None:
             return False
@@ -124,29 +119,13 @@ class Frame:
         return float(self.low_pass.behind.white[0])
 
     def in_the_log(self, posterior: Posterior, terms: Terms) -> Posterior:
-        """Return draws with N as the low frequencies of the log show it.
-
-        Parameters
-        ----------
-        posterior : Posterior
-            Of a model behind the low-pass.
-        terms : Terms
-            The model.
-        """
+        """Return draws of a model behind the low-pass with N as the log shows it, at its lowest."""
         return _scaled(posterior, terms, np.array(math.sqrt(self.folding)))
 
     def before_the_filter(
         self, posterior: Posterior, terms: Terms, rng: np.random.Generator
     ) -> Posterior:
-        """Return draws with what is not known of the sensor's low-pass in N.
-
-        Parameters
-        ----------
-        posterior : Posterior
-            Of a model behind the low-pass.
-        terms : Terms
-            The model.
-        """
+        """Return draws of a model behind the low-pass with what is not known of that in N."""
         if self.low_pass is None or not self.low_pass.readings:
             return posterior
         return _scaled(

@@ -57,14 +57,9 @@ _SHARE = 0.05
 
 
 def worth_joining(candidates: Sequence[Candidate], always: Terms) -> list[Candidate]:
-    """Return the models for which the cut-off of a filter is fitted, the best first.
+    """Return the models for which the cut-off of a filter is fitted, the best first, as they come.
 
-    Parameters
-    ----------
-    candidates : sequence of Candidate
-        The best first, with a common cut-off.
-    always : Terms
-        A model that is one of them in any case.
+    ``always`` is one of them in any case.
     """
     best = candidates[0]
     return [
@@ -82,14 +77,9 @@ def refine_cutoff(
     """Return a low-pass whose cut-off is fitted together with all parameters of a model.
 
     Of the models, that which is the best by BIC with a cut-off of its own; what the others, and
-    other filters that the log allows, make of N is in ``models``.
-
-    Parameters
-    ----------
-    clear : ndarray of bool, shape (b,)
-        Bins that no line touches, and in which the ends of the transform do not rule.
-    candidates : sequence of Candidate
-        The models, the best first, with the cut-off as it is; of a ramp nothing is taken.
+    other filters that the log allows, make of N is in ``models``. ``clear``, shape (b,), are the
+    bins that no line touches, and in which the ends of the transform do not rule. The candidates
+    come with the cut-off as it is, the best first; of a ramp nothing is taken.
     """
     if low_pass.kind is None or low_pass.behind is None or not candidates:
         return low_pass

@@ -216,13 +216,7 @@ def _first_model(
 
 
 def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) -> Likelihood:
-    """Estimate the noise parameters from a spectrum (see `fit`).
-
-    Parameters
-    ----------
-    frame : Frame
-        What of it is fitted.
-    """
+    """Estimate the noise parameters from what a frame has of a spectrum (see `fit`)."""
     if frame.used.sum() < FEWEST_BINS:
         return _too_short(spectrum, frame)
     frame, whittle, candidates = fit_models(spectrum, frame)
@@ -330,20 +324,8 @@ def fit_models(spectrum: Spectrum, frame: Frame) -> tuple[Frame, Whittle, list[C
     """Fit all models in a frame, and in another one where it explains more.
 
     Where noise up to Nyquist, behind the filter that shows, is not explained: with processes of a
-    few sampling intervals; then without the frequencies that bend.
-
-    Parameters
-    ----------
-    frame : Frame
-        As `imubench_pipeline.estimators.frame.frame_of` gives it.
-
-    Returns
-    -------
-    frame : Frame
-    whittle : Whittle
-        The likelihood in it.
-    candidates : list of Candidate
-        The models tried, the best first.
+    few sampling intervals; then without the frequencies that bend. Returned are the frame, its
+    likelihood and the models tried, the best first.
     """
 
     def fitted(tried: Frame) -> tuple[Frame, Whittle, list[Candidate]]:

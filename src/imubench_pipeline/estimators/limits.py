@@ -106,18 +106,11 @@ def fit_errors(
     *,
     held: Sequence[str] = (),
 ) -> Errors:
-    """Return the errors of a weighted least squares fit.
+    """Return the errors of a weighted least squares fit at the values of its model.
 
-    Parameters
-    ----------
-    used : ndarray of bool, shape (m,)
-        The tau of the fit.
-    model : NoiseModel
-        The model that was fitted; the errors are those at its values.
-    method : {"weighted", "paper"}
-        Weights of the fit, see `imubench_pipeline.estimators.least_squares.fit`.
-    held : sequence of str
-        Parameters that the fit did not vary.
+    ``used`` are the tau of the fit, ``method`` says its weights
+    (`imubench_pipeline.estimators.least_squares.fit`), and ``held`` are the parameters that it did
+    not vary.
     """
     expected, derivatives = _derivatives(curve, used, model)
     names = [name for name in derivatives if name not in held]
@@ -181,18 +174,12 @@ def with_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) 
     """Return an estimate with 95 % limits, and without the values that the log cannot tell.
 
     A parameter of a relative standard error above 50 % is ``not_identified``; so are B and T_B
-    where the T_B of the peak is not known to 75 %, and where B at a T_B that ran into its bound
-    is not known to 25 %. Beside such a B, N and K are judged as if it were held, to 25 %.
+    where the T_B of the peak is not known to 75 %, and where B at a T_B that ran into its bound is
+    not known to 25 %. Beside such a B, N and K are judged as if it were held, to 25 %.
 
-    The limits of an amplitude that is not identified begin at 0; a limit is None where nothing
-    is known. A B or T_B that stays ``at_bound`` has none.
-
-    Parameters
-    ----------
-    estimate : Estimate
-        A fit in which every term that is there has a value.
-    used : ndarray of bool, shape (m,)
-        The tau of the fit.
+    The limits of an amplitude that is not identified begin at 0; a limit is None where nothing is
+    known. A B or T_B that stays ``at_bound`` has none. In the estimate every term that is there has
+    a value; it is of the ``used`` tau.
     """
     model = estimate.model
     if not model.terms:

@@ -126,24 +126,15 @@ class Line:
 def find(
     spectra: Sequence[LineSpectrum], model: NoiseModel, rate: float, crossover: float
 ) -> list[Line]:
-    """Find the lines of a log.
+    """Find the lines of a log, by frequency.
 
     Parameters
     ----------
     spectra : sequence of LineSpectrum
-        Of block means for frequencies up to ``crossover``, and of samples beyond; or one alone.
+        Of block means for frequencies up to ``crossover``, Hz, and of samples beyond; or one alone.
     model : NoiseModel
         What was fitted to the spectrum; a median over neighbouring bins mends it where it does
         not follow.
-    rate : float
-        Hz.
-    crossover : float
-        Highest frequency that is looked at in block means, Hz.
-
-    Returns
-    -------
-    list of Line
-        By frequency.
     """
     divided = crossover if len(spectra) > 1 else 0.0
     searched = [_range(spectrum, divided) for spectrum in spectra]
@@ -332,14 +323,8 @@ def _stands_out(spectrum: LineSpectrum, peak: int) -> bool:
 def without_lines(spectrum: Spectrum, lines: Sequence[Line], density: Array) -> NDArray[np.bool_]:
     """Return the bins of a spectrum that lines leave as they are.
 
-    Parameters
-    ----------
-    density : ndarray, shape (b,)
-        Fitted density of each bin: a strong line reaches further, as 1/f², than a weak one.
-
-    Returns
-    -------
-    ndarray of bool, shape (b,)
+    ``density``, shape (b,), is the fitted one of each bin: a strong line reaches further, as 1/f²,
+    than a weak one.
     """
     clear = np.ones(len(spectrum.frequency), dtype=np.bool_)
     allowed = _LEAKS * density * np.minimum(np.sqrt(2.0 / spectrum.ordinates), 1.0)
@@ -356,10 +341,7 @@ def without_lines(spectrum: Spectrum, lines: Sequence[Line], density: Array) -> 
 def carried_sinusoids(lines: Sequence[Line]) -> list[dict[str, Parameter]]:
     """Return amplitude and frequency of the sinusoids that a model carries on, by frequency.
 
-    Parameters
-    ----------
-    lines : sequence of Line
-        All that were found, by frequency; bands of noise and aliases are left out.
+    Of all lines that were found, by frequency, bands of noise and aliases are left out.
     """
     narrow = [line for line in lines if line.narrow]
     if len(narrow) <= MOST:
@@ -381,11 +363,7 @@ def strongest(amplitudes: Sequence[float]) -> list[int]:
 def joined_finding(channel: str, quantity: str, sinusoids: Sequence[Mapping[str, Any]]) -> Finding:
     """Return the warning about a channel with more sinusoids than a model carries on.
 
-    Parameters
-    ----------
-    quantity : {"gyro", "accel"}
-    sinusoids : sequence of mapping
-        With ``amplitude``, SI; more than `MOST`.
+    The quantity is gyro or accel; the sinusoids, more than `MOST`, have ``amplitude``, SI.
     """
     single = set(strongest([sinusoid["amplitude"] for sinusoid in sinusoids]))
     powers = [0.5 * sinusoid["amplitude"] ** 2 for sinusoid in sinusoids]

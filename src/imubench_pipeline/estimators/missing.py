@@ -69,12 +69,7 @@ class SlowPath:
 def block_means(blocks: Iterable[Array], segments: Sequence[tuple[int, int]]) -> BlockMeans:
     """Return the means of blocks of a log with missing samples (NaN), in one pass.
 
-    Parameters
-    ----------
-    blocks : iterable of ndarray
-        The log in order.
-    segments : sequence of (int, int)
-        First and one-past-last sample of each, in order.
+    ``segments`` are first and one-past-last sample of each, in order.
     """
     begin = np.concatenate([np.arange(start, stop, BLOCK) for start, stop in segments])
     ends = np.concatenate([np.full(-(-(b - a) // BLOCK), b) for a, b in segments])
@@ -93,19 +88,9 @@ def samples_present(
 ) -> Iterator[tuple[NDArray[np.int64], Array]]:
     """Yield the samples of a log that are present, and the blocks that they belong to.
 
-    Parameters
-    ----------
-    parts : iterable of ndarray
-        The log in order; NaN where a sample is missing.
-    begin, end : ndarray of int, shape (b,)
-        First and one-past-last sample of each block, rising; samples of no block are left out.
-
-    Yields
-    ------
-    place : ndarray of int, shape (n,)
-        Block of each sample, rising.
-    present : ndarray, shape (n,)
-        The samples, at least one.
+    The parts are the log in order, NaN where a sample is missing; ``begin`` and ``end``, shape
+    (b,), first and one-past-last sample of each block, rising. Samples of no block are left out.
+    Yielded are the block of each sample, rising, and the samples, at least one.
     """
     reached = 0
     for values in parts:
@@ -122,15 +107,8 @@ def divide_at_holes(
 ) -> tuple[tuple[int, int], ...]:
     """Divide segments at the holes that are too long to be filled, and trim their ends.
 
-    Parameters
-    ----------
-    segments : sequence of (int, int)
-        First and one-past-last sample of each, as `block_means` had them.
-
-    Returns
-    -------
-    tuple of (int, int)
-        Parts in which every hole can be filled, from the beginning of a block to the end of one.
+    They are as `block_means` had them. In each part every hole can be filled; it goes from the
+    beginning of a block to the end of one.
     """
     parts: list[tuple[int, int]] = []
     for start, stop in segments:
@@ -152,19 +130,9 @@ def slow_part(
     rate: float,
     rng: np.random.Generator,
 ) -> SlowPath:
-    """Draw the slow part of the noise, given the block means.
+    """Draw the slow part of the noise, given the means of blocks in parts (`divide_at_holes`).
 
-    Parameters
-    ----------
-    parts : sequence of (int, int)
-        First and one-past-last sample of each part of the log (`divide_at_holes`).
-    rate : float
-        Hz.
-
-    Returns
-    -------
-    SlowPath
-        Its jumps lie between the parts.
+    Its jumps lie between the parts.
     """
     interval = BLOCK / rate
     white = max(model.N**2 * rate, 1e-300)
@@ -208,16 +176,9 @@ def fill_missing(
     rate: float,
     rng: np.random.Generator,
 ) -> Iterator[Array]:
-    """Yield the blocks of a log with each missing sample replaced by a draw.
+    """Yield the blocks of a log with each missing sample (NaN) replaced by a draw.
 
-    Parameters
-    ----------
-    blocks : iterable of ndarray
-        The log in order, NaN where a sample is missing.
-    model : NoiseModel
-        Its N is the white part.
-    rate : float
-        Hz.
+    N of the model is the white part beside the path.
     """
     reached = 0
     for values in blocks:

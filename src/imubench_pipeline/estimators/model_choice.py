@@ -68,10 +68,7 @@ class Candidate:
 def compare(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
     """Fit all candidates and sort them, the best by BIC first.
 
-    Parameters
-    ----------
-    quantization : bool
-        Try quantization noise too; the band must reach frequencies that show it.
+    With ``quantization`` that noise is tried too: the band must reach frequencies that show it.
     """
     bins = len(whittle.spectrum.density)
     penalty = math.log(bins)
@@ -135,13 +132,7 @@ def compare(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
 
 
 def rescore(candidates: Sequence[Candidate], gained: Mapping[Terms, float]) -> list[Candidate]:
-    """Return candidates with more explained, sorted anew.
-
-    Parameters
-    ----------
-    gained : mapping of Terms to float
-        Log likelihood that models gain; with a ramp as without it.
-    """
+    """Return candidates sorted anew, by what each model, with a ramp or without, gains."""
     gains = [gained.get(replace(candidate.terms, ramp=False), 0.0) for candidate in candidates]
     bics = np.array([candidate.bic for candidate in candidates]) - 2.0 * np.array(gains)
     aics = np.array([candidate.aic for candidate in candidates]) - 2.0 * np.array(gains)

@@ -74,12 +74,7 @@ def sample(
 ) -> Posterior:
     """Draw from the posterior of a model around its best fit.
 
-    Parameters
-    ----------
-    maximum : Maximum
-        The best fit of the model; a term that it has at 0 is drawn all the same.
-    draws : int
-        Draws to keep.
+    A term that the best fit has at 0 is drawn all the same.
     """
     target = _Target(whittle, maximum)
     wanted = draws / _WORTH

@@ -183,15 +183,8 @@ def chain(
 ) -> tuple[Array, float]:
     """Return draws of a point, shape (draws, d), and the share of proposals that were taken.
 
-    Parameters
-    ----------
-    start : ndarray, shape (d,)
-    covariance : ndarray, shape (d, d)
-        Of the first proposals.
-    draws : int
-        Draws to keep, after those in which the chain learns.
-    fixed, bins, processes, with_ramp, table
-        As in `imubench_pipeline.estimators.posterior_kernels`.
+    ``covariance``, shape (d, d), is that of the first proposals; the draws in which the chain
+    learns are not kept. The rest is as in `log_posterior`.
 
     References
     ----------

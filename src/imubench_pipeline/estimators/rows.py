@@ -109,10 +109,7 @@ def draws(path: Path) -> dict[tuple[str, str], JointDraws]:
 def estimates(path: Path, joint: Path | None = None) -> dict[str, list[Estimate]]:
     """Read the estimates of a recording from its table ``parameters``, by channel.
 
-    Parameters
-    ----------
-    joint : Path, optional
-        Of its table ``draws``; without it no estimate has joint draws.
+    With joint draws where the path of its table ``draws`` is given.
     """
     return _estimates(read("parameters", [path]), joint)
 

@@ -43,14 +43,8 @@ def line_findings(
     """Return a note for each channel with lines, from rows of the table ``lines``.
 
     There is a warning where they are too many for a noise model to carry each on, and where one is
-    so strong that it is a good part of an error budget: a sensor seldom makes such a line itself.
-
-    Parameters
-    ----------
-    lines : iterable of mapping
-        With ``channel``, ``kind``, ``frequency`` (Hz), ``amplitude`` (SI) and ``ratio``.
-    white : mapping of str to float, optional
-        N of each channel, where it is known.
+    so strong beside N of its channel that it is a good part of an error budget: a sensor seldom
+    makes such a line itself.
     """
     by_channel: dict[str, list[Mapping[str, Any]]] = {}
     for line in lines:
@@ -103,12 +97,7 @@ def _strong(
 def band_finding(channel: str, highest: float, source: str) -> list[Finding]:
     """Return a note where the band of a channel ends before Nyquist by what its spectrum shows.
 
-    Parameters
-    ----------
-    highest : float
-        Hz.
-    source : str
-        How it was found (`imubench_pipeline.estimators.band.Band`).
+    ``highest`` is in Hz, ``source`` that of `imubench_pipeline.estimators.band.Band`.
     """
     if not source.startswith(("found: beyond", "default")):
         return []

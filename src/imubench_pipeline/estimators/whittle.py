@@ -157,12 +157,7 @@ class Whittle:
     def with_column(self, letter: str, shape: Array) -> Whittle:
         """Return the likelihood with another density in the place of a linear term.
 
-        Parameters
-        ----------
-        letter : str
-            Of the term: Q, N, F or K.
-        shape : ndarray, shape (b,)
-            Its density in each bin, for a parameter of 1.
+        The letter is Q, N, F or K; ``shape``, (b,), is the density for a parameter of 1.
         """
         _ = self.table  # made once for both
         other = copy.copy(self)
@@ -296,18 +291,9 @@ def whittle_of(
 ) -> Whittle:
     """Return the likelihood of a spectrum, with the correlation times that it can show.
 
-    Parameters
-    ----------
-    spectrum : Spectrum
-        The bins to use.
-    highest : float
-        Frequency up to which they reach, Hz.
-    shapes : int
-        Correlation times to tabulate.
-    shortest : float, optional
-        Shortest correlation time, s; by default twenty sampling intervals.
-    behind : Behind, optional
-        The sensor's low-pass, in these bins.
+    ``highest`` is the frequency up to which its bins reach, Hz; ``shortest`` the shortest
+    correlation time, s, by default twenty sampling intervals. ``shapes`` and ``behind``: as of
+    `Whittle`.
     """
     longest = CORRELATION_TIMES.of_log * float(spectrum.length.max())
     least = CORRELATION_TIMES.samples / spectrum.rate if shortest is None else shortest

@@ -106,15 +106,9 @@ class ContinuousSpace:
 
 
 def root_of(covariance: Array) -> Array:
-    """Return the lower triangular root of a covariance; what does not vary has a row of zeros.
+    """Return the lower triangular root of a covariance, shape (m, m).
 
-    Parameters
-    ----------
-    covariance : ndarray, shape (m, m)
-
-    Returns
-    -------
-    ndarray, shape (m, m)
+    What does not vary has a row of zeros.
     """
     varying = np.flatnonzero(np.diag(covariance))
     root, own = np.zeros_like(covariance), np.ix_(varying, varying)
@@ -123,20 +117,10 @@ def root_of(covariance: Array) -> Array:
 
 
 def repeat_step(transition: Array, noise: Array, times: int) -> tuple[Array, Array]:
-    """Return what a step does when it is done several times, by powers of two.
+    """Return what a step does when it is done several times, from 0, by powers of two.
 
-    Parameters
-    ----------
-    transition : ndarray, shape (m, m)
-    noise : ndarray, shape (m, m)
-        Covariance that a step adds.
-    times : int
-        From 0.
-
-    Returns
-    -------
-    (ndarray, ndarray), shapes (m, m)
-        Phi^times, and the sum of Phi^i noise (Phi^i)^T over i from 0 to times - 1.
+    ``noise`` is the covariance that a step adds, both shape (m, m). Returned are Phi^times, and the
+    sum of Phi^i noise (Phi^i)^T over i from 0 to times - 1.
     """
     whole, added = np.eye(len(transition)), np.zeros_like(noise)
     while times:
@@ -151,22 +135,11 @@ def repeat_step(transition: Array, noise: Array, times: int) -> tuple[Array, Arr
 def draw_block_sums(
     space: StateSpace, start: Array, blocks: int, width: int, rng: np.random.Generator
 ) -> Array:
-    """Draw the sums over blocks of samples, exactly.
+    """Draw the sums over blocks of samples, exactly, shape (blocks,).
 
-    The sum over a block and the state after it are jointly Gaussian, given the state before.
-
-    Parameters
-    ----------
-    space : StateSpace
-        Of one state, seen as it is, without measurement noise.
-    start : ndarray, shape (1,)
-        The first state.
-    width : int
-        Samples a block.
-
-    Returns
-    -------
-    ndarray, shape (blocks,)
+    The sum over a block and the state after it are jointly Gaussian, given the state before. The
+    space has one state, seen as it is, without measurement noise; ``start``, shape (1,), is the
+    first; a block has ``width`` samples.
     """
     p, drive = float(space.transition[0, 0]), float(space.process_noise[0, 0])
     # The sample i of a block is p^i x + sum_{j<i} p^(i-1-j) w_j.

@@ -72,13 +72,7 @@ class Courses:
     """There are more steps than can be told one by one: nothing was taken out."""
 
     def less(self, blocks: Iterable[Array]) -> Iterator[Array]:
-        """Yield the blocks of a log without what was found.
-
-        Parameters
-        ----------
-        blocks : iterable of ndarray
-            The log in order, SI.
-        """
+        """Yield the blocks of a log, in order, SI, without what was found."""
         reached = 0
         for values in blocks:
             stop = reached + len(values)

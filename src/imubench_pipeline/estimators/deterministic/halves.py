@@ -52,17 +52,8 @@ class Halves:
 def compare_halves(means: Means, noise: Maximum) -> Iterator[Halves]:
     """Estimate the slow noise on each half of the longest part of a log, and compare.
 
-    Parameters
-    ----------
-    means : Means
-        Less what is deterministic.
-    noise : Maximum
-        Of the whole log.
-
-    Yields
-    ------
-    Halves
-        Of the random walk, where there is one, and of all slow noise; nothing of short logs.
+    Of the random walk, where there is one, and of all slow noise; nothing of short logs. ``means``
+    are less what is deterministic, ``noise`` is that of the whole log.
     """
     part = max(means.parts, key=lambda part: len(part.mean))
     half = len(part.mean) // 2

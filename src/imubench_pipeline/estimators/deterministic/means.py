@@ -95,16 +95,8 @@ def means_of(
 ) -> Means:
     """Return the block means of a log in one pass, in bounded memory.
 
-    Parameters
-    ----------
-    blocks : iterable of ndarray
-        The log in order, in SI; NaN where a sample is missing.
-    samples : int
-        L, the length of all blocks together.
-    rate : float
-        Hz.
-    segments : sequence of (int, int), optional
-        First and one-past-last sample of each; one by default.
+    The blocks are the log in order, in SI, NaN where a sample is missing; ``segments`` first and
+    one-past-last sample of each, one by default.
     """
     spans = tuple(segments) if segments else ((0, samples),)
     total = sum(stop - start for start, stop in spans)
@@ -250,10 +242,7 @@ class Steadiness:
 def steadiness_of(means: Means) -> Steadiness | None:
     """Return how the power of the fast noise changes over the longest part of a log.
 
-    Returns
-    -------
-    Steadiness or None
-        None for a short log, or one of constant samples.
+    None for a short log, or one of constant samples.
     """
     part = max(means.parts, key=lambda part: len(part.power))
     size = len(part.power) // _SECTIONS

@@ -62,14 +62,7 @@ class Fit:
 
 
 class Ordinates:
-    """The ordinates of all parts of a log.
-
-    Parameters
-    ----------
-    means : Means
-    highest : float, optional
-        Frequency up to which they are used, Hz.
-    """
+    """The ordinates of all parts of a log, used up to a frequency in Hz, by default all."""
 
     def __init__(self, means: Means, highest: float | None = None) -> None:
         self.means = means
@@ -161,12 +154,7 @@ class Ordinates:
     ) -> Fit:
         """Fit noise and regressors together.
 
-        Parameters
-        ----------
-        start : ndarray, shape (k,), optional
-            Density of the noise that the first weights are taken from.
-        terms : Terms
-            The noise model.
+        ``start``, shape (k,), is a density of the noise that the first weights are taken from.
         """
         weight = np.ones_like(self.coefficient)
         residual, leverage = self.coefficient, np.zeros_like(weight)
@@ -249,14 +237,10 @@ class Ordinates:
 
 
 def covariance_of_sizes(ordinates: Ordinates, fit: Fit) -> Array:
-    """Return the covariance of the amplitudes of a fit, over the walks that the log allows.
+    """Return the covariance of the amplitudes of a fit, (p, p), over the walks that the log allows.
 
     All K are as likely beforehand; each counts by its restricted likelihood, in which the
     amplitudes are integrated over. The other noise is held.
-
-    Returns
-    -------
-    ndarray, shape (p, p)
     """
     if not fit.regressors:
         return fit.covariance

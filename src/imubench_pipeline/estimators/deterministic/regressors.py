@@ -68,12 +68,7 @@ class Regressor:
         return np.asarray(scipy.fft.dct(self.means(n), type=2, norm="ortho", axis=1)[:, 1:])
 
     def at(self, blocks: Array) -> Array:
-        """Return its values at times in blocks from the beginning of the part.
-
-        Returns
-        -------
-        ndarray, shape (columns, s)
-        """
+        """Return its values, shape (columns, s), at times in blocks from where its part begins."""
         if self.kind in ("step", "restart"):
             return (blocks >= self.where).astype(np.float64)[None]
         if self.kind == "pulse":

@@ -93,13 +93,7 @@ _SURE = 3.0
 
 
 def find_candidates(ordinates: Ordinates, fit: Fit) -> list[tuple[Score, Array]]:
-    """Return the candidates that may pass, each with the density of the noise it stands out of.
-
-    Parameters
-    ----------
-    fit : Fit
-        What is there already.
-    """
+    """Return what may pass beside a fit, each with the density of the noise it stands out of."""
     scores: dict[Regressor, tuple[Score, Array]] = {}
     pauses = restarts(ordinates)
     for seen in best_scores(ordinates, fit, fit.density):
@@ -143,12 +137,7 @@ def with_candidate(
 ) -> tuple[Fit, float]:
     """Return the fit with a further regressor, and twice the log likelihood that it adds.
 
-    Parameters
-    ----------
-    score : Score
-        The regressor.
-    density : ndarray, shape (k,)
-        Of the noise that it stood out of, SI²/Hz.
+    ``density``, shape (k,), is that of the noise that it stood out of, SI²/Hz.
     """
     regressors = (*fit.regressors, score.regressor)
     if density is not fit.density:
@@ -164,14 +153,9 @@ def with_candidate(
 def polish(
     ordinates: Ordinates, regressors: Sequence[Regressor], which: int, density: Array
 ) -> tuple[Regressor, ...]:
-    """Move the place, time constant or frequency of a regressor to where it fits best.
+    """Move the place, time constant or frequency of one regressor to where it fits best.
 
-    Parameters
-    ----------
-    which : int
-        Of them, the one that is moved.
-    density : ndarray, shape (k,)
-        Of the noise, SI²/Hz.
+    ``density``, shape (k,), is that of the noise, SI²/Hz.
     """
     best = regressors[which]
     if best.kind in ("ramp", "pulse", "restart"):
@@ -237,18 +221,9 @@ class Rival:
 def rival_of_walk(ordinates: Ordinates, fit: Fit) -> Rival | None:
     """Return the course that explains a log best in the place of a random walk.
 
-    Steps, also at all pauses together, warm-ups and periodic drift are tried. A ramp is a term of
-    the noise models, whose choice weighs it against a walk itself.
-
-    Parameters
-    ----------
-    fit : Fit
-        What was found so far.
-
-    Returns
-    -------
-    Rival or None
-        None where there is no walk, or no course that may be as good.
+    Steps, also at all pauses together, warm-ups and periodic drift are tried, beside what was found
+    so far. A ramp is a term of the noise models, whose choice weighs it against a walk itself. None
+    where there is no walk, or no course that may be as good.
     """
     if fit.noise.parameter("K") == 0.0:
         return None
@@ -270,15 +245,8 @@ def rival_of_walk(ordinates: Ordinates, fit: Fit) -> Rival | None:
 def anew_at_pauses(ordinates: Ordinates, fit: Fit, walk: float = 0.0) -> Rival | None:
     """Return a fit with a step at each pause that has none, or None where there are none.
 
-    Parameters
-    ----------
-    walk : float
-        What a random walk in their place gains over the fit, twice the log likelihood.
-
-    Returns
-    -------
-    Rival or None
-        As good as a walk is what has the same AIC.
+    ``walk`` is what a random walk in their place gains over the fit, twice the log likelihood; as
+    good as a walk is what has the same AIC.
     """
     steps_before = [x for x in fit.regressors if x.kind in ("step", "restart")]
     steps = tuple(

@@ -109,13 +109,7 @@ def _widened(parameter: Parameter, times: float) -> Parameter:
 
 
 def verdict_of(channel: str, unit: str, courses: Courses) -> Verdict:
-    """Return what was found of a channel, and what it casts doubt on.
-
-    Parameters
-    ----------
-    unit : str
-        SI unit of its samples.
-    """
+    """Return what was found of a channel, with its SI unit, and what it casts doubt on."""
     findings = [_finding(channel, unit, course) for course in courses.courses]
     caveats: dict[str, tuple[Status, str]] = {}
     if courses.means is None or courses.searched is None:
@@ -156,15 +150,7 @@ def verdict_of(channel: str, unit: str, courses: Courses) -> Verdict:
 
 
 def deterministic_rows(key: Mapping[str, str], unit: str, courses: Courses) -> Iterator[Row]:
-    """Yield the rows of the table ``deterministic``.
-
-    Parameters
-    ----------
-    key : mapping
-        Sensor, recording and channel.
-    unit : str
-        SI unit of the samples.
-    """
+    """Yield the rows of the table ``deterministic``; the key is sensor, recording and channel."""
     for course in courses.courses:
         yield {
             **key,

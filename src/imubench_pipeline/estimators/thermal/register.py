@@ -92,12 +92,9 @@ class Readings:
 def readings(blocks: Iterable[Array], segments: Sequence[Span]) -> Readings:
     """Gather the readings of a temperature in one pass, in bounded memory.
 
-    Parameters
-    ----------
-    blocks : iterable of ndarray
-        Temperature in order on the grid of the log, °C; NaN where missing.
-    segments : sequence of (int, int)
-        First and one-past-last sample of each part that no time relates to the others.
+    The blocks are the readings in order on the grid of the log, °C, of any shape (n,), NaN where
+    missing; ``segments`` first and one-past-last sample of each part that no time relates to the
+    others.
 
     Raises
     ------
@@ -143,21 +140,11 @@ def readings(blocks: Iterable[Array], segments: Sequence[Span]) -> Readings:
 
 
 def step_of(levels: Array, present: int) -> float:
-    """Return the least significant bit of a register from the different values that it gave.
+    """Return the least significant bit of a register from the different values that it gave, °C.
 
-    Parameters
-    ----------
-    levels : ndarray, shape (n,)
-        The values, rising, °C.
-    present : int
-        Readings that were made.
-
-    Returns
-    -------
-    float
-        °C. The smallest gap between values, of which all gaps are multiples, as closely as
-        decimals may have rounded them; 0 where there is none, or where only one value was read
-        (no step is known then) or hardly any was read twice.
+    The smallest gap between the levels, shape (n,), rising, of which all gaps are multiples, as
+    closely as decimals may have rounded them; 0 where there is none, or where only one value was
+    read (no step is known then) or hardly any of the readings ``present`` was read twice.
     """
     if len(levels) < 2 or present < _FEWEST_REPEATS * len(levels):
         return 0.0
@@ -206,11 +193,7 @@ def cut_at_jumps(read: Readings) -> Readings:
 
     The sample of a jump follows from the mean of the block that it falls into. A single sample
     stands on each side, so that a path that is linear between the middles of blocks jumps there.
-
-    Returns
-    -------
-    Readings
-        The same where there is none.
+    Readings without a jump stay as they are.
     """
     parts = [_of_part(read, part) for part in read.parts]
     if not any(jumps for jumps in parts):

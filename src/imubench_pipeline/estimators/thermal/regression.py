@@ -92,15 +92,7 @@ class Regressors:
         settling: float | None = None,
         used: NDArray[np.bool_] | None = None,
     ) -> Regressors:
-        """Return the regressors with other terms, or in other bins; None: as they are.
-
-        Parameters
-        ----------
-        quadratic, ramp : bool, optional
-        settling : float, optional
-            s.
-        used : ndarray of bool, shape (b,), optional
-        """
+        """Return the regressors with other terms, or in other bins; None: as they are."""
         other = copy.copy(self)
         other.used = self.used if used is None else used
         other.quadratic = self.quadratic if quadratic is None else quadratic
@@ -116,33 +108,11 @@ class Regressors:
         return 1 + self.quadratic + (self.settling > 0.0)
 
     def knots(self, lag: float) -> Array:
-        """Return T_lag - T_0 at the knots of the path.
-
-        Parameters
-        ----------
-        lag : float
-            s.
-
-        Returns
-        -------
-        ndarray, shape (k,)
-            K.
-        """
+        """Return T_lag - T_0 at the knots of the path, shape (k,), K, for a lag in s."""
         return lagged_path(self.path, self.path.value, self.rate, lag) - self.reference
 
     def effect(self, regression: Regression) -> Array:
-        """Return what temperature adds to the log, at the knots of the path.
-
-        Parameters
-        ----------
-        regression : Regression
-            Of these regressors.
-
-        Returns
-        -------
-        ndarray, shape (k,)
-            rad/s or m/s².
-        """
+        """Return what temperature adds to the log, at the knots of the path, shape (k,), SI."""
         of_knots = self._of(self.knots(regression.lag))
         return np.asarray(np.einsum("i,ik->k", regression.beta[: self.thermal], np.array(of_knots)))
 
@@ -156,15 +126,7 @@ class Regressors:
         return terms
 
     def slope(self, regression: Regression) -> Array:
-        """Return how what temperature adds to the log changes with it, at the knots of the path.
-
-        `regression`: as of `effect`.
-
-        Returns
-        -------
-        ndarray, shape (k,)
-            SI per K.
-        """
+        """Return how what temperature adds changes with it, at the knots, shape (k,), SI per K."""
         knots = self.knots(regression.lag)
         slope = np.full(len(knots), regression.beta[0])
         if self.quadratic:
@@ -179,38 +141,19 @@ class Regressors:
         return int(np.searchsorted(self.path.sample, begin))
 
     def means(self, lag: float) -> Array:
-        """Return the mean over the log of each regressor of temperature.
-
-        `lag`: as of `knots`.
-
-        Returns
-        -------
-        ndarray, shape (thermal,)
-            K, or K² of the square.
-        """
+        """Return the mean over the log of each regressor of temperature, K, or K² of the square."""
         return np.array([float(term.mean()) for term in self._of(self.knots(lag))])
 
     def columns(self, lag: float) -> list[Array]:
-        """Return the coefficients of the regressors, in the order of `Regression.beta`.
+        """Return the coefficients of the regressors in the order of `Regression.beta`.
 
-        `lag`: as of `knots`.
-
-        Returns
-        -------
-        list of ndarray, shape (n,)
-            K, or K² of the square; s of the ramp.
+        Of shape (n,) each, in K, or K² of the square; s of the ramp.
         """
         columns = self.coefficients.of_knots(self.path, self._of(self.knots(lag)))
         return [*columns] + [self._time] * self.ramp
 
     def prepare(self, lags: Sequence[float] | Array) -> None:
-        """Compute the products for several lags together, which takes less time.
-
-        Parameters
-        ----------
-        lags : sequence of float
-            s.
-        """
+        """Compute the products for several lags together, which takes less time."""
         lags_to_do = [float(lag) for lag in lags if self._key(float(lag)) not in self._full]
         for first in range(0, len(lags_to_do), _TOGETHER):
             batch = lags_to_do[first : first + _TOGETHER]
@@ -225,10 +168,7 @@ class Regressors:
         return lag, self.quadratic, self.settling
 
     def products(self, lag: float) -> Products:
-        """Return the products of log and regressors in the bins used.
-
-        `lag`: as of `knots`.
-        """
+        """Return the products of log and regressors at a lag in the bins used."""
         if lag not in self._products:
             self.prepare([lag])
             full, own = self._full[self._key(lag)], slice(None if self.ramp else self.thermal)
@@ -237,14 +177,10 @@ class Regressors:
         return self._products[lag]
 
     def at(self, lag: float, weights: Array) -> Regression:
-        """Return the fit at a lag.
+        """Return the fit at a lag in s.
 
-        Parameters
-        ----------
-        lag : float
-            s.
-        weights : ndarray, shape (b,)
-            nu / S of the bins used: their ordinates over the density of the noise, Hz/SI².
+        ``weights``, shape (b,), are nu / S of the bins used: their ordinates over the density of
+        the noise, Hz/SI².
         """
         products = self.products(lag)
         information = np.einsum("b,bij->ij", weights, products.gram)
@@ -254,17 +190,9 @@ class Regressors:
         return Regression(beta, information, lag, 0.5 * float(target @ beta))
 
     def lags(self, longest: float | None = None) -> Array:
-        """Return the lags to scan.
+        """Return the lags to scan, s: 0, then rising; 0 alone where the knots lie too far apart.
 
-        Parameters
-        ----------
-        longest : float, optional
-            s; by default a twentieth of the longest segment, at most half an hour.
-
-        Returns
-        -------
-        ndarray, shape (l,)
-            s, 0 first, then rising; 0 alone where the knots lie too far apart for more.
+        The longest is by default a twentieth of the longest segment, at most half an hour.
         """
         duration = max(stop - start for start, stop in self.path.segments) / self.rate
         knot = float(np.median(np.diff(self.path.sample))) / self.rate
@@ -275,14 +203,9 @@ class Regressors:
         return np.concatenate(([0.0], np.geomspace(first, last, _LAGS)))
 
     def best(self, weights: Array, lags: Array) -> Regression:
-        """Return the fit of the greatest log likelihood: scan the lags, then polish.
+        """Return the fit of the greatest log likelihood: scan the lags, rising, then polish.
 
-        Parameters
-        ----------
-        weights : ndarray, shape (b,)
-            As for `at`.
-        lags : ndarray, shape (l,)
-            s, rising (`lags`).
+        ``weights``: as for `at`.
         """
         self.prepare(lags)
         fits = [self.at(float(lag), weights) for lag in lags]
@@ -303,17 +226,8 @@ class Regressors:
     def without(self, spectrum: Spectrum, regression: Regression, weights: Array) -> Spectrum:
         """Return the spectrum (of the bins used) less what temperature explains.
 
-        The degrees of freedom that the fit takes from a bin are taken from its ordinates, so
-        that the density keeps its mean.
-
-        Parameters
-        ----------
-        spectrum : Spectrum
-            Of the bins used.
-        regression : Regression
-            Of these regressors.
-        weights : ndarray, shape (b,)
-            As for `at`: those that the fit was made with.
+        The degrees of freedom that the fit takes from a bin are taken from its ordinates, so that
+        the density keeps its mean. ``weights``: as for `at`, those that the fit was made with.
         """
         products = self.products(regression.lag)
         p = self.thermal

@@ -81,19 +81,9 @@ def judge(
 ) -> Verdict:
     """Say what a settled fit tells.
 
-    Parameters
-    ----------
-    regressors : Regressors
-    regression : Regression
-    whittle : Whittle
-        Of what temperature leaves.
-    candidates : sequence of Candidate
-        Noise models of that, the best first.
-    lags : ndarray, shape (l,)
-        Lags that were scanned, s.
-    gained : float
-        BIC of the best noise without temperature, less that of the fit.
-    rng : numpy.random.Generator
+    ``whittle`` and the noise models, the best first, are of what temperature leaves; the lags,
+    shape (l,), s, are those that were scanned; ``gained`` is BIC of the best noise without
+    temperature, less that of the fit.
     """
     weights = whittle.spectrum.ordinates / whittle.density(candidates[0].maximum)
     p = regressors.thermal
@@ -147,18 +137,9 @@ def _parameter(value: float, lower: float, upper: float, confused: str | None) -
 def lag_parameter(value: float, draws: Array, longest: float, compensated: bool) -> Parameter:
     """Return the lag as it is told, with the shortest interval that holds 95 % of its draws.
 
-    Equal tails would leave out a lag of 0 in every other log that has none.
-
-    Parameters
-    ----------
-    value : float
-        The most likely lag, s.
-    draws : ndarray, shape (d,)
-        s.
-    longest : float
-        The longest lag that was looked for, s.
-    compensated : bool
-        Temperature is taken out of the noise.
+    Equal tails would leave out a lag of 0 in every other log that has none. ``value`` is the most
+    likely lag, ``longest`` the longest that was looked for, ``draws`` have shape (d,), all in s;
+    ``compensated`` says that temperature is taken out of the noise.
     """
     if longest == 0.0:
         return Parameter(None, "absent", "no lag was asked for")
@@ -245,10 +226,7 @@ def _about_the_likely(regressors: Regressors, weights: Array, lags: Array) -> tu
 def shares(candidates: Sequence[Candidate]) -> list[tuple[Candidate, float]]:
     """Return the noise models that the log does not rule out, each with its share of 1.
 
-    Parameters
-    ----------
-    candidates : sequence of Candidate
-        The best first.
+    They come with the best first.
     """
     chosen = candidates[0]
     alike = {
@@ -320,15 +298,8 @@ def _densities(whittle: Whittle, maximum: Maximum, number: int, rng: np.random.G
 def with_likely_walk(model: NoiseModel, K: Parameter) -> NoiseModel:
     """Return a model with a random walk as strong as it may be where the log does not show one.
 
-    The most likely walk is then often none at all, which would leave the mean all too sure: the
-    rms of K over its posterior, half a normal distribution, is taken.
-
-    Parameters
-    ----------
-    model : NoiseModel
-        With a random walk, of which nothing may be left.
-    K : Parameter
-        As it is told: its upper limit counts where it is absent.
+    The most likely walk is then often none at all, which would leave the mean all too sure: the rms
+    of K over its posterior, half a normal distribution, is taken, from its upper limit.
     """
     if K.status != "absent" or K.upper is None:
         return model
@@ -336,23 +307,12 @@ def with_likely_walk(model: NoiseModel, K: Parameter) -> NoiseModel:
 
 
 def mean_error(models: Iterable[tuple[NoiseModel, float]], spectrum: Spectrum) -> float:
-    """Return the standard deviation of the mean of a log about the bias at its beginning.
+    """Return the standard deviation of the mean of a log about the bias at its beginning, SI.
 
-    A random walk counts from 0 at the beginning of the log: sigma^2 = N^2 / D + K^2 D / 3 and, of
-    a process of variance v, 2 v T_B / D (1 - T_B / D (1 - e^(-D / T_B))), D long.
-
-    Parameters
-    ----------
-    models : iterable of (NoiseModel, float)
-        Models that the log does not rule out and their shares of 1: a walk that is too weak to be
-        the choice may still carry the mean away.
-    spectrum : Spectrum
-        Of the log: its rate, and its length.
-
-    Returns
-    -------
-    float
-        rad/s or m/s².
+    A random walk counts from 0 at the beginning of the log: sigma^2 = N^2 / D + K^2 D / 3 and, of a
+    process of variance v, 2 v T_B / D (1 - T_B / D (1 - e^(-D / T_B))), D long. The models are
+    those that the log does not rule out, with their shares of 1: a walk that is too weak to be the
+    choice may still carry the mean away.
     """
     return math.sqrt(sum(share * _variance(model, spectrum) for model, share in models))
 

@@ -75,13 +75,7 @@ class Flicker(Term):
         return 0.5 / np.pi * self.B**2 * sampled_flicker_sums(np.abs(lags))
 
     def state_space(self, interval: float) -> StateSpace:
-        """Raise: there is none.
-
-        Raises
-        ------
-        ValueError
-            Always.
-        """
+        """Raise ValueError: there is none."""
         raise ValueError("flicker noise has no finite state space; take its Gauss-Markov bank")
 
     def continuous_space(self) -> ContinuousSpace | None:
@@ -123,23 +117,11 @@ class Flicker(Term):
         return -(self.B**2) / math.pi * _mean_logarithm(lags)
 
     def mean_covariance(self, blocks: SampleBlocks) -> Array:
-        """Raise: it has no covariance.
-
-        Raises
-        ------
-        TypeError
-            Always.
-        """
+        """Raise TypeError: it has no covariance."""
         raise TypeError("flicker noise has no covariance; take its Gauss-Markov bank")
 
     def block_sums(self, blocks: int, width: int, rate: float, rng: np.random.Generator) -> Array:
-        """Raise: those of its bank are drawn.
-
-        Raises
-        ------
-        TypeError
-            Always.
-        """
+        """Raise TypeError: those of its bank are drawn."""
         raise TypeError("flicker noise has no finite state space; take its Gauss-Markov bank")
 
     def reading(self, lowest_tau: float) -> Reading:
@@ -207,12 +189,8 @@ def bank(B: float, interval: float, longest: float) -> list[Term]:
 def ripple(interval: float, longest: float) -> tuple[float, float]:
     """Return the largest relative errors of a bank inside its band.
 
-    Returns
-    -------
-    (float, float)
-        Of the sampled Allan variance at tau from ``interval`` to ``longest``, and of the
-        spectrum of the samples at frequencies from 1 / (2 longest) to Nyquist, both against
-        sampled flicker noise.
+    Of the sampled Allan variance at tau from ``interval`` to ``longest``, and of the spectrum of
+    the samples at frequencies from 1 / (2 longest) to Nyquist, both against sampled flicker noise.
     """
     terms = bank(1.0, interval, longest)
     points = math.ceil(math.log10(longest / interval) * _POINTS_A_DECADE * 2)
