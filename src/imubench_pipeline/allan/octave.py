@@ -150,11 +150,15 @@ class OctaveSums:
         self.first = integrate(self._begin, sum(map(len, self._begin)), holes=self._holes)
 
     @property
+    def phase(self) -> Phase:
+        """Cumulative sums at every `DECIMATION`-th sample."""
+        return Phase(self.theta, self.present, ((0, len(self.theta) - 1),))
+
+    @property
     def results(self) -> list[NDArray[Any]]:
         """Sum of squares, sum of mean inverse counts, differences, and the most there could be."""
-        phase = Phase(self.theta, self.present, ((0, len(self.theta) - 1),))
         steps = self._sizes[~self._short] // DECIMATION
-        long = full_sums(phase, steps, self._threads, stride=DECIMATION)
+        long = full_sums(self.phase, steps, self._threads, stride=DECIMATION)
         return [
             np.concatenate((of_short.astype(of_long.dtype), of_long))
             for of_short, of_long in zip(self._sums, long, strict=True)

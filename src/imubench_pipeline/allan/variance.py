@@ -255,15 +255,13 @@ def of_blocks(
         done += 1
     if longest is None or done < len(spans):
         raise ValueError(f"the blocks end before sample {spans[done][1]}")
-    first = longest.first
 
     def edges(n: int) -> tuple[Array, NDArray[Any] | None, int]:
         if n < _FEW_STEPS * DECIMATION:
-            return first.theta[::n], None if first.present is None else first.present[::n], n
+            return *longest.first.every(n), n
         # The noise type is the same at the nearest multiple of the stride.
         step = round(n / DECIMATION)
-        counts = longest.present
-        return longest.theta[::step], None if counts is None else counts[::step], step * DECIMATION
+        return *longest.phase.every(step), step * DECIMATION
 
     return _curve(rate, wanted, samples, spans, sums, edges)
 
@@ -279,12 +277,7 @@ def of_phase(
     start, stop = max(phase.segments, key=lambda segment: segment[1] - segment[0])
 
     def edges(n: int) -> tuple[Array, NDArray[Any] | None, int]:
-        counts = phase.present
-        return (
-            phase.theta[start : stop + 1 : n],
-            None if counts is None else counts[start : stop + 1 : n],
-            n,
-        )
+        return *phase.every(n, start, stop), n
 
     sums = full_sums(phase, wanted, threads)
     return _curve(rate, wanted, phase.samples, phase.segments, sums, edges)

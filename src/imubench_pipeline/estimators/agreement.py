@@ -75,14 +75,9 @@ def disagreements(channel: str, estimates: Mapping[str, Estimate]) -> Iterator[F
     weighted, likelihood = (
         estimates[method].parameters["N"] for method in ("weighted", "likelihood")
     )
-    if (
-        weighted.value is None
-        or likelihood.value is None
-        or weighted.lower is None
-        or weighted.upper is None
-    ):
+    if weighted.value is None or weighted.lower is None or weighted.upper is None:
         return
-    if likelihood.lower is None or likelihood.upper is None:
+    if likelihood.value is None or likelihood.lower is None or likelihood.upper is None:
         return
     if weighted.upper < likelihood.lower or weighted.lower > likelihood.upper:
         ratio = weighted.value / likelihood.value

@@ -68,7 +68,7 @@ class Models:
     @property
     def has_bias(self) -> bool:
         """Whether there is flicker noise or a Gauss-Markov process."""
-        return "F" in self.terms.linear or self.terms.gauss_markov > 0
+        return any(self.terms.biases)
 
 
 def models_of(model: NoiseModel) -> Models:

@@ -21,7 +21,7 @@ from imubench_pipeline.allan import FITTED, POWER_LAW, AllanCurve
 from imubench_pipeline.allan.presence import Presence
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.whittle import model_of
-from imubench_pipeline.noise import NoiseModel, Sinusoid
+from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.spectral_degrees import Degrees, Span, degrees_of_model
 
 _FEW_CLUSTERS = 100
@@ -93,5 +93,4 @@ def _with_more_walk(model: NoiseModel, likelihood: Likelihood) -> NoiseModel | N
 
 def with_lines(model: NoiseModel, likelihood: Likelihood) -> NoiseModel:
     """Return a model with the narrow lines that were found beside it."""
-    lines = [Sinusoid(line.amplitude, line.frequency) for line in likelihood.lines if line.narrow]
-    return replace(model, sinusoids=lines)
+    return replace(model, sinusoids=[line.term for line in likelihood.lines if line.narrow])

@@ -256,7 +256,7 @@ def _with_filter(
     limits = [fits.limits(trial) for trial in alike]
     lower, upper = min(low for low, _ in limits), max(high for _, high in limits)
     N, after = fits.density(best)
-    highest = upper >= 0.999 * fits.highest(best.kind, best.order)
+    highest = upper >= 0.999 * best.highest(fits.rate)
     shown, lower, upper = (
         replace(best, cutoff=cutoff).low_pass.half_power(spectrum.rate)
         for cutoff in (best.cutoff, lower, upper)

@@ -166,10 +166,10 @@ def _beside_a_ramp(chosen: Candidate, candidates: Sequence[Candidate]) -> str | 
 
 def _with_fewer_terms(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
     """Say so where two terms of bias instability are hardly better than one, or one than none."""
-    terms, biases = chosen.terms, _biases(chosen)
+    terms, biases = chosen.terms, sum(chosen.terms.biases)
     if biases == 0:
         return None
-    fewer = [candidate for candidate in candidates if _biases(candidate) < min(biases, 2)]
+    fewer = [candidate for candidate in candidates if sum(candidate.terms.biases) < min(biases, 2)]
     best = min(fewer, key=lambda candidate: candidate.bic, default=None)
     if best is None or best.bic > chosen.bic + (_HARDLY if biases > 1 else _AS_GOOD):
         return None
@@ -187,7 +187,7 @@ def _with_other_terms(chosen: Candidate, candidates: Sequence[Candidate]) -> str
     terms = chosen.terms
     if terms.gauss_markov == 0 or "K" in terms.linear:
         return None
-    if _kinds_of_bias(best) == _kinds_of_bias(chosen):
+    if best.terms.biases == terms.biases:
         return None
     better = chosen.aic - best.aic
     if better < _OTHERWISE:
@@ -205,14 +205,6 @@ def _hardly_needed(name: str, chosen: Candidate, candidates: Sequence[Candidate]
         return None
     worse = f"{other.bic - chosen.bic:.1f} in BIC"
     return f"{without.name}, which has none, is hardly worse than {terms.name}, by {worse}"
-
-
-def _kinds_of_bias(candidate: Candidate) -> tuple[bool, int]:
-    return "F" in candidate.terms.linear, candidate.terms.gauss_markov
-
-
-def _biases(candidate: Candidate) -> int:
-    return ("F" in candidate.terms.linear) + candidate.terms.gauss_markov
 
 
 def _with_one_bias(estimate: Estimate) -> Estimate:

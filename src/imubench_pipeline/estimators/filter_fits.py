@@ -99,11 +99,6 @@ def frequencies_in_bins(spectrum: Spectrum) -> Array:
     return np.asarray(spectrum.lower[:, None] + width * within)
 
 
-def highest_cutoff(kind: Kind, order: int, rate: float) -> float:
-    """Return the highest cut-off of a filter that is looked for at a rate, Hz."""
-    return _HIGHEST[kind, order] * rate
-
-
 def gains(spectrum: Spectrum, trial: FilterTrial) -> tuple[Array, Array, Array]:
     """Return what a filter leaves of white noise, of flicker noise and of slow noise."""
     low_pass, frequency = trial.low_pass, frequencies_in_bins(spectrum)
@@ -134,6 +129,10 @@ class FilterTrial:
     def is_first_order_analogue(self) -> bool:
         """Whether white noise behind it is a Gauss-Markov process."""
         return self.kind == "analogue" and self.order == 1
+
+    def highest(self, rate: float) -> float:
+        """Return the highest cut-off of such a filter that is looked for, Hz."""
+        return _HIGHEST[self.kind, self.order] * rate
 
     def correlation(self, rate: float) -> float:
         """Return the correlation time of a filter of first order, sampling intervals."""
@@ -234,10 +233,6 @@ class FilterFits:
         powers = self._powers(self._columns(trial))[0]
         return math.sqrt(powers[0]), math.sqrt(powers[-1]) if trial.floor else 0.0
 
-    def highest(self, kind: Kind, order: int) -> float:
-        """Return the highest cut-off that is looked for, Hz."""
-        return highest_cutoff(kind, order, self.rate)
-
     def may_bend(self, filters: Sequence[tuple[Kind, int]]) -> bool:
         """Return whether a filter at any of a few cut-offs is nearly as good as none."""
         _, _, alone, _ = self.unfiltered()
@@ -303,7 +298,7 @@ class FilterFits:
 
     def _cutoffs(self, kind: Kind, order: int, lowest: float, number: int) -> Array:
         """Return the cut-offs from which a search starts, rising, Hz."""
-        scan = np.geomspace(lowest, self.highest(kind, order), number)
+        scan = np.geomspace(lowest, _HIGHEST[kind, order] * self.rate, number)
         if kind != "boxcar":
             return scan
         lengths = np.arange(_WHOLE, 2, -1)
@@ -335,7 +330,7 @@ class FilterFits:
             return end
 
         ends = []
-        for sign, end in ((-1.0, self.lowest), (1.0, self.highest(trial.kind, trial.order))):
+        for sign, end in ((-1.0, self.lowest), (1.0, trial.highest(self.rate))):
             edge = end_of(sign, math.log(end))
             first = max(math.log(end), min(edge, math.log(UNFOLDED * self.rate)))
             number = _BETWEEN if first != edge else 0

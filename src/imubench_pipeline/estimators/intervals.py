@@ -264,7 +264,6 @@ def _comparable(name: str, terms: Terms, other: Terms) -> bool:
         return False
     if not name.startswith(("B", "T_B")):
         return True
-    alike = "F" in terms.linear, terms.gauss_markov
-    others = "F" in other.linear, other.gauss_markov
     # One bias instability is one level, flicker or not; of several each has its own.
-    return alike == others or (name == "B" and sum(alike) == sum(others) == 1)
+    one = sum(terms.biases) == sum(other.biases) == 1
+    return terms.biases == other.biases or (name == "B" and one)

@@ -28,7 +28,6 @@ from imubench_pipeline.estimators.filter_fits import (
     also_after_sampling,
     explains_bend,
     gains,
-    highest_cutoff,
 )
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.spectrum import Spectrum
@@ -240,8 +239,7 @@ class _Joint:
         return end(-1.0), end(1.0)
 
     def _highest(self, allowed: Allowed) -> float:
-        trial = allowed.filter
-        return math.log(highest_cutoff(trial.kind, trial.order, self._spectrum.rate))
+        return math.log(allowed.filter.highest(self._spectrum.rate))
 
     def _best(self, allowed: Allowed, terms: Terms) -> _Fit:
         around = math.log(allowed.filter.cutoff)

@@ -228,13 +228,9 @@ def _bands_merged(lines: list[Line]) -> list[Line]:
     merged: list[Line] = []
     for line in lines:
         last = merged[-1] if merged else None
-        beside = last and not (last.narrow or line.narrow)
-        if (
-            last
-            and beside
-            and line.frequency - last.frequency
-            < _FAR * line.resolution + 0.5 * (last.width + line.width)
-        ):
+        near = _FAR * line.resolution + 0.5 * ((last.width if last else 0.0) + line.width)
+        both_wide = last and not (last.narrow or line.narrow)
+        if last and both_wide and line.frequency - last.frequency < near:
             merged[-1] = _both(last, line)
         else:
             merged.append(line)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy.fft
@@ -84,18 +85,12 @@ class Spectrum:
 
     def select(self, chosen: NDArray[np.bool_]) -> Spectrum:
         """Return the spectrum of chosen bins."""
-        names = (
-            "frequency",
-            "lower",
-            "upper",
-            "ordinates",
-            "density",
-            "block",
-            "length",
-            "ramp",
-            "cross",
-        )
-        return replace(self, **{name: getattr(self, name)[chosen] for name in names})
+        columns: dict[str, Any] = {
+            name: column[chosen]
+            for name, column in vars(self).items()
+            if isinstance(column, np.ndarray)
+        }
+        return replace(self, **columns)
 
 
 @dataclass(frozen=True)

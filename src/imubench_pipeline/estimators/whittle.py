@@ -19,6 +19,7 @@ from imubench_pipeline.estimators.spectral_shapes import Shapes
 from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle_kernels import (
     Bins,
+    Problem,
     ShapeTable,
     best_powers,
     one_process,
@@ -51,6 +52,11 @@ class Terms:
         names += ["GM"] * self.gauss_markov
         names += ["K"] * ("K" in self.linear) + ["R"] * self.ramp
         return "+".join(names)
+
+    @property
+    def biases(self) -> tuple[bool, int]:
+        """Whether it has flicker noise, and how many Gauss-Markov processes."""
+        return "F" in self.linear, self.gauss_markov
 
     @property
     def parameters(self) -> int:
@@ -236,7 +242,7 @@ class Whittle:
         where = np.empty(0)
         if terms.gauss_markov:
             search = one_process if terms.gauss_markov == 1 else two_processes
-            where = search(fixed, bins, terms.ramp, self.shape_table())
+            where = search(Problem(fixed, bins, terms.ramp, self.shape_table()))
         times = np.sort(np.exp(where))
         processes = [self.gauss_markov(float(time)) for time in times]
         columns = np.ascontiguousarray(np.column_stack([fixed, *processes]))

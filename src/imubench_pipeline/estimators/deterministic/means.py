@@ -67,7 +67,6 @@ class Part:
     white noise, (rad/s)² or (m/s²)². NaN where a block has few samples."""
     kurtosis: float
     """Excess kurtosis of samples that are independent: twice that of their differences."""
-    present: float  # share of its samples that are there
     pauses: tuple[tuple[float, float], ...] = ()
     """Middle and length, in blocks, of holes so long that the sensor may have begun anew; the
     longest of them, in order."""
@@ -166,7 +165,6 @@ def _parts(start: int, size: int, rows: Array, interval: float) -> list[Part]:
                 _bridged(mean[span], share[span] >= 0.5),
                 np.where(share[span] >= 0.5, power[span], np.nan),
                 _kurtosis(power[span], fourth[span], share[span] >= 0.5),
-                float(share[span].mean()),
                 _pauses(share[span] < 0.5, interval),
             )
         )
