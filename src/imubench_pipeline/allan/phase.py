@@ -21,6 +21,15 @@ PRESENT = 0.9
 """Part of a cluster's samples that must be there for its mean to count."""
 
 
+Span = tuple[int, int]
+"""First and one-past-last sample of a segment."""
+
+
+def spans_of(segments: Sequence[Span] | None, samples: int) -> tuple[Span, ...]:
+    """Return the segments of a log; by default it is one."""
+    return tuple(segments) if segments else ((0, samples),)
+
+
 @dataclass(frozen=True)
 class Phase:
     """Cumulative sums of a log on its uniform grid."""
@@ -29,7 +38,7 @@ class Phase:
     """(L + 1,): cumulative sum of the samples less a constant; missing samples add nothing."""
     present: NDArray[np.integer[Any]] | None
     """(L + 1,): cumulative number of samples present; None: all are."""
-    segments: tuple[tuple[int, int], ...]  # grid points that begin and end each segment
+    segments: tuple[Span, ...]  # grid points that begin and end each segment
 
     @property
     def samples(self) -> int:
@@ -49,7 +58,7 @@ def integrate(
     samples: int,
     *,
     holes: bool,
-    segments: Sequence[tuple[int, int]] | None = None,
+    segments: Sequence[Span] | None = None,
 ) -> Phase:
     """Sum consecutive blocks of samples up, in bounded memory beyond the result.
 
@@ -95,11 +104,11 @@ def integrate(
         raise ValueError(
             "a sample is infinite" if holes else "a sample is missing or infinite, but holes=False"
         )
-    return Phase(theta, present, tuple(segments) if segments else ((0, samples),))
+    return Phase(theta, present, spans_of(segments, samples))
 
 
 def split(
-    blocks: Iterable[NDArray[Any]], segments: Sequence[tuple[int, int]]
+    blocks: Iterable[NDArray[Any]], segments: Sequence[Span]
 ) -> Iterator[tuple[int, NDArray[Any]]]:
     """Yield blocks cut at the ends of segments, each with the number of its segment."""
     reached, number = 0, 0

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.allan.phase import PRESENT
+from imubench_pipeline.allan.phase import PRESENT, Span, spans_of
 
 Counts = NDArray[np.int64]
 
@@ -23,7 +23,7 @@ class Presence:
     """Cumulative numbers of samples present."""
 
     samples: int  # L, the points of the grid
-    segments: tuple[tuple[int, int], ...]  # grid points that begin and end each segment
+    segments: tuple[Span, ...]  # grid points that begin and end each segment
     first: Counts  # samples present before each of the first points
     stride: int
     coarse: Counts  # samples present before every ``stride``-th point of the log
@@ -60,7 +60,7 @@ class Presence:
 def presence(
     blocks: Iterable[NDArray[np.floating[Any]]],
     samples: int,
-    segments: Sequence[tuple[int, int]] | None = None,
+    segments: Sequence[Span] | None = None,
 ) -> Presence:
     """Count the samples that are present in a log, NaN where one is missing.
 
@@ -81,4 +81,4 @@ def presence(
             part = counts[: len(first) - 1 - reached]
             first[reached + 1 : reached + 1 + len(part)] = part
         reached, total = stop, int(counts[-1]) if len(counts) else total
-    return Presence(samples, tuple(segments or ((0, samples),)), first, stride, coarse)
+    return Presence(samples, spans_of(segments, samples), first, stride, coarse)

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from imubench_pipeline.allan.confidence import deviation_limits, equivalent_degrees, noise_exponent
 from imubench_pipeline.allan.octave import DECIMATION, SHORTEST, OctaveSums, octave_sizes
-from imubench_pipeline.allan.phase import Phase, full_sums, integrate, split
+from imubench_pipeline.allan.phase import Phase, Span, full_sums, integrate, spans_of, split
 from imubench_pipeline.allan.threads import read_ahead
 from imubench_pipeline.typing import Array
 
@@ -138,7 +138,7 @@ def allan_variance(
     cluster_sizes: ArrayLike | None = None,
     overlap: Literal["full", "octave"] = "full",
     valid: ArrayLike | None = None,
-    segments: Sequence[tuple[int, int]] | None = None,
+    segments: Sequence[Span] | None = None,
 ) -> AllanCurve:
     """Return the overlapping Allan variance of a log.
 
@@ -200,7 +200,7 @@ def of_blocks(
     sizes: ArrayLike | None = None,
     *,
     holes: bool,
-    segments: Sequence[tuple[int, int]] | None = None,
+    segments: Sequence[Span] | None = None,
     threads: int = 1,
 ) -> AllanCurve:
     """Return the multi-octave Allan variance of a log that comes in blocks.
@@ -230,7 +230,7 @@ def of_blocks(
     ValueError
         As `allan_variance`.
     """
-    spans = tuple(segments) if segments else ((0, samples),)
+    spans = spans_of(segments, samples)
     wanted = _checked(rate, sizes, samples, spans)
     wanted = octave_sizes(wanted)
     if samples < SHORTEST:
@@ -284,7 +284,7 @@ def of_phase(
 
 
 def _checked(
-    rate: float, sizes: ArrayLike | None, samples: int, segments: Sequence[tuple[int, int]]
+    rate: float, sizes: ArrayLike | None, samples: int, segments: Sequence[Span]
 ) -> NDArray[np.int64]:
     """Check the arguments that all kernels share, and return the sizes."""
     if not rate > 0:
@@ -307,7 +307,7 @@ def _curve(
     rate: float,
     sizes: NDArray[np.int64],
     samples: int,
-    segments: Sequence[tuple[int, int]],
+    segments: Sequence[Span],
     sums: Sequence[NDArray[Any]],
     edges: Edges,
 ) -> AllanCurve:
@@ -352,6 +352,6 @@ def _exponents(edges: Edges, sizes: NDArray[np.int64]) -> list[int]:
     return exponents
 
 
-def _degrees(segments: Sequence[tuple[int, int]], exponent: int, n: int) -> float:
+def _degrees(segments: Sequence[Span], exponent: int, n: int) -> float:
     terms = [stop - start - 2 * n + 1 for start, stop in segments]
     return sum(equivalent_degrees(exponent, n, term) for term in terms if term > 0)

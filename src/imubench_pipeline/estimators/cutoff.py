@@ -81,6 +81,7 @@ WIDEST = 1.2
 _LEAST_WIDTH = 1e-5
 """Half of an interval of a logarithm."""
 
+ALLOWED = "the log allows cut-offs from {:.4g} to {:.4g} Hz"
 NOT_AS_BEHIND = "the spectrum bends, but not as behind any of {} filters that were tried"
 
 _AS_STATED = 1.6
@@ -271,17 +272,18 @@ def _with_filter(
     density = Parameter(
         N, lower=N * math.exp(min(0.0, *ends) - error), upper=N * math.exp(max(0.0, *ends) + error)
     )
-    reason = ""
-    if beside_rounding < _BEYOND_BIC:
+    or_quantization = beside_rounding < _BEYOND_BIC
+    reason = None
+    if or_quantization:
         reason = (
             "the spectrum rises towards Nyquist, by quantization noise as well as by a low-pass "
             f"with a cut-off from {lower:.4g} to {upper:.4g} Hz"
         )
     elif upper > WIDEST * lower or highest:
-        reason = f"the log allows cut-offs from {lower:.4g} to {upper:.4g} Hz"
+        reason = ALLOWED.format(lower, upper)
     elif not fits.explains(best):
         reason = NOT_AS_BEHIND.format(number)
-    if reason:
+    if reason is not None:
         frequency = Parameter(None, "not_identified", reason, lower, upper, fitted=shown)
         density = replace(
             density, value=None, status="not_identified", reason=reason, fitted=density.value
@@ -297,7 +299,7 @@ def _with_filter(
         density,
         math.hypot(after, math.sqrt(rounding)),
         gained,
-        beside_rounding < _BEYOND_BIC,
+        or_quantization,
         best.kind,
         behind=Behind(white + (after / N) ** 2, *slow),
         ruled=settled.ruled,

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
-from imubench_pipeline.estimators.cutoff import NOT_AS_BEHIND, RULED_OUT, WIDEST, Cutoff
+from imubench_pipeline.estimators.cutoff import ALLOWED, NOT_AS_BEHIND, RULED_OUT, WIDEST, Cutoff
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.filter_fits import (
     FAMILY,
@@ -124,7 +124,7 @@ def _as_parameter(shown: float, ends: Sequence[float], explains: bool) -> Parame
     """Return a cut-off with its limits, or why it is not told."""
     lower, upper = min(ends), max(ends)
     if upper > WIDEST * lower:
-        reason = f"the log allows cut-offs from {lower:.4g} to {upper:.4g} Hz"
+        reason = ALLOWED.format(lower, upper)
     elif not explains:
         reason = NOT_AS_BEHIND.format(len(FAMILY))
     else:

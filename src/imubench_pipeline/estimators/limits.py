@@ -68,16 +68,16 @@ class Errors:
         return min(math.sqrt(max(variance, 0.0)), _NOTHING_KNOWN)
 
     def factors(
-        self, name: str, doubtful: Sequence[str], held: float | None = None
+        self, name: str, doubtful: Sequence[str], beside: float | None = None
     ) -> tuple[float, float]:
         """Return the factors from a parameter to its 95 % limits.
 
         They hold with and without the ``doubtful`` terms: without one, the parameter moves by
-        what its correlation with the density of that term tells. ``held`` is the standard error
+        what its correlation with the density of that term tells. ``beside`` is the standard error
         with those terms held; by default they vary. An amplitude whose square is closer to 0
         than 1.96 standard errors may be 0.
         """
-        error = self.of(name) if held is None else held
+        error = self.of(name) if beside is None else beside
         low, high = -SIGMAS * error, SIGMAS * error
         for term in doubtful:
             if term == name or not self.of(term) < _NOTHING_KNOWN:
@@ -86,7 +86,7 @@ class Errors:
             # The density is the square: that it falls to 0 is -1/2 in the logarithm of the root.
             moved = -0.5 * slope
             rest = error
-            if held is None:
+            if beside is None:
                 rest = math.sqrt(max(error**2 - slope * self._at(name, term), 0.0))
             low = min(low, moved - SIGMAS * rest)
             high = max(high, moved + SIGMAS * rest)
@@ -300,8 +300,8 @@ def _wide_limits(name: str, value: float, errors: Errors) -> tuple[float | None,
     Its upper limit is linear in the amplitude: with a logarithm it would run away.
     """
     error = errors.of(name)
-    known = error < _NOTHING_KNOWN
+    limited = error < _NOTHING_KNOWN
     if name == "T_B":
         low, high = errors.factors(name, [])
-        return (value * low, value * high) if known else (None, None)
-    return 0.0, value * (1.0 + SIGMAS * error) if known else None
+        return (value * low, value * high) if limited else (None, None)
+    return 0.0, value * (1.0 + SIGMAS * error) if limited else None

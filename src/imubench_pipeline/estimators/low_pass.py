@@ -126,13 +126,8 @@ class Filter:
         corner = math.tan(math.pi * min(self.cutoff / rate, 0.4999))
         # The tangent has no value at Nyquist, where nothing is left.
         warped = np.tan(np.minimum(np.pi * f / rate, 0.5 * np.pi - 1e-7)) / corner
-        return np.asarray(
-            1.0
-            / (
-                1.0
-                + np.exp(np.minimum(2.0 * self.order * np.log(np.maximum(warped, 1e-30)), 600.0))
-            )
-        )
+        logarithm = np.minimum(2.0 * self.order * np.log(np.maximum(warped, 1e-30)), 600.0)
+        return np.asarray(1.0 / (1.0 + np.exp(logarithm)))
 
     def _triangle(self, f: Array, rate: float) -> Array:
         length = BOXCAR / self.cutoff * rate  # in samples

@@ -22,6 +22,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from imubench_pipeline.allan.phase import Span
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.state_space import StateSpace
 from imubench_pipeline.typing import Array
@@ -66,7 +67,7 @@ class SlowPath:
         return np.interp(samples, self.sample, self.value)
 
 
-def block_means(blocks: Iterable[Array], segments: Sequence[tuple[int, int]]) -> BlockMeans:
+def block_means(blocks: Iterable[Array], segments: Sequence[Span]) -> BlockMeans:
     """Return the means of blocks of a log with missing samples (NaN), in one pass.
 
     ``segments`` are first and one-past-last sample of each, in order.
@@ -102,15 +103,13 @@ def samples_present(
         reached += len(values)
 
 
-def divide_at_holes(
-    means: BlockMeans, segments: Sequence[tuple[int, int]]
-) -> tuple[tuple[int, int], ...]:
+def divide_at_holes(means: BlockMeans, segments: Sequence[Span]) -> tuple[Span, ...]:
     """Divide segments at the holes that are too long to be filled, and trim their ends.
 
     They are as `block_means` had them. In each part every hole can be filled; it goes from the
     beginning of a block to the end of one.
     """
-    parts: list[tuple[int, int]] = []
+    parts: list[Span] = []
     for start, stop in segments:
         chosen = means.within(start, stop)
         occupied = np.flatnonzero(means.count[chosen] > 0) + chosen.start
@@ -125,7 +124,7 @@ def divide_at_holes(
 
 def slow_part(
     means: BlockMeans,
-    parts: Sequence[tuple[int, int]],
+    parts: Sequence[Span],
     model: NoiseModel,
     rate: float,
     rng: np.random.Generator,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -71,24 +72,8 @@ def compare(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
     With ``quantization`` that noise is tried too: the band must reach frequencies that show it.
     """
     bins = len(whittle.spectrum.density)
-    penalty = math.log(bins)
     tried: dict[Terms, Maximum] = {}
-
-    def bic(maximum: Maximum) -> float:
-        like_a_walk = (
-            "K" not in maximum.terms.linear
-            and len(maximum.times) > 0
-            and maximum.times[-1] > LIKE_A_WALK * whittle.longest
-        )
-        # A ramp is tried beside a walk: it stands for the walk where none is left.
-        like_a_walk |= maximum.terms.ramp and maximum.parameter("K") == 0.0
-        unlikely = maximum.terms.ramp + ("Q" in maximum.terms.linear)
-        return (
-            2.0 * maximum.cost
-            + maximum.terms.parameters * penalty
-            + UNIT_ROOT * like_a_walk
-            + UNLIKELY * unlikely
-        )
+    bic = partial(_bic, bins=bins, longest=whittle.longest)
 
     def add(terms: Terms) -> None:
         if terms not in tried and terms.parameters < bins // 4:
@@ -129,6 +114,22 @@ def compare(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
         )
         for i, maximum in enumerate(order)
     ]
+
+
+def _bic(maximum: Maximum, bins: int, longest: float) -> float:
+    """Return the BIC of a fit, with what is asked of a model that few sensors have."""
+    terms, times = maximum.terms, maximum.times
+    slow = len(times) > 0 and times[-1] > LIKE_A_WALK * longest
+    like_a_walk = "K" not in terms.linear and slow
+    # A ramp is tried beside a walk: it stands for the walk where none is left.
+    like_a_walk |= terms.ramp and maximum.parameter("K") == 0.0
+    unlikely = terms.ramp + ("Q" in terms.linear)
+    return (
+        2.0 * maximum.cost
+        + terms.parameters * math.log(bins)
+        + UNIT_ROOT * like_a_walk
+        + UNLIKELY * unlikely
+    )
 
 
 def rescore(candidates: Sequence[Candidate], gained: Mapping[Terms, float]) -> list[Candidate]:

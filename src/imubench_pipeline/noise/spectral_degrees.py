@@ -15,13 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from imubench_pipeline.allan.phase import Span, spans_of
 from imubench_pipeline.allan.presence import Presence
 from imubench_pipeline.allan.quadratic_forms import tail_degrees, variance_degrees
 from imubench_pipeline.noise.model import NoiseModel
 from imubench_pipeline.noise.terms import Deterministic, Quantization
 from imubench_pipeline.typing import Array
-
-Span = tuple[int, int]
 
 _STEPS = 32
 """Lags in a cluster's length at which the covariance is taken; linear in between."""
@@ -81,7 +80,7 @@ def degrees_of_model(
     PTTI 2003, for power laws; W. Satterthwaite, "An approximate distribution of estimates of
     variance components", Biometrics Bulletin 2, 1946.
     """
-    spans = tuple(segments) if segments else ((0, samples),)
+    spans = spans_of(segments, samples)
     left = np.ones(len(sizes)) if share is None else share
     pairs = [
         _degrees(model, 1.0 / rate, int(n), spans, presence, float(part))

@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from imubench_pipeline.allan.phase import Span
 from imubench_pipeline.estimators.deterministic.means import Means, means_of
 from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates, covariance_of_sizes
 from imubench_pipeline.estimators.deterministic.regressors import Regressor
@@ -165,7 +166,7 @@ def find_courses(
     samples: int,
     rate: float,
     *,
-    segments: Sequence[tuple[int, int]] | None = None,
+    segments: Sequence[Span] | None = None,
     highest: float | None = None,
 ) -> Courses:
     """Find steps, warm-ups and periodic drift in a log.

@@ -55,7 +55,7 @@ def compare_halves(means: Means, noise: Maximum) -> Iterator[Halves]:
     Of the random walk, where there is one, and of all slow noise; nothing of short logs. ``means``
     are less what is deterministic, ``noise`` is that of the whole log.
     """
-    part = max(means.parts, key=lambda part: len(part.mean))
+    part = means.longest
     half = len(part.mean) // 2
     if half < _FEWEST // 2:
         return

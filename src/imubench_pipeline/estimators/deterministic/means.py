@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.allan.phase import split
+from imubench_pipeline.allan.phase import Span, spans_of, split
 from imubench_pipeline.typing import Array
 
 _MOST = 1 << 14
@@ -85,19 +85,24 @@ class Means:
         """Duration of a block, s."""
         return self.block / self.rate
 
+    @property
+    def longest(self) -> Part:
+        """The part with the most blocks."""
+        return max(self.parts, key=lambda part: len(part.mean))
+
 
 def means_of(
     blocks: Iterable[Array],
     samples: int,
     rate: float,
-    segments: Sequence[tuple[int, int]] | None = None,
+    segments: Sequence[Span] | None = None,
 ) -> Means:
     """Return the block means of a log in one pass, in bounded memory.
 
     The blocks are the log in order, in SI, NaN where a sample is missing; ``segments`` first and
     one-past-last sample of each, one by default.
     """
-    spans = tuple(segments) if segments else ((0, samples),)
+    spans = spans_of(segments, samples)
     total = sum(stop - start for start, stop in spans)
     size = max(-(-total // _MOST), min(_LEAST, max(total // _FEWEST, 1)))
     gathered: list[list[Array]] = [[] for _ in spans]
@@ -242,7 +247,7 @@ def steadiness_of(means: Means) -> Steadiness | None:
 
     None for a short log, or one of constant samples.
     """
-    part = max(means.parts, key=lambda part: len(part.power))
+    part = means.longest
     size = len(part.power) // _SECTIONS
     if size < _FEWEST_IN_SECTION or means.block < 2:
         return None

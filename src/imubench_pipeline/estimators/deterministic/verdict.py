@@ -115,7 +115,7 @@ def verdict_of(channel: str, unit: str, courses: Courses) -> Verdict:
     if courses.means is None or courses.searched is None:
         return Verdict((), {})
     widening = 1.0
-    kurtosis = max(courses.means.parts, key=lambda part: len(part.mean)).kurtosis
+    kurtosis = courses.means.longest.kurtosis
     if kurtosis > _HEAVY:
         # The power of L samples has a relative variance of (2 + kurtosis) / L.
         widening = math.sqrt(1.0 + 0.5 * kurtosis)

@@ -25,10 +25,10 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import ndtri
 
+from imubench_pipeline.allan.phase import Span
 from imubench_pipeline.estimators.thermal.path_kernels import draw_paths, propagate
 from imubench_pipeline.estimators.thermal.register import (
     Readings,
-    Span,
     cut_at_jumps,
     dwells,
     readings,

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.fft
 
+from imubench_pipeline.allan.phase import Span
 from imubench_pipeline.estimators.spectrum import BLOCK_BAND, Spectrum
 from imubench_pipeline.estimators.thermal.path import TemperaturePath
-from imubench_pipeline.estimators.thermal.register import Span
 from imubench_pipeline.typing import Array
 
 

@@ -24,10 +24,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from imubench_pipeline.allan.phase import Span
 from imubench_pipeline.estimators.missing import samples_present
 from imubench_pipeline.typing import Array
-
-Span = tuple[int, int]
 
 KNOTS = 8192
 """Blocks that a log is divided into, at most (and one more a segment)."""

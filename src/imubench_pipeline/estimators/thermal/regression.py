@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -37,9 +38,9 @@ class Regression:
     log_likelihood_gain: float  # log likelihood over that of beta = 0
 
     @property
-    def covariance(self) -> Array:
-        """Covariance of beta, for given noise and lag."""
-        return np.asarray(np.linalg.inv(self.information))
+    def error(self) -> float:
+        """Standard deviation of s, for given noise and lag."""
+        return math.sqrt(float(np.linalg.inv(self.information)[0, 0]))
 
 
 class Regressors:

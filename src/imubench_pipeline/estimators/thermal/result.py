@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from imubench_pipeline.allan.phase import Span
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.missing import block_means, fill_missing, slow_part
 from imubench_pipeline.estimators.thermal.path import TemperaturePath
-from imubench_pipeline.estimators.thermal.register import Span
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 

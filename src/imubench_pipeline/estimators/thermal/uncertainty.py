@@ -183,7 +183,7 @@ def _confused(
         )
     value = regressors.path.value
     if abs(value[-1] - value[0]) > _MONOTONE * regressors.path.range:
-        z = both.beta[0] / math.sqrt(both.covariance[0, 0])
+        z = both.beta[0] / both.error
         if excluded and abs(z) < SIGMAS:
             return "the temperature only rises or falls, and a drift with time explains as much"
     if not excluded and _explained(regressors, regression) > _EXPLAINED:
