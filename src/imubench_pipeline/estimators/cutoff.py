@@ -32,6 +32,7 @@ from imubench_pipeline.estimators.filter_fits import (
     also_after_sampling,
     draw_factors,
     frequencies_in_bins,
+    highest_cutoff,
 )
 from imubench_pipeline.estimators.low_pass import Filter, Kind
 from imubench_pipeline.estimators.spectrum import Spectrum
@@ -82,7 +83,9 @@ _LEAST_WIDTH = 1e-5
 """Half of an interval of a logarithm."""
 
 ALLOWED = "the log allows cut-offs from {:.4g} to {:.4g} Hz"
-NOT_AS_BEHIND = "the spectrum bends, but not as behind any of {} filters that were tried"
+NOT_AS_BEHIND = (
+    f"the spectrum bends, but not as behind any of {len(FAMILY)} filters that were tried"
+)
 
 _AS_STATED = 1.6
 """Ratio to the stated cut-off up to which a filter is the stated one."""
@@ -141,7 +144,6 @@ def find_cutoff(
     spectrum: Spectrum,
     clear: NDArray[np.bool_] | None = None,
     *,
-    filters: Sequence[tuple[Kind, int]] = FAMILY,
     resolution: float = 0.0,
     stated: float | None = None,
 ) -> Cutoff:
@@ -158,8 +160,6 @@ def find_cutoff(
         Of a log, up to Nyquist.
     clear : ndarray of bool, shape (b,), optional
         Bins that no line touches.
-    filters : sequence of (str, int)
-        Kinds and orders to try, at least one.
     resolution : float
         Step of the register (LSB), SI, where the samples are rounded: white noise of variance
         LSB^2 / 12 behind the filter.
@@ -178,11 +178,10 @@ def find_cutoff(
         unknown = Parameter(None, "not_shown", f"the spectrum has {used.sum()} bins only")
         return Cutoff(unknown, None, unknown, 0.0, 0.0)
     fits = FilterFits(spectrum.select(used))
-    if not fits.may_bend(filters):
-        absent = Parameter(None, "absent", "the spectrum shows no low-pass")
-        return Cutoff(absent, None, Parameter(fits.unfiltered()[0]), 0.0, 0.0)
+    if not fits.may_bend():
+        return _without_filter(fits.unfiltered()[0], 0.0, None)
     rounding = resolution**2 / (12.0 * spectrum.rate)
-    settled = _settled(spectrum, used, fits, filters, rounding)
+    settled = _settled(spectrum, used, fits, rounding)
     fits, tried = settled.fits, settled.tried
     N_alone, without, cost_alone, rising = fits.unfiltered()
     behind = fits.behind(tried[0]) if tried else math.inf
@@ -191,9 +190,7 @@ def find_cutoff(
     doubt = _process_or_filter(fits, tried, cost_alone, gained, stated)
     if doubt is not None or gained < _BEYOND_BIC or beside_rounding < -_BEYOND_BIC:
         return _without_filter(N_alone, gained, doubt)
-    return _with_filter(
-        spectrum, settled, rounding, len(filters), (N_alone, gained, beside_rounding)
-    )
+    return _with_filter(spectrum, settled, rounding, (N_alone, gained, beside_rounding))
 
 
 @dataclass(frozen=True)
@@ -210,11 +207,10 @@ def _settled(
     spectrum: Spectrum,
     usable: NDArray[np.bool_],
     fits: FilterFits,
-    filters: Sequence[tuple[Kind, int]],
     rounding: float,
 ) -> _Settled:
     """Fit the filters, and again where the best of them changes which bins tell of it."""
-    tried = fits.try_filters(filters, _COARSE)
+    tried = fits.try_filters(_COARSE)
     used, ruled = usable, np.zeros(len(usable), dtype=np.bool_)
     for passed in range(_PASSES if tried else 0):
         earlier, ruled = ruled, _ruled_by_ends(spectrum, fits, tried[0], rounding)
@@ -227,7 +223,7 @@ def _settled(
         if rounding > 0.0:
             fits.rounded = rounding / fits.density(tried[0])[0] ** 2
         fits.choose_slow(tried[0])
-        tried = fits.try_filters(filters)
+        tried = fits.try_filters()
         if not tried:
             break
     return _Settled(fits, tried, used, ruled)
@@ -237,10 +233,9 @@ def _with_filter(
     spectrum: Spectrum,
     settled: _Settled,
     rounding: float,
-    number: int,
     against: tuple[float, float, float],
 ) -> Cutoff:
-    """Describe the best of ``number`` filters and the others that the log allows.
+    """Describe the best of the filters and the others that the log allows.
 
     ``against``: N of the noise alone, and what BIC gains over it, and over that with rounding.
     """
@@ -257,7 +252,7 @@ def _with_filter(
     limits = [fits.limits(trial) for trial in alike]
     lower, upper = min(low for low, _ in limits), max(high for _, high in limits)
     N, after = fits.density(best)
-    highest = upper >= 0.999 * best.highest(fits.rate)
+    highest = upper >= 0.999 * highest_cutoff(best.kind, best.order, fits.rate)
     shown, lower, upper = (
         replace(best, cutoff=cutoff).low_pass.half_power(spectrum.rate)
         for cutoff in (best.cutoff, lower, upper)
@@ -282,7 +277,7 @@ def _with_filter(
     elif upper > WIDEST * lower or highest:
         reason = ALLOWED.format(lower, upper)
     elif not fits.explains(best):
-        reason = NOT_AS_BEHIND.format(number)
+        reason = NOT_AS_BEHIND
     if reason is not None:
         frequency = Parameter(None, "not_identified", reason, lower, upper, fitted=shown)
         density = replace(

@@ -99,6 +99,11 @@ def frequencies_in_bins(spectrum: Spectrum) -> Array:
     return np.asarray(spectrum.lower[:, None] + width * within)
 
 
+def highest_cutoff(kind: Kind, order: int, rate: float) -> float:
+    """Return the highest cut-off of a filter that is looked for at a rate, Hz."""
+    return _HIGHEST[kind, order] * rate
+
+
 def gains(spectrum: Spectrum, trial: FilterTrial) -> tuple[Array, Array, Array]:
     """Return what a filter leaves of white noise, of flicker noise and of slow noise."""
     low_pass, frequency = trial.low_pass, frequencies_in_bins(spectrum)
@@ -129,10 +134,6 @@ class FilterTrial:
     def is_first_order_analogue(self) -> bool:
         """Whether white noise behind it is a Gauss-Markov process."""
         return self.kind == "analogue" and self.order == 1
-
-    def highest(self, rate: float) -> float:
-        """Return the highest cut-off of such a filter that is looked for, Hz."""
-        return _HIGHEST[self.kind, self.order] * rate
 
     def correlation(self, rate: float) -> float:
         """Return the correlation time of a filter of first order, sampling intervals."""
@@ -233,7 +234,7 @@ class FilterFits:
         powers = self._powers(self._columns(trial))[0]
         return math.sqrt(powers[0]), math.sqrt(powers[-1]) if trial.floor else 0.0
 
-    def may_bend(self, filters: Sequence[tuple[Kind, int]]) -> bool:
+    def may_bend(self) -> bool:
         """Return whether a filter at any of a few cut-offs is nearly as good as none."""
         _, _, alone, _ = self.unfiltered()
         flat = np.column_stack(
@@ -242,19 +243,17 @@ class FilterFits:
         alone = min(alone, self._powers(flat)[1])
         least = min(
             self.cost(FilterTrial(0.0, 0.0, kind, order, float(cutoff), False))
-            for kind, order in filters
+            for kind, order in FAMILY
             for cutoff in self._cutoffs(kind, order, 2.0 * self.lowest, _COARSE_SCAN)
         )
         return least < alone - _WORTH_TRYING
 
-    def try_filters(
-        self, filters: Sequence[tuple[Kind, int]], within: float = 1e-5
-    ) -> list[FilterTrial]:
-        """Return the maxima of the likelihood over kinds and orders, the best by BIC first.
+    def try_filters(self, within: float = 1e-5) -> list[FilterTrial]:
+        """Return the maxima of the likelihood over all filters, the best by BIC first.
 
         ``within``: error up to which a cut-off is found, parts of it.
         """
-        maxima = [trial for kind, order in filters for trial in self._of(kind, order, within)]
+        maxima = [trial for kind, order in FAMILY for trial in self._of(kind, order, within)]
         # A floor that gains next to nothing is none. Of first order, with a floor, digital and
         # analogue filters are the same but for N.
         return sorted(
@@ -298,7 +297,7 @@ class FilterFits:
 
     def _cutoffs(self, kind: Kind, order: int, lowest: float, number: int) -> Array:
         """Return the cut-offs from which a search starts, rising, Hz."""
-        scan = np.geomspace(lowest, _HIGHEST[kind, order] * self.rate, number)
+        scan = np.geomspace(lowest, highest_cutoff(kind, order, self.rate), number)
         if kind != "boxcar":
             return scan
         lengths = np.arange(_WHOLE, 2, -1)
@@ -330,7 +329,10 @@ class FilterFits:
             return end
 
         ends = []
-        for sign, end in ((-1.0, self.lowest), (1.0, trial.highest(self.rate))):
+        for sign, end in (
+            (-1.0, self.lowest),
+            (1.0, highest_cutoff(trial.kind, trial.order, self.rate)),
+        ):
             edge = end_of(sign, math.log(end))
             first = max(math.log(end), min(edge, math.log(UNFOLDED * self.rate)))
             number = _BETWEEN if first != edge else 0

@@ -67,9 +67,9 @@ class Frame:
     stated: float | None = None  # cut-off of the sensor's own filter, where it is stated, Hz
     cut: bool = False  # frequencies are left out that neither a process nor a filter explains
 
-    def whittle(self, spectrum: Spectrum, shapes: int = SHAPES) -> Whittle:
+    def whittle(self, spectrum: Spectrum) -> Whittle:
         """Return the likelihood of the bins that are fitted."""
-        return self._whittle(spectrum, self.used, shapes)
+        return self._whittle(spectrum, self.used, SHAPES)
 
     def whole(self, spectrum: Spectrum) -> Whittle:
         """Return that of all bins, to carry a fit on to those that are not."""

@@ -18,7 +18,6 @@ from scipy.optimize import brentq, minimize_scalar
 from imubench_pipeline.estimators.cutoff import ALLOWED, NOT_AS_BEHIND, RULED_OUT, WIDEST, Cutoff
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.filter_fits import (
-    FAMILY,
     HALF_CHI_SQUARED,
     PROCESSES,
     Allowed,
@@ -28,6 +27,7 @@ from imubench_pipeline.estimators.filter_fits import (
     also_after_sampling,
     explains_bend,
     gains,
+    highest_cutoff,
 )
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.spectrum import Spectrum
@@ -126,7 +126,7 @@ def _as_parameter(shown: float, ends: Sequence[float], explains: bool) -> Parame
     if upper > WIDEST * lower:
         reason = ALLOWED.format(lower, upper)
     elif not explains:
-        reason = NOT_AS_BEHIND.format(len(FAMILY))
+        reason = NOT_AS_BEHIND
     else:
         return Parameter(shown, lower=lower, upper=upper)
     return Parameter(None, "not_identified", reason, lower, upper, fitted=shown)
@@ -239,7 +239,8 @@ class _Joint:
         return end(-1.0), end(1.0)
 
     def _highest(self, allowed: Allowed) -> float:
-        return math.log(allowed.filter.highest(self._spectrum.rate))
+        trial = allowed.filter
+        return math.log(highest_cutoff(trial.kind, trial.order, self._spectrum.rate))
 
     def _best(self, allowed: Allowed, terms: Terms) -> _Fit:
         around = math.log(allowed.filter.cutoff)

@@ -345,7 +345,8 @@ def carried_sinusoids(lines: Sequence[Line]) -> list[dict[str, Parameter]]:
     single = set(strongest([line.amplitude for line in narrow]))
     weaker = [line for place, line in enumerate(narrow) if place not in single]
     sinusoids = [_line_parameters(narrow[place]) for place in single]
-    sinusoids += [_as_one_line([weaker[i] for i in group]) for group in _groups(len(weaker))]
+    groups = np.array_split(np.arange(len(weaker)), GROUPS)
+    sinusoids += [_as_one_line([weaker[i] for i in group]) for group in groups]
     return sorted(sinusoids, key=lambda sinusoid: sinusoid["frequency"].value or 0.0)
 
 
@@ -373,10 +374,6 @@ def joined_finding(channel: str, quantity: str, sinusoids: Sequence[Mapping[str,
         f"{SI_UNITS[quantity]['amplitude']} rms)"
     )
     return Finding("too_many_lines", "warning", detail, float(len(sinusoids)), channel)
-
-
-def _groups(number: int) -> list[list[int]]:
-    return [part.tolist() for part in np.array_split(np.arange(number), GROUPS)]
 
 
 def _line_parameters(line: Line) -> dict[str, Parameter]:

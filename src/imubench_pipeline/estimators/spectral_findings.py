@@ -19,7 +19,7 @@ _STRONG = 0.5
 """Part of what white noise integrates to in a second from which a sinusoid counts in budgets."""
 
 _HIGHEST = 0.05
-"""Part of the rate up to which it is looked for."""
+"""Part of the rate up to which slow noise is looked for that is missing."""
 
 _FLAT = 0.95
 """Part of N^2 that the fitted density has at least, before a low-pass takes from it."""

@@ -44,7 +44,7 @@ class Regression:
 
 
 class Regressors:
-    """The regressors of a log, and their products with it, for any lag.
+    """The regressors of a log, and their products with it, for any lag; `also` has further ones.
 
     Parameters
     ----------
@@ -57,11 +57,6 @@ class Regressors:
         T_0, °C.
     used : ndarray of bool, shape (b,)
         Bins to use.
-    quadratic, ramp : bool
-        Whether the square of the temperature, and time, are regressors too.
-    settling : float
-        s from the beginning of the log in which a sensor that settles may follow the temperature
-        otherwise; 0: none.
     """
 
     def __init__(
@@ -71,14 +66,12 @@ class Regressors:
         rate: float,
         reference: float,
         used: NDArray[np.bool_],
-        *,
-        quadratic: bool = False,
-        ramp: bool = False,
-        settling: float = 0.0,
     ) -> None:
         self.coefficients, self.path, self.rate = coefficients, path, rate
         self.reference, self.used = reference, used
-        self.quadratic, self.ramp, self.settling = quadratic, ramp, settling
+        # Whether the square of the temperature, and time, are regressors too; and for how many s
+        # from the beginning a sensor that settles may follow the temperature otherwise.
+        self.quadratic, self.ramp, self.settling = False, False, 0.0
         self._products: dict[float, Products] = {}
         self._time = coefficients.of_time(rate)
         # With the ramp and in all bins, for `also` to share: the transforms are the costly part.

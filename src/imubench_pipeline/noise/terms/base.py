@@ -256,6 +256,10 @@ class Deterministic(Term):
         """0: a filter that knows it predicts it."""
         return np.zeros_like(time), np.zeros_like(time)
 
+    def reading(self, lowest_tau: float) -> Reading | None:
+        """None."""
+        return None
+
     def block_covariance(self, lags: Array, block: float) -> Array:
         """Raise TypeError: it has a course instead (`swing`)."""
         raise TypeError(f"{self} is deterministic")
