@@ -38,9 +38,14 @@ class Regression:
     log_likelihood_gain: float  # log likelihood over that of beta = 0
 
     @property
+    def covariance(self) -> Array:
+        """Covariance of beta, for given noise and lag."""
+        return np.asarray(np.linalg.inv(self.information))
+
+    @property
     def error(self) -> float:
         """Standard deviation of s, for given noise and lag."""
-        return math.sqrt(float(np.linalg.inv(self.information)[0, 0]))
+        return math.sqrt(float(self.covariance[0, 0]))
 
 
 class Regressors:
