@@ -182,15 +182,9 @@ def with_curve(
     best = [_best(candidate) for candidate in alike]
     drawn = [_drawn(candidate, draws) for candidate in alike]
     if not best[0].has_bias:
-        having = [
-            candidate
-            for candidate in alike
-            if as_good(candidate, chosen) and _best(candidate).has_bias
-        ]
-        every = [*(candidate for candidate in wider if _best(candidate).has_bias), *having]
-        bias = _weak_bias(
-            [_drawn(candidate, draws) for candidate in every], bool(having), float(tau[-1])
-        )
+        having = [c for c in alike if as_good(c, chosen) and any(c.terms.biases)]
+        every = [c for c in wider if any(c.terms.biases)] + having
+        bias = _weak_bias([_drawn(c, draws) for c in every], bool(having), float(tau[-1]))
     else:
         bias = _bias(best, drawn, float(tau[-1]))
     return replace(estimate, curve={"B_curve": bias} | lowest_parameters(best, drawn, tau))

@@ -62,10 +62,9 @@ _LEAKS = 0.3
 
 # Sums over the bins of a line of the squared correlations of Hann-windowed Fourier coefficients
 # (1, 2/3 and 1/6 at a distance of 0, 1 and 2 bins), without and with the distances as weights;
-# and what a line on a bin makes of them.
-_NOISE_POWER, _NOISE_PLACE = 12.6, 50.0
-_CROSS_POWER, _CROSS_PLACE = 35.0 / 18.0, 5.0 / 18.0
-_FLOOR_POWER, _FLOOR_PLACE = 4e-3, 5e-3
+# what a line on a bin makes of them; and the least error.
+_POWER = (12.6, 35.0 / 18.0, 4e-3)
+_PLACE = (50.0, 5.0 / 18.0, 5e-3)
 
 STRONGEST = 12
 """Lines that are carried as they are where there are too many."""
@@ -279,12 +278,11 @@ def _line(
     places = spectrum.frequency[bins]
     place = float(np.clip(excess @ places / power, places[0], places[-1]))
     to_noise = power / float(noise[peak])
-    power_error = math.hypot(
-        math.sqrt((_NOISE_POWER / to_noise**2 + 2.0 * _CROSS_POWER / to_noise) / n), _FLOOR_POWER
+    power_error, place_error = (
+        math.hypot(math.sqrt((noise_sum / to_noise**2 + 2.0 * cross / to_noise) / n), floor)
+        for noise_sum, cross, floor in (_POWER, _PLACE)
     )
-    place_error = step * math.hypot(
-        math.sqrt((_NOISE_PLACE / to_noise**2 + 2.0 * _CROSS_PLACE / to_noise) / n), _FLOOR_PLACE
-    )
+    place_error *= step
     if wide:
         place_error = math.hypot(place_error, step * across / math.sqrt(12.0 * n))
     # A line of amplitude A has the power A^2 / 4 at +f; block means see it damped.

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, replace
+from dataclasses import asdict, fields, replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -18,7 +18,6 @@ from imubench_pipeline.estimators.estimate import (
     Estimate,
     JointDraws,
     Parameter,
-    Status,
 )
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables import read
@@ -140,14 +139,6 @@ def estimate_of(method: str, rows: Iterable[Row]) -> Estimate:
         name = row["parameter"]
         group = lines if name in ("amplitude", "frequency") else components
         place = of_curve if name in CURVE else group.setdefault(row["component"], {})
-        place[name] = Parameter(
-            row["value"],
-            cast(Status, row["status"]),
-            row["reason"],
-            row["lower"],
-            row["upper"],
-            row["duration_needed"],
-            row["fitted"],
-        )
+        place[name] = Parameter(**{field.name: row[field.name] for field in fields(Parameter)})
     first = components.pop(1, {})
     return Estimate(method, first, list(components.values()), list(lines.values()), of_curve)
