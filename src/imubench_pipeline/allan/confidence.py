@@ -80,17 +80,9 @@ def _lag_one(values: Array, good: NDArray[np.bool_]) -> float | None:
 def equivalent_degrees(exponent: int, n: int, terms: int) -> float:
     """Return the equivalent degrees of freedom of a fully overlapping Allan variance.
 
-    edf = M / (1 + 2 sum_k (1 - k/M) r_k^2) with r_k the autocorrelation, at lag k, of the
-    second differences of power-law noise, and M their number.
-
-    Parameters
-    ----------
-    exponent : int
-        Noise type, 2 to -2.
-    n : int
-        Samples in a cluster.
-    terms : int
-        M, the differences in the sum: L - 2n + 1.
+    edf = M / (1 + 2 sum_k (1 - k/M) r_k^2) with r_k the autocorrelation, at lag k, of the second
+    differences of power-law noise, and M = L - 2n + 1 the number of these ``terms``. The exponent,
+    the noise type, is 2 to -2, and ``n`` samples are in a cluster.
 
     References
     ----------

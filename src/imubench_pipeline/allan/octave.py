@@ -73,16 +73,8 @@ def _level(sizes: Integers) -> Integers:
 class OctaveSums:
     """Sums of squared differences of cluster means of one segment of a log.
 
-    Parameters
-    ----------
-    sizes : ndarray of int, shape (m,)
-        n of each tau, as `octave_sizes` gives them.
-    samples : int
-        Length of the segment.
-    holes : bool
-        Samples may be missing (NaN).
-    threads : int
-        The sums have the same bits for any number.
+    The sizes, shape (m,), are as `octave_sizes` gives them; the sums have the same bits for any
+    number of threads. With ``holes`` samples may be missing (NaN).
 
     Attributes
     ----------

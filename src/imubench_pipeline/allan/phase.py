@@ -62,16 +62,8 @@ def integrate(
 ) -> Phase:
     """Sum consecutive blocks of samples up, in bounded memory beyond the result.
 
-    Parameters
-    ----------
-    blocks : iterable of ndarray
-        The log in order; NaN where a sample is missing.
-    samples : int
-        L, the length of all blocks together.
-    holes : bool
-        Samples may be missing; False saves the memory of their counts.
-    segments : sequence of (int, int), optional
-        Grid points that begin and end each segment; one segment by default.
+    The blocks are the log in order, NaN where a sample is missing; without ``holes`` no counts are
+    in memory.
 
     Raises
     ------

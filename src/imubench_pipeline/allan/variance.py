@@ -112,7 +112,7 @@ class AllanCurve:
 
 
 def cluster_sizes(samples: int, *, per_decade: int = 10, longest: float = 0.5) -> NDArray[np.int64]:
-    """Return log-spaced cluster sizes, whole and distinct.
+    """Return log-spaced cluster sizes of a log, whole and distinct.
 
     Parameters
     ----------
@@ -214,14 +214,10 @@ def of_blocks(
         The log in order, in SI; NaN where a sample is missing. Blocks of float32 are not copied.
     samples : int
         L, the length of all blocks together.
-    rate : float
-        Hz.
-    sizes : array_like of int, optional
-        n of each tau, rounded to the stride of their octave.
+    rate, sizes, segments : as in `allan_variance`
+        The sizes are rounded to the stride of their octave.
     holes : bool
         Samples may be missing.
-    segments : sequence of (int, int), optional
-        First and one-past-last sample of each; one segment by default.
     threads : int
         With more than one, the next block is made while the last is summed.
 
