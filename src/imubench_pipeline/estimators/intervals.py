@@ -265,5 +265,5 @@ def _comparable(name: str, terms: Terms, other: Terms) -> bool:
     if not name.startswith(("B", "T_B")):
         return True
     # One bias instability is one level, flicker or not; of several each has its own.
-    one = sum(terms.biases) == sum(other.biases) == 1
-    return terms.biases == other.biases or (name == "B" and one)
+    single = sum(terms.biases) == sum(other.biases) == 1
+    return terms.biases == other.biases or (name == "B" and single)
