@@ -5,14 +5,14 @@ import math
 import numpy as np
 import pytest
 
-from imubench_pipeline.estimators.carried_lines import (
+from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.estimators.lines import (
     MOST,
     STRONGEST,
+    Line,
     carried_sinusoids,
     joined_finding,
 )
-from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.estimators.lines import Line
 from imubench_pipeline.estimators.spectral_findings import line_findings
 from imubench_pipeline.noise import NoiseModel
 

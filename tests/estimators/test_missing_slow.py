@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from imubench_pipeline.estimators import likelihood
-from imubench_pipeline.estimators.missing_slow import slow_noise_missing
+from imubench_pipeline.estimators.spectral_findings import slow_noise_missing
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.simulate import simulate
 from imubench_pipeline.tables.findings import Finding

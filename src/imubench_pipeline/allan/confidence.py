@@ -21,20 +21,10 @@ _TOWARDS_TAIL = 1.4
 def noise_exponent(theta: Array, present: NDArray[np.integer[Any]] | None, n: int) -> int | None:
     """Tell the noise type from the lag-1 autocorrelation of adjacent cluster means.
 
-    Parameters
-    ----------
-    theta : ndarray, shape (m + 1,)
-        Cumulative sums of the samples at the edges of m adjacent clusters.
-    present : ndarray of int, shape (m + 1,), or None
-        Cumulative counts of the samples present at the same edges; None: all are.
-    n : int
-        Samples in a cluster.
-
-    Returns
-    -------
-    int or None
-        Exponent from 2 to -2 (see `imubench_pipeline.allan.variance.AllanCurve`); None where fewer
-        than 30 clusters are left.
+    ``theta``, shape (m + 1,), are cumulative sums of the samples at the edges of m adjacent
+    clusters of n, ``present`` the counts of samples there (None: all are). The exponent goes from 2
+    to -2 (see `imubench_pipeline.allan.variance.AllanCurve`); None where fewer than 30 clusters are
+    left.
 
     References
     ----------
@@ -90,17 +80,9 @@ def _lag_one(values: Array, good: NDArray[np.bool_]) -> float | None:
 def equivalent_degrees(exponent: int, n: int, terms: int) -> float:
     """Return the equivalent degrees of freedom of a fully overlapping Allan variance.
 
-    edf = M / (1 + 2 sum_k (1 - k/M) r_k^2) with r_k the autocorrelation, at lag k, of the
-    second differences of power-law noise, and M their number.
-
-    Parameters
-    ----------
-    exponent : int
-        Noise type, 2 to -2.
-    n : int
-        Samples in a cluster.
-    terms : int
-        M, the differences in the sum: L - 2n + 1.
+    edf = M / (1 + 2 sum_k (1 - k/M) r_k^2) with r_k the autocorrelation, at lag k, of the second
+    differences of power-law noise, and M = L - 2n + 1 the number of these ``terms``. The exponent,
+    the noise type, is 2 to -2, and ``n`` samples are in a cluster.
 
     References
     ----------

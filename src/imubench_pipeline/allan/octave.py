@@ -15,12 +15,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from imubench_pipeline.allan.full_overlap import enough_present, full_sums
 from imubench_pipeline.allan.phase import (
     Phase,
     accumulate,
     accumulate_present,
+    enough_present,
     finite_mean,
+    full_sums,
     integrate,
     sum_present,
     sum_sizes,
@@ -72,16 +73,8 @@ def _level(sizes: Integers) -> Integers:
 class OctaveSums:
     """Sums of squared differences of cluster means of one segment of a log.
 
-    Parameters
-    ----------
-    sizes : ndarray of int, shape (m,)
-        n of each tau, as `octave_sizes` gives them.
-    samples : int
-        Length of the segment.
-    holes : bool
-        Samples may be missing (NaN).
-    threads : int
-        The sums have the same bits for any number.
+    The sizes, shape (m,), are as `octave_sizes` gives them; the sums have the same bits for any
+    number of threads. With ``holes`` samples may be missing (NaN).
 
     Attributes
     ----------
@@ -149,11 +142,15 @@ class OctaveSums:
         self.first = integrate(self._begin, sum(map(len, self._begin)), holes=self._holes)
 
     @property
+    def phase(self) -> Phase:
+        """Cumulative sums at every `DECIMATION`-th sample."""
+        return Phase(self.theta, self.present, ((0, len(self.theta) - 1),))
+
+    @property
     def results(self) -> list[NDArray[Any]]:
         """Sum of squares, sum of mean inverse counts, differences, and the most there could be."""
-        phase = Phase(self.theta, self.present, ((0, len(self.theta) - 1),))
         steps = self._sizes[~self._short] // DECIMATION
-        long = full_sums(phase, steps, self._threads, stride=DECIMATION)
+        long = full_sums(self.phase, steps, self._threads, stride=DECIMATION)
         return [
             np.concatenate((of_short.astype(of_long.dtype), of_long))
             for of_short, of_long in zip(self._sums, long, strict=True)
@@ -224,16 +221,10 @@ def _sections(
 ) -> tuple[Array, Array, Array, Integers]:
     """Sum the clusters that begin in sections ``low`` to ``high``.
 
-    Returns
-    -------
-    sums : ndarray, shape (sections, 4, sizes)
-        As `OctaveSums.results`.
-    totals : ndarray, shape (sections,)
-        Sum of the samples less the bias.
-    edges : ndarray, shape (sections, SECTION / DECIMATION)
-        Cumulative sums within the section.
-    counts : ndarray of int
-        Cumulative numbers of samples present at the edges, and of the section; empty: all are.
+    Returned are sums, shape (sections, 4, sizes), as `OctaveSums.results`; totals, the sum of the
+    samples less the bias by section; edges, shape (sections, SECTION / DECIMATION), cumulative sums
+    within the section; and counts, cumulative numbers of samples present at the edges, and of the
+    section (empty: all are).
     """
     theta, tail, present = room
     points = SECTION // DECIMATION

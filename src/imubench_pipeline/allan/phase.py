@@ -1,40 +1,56 @@
-"""Cumulative sums of a log: what every Allan variance is taken from."""
+"""Cumulative sums of a log, and of their differences: what every Allan variance is taken from."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from imubench_pipeline.allan.threads import in_threads
 from imubench_pipeline.typing import Array
+
+BLOCK = 1 << 14
+"""Differences summed together: three blocks of float64 stay in the L2 cache."""
+
+PRESENT = 0.9
+"""Part of a cluster's samples that must be there for its mean to count."""
+
+
+Span = tuple[int, int]
+"""First and one-past-last sample of a segment."""
+
+
+def spans_of(segments: Sequence[Span] | None, samples: int) -> tuple[Span, ...]:
+    """Return the segments of a log; by default it is one."""
+    return tuple(segments) if segments else ((0, samples),)
 
 
 @dataclass(frozen=True)
 class Phase:
-    """Cumulative sums of a log on its uniform grid.
-
-    Attributes
-    ----------
-    theta : ndarray of float64, shape (L + 1,)
-        Cumulative sum of the samples less a constant; missing samples add nothing.
-    present : ndarray of int, shape (L + 1,), or None
-        Cumulative number of samples present; None: all are.
-    segments : tuple of (int, int)
-        Grid points that begin and end each segment.
-    """
+    """Cumulative sums of a log on its uniform grid."""
 
     theta: Array
+    """(L + 1,): cumulative sum of the samples less a constant; missing samples add nothing."""
     present: NDArray[np.integer[Any]] | None
-    segments: tuple[tuple[int, int], ...]
+    """(L + 1,): cumulative number of samples present; None: all are."""
+    segments: tuple[Span, ...]  # grid points that begin and end each segment
 
     @property
     def samples(self) -> int:
         """L, the points of the grid."""
         return len(self.theta) - 1
+
+    def every(
+        self, n: int, start: int = 0, stop: int | None = None
+    ) -> tuple[Array, NDArray[np.integer[Any]] | None]:
+        """Return sums and counts at every n-th point from ``start`` to ``stop``, that included."""
+        points = slice(start, None if stop is None else stop + 1, n)
+        return self.theta[points], None if self.present is None else self.present[points]
 
 
 def integrate(
@@ -42,20 +58,12 @@ def integrate(
     samples: int,
     *,
     holes: bool,
-    segments: Sequence[tuple[int, int]] | None = None,
+    segments: Sequence[Span] | None = None,
 ) -> Phase:
     """Sum consecutive blocks of samples up, in bounded memory beyond the result.
 
-    Parameters
-    ----------
-    blocks : iterable of ndarray
-        The log in order; NaN where a sample is missing.
-    samples : int
-        L, the length of all blocks together.
-    holes : bool
-        Samples may be missing; False saves the memory of their counts.
-    segments : sequence of (int, int), optional
-        Grid points that begin and end each segment; one segment by default.
+    The blocks are the log in order, NaN where a sample is missing; without ``holes`` no counts are
+    in memory.
 
     Raises
     ------
@@ -88,11 +96,11 @@ def integrate(
         raise ValueError(
             "a sample is infinite" if holes else "a sample is missing or infinite, but holes=False"
         )
-    return Phase(theta, present, tuple(segments) if segments else ((0, samples),))
+    return Phase(theta, present, spans_of(segments, samples))
 
 
 def split(
-    blocks: Iterable[NDArray[Any]], segments: Sequence[tuple[int, int]]
+    blocks: Iterable[NDArray[Any]], segments: Sequence[Span]
 ) -> Iterator[tuple[int, NDArray[Any]]]:
     """Yield blocks cut at the ends of segments, each with the number of its segment."""
     reached, number = 0, 0
@@ -175,14 +183,7 @@ def _sum_squares_twice(
 def sum_sizes(theta: Array, start: int, stop: int, sizes: NDArray[np.int64], sums: Array) -> None:
     """Add the squared second differences that begin at points ``start`` to ``stop``, by size.
 
-    Parameters
-    ----------
-    theta : ndarray
-    start, stop : int
-    sizes : ndarray of int
-        Points in a cluster.
-    sums : ndarray
-        What is added to, by size.
+    ``sizes`` are points in a cluster; ``sums`` is what is added to.
     """
     j = 0
     while j < sizes.size:
@@ -217,21 +218,10 @@ def sum_present(
 ) -> tuple[float, float, int]:
     """Sum squared differences of adjacent means over the samples present.
 
-    Parameters
-    ----------
-    theta, present : ndarray
-        Cumulative sums, and numbers of samples present, at one stride.
-    m : int
-        Steps of that stride in a cluster.
-    enough : int
-        Samples that a cluster must have.
-    start, stop : int
-        First and one-past-last point at which the first cluster of a pair begins.
-
-    Returns
-    -------
-    (float, float, int)
-        Sum of squares, sum of the mean inverse numbers of samples, and number of pairs.
+    ``theta`` and ``present`` are cumulative sums and numbers of samples at one stride, ``m`` steps
+    of that in a cluster, which must have ``enough`` samples; the first of a pair begins at points
+    ``start`` to ``stop``. Returned are the sum of squares, the sum of the mean inverse numbers of
+    samples, and the number of pairs.
     """
     total = 0.0
     thinned = 0.0
@@ -255,3 +245,91 @@ def sum_present(
         thinned += weight * 0.5 * (inverse_first + inverse_second)
         number += good
     return total, thinned, number
+
+
+def enough_present(sizes: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return how many samples a cluster must have for its mean to count, by size."""
+    return np.ceil(PRESENT * sizes - 1e-9).astype(np.int64)
+
+
+def full_sums(
+    phase: Phase, sizes: NDArray[np.int64], threads: int, *, stride: int = 1
+) -> tuple[Array, Array, NDArray[np.int64], NDArray[np.int64]]:
+    """Sum over the differences of means, by size.
+
+    Parameters
+    ----------
+    sizes : ndarray of int
+        Points of the phase in a cluster.
+    threads : int
+        The sums have the same bits for any number.
+    stride : int
+        Samples from one point of the phase to the next.
+
+    Returns
+    -------
+    total, thinned : ndarray
+        Sums of the squared differences, and of the mean inverse numbers of samples that the two
+        clusters average.
+    terms, possible : ndarray of int
+        Number of differences, and what it would be without holes.
+    """
+    total = np.zeros(len(sizes))
+    thinned = np.zeros(len(sizes))
+    terms = np.zeros(len(sizes), dtype=np.int64)
+    possible = np.zeros(len(sizes), dtype=np.int64)
+    samples = sizes * stride
+    for start, stop in phase.segments:
+        theta = phase.theta[start : stop + 1]
+        blocks = -(-len(theta) // BLOCK)
+        most = np.maximum(stop - start - 2 * sizes + 1, 0)
+        possible += most
+        if phase.present is None:
+            (sums,) = in_threads(partial(_full, theta, sizes), blocks, threads)
+            total += sums.sum(axis=0) / samples.astype(np.float64) ** 2
+            thinned += most / samples
+            terms += most
+        else:
+            counts = phase.present[start : stop + 1]
+            work = partial(_full_with_holes, theta, counts, sizes, enough_present(samples))
+            sums, inverse, numbers = in_threads(work, blocks, threads)
+            total += sums.sum(axis=0)
+            thinned += inverse.sum(axis=0)
+            terms += numbers.sum(axis=0)
+    return total, thinned, terms, possible
+
+
+@njit(cache=True, nogil=True)
+def _full(theta: Array, sizes: NDArray[np.int64], low: int, high: int) -> tuple[Array]:
+    """Return the sum of squared second differences of each block and size."""
+    sums = np.zeros((high - low, sizes.size))
+    for block in range(high - low):
+        start = (low + block) * BLOCK
+        sum_sizes(theta, start, start + BLOCK, sizes, sums[block])
+    return (sums,)
+
+
+@njit(cache=True, nogil=True)
+def _full_with_holes(
+    theta: Array,
+    present: NDArray[np.integer[Any]],
+    sizes: NDArray[np.int64],
+    enough: NDArray[np.int64],
+    low: int,
+    high: int,
+) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Return, by block and size, what `full_sums` adds up, over the samples present."""
+    points = theta.size
+    sums = np.zeros((high - low, sizes.size))
+    inverse = np.zeros((high - low, sizes.size))
+    numbers = np.zeros((high - low, sizes.size), dtype=np.int64)
+    for block in range(high - low):
+        start = (low + block) * BLOCK
+        for j in range(sizes.size):
+            n = sizes[j]
+            stop = min(start + BLOCK, points - 2 * n)
+            total, thinned, number = sum_present(theta, present, n, enough[j], start, stop)
+            sums[block, j] = total
+            inverse[block, j] = thinned
+            numbers[block, j] = number
+    return sums, inverse, numbers

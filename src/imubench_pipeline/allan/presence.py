@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.allan.full_overlap import PRESENT
+from imubench_pipeline.allan.phase import PRESENT, Span, spans_of
 
 Counts = NDArray[np.int64]
 
@@ -20,39 +20,19 @@ _STEPS = 32
 
 @dataclass(frozen=True)
 class Presence:
-    """Cumulative numbers of samples present.
+    """Cumulative numbers of samples present."""
 
-    Attributes
-    ----------
-    samples : int
-        L, the points of the grid.
-    segments : tuple of (int, int)
-        Grid points that begin and end each segment.
-    first : ndarray of int
-        Samples present before each of the first points.
-    stride : int
-    coarse : ndarray of int
-        Samples present before every ``stride``-th point of the log.
-    """
-
-    samples: int
-    segments: tuple[tuple[int, int], ...]
-    first: Counts
+    samples: int  # L, the points of the grid
+    segments: tuple[Span, ...]  # grid points that begin and end each segment
+    first: Counts  # samples present before each of the first points
     stride: int
-    coarse: Counts
+    coarse: Counts  # samples present before every ``stride``-th point of the log
 
     def differences(self, n: int) -> tuple[NDArray[np.bool_], int] | None:
         """Tell which differences of two adjacent cluster means of n samples there are.
 
-        Parameters
-        ----------
-        n : int
-
-        Returns
-        -------
-        (ndarray of bool, int) or None
-            For differences that begin a stride apart, and the stride; of the whole log, or of
-            its beginning where that has clusters enough. None: neither is fine enough.
+        For differences that begin a stride apart, and the stride; of the whole log, or of its
+        beginning where that has clusters enough. None: neither is fine enough.
         """
         if n >= _STEPS // 2 * self.stride:
             counts, base = self.coarse, self.stride
@@ -80,18 +60,11 @@ class Presence:
 def presence(
     blocks: Iterable[NDArray[np.floating[Any]]],
     samples: int,
-    segments: Sequence[tuple[int, int]] | None = None,
+    segments: Sequence[Span] | None = None,
 ) -> Presence:
-    """Count the samples that are present.
+    """Count the samples that are present in a log, NaN where one is missing.
 
-    Parameters
-    ----------
-    blocks : iterable of ndarray
-        The log in order; NaN where a sample is missing.
-    samples : int
-        L, the length of all blocks together.
-    segments : sequence of (int, int), optional
-        Grid points that begin and end each segment; one segment by default.
+    ``segments`` are the grid points that begin and end each; one by default.
     """
     stride = 1
     while samples // stride > _POINTS:
@@ -108,4 +81,4 @@ def presence(
             part = counts[: len(first) - 1 - reached]
             first[reached + 1 : reached + 1 + len(part)] = part
         reached, total = stop, int(counts[-1]) if len(counts) else total
-    return Presence(samples, tuple(segments or ((0, samples),)), first, stride, coarse)
+    return Presence(samples, spans_of(segments, samples), first, stride, coarse)

@@ -31,12 +31,7 @@ def variance_degrees(weights: Array) -> float:
 def tail_degrees(weights: Array) -> float:
     """Return the degrees of freedom of the chi-squared variate with the same lower tail.
 
-    Over its mean it has the same quantile of chance 2.5 %.
-
-    Parameters
-    ----------
-    weights : ndarray, shape (m,)
-        w_i >= 0, to a factor.
+    Over its mean it has the same quantile of chance 2.5 %. The weights w_i >= 0 are to a factor.
     """
     if len(weights) == 1:
         return 1.0
@@ -51,15 +46,8 @@ def tail_degrees(weights: Array) -> float:
 def lower_quantile(weights: Array, chance: float) -> float:
     """Return a quantile below the mean of a weighted sum of chi-squared variates over its mean.
 
-    The saddlepoint approximation is within a tenth of the chance; the quantile within 1 % where
-    more than three weights count.
-
-    Parameters
-    ----------
-    weights : ndarray, shape (m,)
-        w_i >= 0, to a factor.
-    chance : float
-        Below a third.
+    The saddlepoint approximation is within a tenth of the chance, which is below a third; the
+    quantile within 1 % where more than three weights count. The weights w_i >= 0 are to a factor.
 
     References
     ----------

@@ -16,20 +16,10 @@ _SHARES = 4
 def in_threads(
     work: Callable[[int, int], tuple[NDArray[Any], ...]], pieces: int, threads: int
 ) -> tuple[NDArray[Any], ...]:
-    """Do work on pieces 0 to ``pieces``, a few at a time, and join the results.
+    """Do work on pieces 0 to ``pieces``, a few at a time, and join the rows of all in order.
 
-    Parameters
-    ----------
-    work : callable
-        Takes the first and one-past-last piece; returns arrays with one row a piece. It must let
-        other threads run.
-    pieces : int
-    threads : int
-
-    Returns
-    -------
-    tuple of ndarray
-        The rows of all pieces in order.
+    The work takes the first and one-past-last piece, and returns arrays with one row a piece. It
+    must let other threads run.
     """
     threads = max(1, min(threads, pieces))
     if threads == 1:

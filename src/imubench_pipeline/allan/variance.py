@@ -20,9 +20,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from imubench_pipeline.allan.confidence import deviation_limits, equivalent_degrees, noise_exponent
-from imubench_pipeline.allan.full_overlap import full_sums
 from imubench_pipeline.allan.octave import DECIMATION, SHORTEST, OctaveSums, octave_sizes
-from imubench_pipeline.allan.phase import Phase, integrate, split
+from imubench_pipeline.allan.phase import Phase, Span, full_sums, integrate, spans_of, split
 from imubench_pipeline.allan.threads import read_ahead
 from imubench_pipeline.typing import Array
 
@@ -113,7 +112,7 @@ class AllanCurve:
 
 
 def cluster_sizes(samples: int, *, per_decade: int = 10, longest: float = 0.5) -> NDArray[np.int64]:
-    """Return log-spaced cluster sizes, whole and distinct.
+    """Return log-spaced cluster sizes of a log, whole and distinct.
 
     Parameters
     ----------
@@ -139,7 +138,7 @@ def allan_variance(
     cluster_sizes: ArrayLike | None = None,
     overlap: Literal["full", "octave"] = "full",
     valid: ArrayLike | None = None,
-    segments: Sequence[tuple[int, int]] | None = None,
+    segments: Sequence[Span] | None = None,
 ) -> AllanCurve:
     """Return the overlapping Allan variance of a log.
 
@@ -201,7 +200,7 @@ def of_blocks(
     sizes: ArrayLike | None = None,
     *,
     holes: bool,
-    segments: Sequence[tuple[int, int]] | None = None,
+    segments: Sequence[Span] | None = None,
     threads: int = 1,
 ) -> AllanCurve:
     """Return the multi-octave Allan variance of a log that comes in blocks.
@@ -215,14 +214,10 @@ def of_blocks(
         The log in order, in SI; NaN where a sample is missing. Blocks of float32 are not copied.
     samples : int
         L, the length of all blocks together.
-    rate : float
-        Hz.
-    sizes : array_like of int, optional
-        n of each tau, rounded to the stride of their octave.
+    rate, sizes, segments : as in `allan_variance`
+        The sizes are rounded to the stride of their octave.
     holes : bool
         Samples may be missing.
-    segments : sequence of (int, int), optional
-        First and one-past-last sample of each; one segment by default.
     threads : int
         With more than one, the next block is made while the last is summed.
 
@@ -231,7 +226,7 @@ def of_blocks(
     ValueError
         As `allan_variance`.
     """
-    spans = tuple(segments) if segments else ((0, samples),)
+    spans = spans_of(segments, samples)
     wanted = _checked(rate, sizes, samples, spans)
     wanted = octave_sizes(wanted)
     if samples < SHORTEST:
@@ -256,15 +251,13 @@ def of_blocks(
         done += 1
     if longest is None or done < len(spans):
         raise ValueError(f"the blocks end before sample {spans[done][1]}")
-    first = longest.first
 
     def edges(n: int) -> tuple[Array, NDArray[Any] | None, int]:
         if n < _FEW_STEPS * DECIMATION:
-            return first.theta[::n], None if first.present is None else first.present[::n], n
+            return *longest.first.every(n), n
         # The noise type is the same at the nearest multiple of the stride.
         step = round(n / DECIMATION)
-        counts = longest.present
-        return longest.theta[::step], None if counts is None else counts[::step], step * DECIMATION
+        return *longest.phase.every(step), step * DECIMATION
 
     return _curve(rate, wanted, samples, spans, sums, edges)
 
@@ -280,19 +273,14 @@ def of_phase(
     start, stop = max(phase.segments, key=lambda segment: segment[1] - segment[0])
 
     def edges(n: int) -> tuple[Array, NDArray[Any] | None, int]:
-        counts = phase.present
-        return (
-            phase.theta[start : stop + 1 : n],
-            None if counts is None else counts[start : stop + 1 : n],
-            n,
-        )
+        return *phase.every(n, start, stop), n
 
     sums = full_sums(phase, wanted, threads)
     return _curve(rate, wanted, phase.samples, phase.segments, sums, edges)
 
 
 def _checked(
-    rate: float, sizes: ArrayLike | None, samples: int, segments: Sequence[tuple[int, int]]
+    rate: float, sizes: ArrayLike | None, samples: int, segments: Sequence[Span]
 ) -> NDArray[np.int64]:
     """Check the arguments that all kernels share, and return the sizes."""
     if not rate > 0:
@@ -315,7 +303,7 @@ def _curve(
     rate: float,
     sizes: NDArray[np.int64],
     samples: int,
-    segments: Sequence[tuple[int, int]],
+    segments: Sequence[Span],
     sums: Sequence[NDArray[Any]],
     edges: Edges,
 ) -> AllanCurve:
@@ -360,6 +348,6 @@ def _exponents(edges: Edges, sizes: NDArray[np.int64]) -> list[int]:
     return exponents
 
 
-def _degrees(segments: Sequence[tuple[int, int]], exponent: int, n: int) -> float:
+def _degrees(segments: Sequence[Span], exponent: int, n: int) -> float:
     terms = [stop - start - 2 * n + 1 for start, stop in segments]
     return sum(equivalent_degrees(exponent, n, term) for term in terms if term > 0)

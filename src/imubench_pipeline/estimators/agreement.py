@@ -23,12 +23,7 @@ _TWICE = 1.8
 def doubt_contradicted(estimate: Estimate, reference: Estimate) -> Estimate:
     """Return an estimate with its values doubtful that the likelihood rules out.
 
-    Parameters
-    ----------
-    estimate : Estimate
-        By another method.
-    reference : Estimate
-        By the likelihood, of the same channel.
+    ``reference`` is that by the likelihood, of the same channel.
     """
     references = dict(reference.parameters)
     if reference.further and "B_curve" in reference.curve:
@@ -74,27 +69,15 @@ def _contradiction(name: str, parameter: Parameter, reference: Parameter) -> str
 
 
 def disagreements(channel: str, estimates: Mapping[str, Estimate]) -> Iterator[Finding]:
-    """Yield a finding where the fit of the curve and the likelihood disagree on N.
-
-    Parameters
-    ----------
-    channel : str
-    estimates : mapping of str to Estimate
-        By method, as they were found.
-    """
+    """Yield a finding where the fit of the curve and the likelihood, by method, disagree on N."""
     if not {"weighted", "likelihood"} <= estimates.keys():
         return
     weighted, likelihood = (
         estimates[method].parameters["N"] for method in ("weighted", "likelihood")
     )
-    if (
-        weighted.value is None
-        or likelihood.value is None
-        or weighted.lower is None
-        or weighted.upper is None
-    ):
+    if weighted.value is None or weighted.lower is None or weighted.upper is None:
         return
-    if likelihood.lower is None or likelihood.upper is None:
+    if likelihood.value is None or likelihood.lower is None or likelihood.upper is None:
         return
     if weighted.upper < likelihood.lower or weighted.lower > likelihood.upper:
         ratio = weighted.value / likelihood.value

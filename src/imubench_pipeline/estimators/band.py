@@ -33,18 +33,10 @@ _FLEXIBLE = Terms("NFK", 1)
 
 @dataclass(frozen=True)
 class Band:
-    """The highest frequency that enters the likelihood.
+    """The highest frequency that enters the likelihood."""
 
-    Attributes
-    ----------
-    highest : float
-        Hz.
-    source : str
-        How it was found, in words.
-    """
-
-    highest: float
-    source: str
+    highest: float  # Hz
+    source: str  # how it was found, in words
 
 
 def find_band(
@@ -63,17 +55,12 @@ def find_band(
 
     Parameters
     ----------
-    spectrum : Spectrum
     clear : ndarray of bool, shape (b,)
         Bins that no line touches.
     asked : float, optional
         Set by the user, Hz: it is taken as it is.
     bandwidth : float, optional
         Cut-off of the sensor's own filter, Hz, where it is stated: a tenth of it is the limit.
-
-    Returns
-    -------
-    Band
     """
     nyquist = 0.5 * spectrum.rate
     if asked is not None:

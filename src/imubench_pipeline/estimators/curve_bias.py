@@ -47,23 +47,12 @@ _PEAK_SHAPE = float(gauss_markov_shape(np.array([PEAK_TAU]), 1.0)[0])
 
 @dataclass(frozen=True)
 class Models:
-    """Parameters of many models that have the same terms.
-
-    Attributes
-    ----------
-    terms : Terms
-    parameters : ndarray, shape (d, p)
-        The linear parameters in their order, then B of each process; SI.
-    times : ndarray, shape (d, g)
-        T_B of each process, s.
-    weight : float
-        Of all of them together, among those of other terms.
-    """
+    """Parameters of many models that have the same terms."""
 
     terms: Terms
-    parameters: Array
-    times: Array
-    weight: float = 1.0
+    parameters: Array  # (d, p): the linear parameters in their order, then B of each process; SI
+    times: Array  # (d, g): T_B of each process, s
+    weight: float = 1.0  # of all of them together, among those of other terms
 
     def parameter(self, letter: str) -> Array:
         """Return Q, N, B of flicker noise (F) or K, shape (d,); zeros where there is none."""
@@ -79,7 +68,7 @@ class Models:
     @property
     def has_bias(self) -> bool:
         """Whether there is flicker noise or a Gauss-Markov process."""
-        return "F" in self.terms.linear or self.terms.gauss_markov > 0
+        return any(self.terms.biases)
 
 
 def models_of(model: NoiseModel) -> Models:
@@ -101,21 +90,11 @@ def models_of(model: NoiseModel) -> Models:
 
 
 def bias_of_curve(models: Models, longest: float) -> tuple[Array, Array]:
-    """Return the bias instability of the curve of models.
+    """Return the bias instability of the curve of models up to a tau in s, and where it is.
 
-    Parameters
-    ----------
-    models : Models
-    longest : float
-        Averaging time up to which it is looked for, s.
-
-    Returns
-    -------
-    bias : ndarray, shape (d,)
-        The largest Allan deviation of the flicker and Gauss-Markov terms over 0.664, rad/s or
-        m/s².
-    at : ndarray, shape (d,)
-        Where it is, s; flicker noise alone has it everywhere, and the longest is given.
+    That is the largest Allan deviation of the flicker and Gauss-Markov terms over 0.664, rad/s or
+    m/s², and its tau, s, both of shape (d,); flicker noise alone has it everywhere, and the longest
+    is given.
     """
     flicker, count = models.parameter("F"), models.terms.gauss_markov
     if count == 0:
@@ -152,20 +131,9 @@ def allan_variance(models: Models, tau: Array) -> Array:
 def lowest_point(models: Models, tau: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Return the lowest point of the Allan deviation of models.
 
-    Parameters
-    ----------
-    models : Models
-    tau : ndarray, shape (m,)
-        Rising evenly in the logarithm, s; between them a parabola is taken.
-
-    Returns
-    -------
-    deviation : ndarray, shape (d,)
-        rad/s or m/s².
-    at : ndarray, shape (d,)
-        Its averaging time, s.
-    inside : ndarray of bool, shape (d,)
-        It is a minimum, and not an end of ``tau``.
+    ``tau``, shape (m,), rises evenly in the logarithm, s; between them a parabola is taken.
+    Returned are, each of shape (d,), the deviation, rad/s or m/s², its averaging time, s, and
+    whether it is a minimum, and not an end of ``tau``.
     """
     level = np.log(allan_variance(models, tau))
     rows = np.arange(len(level))
@@ -198,19 +166,15 @@ def with_curve(
 
     Values are the geometric means over the models that the log does not rule out, by their weights
     (BIC), and intervals those of their draws together. (By AIC, two processes of which the slower
-    stands for the random walk count as much as the walk: limits are twice as wide as they need
-    be.)
+    stands for the random walk count as much as the walk: limits are twice as wide as they need be.)
 
     Parameters
     ----------
-    estimate : Estimate
     alike : sequence of Candidate
         The models that the log does not rule out, the chosen one first.
     wider : sequence of Candidate
         Models with one bias instability beside the terms of the chosen one: what is absent is
         below their limits.
-    draws : mapping of Terms to Posterior
-        Of all of them.
     tau : ndarray, shape (m,)
         As `averaging_times` gives them.
     """
@@ -218,15 +182,9 @@ def with_curve(
     best = [_best(candidate) for candidate in alike]
     drawn = [_drawn(candidate, draws) for candidate in alike]
     if not best[0].has_bias:
-        having = [
-            candidate
-            for candidate in alike
-            if as_good(candidate, chosen) and _best(candidate).has_bias
-        ]
-        every = [*(candidate for candidate in wider if _best(candidate).has_bias), *having]
-        bias = _weak_bias(
-            [_drawn(candidate, draws) for candidate in every], bool(having), float(tau[-1])
-        )
+        having = [c for c in alike if as_good(c, chosen) and any(c.terms.biases)]
+        every = [c for c in wider if any(c.terms.biases)] + having
+        bias = _weak_bias([_drawn(c, draws) for c in every], bool(having), float(tau[-1]))
     else:
         bias = _bias(best, drawn, float(tau[-1]))
     return replace(estimate, curve={"B_curve": bias} | lowest_parameters(best, drawn, tau))
@@ -266,14 +224,7 @@ def _weak_bias(drawn: Sequence[Models], as_good: bool, longest: float) -> Parame
 
 
 def of_model(model: NoiseModel, tau: Array) -> dict[str, Parameter]:
-    """Return the figures of the curve of a model as it is, without limits.
-
-    Parameters
-    ----------
-    model : NoiseModel
-    tau : ndarray, shape (m,)
-        As `averaging_times` gives them.
-    """
+    """Return the figures of the curve of a model as it is, at `averaging_times`, without limits."""
     models = models_of(model)
     if not models.terms.parameters:
         nothing = Parameter(None, "not_shown", "there is no noise")
@@ -287,16 +238,10 @@ def of_model(model: NoiseModel, tau: Array) -> dict[str, Parameter]:
 def lowest_parameters(
     best: Sequence[Models], drawn: Sequence[Models], tau: Array
 ) -> dict[str, Parameter]:
-    """Return ``sigma_min`` and ``tau_min``.
+    """Return ``sigma_min`` and ``tau_min``, at `averaging_times`.
 
-    Parameters
-    ----------
-    best : sequence of Models
-        One model of each set of terms, as it is fitted; the chosen one first.
-    drawn : sequence of Models
-        Draws of them; none where the fit gives no limits.
-    tau : ndarray, shape (m,)
-        As `averaging_times` gives them.
+    ``best`` has one model of each set of terms, as it is fitted, the chosen one first; ``drawn``
+    has draws of them, none where the fit gives no limits.
     """
     points = [lowest_point(models, tau) for models in best]
     weights = [models.weight for models in best]

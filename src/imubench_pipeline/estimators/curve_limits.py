@@ -18,11 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.allan import FITTED, POWER_LAW, AllanCurve
+from imubench_pipeline.allan.phase import Span
 from imubench_pipeline.allan.presence import Presence
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.whittle import model_of
-from imubench_pipeline.noise import NoiseModel, Sinusoid
-from imubench_pipeline.noise.spectral_degrees import Degrees, Span, degrees_of_model
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise.spectral_degrees import Degrees, degrees_of_model
 
 _FEW_CLUSTERS = 100
 
@@ -39,23 +40,9 @@ def with_fitted_limits(
     """Return a curve with the degrees of freedom that the fitted spectrum implies.
 
     Where the model does not explain the log, and at tau so short that the curve shows frequencies
-    that were not fitted, the fewer of these and those of the identified power law are taken.
-
-    Parameters
-    ----------
-    curve : AllanCurve
-        With the degrees of freedom of the identified power law.
-    likelihood : Likelihood
-        Of the same log.
-    segments : tuple of (int, int), optional
-        First and one-past-last sample of each.
-    presence : Presence, optional
-        Of the samples, where some are missing.
-
-    Returns
-    -------
-    AllanCurve
-        The same where nothing was fitted.
+    that were not fitted, the fewer of these and those of the identified power law, which the curve
+    comes with, are taken. Where nothing was fitted the curve is the same. ``segments`` are first
+    and one-past-last sample of each; ``presence`` is needed where samples are missing.
     """
     if not likelihood.candidates or likelihood.band is None:
         return curve
@@ -107,5 +94,4 @@ def _with_more_walk(model: NoiseModel, likelihood: Likelihood) -> NoiseModel | N
 
 def with_lines(model: NoiseModel, likelihood: Likelihood) -> NoiseModel:
     """Return a model with the narrow lines that were found beside it."""
-    lines = [Sinusoid(line.amplitude, line.frequency) for line in likelihood.lines if line.narrow]
-    return replace(model, sinusoids=lines)
+    return replace(model, sinusoids=[line.term for line in likelihood.lines if line.narrow])

@@ -24,16 +24,15 @@ from imubench_pipeline.estimators.filter_fits import (
     FAMILY,
     FEWEST_BINS,
     PROCESSES,
+    Allowed,
     FilterFits,
     FilterTrial,
-    frequencies_in_bins,
-)
-from imubench_pipeline.estimators.filter_readings import (
-    Allowed,
     OfModel,
     Reading,
     also_after_sampling,
     draw_factors,
+    frequencies_in_bins,
+    highest_cutoff,
 )
 from imubench_pipeline.estimators.low_pass import Filter, Kind
 from imubench_pipeline.estimators.spectrum import Spectrum
@@ -83,7 +82,10 @@ WIDEST = 1.2
 _LEAST_WIDTH = 1e-5
 """Half of an interval of a logarithm."""
 
-NOT_AS_BEHIND = "the spectrum bends, but not as behind any of {} filters that were tried"
+ALLOWED = "the log allows cut-offs from {:.4g} to {:.4g} Hz"
+NOT_AS_BEHIND = (
+    f"the spectrum bends, but not as behind any of {len(FAMILY)} filters that were tried"
+)
 
 _AS_STATED = 1.6
 """Ratio to the stated cut-off up to which a filter is the stated one."""
@@ -91,57 +93,27 @@ _AS_STATED = 1.6
 
 @dataclass(frozen=True)
 class Cutoff:
-    """The low-pass that a spectrum shows.
+    """The low-pass that a spectrum shows."""
 
-    Attributes
-    ----------
-    frequency : Parameter
-        f_c (-3 dB), Hz.
-    order : int or None
-        n; None where no filter shows.
-    N : Parameter
-        Density of white noise before the filter, SI.
-    floor : float
-        Density of white noise after it, that of rounding and what else shows, SI.
-    gained : float
-        BIC of the noise without a filter, less that with it.
-    or_quantization : bool
-        Quantization noise would explain the spectrum as well.
-    kind : str or None
-        ``analogue``, ``bilinear`` or ``boxcar``; None where no filter shows.
-    or_process : str or None
-        Why what bends the spectrum may be a process or a filter, and is not told.
-    N_behind : float or None
-        N before the filter, if it is one, where that is not told; SI.
-    behind : Behind or None
-        What the filter leaves of noise in each bin of the whole spectrum.
-    ruled : ndarray of bool, shape (b,), or None
-        Bins in which the ends of the transform rule, and not the noise.
-    readings : sequence of Reading
-        Of all filters that the log does not rule out.
-    allowed : sequence of Allowed
-        Those filters, the chosen one first.
-    rounded : float
-        Density of rounding, parts of N^2.
-    models : mapping of Terms to OfModel
-        Where the cut-off was fitted together with models of the noise.
-    """
-
-    frequency: Parameter
-    order: int | None
-    N: Parameter
-    floor: float
-    gained: float
-    or_quantization: bool = False
-    kind: Kind | None = None
+    frequency: Parameter  # f_c (-3 dB), Hz
+    order: int | None  # n; None where no filter shows
+    N: Parameter  # density of white noise before the filter, SI
+    floor: float  # density of white noise after it, that of rounding and what else shows, SI
+    gained: float  # BIC of the noise without a filter, less that with it
+    or_quantization: bool = False  # quantization noise would explain the spectrum as well
+    kind: Kind | None = None  # ``analogue``, ``bilinear`` or ``boxcar``; None where no filter shows
     or_process: str | None = None
-    N_behind: float | None = None
+    """Why what bends the spectrum may be a process or a filter, and is not told."""
+    N_behind: float | None = None  # N before the filter, if it is one, where that is not told; SI
     behind: Behind | None = None
+    """What the filter leaves of noise in each bin of the whole spectrum."""
     ruled: NDArray[np.bool_] | None = None
-    readings: Sequence[Reading] = ()
-    allowed: Sequence[Allowed] = ()
-    rounded: float = 0.0
+    """(b,): bins in which the ends of the transform rule, and not the noise."""
+    readings: Sequence[Reading] = ()  # of all filters that the log does not rule out
+    allowed: Sequence[Allowed] = ()  # those filters, the chosen one first
+    rounded: float = 0.0  # density of rounding, parts of N^2
     models: Mapping[Terms, OfModel] = field(default_factory=dict)
+    """Where the cut-off was fitted together with models of the noise."""
 
     @property
     def words(self) -> str:
@@ -160,15 +132,7 @@ class Cutoff:
         return max((self.floor / N) ** 2 - self.rounded, 0.0)
 
     def factors(self, number: int, rng: np.random.Generator, terms: Terms) -> Array:
-        """Return draws of N over its value for the filter that was chosen, shape (number,).
-
-        Parameters
-        ----------
-        number : int
-        rng : numpy.random.Generator
-        terms : Terms
-            The model of the noise.
-        """
+        """Return draws of N over its value for the chosen filter in a model, shape (number,)."""
         of_model = self.models.get(replace(terms, ramp=False))
         readings = self.readings if of_model is None else of_model.readings
         if not readings:
@@ -180,7 +144,6 @@ def find_cutoff(
     spectrum: Spectrum,
     clear: NDArray[np.bool_] | None = None,
     *,
-    filters: Sequence[tuple[Kind, int]] = FAMILY,
     resolution: float = 0.0,
     stated: float | None = None,
 ) -> Cutoff:
@@ -197,8 +160,6 @@ def find_cutoff(
         Of a log, up to Nyquist.
     clear : ndarray of bool, shape (b,), optional
         Bins that no line touches.
-    filters : sequence of (str, int)
-        Kinds and orders to try, at least one.
     resolution : float
         Step of the register (LSB), SI, where the samples are rounded: white noise of variance
         LSB^2 / 12 behind the filter.
@@ -217,11 +178,10 @@ def find_cutoff(
         unknown = Parameter(None, "not_shown", f"the spectrum has {used.sum()} bins only")
         return Cutoff(unknown, None, unknown, 0.0, 0.0)
     fits = FilterFits(spectrum.select(used))
-    if not fits.may_bend(filters):
-        absent = Parameter(None, "absent", "the spectrum shows no low-pass")
-        return Cutoff(absent, None, Parameter(fits.unfiltered()[0]), 0.0, 0.0)
+    if not fits.may_bend():
+        return _without_filter(fits.unfiltered()[0], 0.0, None)
     rounding = resolution**2 / (12.0 * spectrum.rate)
-    settled = _settled(spectrum, used, fits, filters, rounding)
+    settled = _settled(spectrum, used, fits, rounding)
     fits, tried = settled.fits, settled.tried
     N_alone, without, cost_alone, rising = fits.unfiltered()
     behind = fits.behind(tried[0]) if tried else math.inf
@@ -230,9 +190,7 @@ def find_cutoff(
     doubt = _process_or_filter(fits, tried, cost_alone, gained, stated)
     if doubt is not None or gained < _BEYOND_BIC or beside_rounding < -_BEYOND_BIC:
         return _without_filter(N_alone, gained, doubt)
-    return _with_filter(
-        spectrum, settled, rounding, len(filters), (N_alone, gained, beside_rounding)
-    )
+    return _with_filter(spectrum, settled, rounding, (N_alone, gained, beside_rounding))
 
 
 @dataclass(frozen=True)
@@ -249,11 +207,10 @@ def _settled(
     spectrum: Spectrum,
     usable: NDArray[np.bool_],
     fits: FilterFits,
-    filters: Sequence[tuple[Kind, int]],
     rounding: float,
 ) -> _Settled:
     """Fit the filters, and again where the best of them changes which bins tell of it."""
-    tried = fits.try_filters(filters, _COARSE)
+    tried = fits.try_filters(_COARSE)
     used, ruled = usable, np.zeros(len(usable), dtype=np.bool_)
     for passed in range(_PASSES if tried else 0):
         earlier, ruled = ruled, _ruled_by_ends(spectrum, fits, tried[0], rounding)
@@ -266,7 +223,7 @@ def _settled(
         if rounding > 0.0:
             fits.rounded = rounding / fits.density(tried[0])[0] ** 2
         fits.choose_slow(tried[0])
-        tried = fits.try_filters(filters)
+        tried = fits.try_filters()
         if not tried:
             break
     return _Settled(fits, tried, used, ruled)
@@ -276,10 +233,9 @@ def _with_filter(
     spectrum: Spectrum,
     settled: _Settled,
     rounding: float,
-    number: int,
     against: tuple[float, float, float],
 ) -> Cutoff:
-    """Describe the best of ``number`` filters and the others that the log allows.
+    """Describe the best of the filters and the others that the log allows.
 
     ``against``: N of the noise alone, and what BIC gains over it, and over that with rounding.
     """
@@ -296,7 +252,7 @@ def _with_filter(
     limits = [fits.limits(trial) for trial in alike]
     lower, upper = min(low for low, _ in limits), max(high for _, high in limits)
     N, after = fits.density(best)
-    highest = upper >= 0.999 * fits.highest(best.kind, best.order)
+    highest = upper >= 0.999 * highest_cutoff(best.kind, best.order, fits.rate)
     shown, lower, upper = (
         replace(best, cutoff=cutoff).low_pass.half_power(spectrum.rate)
         for cutoff in (best.cutoff, lower, upper)
@@ -311,17 +267,18 @@ def _with_filter(
     density = Parameter(
         N, lower=N * math.exp(min(0.0, *ends) - error), upper=N * math.exp(max(0.0, *ends) + error)
     )
-    reason = ""
-    if beside_rounding < _BEYOND_BIC:
+    or_quantization = beside_rounding < _BEYOND_BIC
+    reason = None
+    if or_quantization:
         reason = (
             "the spectrum rises towards Nyquist, by quantization noise as well as by a low-pass "
             f"with a cut-off from {lower:.4g} to {upper:.4g} Hz"
         )
     elif upper > WIDEST * lower or highest:
-        reason = f"the log allows cut-offs from {lower:.4g} to {upper:.4g} Hz"
+        reason = ALLOWED.format(lower, upper)
     elif not fits.explains(best):
-        reason = NOT_AS_BEHIND.format(number)
-    if reason:
+        reason = NOT_AS_BEHIND
+    if reason is not None:
         frequency = Parameter(None, "not_identified", reason, lower, upper, fitted=shown)
         density = replace(
             density, value=None, status="not_identified", reason=reason, fitted=density.value
@@ -337,7 +294,7 @@ def _with_filter(
         density,
         math.hypot(after, math.sqrt(rounding)),
         gained,
-        beside_rounding < _BEYOND_BIC,
+        or_quantization,
         best.kind,
         behind=Behind(white + (after / N) ** 2, *slow),
         ruled=settled.ruled,

@@ -28,15 +28,10 @@ def drawn_share(candidate: Candidate, bins: int) -> float:
 
     An amplitude may be anything from 0, and AIC gives a weak one that is there its part; by BIC it
     is in no draw, and the truth lies above the limits. A correlation time must be looked for over
-    decades, of which a fit takes a small part: that costs what BIC asks. That a process as slow as
-    a walk counts less than the walk is left to `joint_draws`: counted here as well, a log that
-    shows such a process nearly as well as a walk has none among its draws.
-
-    Parameters
-    ----------
-    candidate : Candidate
-    bins : int
-        Bins of the spectrum that it was fitted to.
+    decades, of which a fit takes a small part: that costs what BIC asks, of the bins that were
+    fitted. That a process as slow as a walk counts less than the walk is left to `joint_draws`:
+    counted here as well, a log that shows such a process nearly as well as a walk has none among
+    its draws.
     """
     terms = candidate.terms
     of_times = terms.gauss_markov * (0.5 * math.log(bins) - 1.0)
@@ -53,18 +48,8 @@ def joint_draws(
     to chance, and neighbours in a chain do not stand for each other. A process as slow as a walk
     counts as in the choice of the model, less than a walk.
 
-    Parameters
-    ----------
-    parts : sequence of (Terms, Posterior, float)
-        Models that the log does not rule out, with their shares of any sum.
-    longest : float
-        The longest correlation time that the log can show, s.
-    number : int
-        Draws of all together.
-
-    Returns
-    -------
-    JointDraws
+    ``parts`` are the models that the log does not rule out, with shares of any sum; ``longest`` is
+    the longest correlation time that the log can show, s.
 
     Raises
     ------

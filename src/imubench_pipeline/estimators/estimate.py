@@ -96,15 +96,7 @@ class JointDraws:
         return len(self.first)
 
     def model(self, number: int, sinusoids: Sequence[Sinusoid] = ()) -> NoiseModel:
-        """Return the noise model of a draw.
-
-        Parameters
-        ----------
-        number : int
-            Of the draw, from 0.
-        sinusoids : sequence of Sinusoid
-            Lines beside the noise.
-        """
+        """Return the noise model of a draw, numbered from 0, with lines beside the noise."""
         Q, N, B, T_B, K, R = self.first[number].tolist()
         return NoiseModel(
             Q=Q,

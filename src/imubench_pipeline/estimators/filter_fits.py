@@ -1,4 +1,4 @@
-"""Whittle fits of a spectrum behind filters: which cut-off, and how good each filter is."""
+"""Whittle fits of a spectrum behind filters: which cut-off, how good, and what N before it."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
+from imubench_pipeline.estimators.estimate import SIGMAS
 from imubench_pipeline.estimators.goodness import goodness
 from imubench_pipeline.estimators.low_pass import BOXCAR, Filter, Kind
 from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle import COARSE, Behind, Terms, Whittle, whittle_of
 from imubench_pipeline.estimators.whittle_kernels import best_powers
+from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.typing import Array
 
 _POINTS = 6
@@ -85,6 +87,10 @@ _ABOVE_ENDS = 1.01
 
 FEWEST_BINS = 24
 
+_TWIN = 0.1
+"""Weight of the same first-order filter applied to the samples: it looks like that before the
+sampling, whose folds are in N."""
+
 
 def frequencies_in_bins(spectrum: Spectrum) -> Array:
     """Return frequencies within each bin, shape (b, 6), Hz."""
@@ -110,28 +116,14 @@ def gains(spectrum: Spectrum, trial: FilterTrial) -> tuple[Array, Array, Array]:
 
 @dataclass(frozen=True)
 class FilterTrial:
-    """A filter, where its likelihood has a maximum.
+    """A filter, where its likelihood has a maximum."""
 
-    Attributes
-    ----------
-    score : float
-        Half its BIC.
-    cost : float
-        -log L.
-    kind : str
-    order : int
-    cutoff : float
-        Hz.
-    floor : bool
-        White noise stands behind it beside that of rounding.
-    """
-
-    score: float
-    cost: float
+    score: float  # half its BIC
+    cost: float  # -log L
     kind: Kind
     order: int
-    cutoff: float
-    floor: bool
+    cutoff: float  # Hz
+    floor: bool  # white noise stands behind it beside that of rounding
 
     @property
     def low_pass(self) -> Filter:
@@ -151,13 +143,7 @@ class FilterTrial:
 def explains_bend(spectrum: Spectrum, fitted: Array, trial: FilterTrial) -> bool:
     """Return whether a fit behind a filter gives the spectrum where that bends it.
 
-    Parameters
-    ----------
-    spectrum : Spectrum
-    fitted : ndarray, shape (b,)
-        Density of the fit in each bin.
-    trial : Tried
-        The filter.
+    ``fitted``, shape (b,), is the density of the fit in each bin.
     """
     bent = spectrum.frequency > min(0.1 * trial.cutoff, spectrum.frequency[-FEWEST_BINS])
     shown = spectrum.select(bent)
@@ -248,11 +234,7 @@ class FilterFits:
         powers = self._powers(self._columns(trial))[0]
         return math.sqrt(powers[0]), math.sqrt(powers[-1]) if trial.floor else 0.0
 
-    def highest(self, kind: Kind, order: int) -> float:
-        """Return the highest cut-off that is looked for, Hz."""
-        return highest_cutoff(kind, order, self.rate)
-
-    def may_bend(self, filters: Sequence[tuple[Kind, int]]) -> bool:
+    def may_bend(self) -> bool:
         """Return whether a filter at any of a few cut-offs is nearly as good as none."""
         _, _, alone, _ = self.unfiltered()
         flat = np.column_stack(
@@ -261,24 +243,17 @@ class FilterFits:
         alone = min(alone, self._powers(flat)[1])
         least = min(
             self.cost(FilterTrial(0.0, 0.0, kind, order, float(cutoff), False))
-            for kind, order in filters
+            for kind, order in FAMILY
             for cutoff in self._cutoffs(kind, order, 2.0 * self.lowest, _COARSE_SCAN)
         )
         return least < alone - _WORTH_TRYING
 
-    def try_filters(
-        self, filters: Sequence[tuple[Kind, int]], within: float = 1e-5
-    ) -> list[FilterTrial]:
-        """Return the maxima of the likelihood, the best by BIC first.
+    def try_filters(self, within: float = 1e-5) -> list[FilterTrial]:
+        """Return the maxima of the likelihood over all filters, the best by BIC first.
 
-        Parameters
-        ----------
-        filters : sequence of (str, int)
-            Kinds and orders.
-        within : float
-            Error up to which a cut-off is found, parts of it.
+        ``within``: error up to which a cut-off is found, parts of it.
         """
-        maxima = [trial for kind, order in filters for trial in self._of(kind, order, within)]
+        maxima = [trial for kind, order in FAMILY for trial in self._of(kind, order, within)]
         # A floor that gains next to nothing is none. Of first order, with a floor, digital and
         # analogue filters are the same but for N.
         return sorted(
@@ -322,7 +297,7 @@ class FilterFits:
 
     def _cutoffs(self, kind: Kind, order: int, lowest: float, number: int) -> Array:
         """Return the cut-offs from which a search starts, rising, Hz."""
-        scan = np.geomspace(lowest, self.highest(kind, order), number)
+        scan = np.geomspace(lowest, highest_cutoff(kind, order, self.rate), number)
         if kind != "boxcar":
             return scan
         lengths = np.arange(_WHOLE, 2, -1)
@@ -354,7 +329,10 @@ class FilterFits:
             return end
 
         ends = []
-        for sign, end in ((-1.0, self.lowest), (1.0, self.highest(trial.kind, trial.order))):
+        for sign, end in (
+            (-1.0, self.lowest),
+            (1.0, highest_cutoff(trial.kind, trial.order, self.rate)),
+        ):
             edge = end_of(sign, math.log(end))
             first = max(math.log(end), min(edge, math.log(UNFOLDED * self.rate)))
             number = _BETWEEN if first != edge else 0
@@ -393,3 +371,60 @@ class FilterFits:
             np.ascontiguousarray(columns / norm), self.whittle.bins(), False
         )
         return powers / norm * self.whittle.scale, cost
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a filter that the log allows makes of N."""
+
+    weight: float  # of the filter, by its likelihood
+    below: float
+    at: float
+    above: float
+    """Logarithm of N at the lower limit of the cut-off, at its best and at its upper limit, less
+    that of the filter that was chosen."""
+
+
+@dataclass(frozen=True)
+class Allowed:
+    """A filter that the log does not rule out."""
+
+    filter: FilterTrial  # at its best cut-off
+    half_width: float  # half of the 95 % interval of the logarithm of its cut-off
+
+    def at(self, x: float) -> FilterTrial:
+        """Return it at a logarithm of the cut-off, Hz."""
+        return replace(self.filter, cutoff=math.exp(x))
+
+
+@dataclass(frozen=True)
+class OfModel:
+    """What the filters make of N in a model of the noise, each fitted together with it."""
+
+    readings: Sequence[Reading]  # over N at the cut-off that was chosen, in the same model
+    gained: float
+    """Log likelihood of the model with a cut-off of its own, less that with the chosen one."""
+
+
+def also_after_sampling(reading: Reading, trial: FilterTrial, rate: float) -> Reading:
+    """Return the reading of the same filter, analogue of first order, applied to the samples.
+
+    Its shape is the same, and it folds nothing into N.
+    """
+    gain = 0.5 * math.log(float(LowPass(trial.cutoff).folded_power(0.0, rate)))
+    return Reading(
+        _TWIN * reading.weight, reading.below + gain, reading.at + gain, reading.above + gain
+    )
+
+
+def draw_factors(readings: Sequence[Reading], number: int, rng: np.random.Generator) -> Array:
+    """Return draws of N over its value for the filter that was chosen, shape (number,)."""
+    weight = np.array([reading.weight for reading in readings])
+    which = rng.choice(len(weight), number, p=weight / weight.sum())
+    below, at, above = (
+        np.array([getattr(reading, name) for reading in readings])[which]
+        for name in ("below", "at", "above")
+    )
+    normal = rng.standard_normal(number)
+    side = np.where(normal < 0.0, at - below, above - at)
+    return np.asarray(np.exp(at + normal / SIGMAS * side))

@@ -53,37 +53,23 @@ FEWEST_BINS = 20
 
 @dataclass(frozen=True)
 class Frame:
-    """What of a spectrum is fitted.
-
-    Attributes
-    ----------
-    lines : sequence of Line
-    clear, used : ndarray of bool, shape (b,)
-        The bins clear of lines, and those of them that are fitted.
-    band : Band
-        Highest frequency that is fitted, and why.
-    low_pass : Cutoff or None
-        The sensor's low-pass; None where a band is asked for, which is taken as it is.
-    shortest : float or None
-        Shortest correlation time of a process, s; None: as `whittle_of` has it.
-    stated : float or None
-        Cut-off of the sensor's own filter, where it is stated, Hz.
-    cut : bool
-        Frequencies are left out that neither a process nor a filter explains.
-    """
+    """What of a spectrum is fitted."""
 
     lines: Sequence[Line]
     clear: Mask
     used: Mask
-    band: Band
+    """(b,): the bins clear of lines, and those of them that are fitted."""
+    band: Band  # highest frequency that is fitted, and why
     low_pass: Cutoff | None = None
+    """The sensor's low-pass; None where a band is asked for, which is taken as it is."""
     shortest: float | None = None
-    stated: float | None = None
-    cut: bool = False
+    """Shortest correlation time of a process, s; None: as `whittle_of` has it."""
+    stated: float | None = None  # cut-off of the sensor's own filter, where it is stated, Hz
+    cut: bool = False  # frequencies are left out that neither a process nor a filter explains
 
-    def whittle(self, spectrum: Spectrum, shapes: int = SHAPES) -> Whittle:
+    def whittle(self, spectrum: Spectrum) -> Whittle:
         """Return the likelihood of the bins that are fitted."""
-        return self._whittle(spectrum, self.used, shapes)
+        return self._whittle(spectrum, self.used, SHAPES)
 
     def whole(self, spectrum: Spectrum) -> Whittle:
         """Return that of all bins, to carry a fit on to those that are not."""
@@ -100,16 +86,10 @@ class Frame:
         )
 
     def has_a_bend_of_each_model(self, spectrum: Spectrum, times: Array) -> bool:
-        """Return whether each model of the noise has a cut-off of its own.
+        """Return whether each model of the noise, of given T_B in s, has a cut-off of its own.
 
         So it is where the low-pass bends the spectrum well below Nyquist; higher up, what folds
         decides, unless a process is as fast as the low-pass, or nearly.
-
-        Parameters
-        ----------
-        spectrum : Spectrum
-        times : ndarray, shape (g,)
-            T_B of each process, s.
         """
         if self.low_pass is None or self.low_pass.behind is None:
             return False
@@ -139,30 +119,13 @@ class Frame:
         return float(self.low_pass.behind.white[0])
 
     def in_the_log(self, posterior: Posterior, terms: Terms) -> Posterior:
-        """Return draws with N as the low frequencies of the log show it.
-
-        Parameters
-        ----------
-        posterior : Posterior
-            Of a model behind the low-pass.
-        terms : Terms
-            The model.
-        """
+        """Return draws of a model behind the low-pass with N as the log shows it, at its lowest."""
         return _scaled(posterior, terms, np.array(math.sqrt(self.folding)))
 
     def before_the_filter(
         self, posterior: Posterior, terms: Terms, rng: np.random.Generator
     ) -> Posterior:
-        """Return draws with what is not known of the sensor's low-pass in N.
-
-        Parameters
-        ----------
-        posterior : Posterior
-            Of a model behind the low-pass.
-        terms : Terms
-            The model.
-        rng : numpy.random.Generator
-        """
+        """Return draws of a model behind the low-pass with what is not known of that in N."""
         if self.low_pass is None or not self.low_pass.readings:
             return posterior
         return _scaled(
@@ -217,7 +180,6 @@ def frame_of(
 
     Parameters
     ----------
-    spectrum : Spectrum
     line_spectra : sequence of LineSpectrum
         As `imubench_pipeline.estimators.spectrum.spectra` gives them.
     band : float, optional
@@ -226,10 +188,6 @@ def frame_of(
         Cut-off of the sensor's own filter, where it is stated, Hz.
     resolution : float
         Step of the register, SI; 0 where none shows.
-
-    Returns
-    -------
-    Frame
     """
     lines, clear = _lines(spectrum, line_spectra, band)
     nyquist = 0.5 * spectrum.rate

@@ -16,41 +16,22 @@ DOUBT = 1e-3
 
 @dataclass(frozen=True)
 class Goodness:
-    """How well a model explains a spectrum.
+    """How well a model explains a spectrum."""
 
-    Attributes
-    ----------
-    deviance : float
-        Mean deviance of a bin; about 1.0 where the model is right.
-    chance : float
-        Chance of so large a deviance, or so long runs of bins on one side, if the model is right.
-    verdict : str
-        ``explained`` or ``not explained``.
-    where : str
-        The frequencies at which the spectrum is furthest from the model.
-    """
-
-    deviance: float
+    deviance: float  # mean deviance of a bin; about 1.0 where the model is right
     chance: float
-    verdict: str
-    where: str
+    """Chance of so large a deviance, or so long runs of bins on one side, if the model is right."""
+    verdict: str  # ``explained`` or ``not explained``
+    where: str  # the frequencies at which the spectrum is furthest from the model
 
 
 def goodness(nu: Array, data: Array, density: Array, frequency: Array, parameters: int) -> Goodness:
-    """Judge the standardised residuals of a binned spectrum.
+    """Judge the standardised residuals of a binned spectrum, its columns of shape (b,).
 
-    Two tests, each at half the chance: the deviance sum nu (r - 1 - log r) with r = I / S, whose
-    mean and variance are those of chi-squared variates; and the correlation of neighbouring
-    residuals, which shows a shape that the model does not have.
-
-    Parameters
-    ----------
-    nu, data, density : ndarray, shape (b,)
-        Ordinates, measured and fitted density of each bin.
-    frequency : ndarray, shape (b,)
-        Hz.
-    parameters : int
-        Free parameters of the model.
+    Two tests, each at half the chance: the deviance sum nu (r - 1 - log r) with r = I / S, measured
+    over fitted density, whose mean and variance are those of chi-squared variates; and the
+    correlation of neighbouring residuals, which shows a shape that the model does not have.
+    ``parameters`` are the free ones of the model.
     """
     ratio = np.maximum(data, 1e-300 * density) / density
     deviance = nu * (ratio - 1.0 - np.log(ratio))

@@ -96,17 +96,7 @@ def ideal_spectrum(rate: float, duration: float, highest: float) -> Spectrum:
 def bounds_of(model: NoiseModel, rate: float, duration: float, highest: float) -> dict[str, float]:
     """Return the Cramér-Rao bounds of a model's parameters in a log, relative to them.
 
-    Parameters
-    ----------
-    model : NoiseModel
-        Lines apart.
-    rate, duration, highest : float
-        Hz, s, and the highest frequency used, Hz.
-
-    Returns
-    -------
-    dict
-        By the names of `parameter_names`.
+    By the names of `parameter_names`; lines are apart. Rate and highest frequency used are in Hz.
     """
     maximum = _as_maximum(model)
     spectrum = ideal_spectrum(rate, duration, highest)
@@ -127,16 +117,8 @@ def durations_needed(
 ) -> list[float | None]:
     """Return how long a log would tell each parameter to `WANTED`, s.
 
-    Parameters
-    ----------
-    maximum : Maximum
-    rate, duration, highest : float
-        Of the log: Hz, s, and the highest frequency used, Hz.
-
-    Returns
-    -------
-    list of float or None
-        In the order of `relative_errors`; None where 10,000 times the log would not do.
+    In the order of `relative_errors`; None where 10,000 times the log would not do. Rate and
+    highest frequency used are in Hz.
     """
     lengths = np.geomspace(
         duration * _SHORTEST,

@@ -36,20 +36,11 @@ _FITS = 3
 
 @dataclass(frozen=True)
 class Mixture:
-    """A mixture of multivariate Student's t distributions.
+    """A mixture of multivariate Student's t distributions."""
 
-    Attributes
-    ----------
-    weights : ndarray, shape (c,)
-        They sum up to 1.
-    means : ndarray, shape (c, d)
-    scales : ndarray, shape (c, d, d)
-        Positive definite.
-    """
-
-    weights: Array
-    means: Array
-    scales: Array
+    weights: Array  # (c,): they sum up to 1
+    means: Array  # (c, d)
+    scales: Array  # (c, d, d): positive definite
 
     def draw(self, number: int, rng: np.random.Generator) -> Array:
         """Return a power of 2 of points, shape (number, d)."""
@@ -90,17 +81,10 @@ class Mixture:
 
 @dataclass(frozen=True)
 class Weighted:
-    """Points and their weights.
+    """Points and their weights."""
 
-    Attributes
-    ----------
-    points : ndarray, shape (n, d)
-    weights : ndarray, shape (n,)
-        They sum up to 1.
-    """
-
-    points: Array
-    weights: Array
+    points: Array  # (n, d)
+    weights: Array  # (n,): they sum up to 1
 
     @property
     def effective(self) -> float:
@@ -140,7 +124,6 @@ def sample_adaptively(
         Logarithm of the density at points, shape (n, d), up to a constant; -inf where it is 0.
     first : Mixture
         That of the first round.
-    rng : numpy.random.Generator
     size : int
         Points of a round, a power of 2.
     wanted : float

@@ -46,18 +46,10 @@ def with_upper_limits(
 ) -> Estimate:
     """Return an estimate that says of the K and B that its model does not have what is known.
 
-    Where a model that has one is about as good as the chosen one it is ``not_identified``, with
-    its interval; else ``absent``, with an upper limit.
-
-    Parameters
-    ----------
-    estimate : Estimate
-    alike : sequence of Candidate
-        The models that the log does not rule out, the chosen one first.
-    wider : sequence of Candidate
-        The model with a random walk, or with one bias instability, beside its terms.
-    draws : dict of Terms to Posterior
-        Of all of them.
+    Where a model that has one is about as good as the chosen one it is ``not_identified``, with its
+    interval; else ``absent``, with an upper limit. ``alike`` are the models that the log does not
+    rule out, the chosen one first; ``wider`` those with a random walk, or with one bias
+    instability, beside its terms.
     """
     parameters = dict(estimate.parameters)
     for name in ("K", "B"):
@@ -122,28 +114,10 @@ def describe(
 ) -> Estimate:
     """Describe a fit: values with intervals, what is not identified, and what is absent.
 
-    Parameters
-    ----------
-    method : str
-        Name of the estimate.
-    whittle : Whittle
-        The likelihood that was maximised.
-    chosen : Candidate
-        The model to describe.
-    alike : sequence of Candidate
-        The models, ``chosen`` among them, over which the intervals go, by their shares.
-    draws : dict of Terms to Posterior
-        Of the models ``alike``.
-    band : Band
-        The frequencies used.
-
-    Returns
-    -------
-    Estimate
-        Of all the family's parameters. K is the median over the models ``alike``: they share the
-        power of the lowest frequencies in different ways, and it is a fifth nearer to the truth
-        than that of one of them where it is known badly. The model that stands beside it has its
-        own.
+    Of all the family's parameters. The intervals go over the models ``alike``, ``chosen`` among
+    them, by their shares. K is the median over them: they share the power of the lowest frequencies
+    in different ways, and it is a fifth nearer to the truth than that of one of them where it is
+    known badly. The model that stands beside it has its own.
     """
     maximum = chosen.maximum
     names = parameter_names(maximum.terms)
@@ -290,7 +264,6 @@ def _comparable(name: str, terms: Terms, other: Terms) -> bool:
         return False
     if not name.startswith(("B", "T_B")):
         return True
-    alike = "F" in terms.linear, terms.gauss_markov
-    others = "F" in other.linear, other.gauss_markov
     # One bias instability is one level, flicker or not; of several each has its own.
-    return alike == others or (name == "B" and sum(alike) == sum(others) == 1)
+    single = sum(terms.biases) == sum(other.biases) == 1
+    return terms.biases == other.biases or (name == "B" and single)

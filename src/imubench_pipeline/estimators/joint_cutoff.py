@@ -15,22 +15,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
-from imubench_pipeline.estimators.cutoff import NOT_AS_BEHIND, RULED_OUT, WIDEST, Cutoff
+from imubench_pipeline.estimators.cutoff import ALLOWED, NOT_AS_BEHIND, RULED_OUT, WIDEST, Cutoff
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.filter_fits import (
-    FAMILY,
     HALF_CHI_SQUARED,
     PROCESSES,
-    FilterTrial,
-    explains_bend,
-    gains,
-    highest_cutoff,
-)
-from imubench_pipeline.estimators.filter_readings import (
     Allowed,
+    FilterTrial,
     OfModel,
     Reading,
     also_after_sampling,
+    explains_bend,
+    gains,
+    highest_cutoff,
 )
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.spectrum import Spectrum
@@ -59,14 +56,9 @@ _SHARE = 0.05
 
 
 def worth_joining(candidates: Sequence[Candidate], always: Terms) -> list[Candidate]:
-    """Return the models for which the cut-off of a filter is fitted, the best first.
+    """Return the models for which the cut-off of a filter is fitted, the best first, as they come.
 
-    Parameters
-    ----------
-    candidates : sequence of Candidate
-        The best first, with a common cut-off.
-    always : Terms
-        A model that is one of them in any case.
+    ``always`` is one of them in any case.
     """
     best = candidates[0]
     return [
@@ -84,16 +76,9 @@ def refine_cutoff(
     """Return a low-pass whose cut-off is fitted together with all parameters of a model.
 
     Of the models, that which is the best by BIC with a cut-off of its own; what the others, and
-    other filters that the log allows, make of N is in ``models``.
-
-    Parameters
-    ----------
-    low_pass : Cutoff
-    spectrum : Spectrum
-    clear : ndarray of bool, shape (b,)
-        Bins that no line touches, and in which the ends of the transform do not rule.
-    candidates : sequence of Candidate
-        The models, the best first, with the cut-off as it is; of a ramp nothing is taken.
+    other filters that the log allows, make of N is in ``models``. ``clear``, shape (b,), are the
+    bins that no line touches, and in which the ends of the transform do not rule. The candidates
+    come with the cut-off as it is, the best first; of a ramp nothing is taken.
     """
     if low_pass.kind is None or low_pass.behind is None or not candidates:
         return low_pass
@@ -139,9 +124,9 @@ def _as_parameter(shown: float, ends: Sequence[float], explains: bool) -> Parame
     """Return a cut-off with its limits, or why it is not told."""
     lower, upper = min(ends), max(ends)
     if upper > WIDEST * lower:
-        reason = f"the log allows cut-offs from {lower:.4g} to {upper:.4g} Hz"
+        reason = ALLOWED.format(lower, upper)
     elif not explains:
-        reason = NOT_AS_BEHIND.format(len(FAMILY))
+        reason = NOT_AS_BEHIND
     else:
         return Parameter(shown, lower=lower, upper=upper)
     return Parameter(None, "not_identified", reason, lower, upper, fitted=shown)

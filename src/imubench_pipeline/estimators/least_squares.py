@@ -27,6 +27,8 @@ from imubench_pipeline.noise import (
 from imubench_pipeline.noise.terms.gauss_markov import CORRELATION_TIMES
 from imubench_pipeline.typing import Array
 
+Method = Literal["weighted", "paper"]
+
 _FEWEST_POINTS = 4
 _BEYOND_FILTERS = 16
 """Cluster size beyond which the sensor's own filter hardly matters."""
@@ -46,9 +48,7 @@ class UnfitCurveError(ValueError):
     """An Allan variance to which no model can be fitted; the text says why."""
 
 
-def fit(
-    curve: AllanCurve, *, method: Literal["weighted", "paper"] = "weighted", longest: float = 1 / 9
-) -> Estimate:
+def fit(curve: AllanCurve, *, method: Method = "weighted", longest: float = 1 / 9) -> Estimate:
     """Fit N, B, T_B and K to an Allan variance.
 
     C = sum_i w_i (variance_i - model(tau_i))^2 with
@@ -102,9 +102,7 @@ def fit(
     return with_limits(Estimate(method, parameters), curve, used)
 
 
-def _first_unbent(
-    curve: AllanCurve, used: NDArray[np.bool_], method: Literal["weighted", "paper"]
-) -> int:
+def _first_unbent(curve: AllanCurve, used: NDArray[np.bool_], method: Method) -> int:
     """Return the smallest cluster size from which the curve follows a model of its longer tau.
 
     The sensor's own low-pass filter, and coarse steps of its output, bend the curve at the
@@ -158,9 +156,7 @@ def _predicted(
     return expected, unsure
 
 
-def _fit(
-    curve: AllanCurve, used: NDArray[np.bool_], method: Literal["weighted", "paper"]
-) -> Estimate:
+def _fit(curve: AllanCurve, used: NDArray[np.bool_], method: Method) -> Estimate:
     continuous = _Search(curve, used, method, sampled=False).estimate()
     if not _sampling_shows(curve, used, continuous.model):
         return continuous
@@ -187,7 +183,7 @@ class _Search:
         self,
         curve: AllanCurve,
         used: NDArray[np.bool_],
-        method: Literal["weighted", "paper"],
+        method: Method,
         *,
         sampled: bool,
     ) -> None:

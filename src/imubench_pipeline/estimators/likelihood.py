@@ -13,18 +13,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from imubench_pipeline.allan import of_blocks
+from imubench_pipeline.allan.phase import Span, spans_of
 from imubench_pipeline.estimators import least_squares
 from imubench_pipeline.estimators.band import Band
-from imubench_pipeline.estimators.carried_lines import carried_sinusoids
 from imubench_pipeline.estimators.curve_bias import averaging_times, with_curve
 from imubench_pipeline.estimators.cutoff import Cutoff
-from imubench_pipeline.estimators.doubts import add_doubts
+from imubench_pipeline.estimators.doubts import add_doubts, instead_of_walk
 from imubench_pipeline.estimators.draws import drawn_share, joint_draws
-from imubench_pipeline.estimators.estimate import CURVE, FAMILY, Estimate, Parameter
+from imubench_pipeline.estimators.estimate import CURVE, FAMILY, Estimate, JointDraws, Parameter
 from imubench_pipeline.estimators.frame import FEWEST_BINS, Frame, frame_of
 from imubench_pipeline.estimators.intervals import describe, papers_only, with_upper_limits
 from imubench_pipeline.estimators.joint_cutoff import worth_joining
-from imubench_pipeline.estimators.lines import Line
+from imubench_pipeline.estimators.lines import Line, carried_sinusoids
 from imubench_pipeline.estimators.missing import (
     block_means,
     divide_at_holes,
@@ -33,13 +33,10 @@ from imubench_pipeline.estimators.missing import (
 )
 from imubench_pipeline.estimators.model_choice import PAPERS, Candidate, compare
 from imubench_pipeline.estimators.posterior import DRAWS, Posterior, sample
-from imubench_pipeline.estimators.smooth_drift import instead_of_walk
 from imubench_pipeline.estimators.spectrum import Spectrum, spectra
 from imubench_pipeline.estimators.whittle import Terms, Whittle, model_of
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
-
-Span = tuple[int, int]
 
 _LEAST_SHARE = 0.05
 """Candidates of a smaller share do not enter the intervals."""
@@ -95,7 +92,7 @@ def fit(
     samples: ArrayLike,
     rate: float,
     *,
-    segments: Sequence[tuple[int, int]] | None = None,
+    segments: Sequence[Span] | None = None,
     band: float | None = None,
     bandwidth: float | None = None,
     resolution: float = 0.0,
@@ -120,10 +117,6 @@ def fit(
         Step of the register (LSB), SI, where the samples are rounded.
     rng : numpy.random.Generator, optional
         For the posterior draws, and for missing samples; by default always the same.
-
-    Returns
-    -------
-    Likelihood
 
     Raises
     ------
@@ -155,7 +148,7 @@ def fit_blocks(
     rate: float,
     *,
     holes: bool,
-    segments: Sequence[tuple[int, int]] | None = None,
+    segments: Sequence[Span] | None = None,
     band: float | None = None,
     bandwidth: float | None = None,
     resolution: float = 0.0,
@@ -178,7 +171,7 @@ def fit_blocks(
     holes : bool
         Samples may be missing.
     """
-    spans = tuple(segments) if segments else ((0, samples),)
+    spans = spans_of(segments, samples)
     if not holes:
         spectrum, lines = spectra(blocks(), samples, rate, spans)
         frame = frame_of(spectrum, lines, band=band, bandwidth=bandwidth, resolution=resolution)
@@ -222,38 +215,28 @@ def _first_model(
 
 
 def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) -> Likelihood:
-    """Estimate the noise parameters from a spectrum (see `fit`).
-
-    Parameters
-    ----------
-    spectrum : Spectrum
-    frame : Frame
-        What of it is fitted.
-    rng : numpy.random.Generator
-    """
+    """Estimate the noise parameters from what a frame has of a spectrum (see `fit`)."""
     if frame.used.sum() < FEWEST_BINS:
         return _too_short(spectrum, frame)
     frame, whittle, candidates = fit_models(spectrum, frame)
-    sinusoids = carried_sinusoids(frame.lines)
     chosen = candidates[0]
-    # As the log shows them, and with N before the sensor's low-pass.
-    shown: dict[Terms, Posterior] = {}
-    draws: dict[Terms, Posterior] = {}
     # A ramp is no noise: it is believed or not, and does not widen intervals as a possibility.
     alike = [chosen] + [c for c in candidates[1:] if c.share >= _LEAST_SHARE and not c.terms.ramp]
     wider = [c for c in candidates if c.terms in _with_one_more(chosen.terms)]
-    for candidate in candidates:
+    papers = next(c for c in candidates if c.terms == PAPERS)
+    # As the log shows them, and with N before the sensor's low-pass.
+    shown: dict[Terms, Posterior] = {}
+    draws: dict[Terms, Posterior] = {}
+    for candidate in (c for c in candidates if c in alike or c in wider or c is papers):
         terms = candidate.terms
-        if candidate in alike or candidate in wider or terms == PAPERS:
-            part = 1.0 if terms == PAPERS or candidate is chosen else candidate.share
-            number = max(_FEWEST_DRAWS, round(part * DRAWS))
-            shown[terms] = sample(whittle, candidate.maximum, rng, number)
-            draws[terms] = frame.before_the_filter(shown[terms], terms, rng)
+        part = 1.0 if candidate in (papers, chosen) else candidate.share
+        number = max(_FEWEST_DRAWS, round(part * DRAWS))
+        shown[terms] = sample(whittle, candidate.maximum, rng, number)
+        draws[terms] = frame.before_the_filter(shown[terms], terms, rng)
     estimate = describe("likelihood", whittle, chosen, alike, draws, frame.band)
     estimate = with_upper_limits(estimate, alike, wider, draws)
     tau = averaging_times(spectrum.rate, float(spectrum.length.max()))
     estimate = with_curve(estimate, alike, wider, draws, tau)
-    papers = next(c for c in candidates if c.terms == PAPERS)
     gauss_markov = describe("likelihood_gm", whittle, papers, [papers], draws, frame.band)
     gauss_markov = with_curve(gauss_markov, [papers], (), draws, tau)
     fitted = frame.whole(spectrum).density(chosen.maximum) + chosen.maximum.ramp**2 * spectrum.ramp
@@ -262,32 +245,23 @@ def fit_spectrum(spectrum: Spectrum, frame: Frame, *, rng: np.random.Generator) 
         estimate, gauss_markov, spectrum, frame, candidates, papers, drift
     )
     estimate, gauss_markov = (_with_folds(each, frame) for each in (estimate, gauss_markov))
+    sinusoids = carried_sinusoids(frame.lines)
+    bins = len(whittle.spectrum.density)
+
+    def drawn(parts: Sequence[tuple[Candidate, float]]) -> JointDraws:
+        posteriors = [(c.terms, frame.in_the_log(shown[c.terms], c.terms), s) for c, s in parts]
+        return joint_draws(posteriors, whittle.longest)
+
+    of_all = drawn([(candidate, drawn_share(candidate, bins)) for candidate in alike])
+    estimate = replace(estimate, lines=sinusoids, draws=of_all)
+    gauss_markov = replace(
+        gauss_markov,
+        parameters=papers_only(gauss_markov.parameters),
+        lines=sinusoids,
+        draws=drawn([(papers, 1.0)]),
+    )
     return Likelihood(
-        (
-            replace(
-                estimate,
-                lines=sinusoids,
-                draws=joint_draws(
-                    [
-                        (
-                            c.terms,
-                            frame.in_the_log(shown[c.terms], c.terms),
-                            drawn_share(c, len(whittle.spectrum.density)),
-                        )
-                        for c in alike
-                    ],
-                    whittle.longest,
-                ),
-            ),
-            replace(
-                gauss_markov,
-                parameters=papers_only(gauss_markov.parameters),
-                lines=sinusoids,
-                draws=joint_draws(
-                    [(PAPERS, frame.in_the_log(shown[PAPERS], PAPERS), 1.0)], whittle.longest
-                ),
-            ),
-        ),
+        (estimate, gauss_markov),
         candidates,
         frame.lines,
         frame.band,
@@ -338,21 +312,8 @@ def fit_models(spectrum: Spectrum, frame: Frame) -> tuple[Frame, Whittle, list[C
     """Fit all models in a frame, and in another one where it explains more.
 
     Where noise up to Nyquist, behind the filter that shows, is not explained: with processes of a
-    few sampling intervals; then without the frequencies that bend.
-
-    Parameters
-    ----------
-    spectrum : Spectrum
-    frame : Frame
-        As `imubench_pipeline.estimators.frame.frame_of` gives it.
-
-    Returns
-    -------
-    frame : Frame
-    whittle : Whittle
-        The likelihood in it.
-    candidates : list of Candidate
-        The models tried, the best first.
+    few sampling intervals; then without the frequencies that bend. Returned are the frame, its
+    likelihood and the models tried, the best first.
     """
 
     def fitted(tried: Frame) -> tuple[Frame, Whittle, list[Candidate]]:

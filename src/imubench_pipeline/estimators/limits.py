@@ -57,17 +57,10 @@ _STEP_OF_LOWEST = 0.05
 
 @dataclass(frozen=True)
 class Errors:
-    """Covariance of the logarithms of the parameters of a fit.
+    """Covariance of the logarithms of the parameters of a fit."""
 
-    Attributes
-    ----------
-    names : sequence of str
-        The parameters, m of them.
-    covariance : ndarray, shape (m, m)
-    """
-
-    names: Sequence[str]
-    covariance: Array
+    names: Sequence[str]  # the parameters, m of them
+    covariance: Array  # (m, m)
 
     def of(self, name: str) -> float:
         """Return the relative standard error of a parameter, at most 10."""
@@ -75,16 +68,16 @@ class Errors:
         return min(math.sqrt(max(variance, 0.0)), _NOTHING_KNOWN)
 
     def factors(
-        self, name: str, doubtful: Sequence[str], held: float | None = None
+        self, name: str, doubtful: Sequence[str], beside: float | None = None
     ) -> tuple[float, float]:
         """Return the factors from a parameter to its 95 % limits.
 
         They hold with and without the ``doubtful`` terms: without one, the parameter moves by
-        what its correlation with the density of that term tells. ``held`` is the standard error
+        what its correlation with the density of that term tells. ``beside`` is the standard error
         with those terms held; by default they vary. An amplitude whose square is closer to 0
         than 1.96 standard errors may be 0.
         """
-        error = self.of(name) if held is None else held
+        error = self.of(name) if beside is None else beside
         low, high = -SIGMAS * error, SIGMAS * error
         for term in doubtful:
             if term == name or not self.of(term) < _NOTHING_KNOWN:
@@ -93,7 +86,7 @@ class Errors:
             # The density is the square: that it falls to 0 is -1/2 in the logarithm of the root.
             moved = -0.5 * slope
             rest = error
-            if held is None:
+            if beside is None:
                 rest = math.sqrt(max(error**2 - slope * self._at(name, term), 0.0))
             low = min(low, moved - SIGMAS * rest)
             high = max(high, moved + SIGMAS * rest)
@@ -113,19 +106,11 @@ def fit_errors(
     *,
     held: Sequence[str] = (),
 ) -> Errors:
-    """Return the errors of a weighted least squares fit.
+    """Return the errors of a weighted least squares fit at the values of its model.
 
-    Parameters
-    ----------
-    curve : AllanCurve
-    used : ndarray of bool, shape (m,)
-        The tau of the fit.
-    model : NoiseModel
-        The model that was fitted; the errors are those at its values.
-    method : {"weighted", "paper"}
-        Weights of the fit, see `imubench_pipeline.estimators.least_squares.fit`.
-    held : sequence of str
-        Parameters that the fit did not vary.
+    ``used`` are the tau of the fit, ``method`` says its weights
+    (`imubench_pipeline.estimators.least_squares.fit`), and ``held`` are the parameters that it did
+    not vary.
     """
     expected, derivatives = _derivatives(curve, used, model)
     names = [name for name in derivatives if name not in held]
@@ -189,19 +174,12 @@ def with_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) 
     """Return an estimate with 95 % limits, and without the values that the log cannot tell.
 
     A parameter of a relative standard error above 50 % is ``not_identified``; so are B and T_B
-    where the T_B of the peak is not known to 75 %, and where B at a T_B that ran into its bound
-    is not known to 25 %. Beside such a B, N and K are judged as if it were held, to 25 %.
+    where the T_B of the peak is not known to 75 %, and where B at a T_B that ran into its bound is
+    not known to 25 %. Beside such a B, N and K are judged as if it were held, to 25 %.
 
-    The limits of an amplitude that is not identified begin at 0; a limit is None where nothing
-    is known. A B or T_B that stays ``at_bound`` has none.
-
-    Parameters
-    ----------
-    estimate : Estimate
-        A fit in which every term that is there has a value.
-    curve : AllanCurve
-    used : ndarray of bool, shape (m,)
-        The tau of the fit.
+    The limits of an amplitude that is not identified begin at 0; a limit is None where nothing is
+    known. A B or T_B that stays ``at_bound`` has none. In the estimate every term that is there has
+    a value; it is of the ``used`` tau.
     """
     model = estimate.model
     if not model.terms:
@@ -322,8 +300,8 @@ def _wide_limits(name: str, value: float, errors: Errors) -> tuple[float | None,
     Its upper limit is linear in the amplitude: with a logarithm it would run away.
     """
     error = errors.of(name)
-    known = error < _NOTHING_KNOWN
+    limited = error < _NOTHING_KNOWN
     if name == "T_B":
         low, high = errors.factors(name, [])
-        return (value * low, value * high) if known else (None, None)
-    return 0.0, value * (1.0 + SIGMAS * error) if known else None
+        return (value * low, value * high) if limited else (None, None)
+    return 0.0, value * (1.0 + SIGMAS * error) if limited else None

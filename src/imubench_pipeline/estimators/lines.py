@@ -1,25 +1,34 @@
-"""Lines: sinusoids that stand out of the fitted spectrum.
+"""Lines: sinusoids that stand out of the fitted spectrum, and those that a noise model carries on.
 
 They are looked for in Hann-windowed Fourier spectra averaged over segments, so a line need not
 keep its phase over the whole log. Under the model the density of a bin over its expectation is
 chi-squared with two degrees of freedom for each segment.
+
+Each line is two states of a Kalman filter and an integral of an error budget; some steps cost the
+square or the cube of their number. So the strongest are carried on as they are. The weaker ones are
+joined in a few groups of neighbours, a floor of the same power: of n sinusoids A_i at f_i,
+
+    A^2 = sum A_i^2,   f^2 = A^2 / sum (A_i / f_i)^2,
+
+which keeps the variance of the signal, and of its integral.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.special import betainc, gammainccinv
 
-from imubench_pipeline.estimators.estimate import SIGMAS
+from imubench_pipeline.estimators.estimate import SI_UNITS, SIGMAS, Parameter
 from imubench_pipeline.estimators.spectrum import LineSpectrum, Spectrum
 from imubench_pipeline.noise import NoiseModel, Sinusoid
+from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.typing import Array
 
 FALSE_ALARM = 0.005
@@ -31,7 +40,7 @@ _LEVEL = 129
 _MEDIAN_KNOWS = 1.0 / (1.94 * 1.57)
 """Independent bins in a bin of the median: neighbours are correlated, and a median wastes some."""
 
-_MOST = 1000
+_MOST_FOUND = 1000
 """Lines of a spectrum, the strongest: what compares them costs the square of their number."""
 
 _DISTURBED = 2
@@ -53,10 +62,18 @@ _LEAKS = 0.3
 
 # Sums over the bins of a line of the squared correlations of Hann-windowed Fourier coefficients
 # (1, 2/3 and 1/6 at a distance of 0, 1 and 2 bins), without and with the distances as weights;
-# and what a line on a bin makes of them.
-_NOISE_POWER, _NOISE_PLACE = 12.6, 50.0
-_CROSS_POWER, _CROSS_PLACE = 35.0 / 18.0, 5.0 / 18.0
-_FLOOR_POWER, _FLOOR_PLACE = 4e-3, 5e-3
+# what a line on a bin makes of them; and the least error.
+_POWER = (12.6, 35.0 / 18.0, 4e-3)
+_PLACE = (50.0, 5.0 / 18.0, 5e-3)
+
+STRONGEST = 12
+"""Lines that are carried as they are where there are too many."""
+
+GROUPS = 4
+"""Groups of the weaker ones."""
+
+MOST = STRONGEST + GROUPS
+"""So many lines are carried without being joined."""
 
 
 @dataclass(frozen=True)
@@ -108,24 +125,15 @@ class Line:
 def find(
     spectra: Sequence[LineSpectrum], model: NoiseModel, rate: float, crossover: float
 ) -> list[Line]:
-    """Find the lines of a log.
+    """Find the lines of a log, by frequency.
 
     Parameters
     ----------
     spectra : sequence of LineSpectrum
-        Of block means for frequencies up to ``crossover``, and of samples beyond; or one alone.
+        Of block means for frequencies up to ``crossover``, Hz, and of samples beyond; or one alone.
     model : NoiseModel
         What was fitted to the spectrum; a median over neighbouring bins mends it where it does
         not follow.
-    rate : float
-        Hz.
-    crossover : float
-        Highest frequency that is looked at in block means, Hz.
-
-    Returns
-    -------
-    list of Line
-        By frequency.
     """
     divided = crossover if len(spectra) > 1 else 0.0
     searched = [_range(spectrum, divided) for spectrum in spectra]
@@ -134,8 +142,8 @@ def find(
     for spectrum, (low, high) in zip(spectra, searched, strict=True):
         if high > low:
             new = _lines(spectrum, model, rate, low, high, total)
-            if len(new) > _MOST:
-                new = sorted(new, key=lambda line: -line.ratio)[:_MOST]
+            if len(new) > _MOST_FOUND:
+                new = sorted(new, key=lambda line: -line.ratio)[:_MOST_FOUND]
             lines = _joined(lines, new)
     lines = [_without_alias(line, lines, spectra[0].block, rate) for line in lines]
     return sorted(lines, key=lambda line: line.frequency)
@@ -219,13 +227,9 @@ def _bands_merged(lines: list[Line]) -> list[Line]:
     merged: list[Line] = []
     for line in lines:
         last = merged[-1] if merged else None
-        beside = last and not (last.narrow or line.narrow)
-        if (
-            last
-            and beside
-            and line.frequency - last.frequency
-            < _FAR * line.resolution + 0.5 * (last.width + line.width)
-        ):
+        near = _FAR * line.resolution + 0.5 * ((last.width if last else 0.0) + line.width)
+        both_wide = last and not (last.narrow or line.narrow)
+        if last and both_wide and line.frequency - last.frequency < near:
             merged[-1] = _both(last, line)
         else:
             merged.append(line)
@@ -274,12 +278,11 @@ def _line(
     places = spectrum.frequency[bins]
     place = float(np.clip(excess @ places / power, places[0], places[-1]))
     to_noise = power / float(noise[peak])
-    power_error = math.hypot(
-        math.sqrt((_NOISE_POWER / to_noise**2 + 2.0 * _CROSS_POWER / to_noise) / n), _FLOOR_POWER
+    power_error, place_error = (
+        math.hypot(math.sqrt((noise_sum / to_noise**2 + 2.0 * cross / to_noise) / n), floor)
+        for noise_sum, cross, floor in (_POWER, _PLACE)
     )
-    place_error = step * math.hypot(
-        math.sqrt((_NOISE_PLACE / to_noise**2 + 2.0 * _CROSS_PLACE / to_noise) / n), _FLOOR_PLACE
-    )
+    place_error *= step
     if wide:
         place_error = math.hypot(place_error, step * across / math.sqrt(12.0 * n))
     # A line of amplitude A has the power A^2 / 4 at +f; block means see it damped.
@@ -314,16 +317,8 @@ def _stands_out(spectrum: LineSpectrum, peak: int) -> bool:
 def without_lines(spectrum: Spectrum, lines: Sequence[Line], density: Array) -> NDArray[np.bool_]:
     """Return the bins of a spectrum that lines leave as they are.
 
-    Parameters
-    ----------
-    spectrum : Spectrum
-    lines : sequence of Line
-    density : ndarray, shape (b,)
-        Fitted density of each bin: a strong line reaches further, as 1/f², than a weak one.
-
-    Returns
-    -------
-    ndarray of bool, shape (b,)
+    ``density``, shape (b,), is the fitted one of each bin: a strong line reaches further, as 1/f²,
+    than a weak one.
     """
     clear = np.ones(len(spectrum.frequency), dtype=np.bool_)
     allowed = _LEAKS * density * np.minimum(np.sqrt(2.0 / spectrum.ordinates), 1.0)
@@ -335,3 +330,74 @@ def without_lines(spectrum: Spectrum, lines: Sequence[Line], density: Array) -> 
             spectrum.lower > line.frequency + reach
         )
     return clear
+
+
+def carried_sinusoids(lines: Sequence[Line]) -> list[dict[str, Parameter]]:
+    """Return amplitude and frequency of the sinusoids that a model carries on, by frequency.
+
+    Of all lines that were found, by frequency, bands of noise and aliases are left out.
+    """
+    narrow = [line for line in lines if line.narrow]
+    if len(narrow) <= MOST:
+        return [_line_parameters(line) for line in narrow]
+    single = set(strongest([line.amplitude for line in narrow]))
+    weaker = [line for place, line in enumerate(narrow) if place not in single]
+    sinusoids = [_line_parameters(narrow[place]) for place in single]
+    groups = np.array_split(np.arange(len(weaker)), GROUPS)
+    sinusoids += [_as_one_line([weaker[i] for i in group]) for group in groups]
+    return sorted(sinusoids, key=lambda sinusoid: sinusoid["frequency"].value or 0.0)
+
+
+def strongest(amplitudes: Sequence[float]) -> list[int]:
+    """Return the places of the lines that are carried as they are; all where they are few."""
+    number = len(amplitudes) if len(amplitudes) <= MOST else STRONGEST
+    order = sorted(range(len(amplitudes)), key=lambda place: -amplitudes[place])
+    return sorted(order[:number])
+
+
+def joined_finding(channel: str, quantity: str, sinusoids: Sequence[Mapping[str, Any]]) -> Finding:
+    """Return the warning about a channel with more sinusoids than a model carries on.
+
+    The quantity is gyro or accel; the sinusoids, more than `MOST`, have ``amplitude``, SI.
+    """
+    single = set(strongest([sinusoid["amplitude"] for sinusoid in sinusoids]))
+    powers = [0.5 * sinusoid["amplitude"] ** 2 for sinusoid in sinusoids]
+    rest = math.fsum(power for place, power in enumerate(powers) if place not in single)
+    share = rest / math.fsum(powers)
+    number = len(sinusoids) - len(single)
+    detail = (
+        f"{channel} has {len(sinusoids)} sinusoids: the {len(single)} strongest go into error "
+        f"budgets, simulations and filters as they are, the other {number} as {GROUPS} of their "
+        f"power, {100 * share:.3g} % of that of all lines ({math.sqrt(rest):.3g} "
+        f"{SI_UNITS[quantity]['amplitude']} rms)"
+    )
+    return Finding("too_many_lines", "warning", detail, float(len(sinusoids)), channel)
+
+
+def _line_parameters(line: Line) -> dict[str, Parameter]:
+    return {
+        "amplitude": Parameter(
+            line.amplitude, lower=line.amplitude_lower, upper=line.amplitude_upper
+        ),
+        "frequency": Parameter(
+            line.frequency, lower=line.frequency_lower, upper=line.frequency_upper
+        ),
+    }
+
+
+def _as_one_line(lines: Sequence[Line]) -> dict[str, Parameter]:
+    amplitude, low, high = (
+        math.hypot(*values)
+        for values in (
+            [line.amplitude for line in lines],
+            [line.amplitude_lower for line in lines],
+            [line.amplitude_upper for line in lines],
+        )
+    )
+    frequency = amplitude / math.hypot(*(line.amplitude / line.frequency for line in lines))
+    first, last = lines[0].frequency, lines[-1].frequency
+    reason = f"{len(lines)} weak lines from {first:.4g} to {last:.4g} Hz together"
+    return {
+        "amplitude": Parameter(amplitude, reason=reason, lower=low, upper=high),
+        "frequency": Parameter(frequency, reason=reason, lower=first, upper=last),
+    }

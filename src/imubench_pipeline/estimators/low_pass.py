@@ -38,7 +38,7 @@ _GRID = 512
 
 @dataclass(frozen=True)
 class Filter:
-    """A low-pass filter.
+    """A low-pass filter; frequencies and rates in Hz, results in the shape of the frequencies.
 
     Parameters
     ----------
@@ -61,20 +61,7 @@ class Filter:
         return f"{self.kind} low-pass of order {self.order}"
 
     def white(self, frequency: ArrayLike, rate: float) -> Array:
-        """Return G, the density of white noise of N = 1 behind the filter, sampled.
-
-        Parameters
-        ----------
-        frequency : array_like
-            Hz, up to Nyquist.
-        rate : float
-            f_s, Hz.
-
-        Returns
-        -------
-        ndarray
-            In the shape of the frequencies.
-        """
+        """Return G, the density of white noise of N = 1 behind the filter, sampled."""
         f = np.asarray(frequency, dtype=np.float64)
         if self.kind == "bilinear":
             return self._bilinear(f, rate)
@@ -83,15 +70,7 @@ class Filter:
         return LowPass(self.cutoff, self.order).folded_power(f, rate)
 
     def slow(self, frequency: ArrayLike, rate: float) -> Array:
-        """Return what the filter leaves of noise that is slow against the rate: no folds.
-
-        Parameters
-        ----------
-        frequency : array_like
-            Hz.
-        rate : float
-            f_s, Hz.
-        """
+        """Return what the filter leaves of noise that is slow against the rate: no folds."""
         f = np.asarray(frequency, dtype=np.float64)
         if self.kind == "bilinear":
             return self._bilinear(f, rate)
@@ -102,13 +81,8 @@ class Filter:
     def half_power(self, rate: float) -> float:
         """Return the frequency at which white noise behind the filter has lost half its density.
 
-        That is ``cutoff`` but for a boxcar, of which sampling folds the skirts: the running mean
-        of three samples has lost it at 0.155 of the rate, and the mean over that time at 0.148.
-
-        Parameters
-        ----------
-        rate : float
-            f_s, Hz.
+        That is ``cutoff`` but for a boxcar, of which sampling folds the skirts: the running mean of
+        three samples has lost it at 0.155 of the rate, and the mean over that time at 0.148.
         """
         if self.kind != "boxcar":
             return self.cutoff
@@ -118,15 +92,7 @@ class Filter:
         )
 
     def flicker(self, frequency: ArrayLike, rate: float) -> Array:
-        """Return what the filter leaves of flicker noise as sampled without it, folds included.
-
-        Parameters
-        ----------
-        frequency : array_like
-            Hz, above 0.
-        rate : float
-            f_s, Hz.
-        """
+        """Return what the filter leaves of flicker noise as sampled without it, folds included."""
         f = np.asarray(frequency, dtype=np.float64)
         if self.kind == "bilinear":
             return self._bilinear(f, rate)
@@ -143,14 +109,8 @@ class Filter:
 
         A filter leaves less and less towards Nyquist, and what the even continuation of a smooth
         signal has there, (4 V T / n) cos^2(w/2) / (2 - 2 cos w)^2 with V the variance of the
-        differences of neighbours, is more in the end.
-
-        Parameters
-        ----------
-        frequency, length : array_like, shape (b,)
-            Hz, and durations of the transforms, s.
-        rate : float
-            f_s, Hz.
+        differences of neighbours, is more in the end. ``length`` is the duration of the transform
+        of each frequency, s.
         """
         omega = 2.0 * np.pi * np.asarray(frequency, dtype=np.float64) / rate
         grid = (np.arange(_GRID) + 0.5) / _GRID * 0.5 * rate
@@ -166,13 +126,8 @@ class Filter:
         corner = math.tan(math.pi * min(self.cutoff / rate, 0.4999))
         # The tangent has no value at Nyquist, where nothing is left.
         warped = np.tan(np.minimum(np.pi * f / rate, 0.5 * np.pi - 1e-7)) / corner
-        return np.asarray(
-            1.0
-            / (
-                1.0
-                + np.exp(np.minimum(2.0 * self.order * np.log(np.maximum(warped, 1e-30)), 600.0))
-            )
-        )
+        logarithm = np.minimum(2.0 * self.order * np.log(np.maximum(warped, 1e-30)), 600.0)
+        return np.asarray(1.0 / (1.0 + np.exp(logarithm)))
 
     def _triangle(self, f: Array, rate: float) -> Array:
         length = BOXCAR / self.cutoff * rate  # in samples

@@ -22,6 +22,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from imubench_pipeline.allan.phase import Span
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.state_space import StateSpace
 from imubench_pipeline.typing import Array
@@ -38,22 +39,13 @@ _DIFFUSE = 1e4
 
 @dataclass(frozen=True)
 class BlockMeans:
-    """Means over the samples present in blocks of `BLOCK`, no block over two segments.
-
-    Attributes
-    ----------
-    begin, end : ndarray of int, shape (b,)
-        First and one-past-last sample of each block.
-    mean : ndarray, shape (b,)
-        rad/s or m/s²; 0 where no sample is present.
-    count : ndarray of int, shape (b,)
-        Samples present.
-    """
+    """Means over the samples present in blocks of `BLOCK`, no block over two segments."""
 
     begin: NDArray[np.int64]
     end: NDArray[np.int64]
-    mean: Array
-    count: NDArray[np.int64]
+    """(b,): first and one-past-last sample of each block."""
+    mean: Array  # (b,): rad/s or m/s²; 0 where no sample is present
+    count: NDArray[np.int64]  # (b,): samples present
 
     def within(self, start: int, stop: int) -> slice:
         """Return the blocks from one sample to another."""
@@ -63,33 +55,22 @@ class BlockMeans:
 
 @dataclass(frozen=True)
 class SlowPath:
-    """The slow part of the noise, the level of the log included, linear between knots.
-
-    Attributes
-    ----------
-    sample : ndarray, shape (k,)
-        Place of the knots on the grid of the log: the middles of blocks, and the ends of parts.
-    value : ndarray, shape (k,)
-        rad/s or m/s².
-    """
+    """The slow part of the noise, the level of the log included, linear between knots."""
 
     sample: Array
-    value: Array
+    """(k,): place of the knots on the grid of the log: the middles of blocks, and the ends of
+    parts."""
+    value: Array  # (k,): rad/s or m/s²
 
     def at(self, samples: NDArray[np.int64]) -> Array:
         """Return the slow part at samples of the log."""
         return np.interp(samples, self.sample, self.value)
 
 
-def block_means(blocks: Iterable[Array], segments: Sequence[tuple[int, int]]) -> BlockMeans:
+def block_means(blocks: Iterable[Array], segments: Sequence[Span]) -> BlockMeans:
     """Return the means of blocks of a log with missing samples (NaN), in one pass.
 
-    Parameters
-    ----------
-    blocks : iterable of ndarray
-        The log in order.
-    segments : sequence of (int, int)
-        First and one-past-last sample of each, in order.
+    ``segments`` are first and one-past-last sample of each, in order.
     """
     begin = np.concatenate([np.arange(start, stop, BLOCK) for start, stop in segments])
     ends = np.concatenate([np.full(-(-(b - a) // BLOCK), b) for a, b in segments])
@@ -108,19 +89,9 @@ def samples_present(
 ) -> Iterator[tuple[NDArray[np.int64], Array]]:
     """Yield the samples of a log that are present, and the blocks that they belong to.
 
-    Parameters
-    ----------
-    parts : iterable of ndarray
-        The log in order; NaN where a sample is missing.
-    begin, end : ndarray of int, shape (b,)
-        First and one-past-last sample of each block, rising; samples of no block are left out.
-
-    Yields
-    ------
-    place : ndarray of int, shape (n,)
-        Block of each sample, rising.
-    present : ndarray, shape (n,)
-        The samples, at least one.
+    The parts are the log in order, NaN where a sample is missing; ``begin`` and ``end``, shape
+    (b,), first and one-past-last sample of each block, rising. Samples of no block are left out.
+    Yielded are the block of each sample, rising, and the samples, at least one.
     """
     reached = 0
     for values in parts:
@@ -132,23 +103,13 @@ def samples_present(
         reached += len(values)
 
 
-def divide_at_holes(
-    means: BlockMeans, segments: Sequence[tuple[int, int]]
-) -> tuple[tuple[int, int], ...]:
+def divide_at_holes(means: BlockMeans, segments: Sequence[Span]) -> tuple[Span, ...]:
     """Divide segments at the holes that are too long to be filled, and trim their ends.
 
-    Parameters
-    ----------
-    means : BlockMeans
-    segments : sequence of (int, int)
-        First and one-past-last sample of each, as `block_means` had them.
-
-    Returns
-    -------
-    tuple of (int, int)
-        Parts in which every hole can be filled, from the beginning of a block to the end of one.
+    They are as `block_means` had them. In each part every hole can be filled; it goes from the
+    beginning of a block to the end of one.
     """
-    parts: list[tuple[int, int]] = []
+    parts: list[Span] = []
     for start, stop in segments:
         chosen = means.within(start, stop)
         occupied = np.flatnonzero(means.count[chosen] > 0) + chosen.start
@@ -163,27 +124,14 @@ def divide_at_holes(
 
 def slow_part(
     means: BlockMeans,
-    parts: Sequence[tuple[int, int]],
+    parts: Sequence[Span],
     model: NoiseModel,
     rate: float,
     rng: np.random.Generator,
 ) -> SlowPath:
-    """Draw the slow part of the noise, given the block means.
+    """Draw the slow part of the noise, given the means of blocks in parts (`divide_at_holes`).
 
-    Parameters
-    ----------
-    means : BlockMeans
-    parts : sequence of (int, int)
-        First and one-past-last sample of each part of the log (`divide_at_holes`).
-    model : NoiseModel
-    rate : float
-        Hz.
-    rng : numpy.random.Generator
-
-    Returns
-    -------
-    SlowPath
-        Its jumps lie between the parts.
+    Its jumps lie between the parts.
     """
     interval = BLOCK / rate
     white = max(model.N**2 * rate, 1e-300)
@@ -227,18 +175,9 @@ def fill_missing(
     rate: float,
     rng: np.random.Generator,
 ) -> Iterator[Array]:
-    """Yield the blocks of a log with each missing sample replaced by a draw.
+    """Yield the blocks of a log with each missing sample (NaN) replaced by a draw.
 
-    Parameters
-    ----------
-    blocks : iterable of ndarray
-        The log in order, NaN where a sample is missing.
-    path : SlowPath
-    model : NoiseModel
-        Its N is the white part.
-    rate : float
-        Hz.
-    rng : numpy.random.Generator
+    N of the model is the white part beside the path.
     """
     reached = 0
     for values in blocks:

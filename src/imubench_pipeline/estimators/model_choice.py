@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -46,28 +47,17 @@ of simulated logs without a ramp get one beside a random walk, and 1 to 3 % quan
 
 @dataclass(frozen=True)
 class Candidate:
-    """A model, its best fit and its scores.
-
-    Attributes
-    ----------
-    maximum : Maximum
-    bic, aic : float
-        2 (-log L) + p log(number of bins), and + 2 p. Where a Gauss-Markov process or a ramp
-        stands for a random walk, 4 is added to the BIC; for a ramp and for quantization noise, 6
-        each.
-    weight : float
-        Weight of the model among the candidates, proportional to e^(-BIC/2).
-    share : float
-        That of e^(-AIC/2): an interval over models must not hang on a choice that the log
-        hardly makes, and BIC leaves out what is weak.
-    goodness : Goodness
-    """
+    """A model, its best fit and its scores."""
 
     maximum: Maximum
     bic: float
     aic: float
-    weight: float
+    """2 (-log L) + p log(number of bins), and + 2 p. Where a Gauss-Markov process or a ramp stands
+    for a random walk, 4 is added to the BIC; for a ramp and for quantization noise, 6 each."""
+    weight: float  # weight of the model among the candidates, proportional to e^(-BIC/2)
     share: float
+    """That of e^(-AIC/2): an interval over models must not hang on a choice that the log hardly
+    makes, and BIC leaves out what is weak."""
     goodness: Goodness
 
     @property
@@ -79,31 +69,11 @@ class Candidate:
 def compare(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
     """Fit all candidates and sort them, the best by BIC first.
 
-    Parameters
-    ----------
-    whittle : Whittle
-    quantization : bool
-        Try quantization noise too; the band must reach frequencies that show it.
+    With ``quantization`` that noise is tried too: the band must reach frequencies that show it.
     """
     bins = len(whittle.spectrum.density)
-    penalty = math.log(bins)
     tried: dict[Terms, Maximum] = {}
-
-    def bic(maximum: Maximum) -> float:
-        like_a_walk = (
-            "K" not in maximum.terms.linear
-            and len(maximum.times) > 0
-            and maximum.times[-1] > LIKE_A_WALK * whittle.longest
-        )
-        # A ramp is tried beside a walk: it stands for the walk where none is left.
-        like_a_walk |= maximum.terms.ramp and maximum.parameter("K") == 0.0
-        unlikely = maximum.terms.ramp + ("Q" in maximum.terms.linear)
-        return (
-            2.0 * maximum.cost
-            + maximum.terms.parameters * penalty
-            + UNIT_ROOT * like_a_walk
-            + UNLIKELY * unlikely
-        )
+    bic = partial(_bic, bins=bins, longest=whittle.longest)
 
     def add(terms: Terms) -> None:
         if terms not in tried and terms.parameters < bins // 4:
@@ -146,15 +116,24 @@ def compare(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
     ]
 
 
-def rescore(candidates: Sequence[Candidate], gained: Mapping[Terms, float]) -> list[Candidate]:
-    """Return candidates with more explained, sorted anew.
+def _bic(maximum: Maximum, bins: int, longest: float) -> float:
+    """Return the BIC of a fit, with what is asked of a model that few sensors have."""
+    terms, times = maximum.terms, maximum.times
+    slow = len(times) > 0 and times[-1] > LIKE_A_WALK * longest
+    like_a_walk = "K" not in terms.linear and slow
+    # A ramp is tried beside a walk: it stands for the walk where none is left.
+    like_a_walk |= terms.ramp and maximum.parameter("K") == 0.0
+    unlikely = terms.ramp + ("Q" in terms.linear)
+    return (
+        2.0 * maximum.cost
+        + terms.parameters * math.log(bins)
+        + UNIT_ROOT * like_a_walk
+        + UNLIKELY * unlikely
+    )
 
-    Parameters
-    ----------
-    candidates : sequence of Candidate
-    gained : mapping of Terms to float
-        Log likelihood that models gain; with a ramp as without it.
-    """
+
+def rescore(candidates: Sequence[Candidate], gained: Mapping[Terms, float]) -> list[Candidate]:
+    """Return candidates sorted anew, by what each model, with a ramp or without, gains."""
     gains = [gained.get(replace(candidate.terms, ramp=False), 0.0) for candidate in candidates]
     bics = np.array([candidate.bic for candidate in candidates]) - 2.0 * np.array(gains)
     aics = np.array([candidate.aic for candidate in candidates]) - 2.0 * np.array(gains)

@@ -16,10 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from imubench_pipeline.estimators.importance import Mixture, sample_adaptively
-from imubench_pipeline.estimators.metropolis import chain
-from imubench_pipeline.estimators.posterior_kernels import log_posteriors, mode_at
+from imubench_pipeline.estimators.posterior_kernels import chain, log_posteriors, mode_at
 from imubench_pipeline.estimators.whittle import Maximum, Whittle
-from imubench_pipeline.estimators.whittle_kernels import Bins, ShapeTable, shape_at
+from imubench_pipeline.estimators.whittle_kernels import Problem, shape_at
 from imubench_pipeline.typing import Array
 
 DRAWS = 20_000
@@ -61,24 +60,13 @@ _LEAST_START = 0.3
 
 @dataclass(frozen=True)
 class Posterior:
-    """Draws from the posterior of a model, equally weighted and in random order.
-
-    Attributes
-    ----------
-    parameters : ndarray, shape (draws, p)
-        The linear parameters in their order, then B of each process; SI.
-    times : ndarray, shape (draws, g)
-        T_B of each process, rising, s.
-    ramps : ndarray, shape (draws,)
-        R; zeros where the model has none.
-    effective : float
-        Number of independent draws that they are worth; NaN of a chain.
-    """
+    """Draws from the posterior of a model, equally weighted and in random order."""
 
     parameters: Array
-    times: Array
-    ramps: Array
-    effective: float
+    """(draws, p): the linear parameters in their order, then B of each process; SI."""
+    times: Array  # (draws, g): T_B of each process, rising, s
+    ramps: Array  # (draws,): R; zeros where the model has none
+    effective: float  # number of independent draws that they are worth; NaN of a chain
 
 
 def sample(
@@ -86,18 +74,7 @@ def sample(
 ) -> Posterior:
     """Draw from the posterior of a model around its best fit.
 
-    Parameters
-    ----------
-    whittle : Whittle
-    maximum : Maximum
-        The best fit of the model; a term that it has at 0 is drawn all the same.
-    rng : numpy.random.Generator
-    draws : int
-        Draws to keep.
-
-    Returns
-    -------
-    Posterior
+    A term that the best fit has at 0 is drawn all the same.
     """
     target = _Target(whittle, maximum)
     wanted = draws / _WORTH
@@ -112,7 +89,7 @@ def sample(
     else:
         effective = math.nan
         start, covariance = target.start()
-        amplitudes, _ = chain(start, covariance, rng, draws, *target.arguments)
+        amplitudes = chain(start, covariance, rng, draws, target.problem)
     return target.posterior(amplitudes, effective, rng)
 
 
@@ -129,14 +106,16 @@ class _Target:
         self.linear, self.processes = len(terms.linear), terms.gauss_markov
         self.terms = self.linear + self.processes
         fixed = np.column_stack([whittle.column(letter) for letter in terms.linear])
-        self.fixed = np.ascontiguousarray(fixed / whittle.scale)
         density = whittle.density(maximum)
         spectrum = whittle.spectrum
         ramp_information = float(np.sum(spectrum.ordinates * spectrum.ramp / density))
         self.ramp_unit = 1.0 / math.sqrt(max(ramp_information, 1e-300))
-        self.bins: Bins = whittle.bins(self.ramp_unit)
-        self.table: ShapeTable = whittle.shape_table(whittle.scale)
-        self.arguments = self.fixed, self.bins, self.processes, terms.ramp, self.table
+        self.problem = Problem(
+            np.ascontiguousarray(fixed / whittle.scale),
+            whittle.bins(self.ramp_unit),
+            terms.ramp,
+            whittle.shape_table(whittle.scale),
+        )
         # How well the square of each amplitude is known: alone, and beside the other terms.
         parts = whittle.matrix(terms, maximum.times) / density[:, None]
         parts *= np.sqrt(spectrum.ordinates / 2.0)[:, None]
@@ -153,7 +132,7 @@ class _Target:
         result = np.full(len(points), -np.inf)
         inside = (points[:, : self.terms] > 0.0).all(axis=1)
         if inside.any():
-            values, _, _ = log_posteriors(self.amplitudes(points[inside]), *self.arguments)
+            values, _, _ = log_posteriors(self.amplitudes(points[inside]), self.problem)
             # d log sinh z = coth z dz
             result[inside] = values - np.log(np.tanh(points[inside, : self.terms])).sum(axis=1)
         return result
@@ -168,7 +147,7 @@ class _Target:
 
     def first(self) -> Mixture:
         """Return a mixture that covers the posterior: a normal one for each T_B of a grid."""
-        first, step, logarithms = self.table
+        first, step, logarithms = self.problem.table
         last = first + step * (len(logarithms) - 1)
         number = _GRID[self.processes]
         apart = (last - first) / max(number, 1)
@@ -183,7 +162,7 @@ class _Target:
         if self.terms > 1:
             components += [self._without(term) for term in self.weak]
         means, scales = (np.array(part) for part in zip(*components, strict=True))
-        values, _, _ = log_posteriors(means, *self.arguments)
+        values, _, _ = log_posteriors(means, self.problem)
         mass = values + 0.5 * np.linalg.slogdet(scales)[1]
         weights = np.exp(mass - mass.max())
         weights /= weights.sum()
@@ -206,18 +185,19 @@ class _Target:
 
     def _component(self, places: Array, width: float) -> tuple[Array, Array]:
         """Return mean and covariance of a normal one about correlation times."""
-        return self._normal(self.log_fitted, places, width, self.fixed)
+        return self._normal(self.log_fitted, places, width, self.problem)
 
     def _without(self, term: int) -> tuple[Array, Array]:
         """Return those of the posterior where one term is nearly gone."""
-        places, fixed = np.log(self.maximum.times), self.fixed
+        places, problem = np.log(self.maximum.times), self.problem
         new = [term]
         if term < self.linear:
-            fixed = np.ascontiguousarray(np.delete(fixed, term, axis=1))
+            fixed = np.ascontiguousarray(np.delete(problem.fixed, term, axis=1))
+            problem = problem._replace(fixed=fixed)
         else:
             places = np.delete(places, term - self.linear)
             new.append(self.terms + term - self.linear)
-        mean, covariance = self._normal(np.delete(self.log_fitted, term), places, _WIDEST, fixed)
+        mean, covariance = self._normal(np.delete(self.log_fitted, term), places, _WIDEST, problem)
         old = np.delete(np.arange(self.terms + self.processes), new)
         full_mean, full = np.empty(len(old) + len(new)), np.zeros((len(old) + len(new),) * 2)
         full_mean[old], full[np.ix_(old, old)] = mean, covariance
@@ -225,19 +205,17 @@ class _Target:
         full[term, term] = _GONE_SPREAD**2
         if term >= self.linear:
             # Its correlation time may be any.
-            first, step, logarithms = self.table
+            first, step, logarithms = self.problem.table
             across = step * (len(logarithms) - 1)
             full_mean[new[1]], full[new[1], new[1]] = first + 0.5 * across, (0.3 * across) ** 2
         return full_mean, full
 
     def _normal(
-        self, start: Array, places: Array, width: float, fixed: Array
+        self, start: Array, places: Array, width: float, problem: Problem
     ) -> tuple[Array, Array]:
         """Return mean and covariance of a normal one, of some of the linear terms and processes."""
-        log_amplitudes, curvature, parts = mode_at(
-            start, places, fixed, self.bins, self.maximum.terms.ramp, self.table
-        )
-        p, g, linear = len(start), len(places), fixed.shape[1]
+        log_amplitudes, curvature, parts = mode_at(start, places, problem)
+        p, g, linear = len(start), len(places), problem.fixed.shape[1]
         information = np.zeros((p + g, p + g))
         information[:p, :p] = curvature
         if g:
@@ -247,7 +225,7 @@ class _Target:
                     for k, place in enumerate(places)
                 ]
             )
-            half = 0.5 * self.bins.nu[:, None]
+            half = 0.5 * self.problem.bins.nu[:, None]
             information[p:, :p] = slopes.T @ (half * parts)
             information[:p, p:] = information[p:, :p].T
             information[p:, p:] = slopes.T @ (half * slopes) + np.eye(g) / width**2
@@ -255,12 +233,12 @@ class _Target:
 
     def _slope(self, place: float) -> Array:
         """Return the change of the logarithm of a shape with log T_B."""
-        first, step, logarithms = self.table
+        first, step, logarithms = self.problem.table
         last = first + step * (len(logarithms) - 1)
         low, high = max(place - 0.5 * step, first), min(place + 0.5 * step, last)
-        ends = np.empty((2, len(self.bins.nu)))
-        shape_at(low, self.table, ends[0])
-        shape_at(high, self.table, ends[1])
+        ends = np.empty((2, len(self.problem.bins.nu)))
+        shape_at(low, self.problem.table, ends[0])
+        shape_at(high, self.problem.table, ends[1])
         return np.asarray(np.log(ends[1] / ends[0]) / (high - low))
 
     def posterior(self, amplitudes: Array, effective: float, rng: np.random.Generator) -> Posterior:
@@ -270,7 +248,7 @@ class _Target:
         if self.maximum.terms.ramp:
             # Given the noise R is normal.
             _, first, again = np.unique(amplitudes[:, 0], return_index=True, return_inverse=True)
-            _, best, information = log_posteriors(amplitudes[first], *self.arguments)
+            _, best, information = log_posteriors(amplitudes[first], self.problem)
             ramps = best[again] + rng.standard_normal(len(amplitudes)) / np.sqrt(information[again])
         times = np.exp(amplitudes[:, p:])
         order = np.argsort(times, axis=1)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, replace
+from dataclasses import asdict, fields, replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -18,7 +18,6 @@ from imubench_pipeline.estimators.estimate import (
     Estimate,
     JointDraws,
     Parameter,
-    Status,
 )
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables import read
@@ -109,11 +108,7 @@ def draws(path: Path) -> dict[tuple[str, str], JointDraws]:
 def estimates(path: Path, joint: Path | None = None) -> dict[str, list[Estimate]]:
     """Read the estimates of a recording from its table ``parameters``, by channel.
 
-    Parameters
-    ----------
-    path : Path
-    joint : Path, optional
-        Of its table ``draws``; without it no estimate has joint draws.
+    With joint draws where the path of its table ``draws`` is given.
     """
     return _estimates(read("parameters", [path]), joint)
 
@@ -144,14 +139,6 @@ def estimate_of(method: str, rows: Iterable[Row]) -> Estimate:
         name = row["parameter"]
         group = lines if name in ("amplitude", "frequency") else components
         place = of_curve if name in CURVE else group.setdefault(row["component"], {})
-        place[name] = Parameter(
-            row["value"],
-            cast(Status, row["status"]),
-            row["reason"],
-            row["lower"],
-            row["upper"],
-            row["duration_needed"],
-            row["fitted"],
-        )
+        place[name] = Parameter(**{field.name: row[field.name] for field in fields(Parameter)})
     first = components.pop(1, {})
     return Estimate(method, first, list(components.values()), list(lines.values()), of_curve)

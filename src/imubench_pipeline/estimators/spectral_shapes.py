@@ -24,12 +24,7 @@ _SLOW = 1e-3
 
 
 class Shapes:
-    """Mean densities of unit terms in the bins of a spectrum, in SI^2/Hz.
-
-    Parameters
-    ----------
-    spectrum : Spectrum
-    """
+    """Mean densities of unit terms in the bins of a spectrum, in SI^2/Hz."""
 
     def __init__(self, spectrum: Spectrum) -> None:
         self._interval = 1.0 / spectrum.rate

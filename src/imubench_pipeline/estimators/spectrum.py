@@ -11,12 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from imubench_pipeline.allan.phase import split
+from imubench_pipeline.allan.phase import Span, spans_of, split
 from imubench_pipeline.typing import Array
 
 SINGLE = 64
@@ -84,18 +85,12 @@ class Spectrum:
 
     def select(self, chosen: NDArray[np.bool_]) -> Spectrum:
         """Return the spectrum of chosen bins."""
-        names = (
-            "frequency",
-            "lower",
-            "upper",
-            "ordinates",
-            "density",
-            "block",
-            "length",
-            "ramp",
-            "cross",
-        )
-        return replace(self, **{name: getattr(self, name)[chosen] for name in names})
+        columns: dict[str, Any] = {
+            name: column[chosen]
+            for name, column in vars(self).items()
+            if isinstance(column, np.ndarray)
+        }
+        return replace(self, **columns)
 
 
 @dataclass(frozen=True)
@@ -130,7 +125,7 @@ def spectra(
     blocks: Iterable[Array],
     samples: int,
     rate: float,
-    segments: Sequence[tuple[int, int]] | None = None,
+    segments: Sequence[Span] | None = None,
 ) -> tuple[Spectrum, list[LineSpectrum]]:
     """Return the spectrum of a log, and those in which lines are looked for.
 
@@ -157,14 +152,14 @@ def spectra(
     N. Ahmed, T. Natarajan and K. Rao, "Discrete cosine transform", IEEE Trans. Computers C-23,
     1974; P. Whittle, "Estimation and information in stationary time series", 1953.
     """
-    spans = tuple(segments) if segments else ((0, samples),)
+    spans = spans_of(segments, samples)
     sums = _Sums(spans, rate)
     for number, part in split(blocks, spans):
         sums.push(number, np.asarray(part, dtype=np.float64))
     return sums.finish()
 
 
-def block_of(segments: Sequence[tuple[int, int]]) -> int:
+def block_of(segments: Sequence[Span]) -> int:
     """Return samples in the blocks whose means give the low frequencies of a spectrum."""
     return _resolution(np.array([stop - start for start, stop in segments]))[1]
 
@@ -172,7 +167,7 @@ def block_of(segments: Sequence[tuple[int, int]]) -> int:
 class _Sums:
     """Takes the parts of a log, block by block."""
 
-    def __init__(self, spans: Sequence[tuple[int, int]], rate: float) -> None:
+    def __init__(self, spans: Sequence[Span], rate: float) -> None:
         lengths = np.array([stop - start for start, stop in spans])
         self._rate = rate
         self._segment, self._block = _resolution(lengths)

@@ -19,6 +19,7 @@ from imubench_pipeline.estimators.spectral_shapes import Shapes
 from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle_kernels import (
     Bins,
+    Problem,
     ShapeTable,
     best_powers,
     one_process,
@@ -53,6 +54,11 @@ class Terms:
         return "+".join(names)
 
     @property
+    def biases(self) -> tuple[bool, int]:
+        """Whether it has flicker noise, and how many Gauss-Markov processes."""
+        return "F" in self.linear, self.gauss_markov
+
+    @property
     def parameters(self) -> int:
         """Number of free parameters."""
         return len(self.linear) + 2 * self.gauss_markov + self.ramp
@@ -60,26 +66,14 @@ class Terms:
 
 @dataclass(frozen=True)
 class Maximum:
-    """The best fit of a model.
-
-    Attributes
-    ----------
-    terms : Terms
-    powers : ndarray, shape (p,)
-        Squared parameters of the linear terms in their order, then B^2 of each process, SI.
-    times : ndarray, shape (g,)
-        T_B of each process, s, rising.
-    ramp : float
-        R, SI.
-    cost : float
-        -log L, up to a constant that all models of a spectrum share.
-    """
+    """The best fit of a model."""
 
     terms: Terms
     powers: Array
-    times: Array
-    ramp: float
-    cost: float
+    """(p,): squared parameters of the linear terms in their order, then B^2 of each process, SI."""
+    times: Array  # (g,): T_B of each process, s, rising
+    ramp: float  # R, SI
+    cost: float  # -log L, up to a constant that all models of a spectrum share
 
     def parameter(self, letter: str) -> float:
         """Return Q, N, B of flicker noise (F) or K."""
@@ -98,19 +92,14 @@ class Maximum:
 
 @dataclass(frozen=True)
 class Behind:
-    """What a low-pass leaves of the noise in each bin of a spectrum.
-
-    Attributes
-    ----------
-    white : ndarray, shape (b,)
-        Of white noise of N = 1, sampled, with what stands behind the filter in proportion to it.
-    flicker, slow : ndarray, shape (b,)
-        Gain of the power of flicker noise, whose folds show, and of slower noise.
-    """
+    """What a low-pass leaves of the noise in each bin of a spectrum."""
 
     white: Array
+    """(b,): of white noise of N = 1, sampled, with what stands behind the filter in proportion to
+    it."""
     flicker: Array
     slow: Array
+    """(b,): gain of the power of flicker noise, whose folds show, and of slower noise."""
 
     def select(self, chosen: NDArray[np.bool_]) -> Behind:
         """Return that of chosen bins."""
@@ -174,12 +163,7 @@ class Whittle:
     def with_column(self, letter: str, shape: Array) -> Whittle:
         """Return the likelihood with another density in the place of a linear term.
 
-        Parameters
-        ----------
-        letter : str
-            Of the term: Q, N, F or K.
-        shape : ndarray, shape (b,)
-            Its density in each bin, for a parameter of 1.
+        The letter is Q, N, F or K; ``shape``, (b,), is the density for a parameter of 1.
         """
         _ = self.table  # made once for both
         other = copy.copy(self)
@@ -258,7 +242,7 @@ class Whittle:
         where = np.empty(0)
         if terms.gauss_markov:
             search = one_process if terms.gauss_markov == 1 else two_processes
-            where = search(fixed, bins, terms.ramp, self.shape_table())
+            where = search(Problem(fixed, bins, terms.ramp, self.shape_table()))
         times = np.sort(np.exp(where))
         processes = [self.gauss_markov(float(time)) for time in times]
         columns = np.ascontiguousarray(np.column_stack([fixed, *processes]))
@@ -313,18 +297,9 @@ def whittle_of(
 ) -> Whittle:
     """Return the likelihood of a spectrum, with the correlation times that it can show.
 
-    Parameters
-    ----------
-    spectrum : Spectrum
-        The bins to use.
-    highest : float
-        Frequency up to which they reach, Hz.
-    shapes : int
-        Correlation times to tabulate.
-    shortest : float, optional
-        Shortest correlation time, s; by default twenty sampling intervals.
-    behind : Behind, optional
-        The sensor's low-pass, in these bins.
+    ``highest`` is the frequency up to which its bins reach, Hz; ``shortest`` the shortest
+    correlation time, s, by default twenty sampling intervals. ``shapes`` and ``behind``: as of
+    `Whittle`.
     """
     longest = CORRELATION_TIMES.of_log * float(spectrum.length.max())
     least = CORRELATION_TIMES.samples / spectrum.rate if shortest is None else shortest

@@ -1,7 +1,6 @@
 """The compiled inner loops of the Whittle likelihood.
 
-Data and densities are in units in which they are near 1. ``fixed`` holds the densities of the
-linear terms, shape (b, p).
+Data and densities are in units in which they are near 1.
 """
 
 from __future__ import annotations
@@ -47,6 +46,15 @@ class ShapeTable(NamedTuple):
     first: float
     step: float
     logarithms: Array
+
+
+class Problem(NamedTuple):
+    """What is fitted to bins: densities of linear terms, shape (b, p), a ramp, processes."""
+
+    fixed: Array
+    bins: Bins
+    with_ramp: bool
+    table: ShapeTable
 
 
 @njit(cache=True)
@@ -224,10 +232,9 @@ def _best_powers(
 
 
 @njit(cache=True)
-def _cost_at(
-    places: Array, fixed: Array, bins: Bins, with_ramp: bool, table: ShapeTable, tolerance: float
-) -> float:
+def _cost_at(places: Array, problem: Problem, tolerance: float) -> float:
     """Return the cost at logarithms of correlation times, profiled over everything else."""
+    fixed, bins, with_ramp, table = problem
     b, p = fixed.shape
     columns = np.empty((b, p + places.size))
     columns[:, :p] = fixed
@@ -240,84 +247,69 @@ def _cost_at(
 
 @njit(cache=True)
 def _polish(
-    places: Array,
-    which: int,
-    low: float,
-    high: float,
-    fixed: Array,
-    bins: Bins,
-    with_ramp: bool,
-    table: ShapeTable,
+    places: Array, which: int, low: float, high: float, problem: Problem
 ) -> tuple[float, float]:
     """Minimise the cost over one correlation time by golden section."""
     tried = places.copy()
     a, d = low, high
     b, c = d - _GOLDEN * (d - a), a + _GOLDEN * (d - a)
     tried[which] = b
-    cost_b = _cost_at(tried, fixed, bins, with_ramp, table, _POLISH_TOLERANCE)
+    cost_b = _cost_at(tried, problem, _POLISH_TOLERANCE)
     tried[which] = c
-    cost_c = _cost_at(tried, fixed, bins, with_ramp, table, _POLISH_TOLERANCE)
+    cost_c = _cost_at(tried, problem, _POLISH_TOLERANCE)
     while d - a > 5e-4:
         if cost_b <= cost_c:
             d, c, cost_c = c, b, cost_b
             b = d - _GOLDEN * (d - a)
             tried[which] = b
-            cost_b = _cost_at(tried, fixed, bins, with_ramp, table, _POLISH_TOLERANCE)
+            cost_b = _cost_at(tried, problem, _POLISH_TOLERANCE)
         else:
             a, b, cost_b = b, c, cost_c
             c = a + _GOLDEN * (d - a)
             tried[which] = c
-            cost_c = _cost_at(tried, fixed, bins, with_ramp, table, _POLISH_TOLERANCE)
+            cost_c = _cost_at(tried, problem, _POLISH_TOLERANCE)
     return (b, cost_b) if cost_b <= cost_c else (c, cost_c)
 
 
 @njit(cache=True)
 def _scan(
-    places: Array,
-    which: int,
-    low: float,
-    high: float,
-    fixed: Array,
-    bins: Bins,
-    with_ramp: bool,
-    table: ShapeTable,
+    places: Array, which: int, low: float, high: float, problem: Problem
 ) -> tuple[float, float]:
     """Return the best of one correlation time on a grid between limits, and its cost."""
-    tried = places.copy()
+    tried, table = places.copy(), problem.table
     best, lowest = places[which], np.inf
     for i in range(0, table.logarithms.shape[0], _SCAN_STEP):
         tried[which] = table.first + i * table.step
         if low <= tried[which] <= high:
-            cost = _cost_at(tried, fixed, bins, with_ramp, table, _SCAN_TOLERANCE)
+            cost = _cost_at(tried, problem, _SCAN_TOLERANCE)
             if cost < lowest:
                 best, lowest = tried[which], cost
     return best, lowest
 
 
 @njit(cache=True)
-def one_process(fixed: Array, bins: Bins, with_ramp: bool, table: ShapeTable) -> Array:
+def one_process(problem: Problem) -> Array:
     """Scan the correlation time, then polish the best."""
-    first, step, logarithms = table
+    first, step, logarithms = problem.table
     last = first + step * (logarithms.shape[0] - 1)
     place = np.array([first])
-    best, lowest = _scan(place, 0, first, last, fixed, bins, with_ramp, table)
+    best, lowest = _scan(place, 0, first, last, problem)
     reach = _SCAN_STEP * step
     place[0] = best
-    polished, cost = _polish(
-        place, 0, max(first, best - reach), min(last, best + reach), fixed, bins, with_ramp, table
-    )
+    low, high = max(first, best - reach), min(last, best + reach)
+    polished, cost = _polish(place, 0, low, high, problem)
     place[0] = polished if cost < lowest else best
     return place
 
 
 @njit(cache=True)
-def two_processes(fixed: Array, bins: Bins, with_ramp: bool, table: ShapeTable) -> Array:
+def two_processes(problem: Problem) -> Array:
     """Begin with the best pair of a coarse grid and with the best single process; take the better.
 
     A strong process has a sharp correlation time, beside which no pair of a coarse grid shows that
     it needs another.
     """
-    first, step, logarithms = table
+    first, step, logarithms = problem.table
     last = first + step * (logarithms.shape[0] - 1)
     apart = np.log(_CLOSEST_PAIR)
     lowest = np.inf
@@ -328,33 +320,30 @@ def two_processes(fixed: Array, bins: Bins, with_ramp: bool, table: ShapeTable) 
             places[0], places[1] = first + i * step, first + j * step
             if places[1] - places[0] < apart:
                 continue
-            cost = _cost_at(places, fixed, bins, with_ramp, table, _SCAN_TOLERANCE)
+            cost = _cost_at(places, problem, _SCAN_TOLERANCE)
             if cost < lowest:
                 lowest = cost
                 pair = places.copy()
-    pair, lowest = _descend(pair, lowest, fixed, bins, with_ramp, table)
-    single = one_process(fixed, bins, with_ramp, table)[0]
-    for slower in range(2):
+    pair, lowest = _descend(pair, lowest, problem)
+    single = one_process(problem)[0]
+    for which in (1, 0):
         beside = np.array([single, single])
-        low, high = (single + apart, last) if slower == 0 else (first, single - apart)
+        low, high = (single + apart, last) if which == 1 else (first, single - apart)
         if high <= low:
             continue
-        which = 1 if slower == 0 else 0
-        beside[which], cost = _scan(beside, which, low, high, fixed, bins, with_ramp, table)
+        beside[which], cost = _scan(beside, which, low, high, problem)
         if cost == np.inf:
             continue
-        beside, cost = _descend(beside, cost, fixed, bins, with_ramp, table)
+        beside, cost = _descend(beside, cost, problem)
         if cost < lowest:
             pair, lowest = beside, cost
     return pair
 
 
 @njit(cache=True)
-def _descend(
-    pair: Array, lowest: float, fixed: Array, bins: Bins, with_ramp: bool, table: ShapeTable
-) -> tuple[Array, float]:
+def _descend(pair: Array, lowest: float, problem: Problem) -> tuple[Array, float]:
     """Polish each of two correlation times in turn."""
-    first, step, logarithms = table
+    first, step, logarithms = problem.table
     last = first + step * (logarithms.shape[0] - 1)
     apart = np.log(_CLOSEST_PAIR)
     best = pair.copy()
@@ -369,7 +358,7 @@ def _descend(
                 low = max(low, best[0] + apart)
             if high <= low:
                 continue
-            polished, cost = _polish(best, g, low, high, fixed, bins, with_ramp, table)
+            polished, cost = _polish(best, g, low, high, problem)
             if cost < lowest:
                 lowest = cost
                 best[g] = polished

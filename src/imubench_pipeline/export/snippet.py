@@ -12,7 +12,7 @@ from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.mapping import named
 from imubench_pipeline.export.matrices import FOLLOWED
 from imubench_pipeline.export.target import Target
-from imubench_pipeline.noise.drives import drives_of
+from imubench_pipeline.noise.terms.base import drives_of
 
 _CONVENTION = (
     "White noise and random walk by their two-sided densities N^2 and K^2, Gauss-Markov processes "

@@ -17,14 +17,7 @@ _LONGEST_SERIES = 48
 def phi(order: int, z: complex) -> complex:
     """Return phi_k(z), the integral of (1 - s)^(k-1) / (k-1)! e^(z s) over s from 0 to 1.
 
-    phi_k(z) = z^-k (e^z - sum_{j<k} z^j / j!) = sum_n z^n / (n + k)!
-
-    Parameters
-    ----------
-    order : int
-        k, from 0.
-    z : complex
-        No dimension.
+    phi_k(z) = z^-k (e^z - sum_{j<k} z^j / j!) = sum_n z^n / (n + k)!, k from 0.
 
     References
     ----------
@@ -56,13 +49,6 @@ def squared_response(order: int, x: float) -> float:
     the integral is by parts
 
         sum_{j=0..m} (-1)^j x^(m-j) / (m-j)! E_{m+2+j}(x) - E_{m+1}(x)^2 / 2.
-
-    Parameters
-    ----------
-    order : int
-        m, from 0.
-    x : float
-        No dimension, from 0.
     """
     m = order
     if x < _SERIES_BELOW:

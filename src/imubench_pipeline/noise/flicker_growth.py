@@ -38,18 +38,12 @@ It is e^-a times a polynomial of e^-2a with these coefficients.
 
 
 def since_switch_on(order: int, on_time: float) -> float:
-    """Return the variance of the (m+1)-fold integral over a unit of time, for B = 1.
+    """Return the variance of the (m+1)-fold integral over a unit of time, for B = 1, m to 2.
 
-    1 / ((2m+2) Gamma(m+3/2)^2) from what drives the noise during the motion, and a sum of a and
-    of e^(-2a), e^(-4a) ... from what drove it before, with sinh^2(a) = on_time. For m = 0 it is
-    (2/pi) (1 + a - (1 - e^(-4a)) / 4).
-
-    Parameters
-    ----------
-    order : int
-        m: 0, 1 or 2.
-    on_time : float
-        Time from switch-on to the motion, over the length of the motion; from 0.
+    1 / ((2m+2) Gamma(m+3/2)^2) from what drives the noise during the motion, and a sum of a and of
+    e^(-2a), e^(-4a) ... from what drove it before, with sinh^2(a) = on_time, the time from switch-
+    on to the motion over the length of the motion. For m = 0 it is (2/pi) (1 + a - (1 - e^(-4a)) /
+    4).
     """
     angle = math.asinh(math.sqrt(on_time))
     logarithmic, decaying = _before(order)
@@ -61,18 +55,12 @@ def since_switch_on(order: int, on_time: float) -> float:
 def after_window(order: int, window: float) -> float:
     """Return the variance of the (m+1)-fold integral less the mean over a window, for B = 1.
 
-    The integral is over a unit of time right after the window. For m = 0 and a window r
+    The integral is over a unit of time right after the window; m is 0 to 2. For m = 0 and a window
+    r
 
         (1/pi) (1 + r) (ln(1 + 1/r) + ln(1 + r) / r),
 
     which is 4 ln 2 / pi, twice the Allan variance, for r = 1.
-
-    Parameters
-    ----------
-    order : int
-        m: 0, 1 or 2.
-    window : float
-        Length of the window over that of the motion, above 0.
     """
     constant = 1.0 / math.factorial(order + 1)
     of_mean = 1.5 - math.log(window)

@@ -87,39 +87,17 @@ class LowPass:
         return states
 
     def power(self, frequency: ArrayLike) -> Array:
-        """Return |H|^2 = 1 / (1 + (f / cutoff)^(2 order)).
-
-        Parameters
-        ----------
-        frequency : array_like
-            Hz.
-
-        Returns
-        -------
-        ndarray
-            Gain of the power, in the shape of ``frequency``.
-        """
+        """Return |H|^2 = 1 / (1 + (f / cutoff)^(2 order)), in the shape of the frequency, Hz."""
         square = np.square(np.asarray(frequency, dtype=np.float64) / self.cutoff)
         # Products: numpy takes ten times as long for a power above 2.
         return np.asarray(1.0 / (1.0 + math.prod([square] * self.order)))
 
     def folded_power(self, frequency: ArrayLike, rate: float) -> Array:
-        """Return the power gain of white noise behind the filter, sampled.
+        """Return the power gain of white noise behind the filter, sampled, up to Nyquist.
 
-        For n = 1 the sum over the folds is (pi f_c / f_s) sinh(2 pi f_c / f_s) / (cosh(2 pi f_c /
-        f_s) - cos(2 pi f / f_s)), the spectrum of a sampled Gauss-Markov process.
-
-        Parameters
-        ----------
-        frequency : array_like
-            Hz, up to Nyquist.
-        rate : float
-            f_s, Hz.
-
-        Returns
-        -------
-        ndarray
-            In the shape of the frequencies.
+        In the shape of the frequencies, Hz. For n = 1 the sum over the folds is (pi f_c / f_s)
+        sinh(2 pi f_c / f_s) / (cosh(2 pi f_c / f_s) - cos(2 pi f / f_s)), the spectrum of a sampled
+        Gauss-Markov process.
         """
         f = np.asarray(frequency, dtype=np.float64)
         if self.order == 1:
@@ -142,17 +120,7 @@ class LowPass:
         return np.asarray(total)
 
     def response(self, frequency: float) -> complex:
-        """Return H: gain and phase of a sinusoid.
-
-        Parameters
-        ----------
-        frequency : float
-            Hz.
-
-        Returns
-        -------
-        complex
-        """
+        """Return H: gain and phase of a sinusoid of a frequency in Hz."""
         s = 1j * frequency / self.cutoff
         poles = np.exp(
             1j * math.pi * (2 * np.arange(1, self.order + 1) + self.order - 1) / (2 * self.order)

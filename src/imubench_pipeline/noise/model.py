@@ -188,12 +188,7 @@ class NoiseModel:
     def realised(self, interval: float, longest: float) -> Sequence[Term]:
         """Return terms of finite state spaces: flicker noise is Gauss-Markov processes.
 
-        Parameters
-        ----------
-        interval : float
-            Sampling interval, s.
-        longest : float
-            Tau up to which the flicker noise is followed, s.
+        Up to ``longest`` flicker noise is followed; both are in s.
         """
         terms: list[Term] = []
         for term in self.terms:

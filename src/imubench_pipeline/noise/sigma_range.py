@@ -63,10 +63,6 @@ def sigma_range(
     level : float
         Share of the draws between the limits.
 
-    Returns
-    -------
-    SigmaRange
-
     Raises
     ------
     ValueError
@@ -100,12 +96,6 @@ def drawn_from_covariance(
         Of Q, N, B, T_B and K, those that are drawn; the others stay.
     covariance : ndarray, shape (p, p)
         Of the natural logarithms of these: for small errors that of the relative errors.
-    draws : int
-    rng : numpy.random.Generator
-
-    Returns
-    -------
-    list of NoiseModel
 
     Raises
     ------

@@ -15,13 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from imubench_pipeline.allan.phase import Span, spans_of
 from imubench_pipeline.allan.presence import Presence
 from imubench_pipeline.allan.quadratic_forms import tail_degrees, variance_degrees
 from imubench_pipeline.noise.model import NoiseModel
 from imubench_pipeline.noise.terms import Deterministic, Quantization
 from imubench_pipeline.typing import Array
-
-Span = tuple[int, int]
 
 _STEPS = 32
 """Lags in a cluster's length at which the covariance is taken; linear in between."""
@@ -41,18 +40,10 @@ _ROUNDED = ((0, 6.0), (1, -4.0), (2, 1.0))
 
 @dataclass(frozen=True)
 class Degrees:
-    """Degrees of freedom of an Allan variance over tau.
+    """Degrees of freedom of an Allan variance over tau."""
 
-    Attributes
-    ----------
-    edf : ndarray, shape (m,)
-        Of the chi-squared variate with the same relative variance.
-    upper : ndarray, shape (m,)
-        Of that with the same lower tail, from which the upper limit follows.
-    """
-
-    edf: Array
-    upper: Array
+    edf: Array  # (m,): of the chi-squared variate with the same relative variance
+    upper: Array  # (m,): of that with the same lower tail, from which the upper limit follows
 
 
 def degrees_of_model(
@@ -89,7 +80,7 @@ def degrees_of_model(
     PTTI 2003, for power laws; W. Satterthwaite, "An approximate distribution of estimates of
     variance components", Biometrics Bulletin 2, 1946.
     """
-    spans = tuple(segments) if segments else ((0, samples),)
+    spans = spans_of(segments, samples)
     left = np.ones(len(sizes)) if share is None else share
     pairs = [
         _degrees(model, 1.0 / rate, int(n), spans, presence, float(part))

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numba import njit
 from scipy.linalg import block_diag
 
 from imubench_pipeline.typing import Array
@@ -104,15 +106,9 @@ class ContinuousSpace:
 
 
 def root_of(covariance: Array) -> Array:
-    """Return the lower triangular root of a covariance; what does not vary has a row of zeros.
+    """Return the lower triangular root of a covariance, shape (m, m).
 
-    Parameters
-    ----------
-    covariance : ndarray, shape (m, m)
-
-    Returns
-    -------
-    ndarray, shape (m, m)
+    What does not vary has a row of zeros.
     """
     varying = np.flatnonzero(np.diag(covariance))
     root, own = np.zeros_like(covariance), np.ix_(varying, varying)
@@ -121,20 +117,10 @@ def root_of(covariance: Array) -> Array:
 
 
 def repeat_step(transition: Array, noise: Array, times: int) -> tuple[Array, Array]:
-    """Return what a step does when it is done several times, by powers of two.
+    """Return what a step does when it is done several times, from 0, by powers of two.
 
-    Parameters
-    ----------
-    transition : ndarray, shape (m, m)
-    noise : ndarray, shape (m, m)
-        Covariance that a step adds.
-    times : int
-        From 0.
-
-    Returns
-    -------
-    (ndarray, ndarray), shapes (m, m)
-        Phi^times, and the sum of Phi^i noise (Phi^i)^T over i from 0 to times - 1.
+    ``noise`` is the covariance that a step adds, both shape (m, m). Returned are Phi^times, and the
+    sum of Phi^i noise (Phi^i)^T over i from 0 to times - 1.
     """
     whole, added = np.eye(len(transition)), np.zeros_like(noise)
     while times:
@@ -144,3 +130,57 @@ def repeat_step(transition: Array, noise: Array, times: int) -> tuple[Array, Arr
         transition = transition @ transition
         times >>= 1
     return whole, added
+
+
+def draw_block_sums(
+    space: StateSpace, start: Array, blocks: int, width: int, rng: np.random.Generator
+) -> Array:
+    """Draw the sums over blocks of samples, exactly, shape (blocks,).
+
+    The sum over a block and the state after it are jointly Gaussian, given the state before. The
+    space has one state, seen as it is, without measurement noise; ``start``, shape (1,), is the
+    first; a block has ``width`` samples.
+    """
+    p, drive = float(space.transition[0, 0]), float(space.process_noise[0, 0])
+    # The sample i of a block is p^i x + sum_{j<i} p^(i-1-j) w_j.
+    powers = p ** np.arange(width + 1)
+    reach = np.concatenate(([0.0], np.cumsum(powers)))
+    in_sum = reach[width - 1 - np.arange(width)]
+    in_state = powers[width - 1 - np.arange(width)]
+    moments = drive * np.array(
+        [[in_state @ in_state, in_state @ in_sum], [in_state @ in_sum, in_sum @ in_sum]]
+    )
+    to_state = math.sqrt(moments[0, 0])
+    shared = moments[0, 1] / to_state
+    own = math.sqrt(max(moments[1, 1] - shared**2, 0.0))
+    normal = rng.standard_normal((2, blocks))
+    sums = np.empty(blocks)
+    _add_up(
+        sums,
+        float(start[0]),
+        powers[width],
+        reach[width],
+        normal[0],
+        normal[1],
+        to_state,
+        shared,
+        own,
+    )
+    return sums
+
+
+@njit(cache=True, nogil=True)
+def _add_up(
+    sums: Array,
+    state: float,
+    decay: float,
+    gain: float,
+    first: Array,
+    second: Array,
+    to_state: float,
+    shared: float,
+    own: float,
+) -> None:
+    for i in range(sums.size):
+        sums[i] = gain * state + shared * first[i] + own * second[i]
+        state = decay * state + to_state * first[i]

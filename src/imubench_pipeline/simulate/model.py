@@ -27,9 +27,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.noise.drives import drives_of
 from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.noise.terms import GaussMarkov, Term
+from imubench_pipeline.noise.terms.base import drives_of
 from imubench_pipeline.simulate import flicker_band, spectra
 from imubench_pipeline.typing import Array
 

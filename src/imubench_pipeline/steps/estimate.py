@@ -22,9 +22,9 @@ from imubench_pipeline.estimators.deterministic.verdict import deterministic_row
 from imubench_pipeline.estimators.estimate import SI_UNITS, Estimate, Parameter, not_shown
 from imubench_pipeline.estimators.least_squares import UnfitCurveError
 from imubench_pipeline.estimators.likelihood import Likelihood
-from imubench_pipeline.estimators.missing_slow import slow_noise_missing
 from imubench_pipeline.estimators.model_choice import disagreement
 from imubench_pipeline.estimators.rows import allan_rows, draw_rows, limit_rows, parameter_rows
+from imubench_pipeline.estimators.spectral_findings import slow_noise_missing
 from imubench_pipeline.estimators.thermal.fit import fit_temperature
 from imubench_pipeline.estimators.thermal.path import TemperaturePath, temperature_path
 from imubench_pipeline.estimators.thermal.register import step_of

@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from imubench_pipeline.allan.phase import Span
 from imubench_pipeline.estimators.deterministic.means import Means, means_of
 from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates, covariance_of_sizes
 from imubench_pipeline.estimators.deterministic.regressors import Regressor
@@ -40,69 +41,39 @@ _MOST_LEVERAGE = 0.5
 
 @dataclass(frozen=True)
 class Course:
-    """A deterministic course that was found.
-
-    Attributes
-    ----------
-    kind : {"bias_step", "warm_up_drift", "periodic_drift"}
-    start, end : float
-        The part of the log that has it, s from the first sample; both the place of a step.
-    size, size_lower, size_upper : float
-        Change at a step; value at the beginning of a warm-up, which it loses; amplitude of
-        periodic drift; with 95 % limits, rad/s or m/s².
-    time, time_lower, time_upper : float or None
-        Time constant of a warm-up, or period, s, with 95 % limits.
-    place_error : float or None
-        Half width of the 95 % interval of a step's place, s.
-    gain : float
-        Twice the log likelihood that is lost without it.
-    regressor : Regressor
-    amplitudes : ndarray, shape (1,) or (2,)
-        Of the regressor, SI.
-    """
+    """A deterministic course that was found."""
 
     kind: Kind
     start: float
     end: float
+    """The part of the log that has it, s from the first sample; both the place of a step."""
     size: float
     size_lower: float
     size_upper: float
+    """Change at a step; value at the beginning of a warm-up, which it loses; amplitude of periodic
+    drift; with 95 % limits, rad/s or m/s²."""
     time: float | None
     time_lower: float | None
     time_upper: float | None
-    place_error: float | None
-    gain: float
+    """Time constant of a warm-up, or period, s, with 95 % limits."""
+    place_error: float | None  # half width of the 95 % interval of a step's place, s
+    gain: float  # twice the log likelihood that is lost without it
     regressor: Regressor
-    amplitudes: Array
+    amplitudes: Array  # (1,) or (2,): of the regressor, SI
 
 
 @dataclass(frozen=True)
 class Courses:
-    """What was found in a log beside noise.
-
-    Attributes
-    ----------
-    courses : tuple of Course
-    means : Means or None
-        The block means that were searched; None where the log is too short.
-    searched : Searched or None
-    telegraph : bool
-        There are more steps than can be told one by one: nothing was taken out.
-    """
+    """What was found in a log beside noise."""
 
     courses: tuple[Course, ...]
-    means: Means | None
+    means: Means | None  # the block means that were searched; None where the log is too short
     searched: Searched | None
     telegraph: bool = False
+    """There are more steps than can be told one by one: nothing was taken out."""
 
     def less(self, blocks: Iterable[Array]) -> Iterator[Array]:
-        """Yield the blocks of a log without what was found.
-
-        Parameters
-        ----------
-        blocks : iterable of ndarray
-            The log in order, SI.
-        """
+        """Yield the blocks of a log, in order, SI, without what was found."""
         reached = 0
         for values in blocks:
             stop = reached + len(values)
@@ -195,7 +166,7 @@ def find_courses(
     samples: int,
     rate: float,
     *,
-    segments: Sequence[tuple[int, int]] | None = None,
+    segments: Sequence[Span] | None = None,
     highest: float | None = None,
 ) -> Courses:
     """Find steps, warm-ups and periodic drift in a log.

@@ -31,27 +31,17 @@ are held, although they are not known."""
 
 @dataclass(frozen=True)
 class Halves:
-    """The slow noise of the two halves of a log, the other terms held.
+    """The slow noise of the two halves of a log, the other terms held."""
 
-    Attributes
-    ----------
-    of : {"K", "slow noise"}
-        The random walk, or all terms but the white noise together.
-    first, second : float
-        Deviation of each half over that of the whole log.
-    ratio : float
-        Twice the log likelihood ratio of two values against one.
-    begin, middle, end : float
-        Of the halves, s from the first sample.
-    """
-
-    of: Literal["K", "slow noise"]
+    of: Literal["K", "slow noise"]  # the random walk, or all terms but the white noise together
     first: float
     second: float
-    ratio: float
+    """Deviation of each half over that of the whole log."""
+    ratio: float  # twice the log likelihood ratio of two values against one
     begin: float
     middle: float
     end: float
+    """Of the halves, s from the first sample."""
 
     @property
     def differ(self) -> bool:
@@ -62,19 +52,10 @@ class Halves:
 def compare_halves(means: Means, noise: Maximum) -> Iterator[Halves]:
     """Estimate the slow noise on each half of the longest part of a log, and compare.
 
-    Parameters
-    ----------
-    means : Means
-        Less what is deterministic.
-    noise : Maximum
-        Of the whole log.
-
-    Yields
-    ------
-    Halves
-        Of the random walk, where there is one, and of all slow noise; nothing of short logs.
+    Of the random walk, where there is one, and of all slow noise; nothing of short logs. ``means``
+    are less what is deterministic, ``noise`` is that of the whole log.
     """
-    part = max(means.parts, key=lambda part: len(part.mean))
+    part = means.longest
     half = len(part.mean) // 2
     if half < _FEWEST // 2:
         return

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.allan.phase import split
+from imubench_pipeline.allan.phase import Span, spans_of, split
 from imubench_pipeline.typing import Array
 
 _MOST = 1 << 14
@@ -57,49 +57,27 @@ _LEAST_SPREAD = 0.05
 
 @dataclass(frozen=True)
 class Part:
-    """Block means of a part of a log without long holes.
+    """Block means of a part of a log without long holes."""
 
-    Attributes
-    ----------
-    start : int
-        First sample.
-    mean : ndarray, shape (n,)
-        rad/s or m/s²; interpolated, with white noise, where a block has few samples.
-    power : ndarray, shape (n,)
-        Half the mean squared difference of neighbouring samples in each block: the variance of
-        white noise, (rad/s)² or (m/s²)². NaN where a block has few samples.
-    kurtosis : float
-        Excess kurtosis of samples that are independent: twice that of their differences.
-    present : float
-        Share of its samples that are there.
-    pauses : tuple of (float, float)
-        Middle and length, in blocks, of holes so long that the sensor may have begun anew; the
-        longest of them, in order.
-    """
-
-    start: int
+    start: int  # first sample
     mean: Array
+    """(n,): rad/s or m/s²; interpolated, with white noise, where a block has few samples."""
     power: Array
+    """(n,): half the mean squared difference of neighbouring samples in each block: the variance of
+    white noise, (rad/s)² or (m/s²)². NaN where a block has few samples."""
     kurtosis: float
-    present: float
+    """Excess kurtosis of samples that are independent: twice that of their differences."""
     pauses: tuple[tuple[float, float], ...] = ()
+    """Middle and length, in blocks, of holes so long that the sensor may have begun anew; the
+    longest of them, in order."""
 
 
 @dataclass(frozen=True)
 class Means:
-    """Block means of a log.
+    """Block means of a log."""
 
-    Attributes
-    ----------
-    block : int
-        Samples in a block.
-    rate : float
-        Of the samples, Hz.
-    parts : tuple of Part
-    """
-
-    block: int
-    rate: float
+    block: int  # samples in a block
+    rate: float  # of the samples, Hz
     parts: tuple[Part, ...]
 
     @property
@@ -107,27 +85,24 @@ class Means:
         """Duration of a block, s."""
         return self.block / self.rate
 
+    @property
+    def longest(self) -> Part:
+        """The part with the most blocks."""
+        return max(self.parts, key=lambda part: len(part.mean))
+
 
 def means_of(
     blocks: Iterable[Array],
     samples: int,
     rate: float,
-    segments: Sequence[tuple[int, int]] | None = None,
+    segments: Sequence[Span] | None = None,
 ) -> Means:
     """Return the block means of a log in one pass, in bounded memory.
 
-    Parameters
-    ----------
-    blocks : iterable of ndarray
-        The log in order, in SI; NaN where a sample is missing.
-    samples : int
-        L, the length of all blocks together.
-    rate : float
-        Hz.
-    segments : sequence of (int, int), optional
-        First and one-past-last sample of each; one by default.
+    The blocks are the log in order, in SI, NaN where a sample is missing; ``segments`` first and
+    one-past-last sample of each, one by default.
     """
-    spans = tuple(segments) if segments else ((0, samples),)
+    spans = spans_of(segments, samples)
     total = sum(stop - start for start, stop in spans)
     size = max(-(-total // _MOST), min(_LEAST, max(total // _FEWEST, 1)))
     gathered: list[list[Array]] = [[] for _ in spans]
@@ -195,7 +170,6 @@ def _parts(start: int, size: int, rows: Array, interval: float) -> list[Part]:
                 _bridged(mean[span], share[span] >= 0.5),
                 np.where(share[span] >= 0.5, power[span], np.nan),
                 _kurtosis(power[span], fourth[span], share[span] >= 0.5),
-                float(share[span].mean()),
                 _pauses(share[span] < 0.5, interval),
             )
         )
@@ -246,26 +220,16 @@ def _bridged(mean: Array, present: NDArray[np.bool_]) -> Array:
 
 @dataclass(frozen=True)
 class Steadiness:
-    """How the density of the fast noise changes over a log.
-
-    Attributes
-    ----------
-    trend, trend_error : float
-        Relative change of the density N from beginning to end, and its standard error.
-    spread : float
-        Relative standard deviation of N over sections of the log beyond chance.
-    chi_squared : float
-        Of the sections about their mean.
-    start, end : float
-        Of the part that was looked at, s.
-    """
+    """How the density of the fast noise changes over a log."""
 
     trend: float
     trend_error: float
-    spread: float
-    chi_squared: float
+    """Relative change of the density N from beginning to end, and its standard error."""
+    spread: float  # relative standard deviation of N over sections of the log beyond chance
+    chi_squared: float  # of the sections about their mean
     start: float
     end: float
+    """Of the part that was looked at, s."""
 
     @property
     def grows(self) -> bool:
@@ -281,12 +245,9 @@ class Steadiness:
 def steadiness_of(means: Means) -> Steadiness | None:
     """Return how the power of the fast noise changes over the longest part of a log.
 
-    Returns
-    -------
-    Steadiness or None
-        None for a short log, or one of constant samples.
+    None for a short log, or one of constant samples.
     """
-    part = max(means.parts, key=lambda part: len(part.power))
+    part = means.longest
     size = len(part.power) // _SECTIONS
     if size < _FEWEST_IN_SECTION or means.block < 2:
         return None

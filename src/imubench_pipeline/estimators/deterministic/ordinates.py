@@ -49,45 +49,20 @@ _LEAST_ALONE = 1e-9
 
 @dataclass(frozen=True)
 class Fit:
-    """Noise and regressors fitted together.
-
-    Attributes
-    ----------
-    regressors : tuple of Regressor
-    sizes : ndarray, shape (p,)
-        Amplitudes, SI, in the order of the regressors' columns.
-    covariance : ndarray, shape (p, p)
-        Of the amplitudes, for the noise as fitted.
-    noise : Maximum
-    density : ndarray, shape (k,)
-        Of the noise at each ordinate, SI²/Hz.
-    residual : ndarray, shape (k,)
-        Coefficients less the regressors.
-    leverage : ndarray, shape (k,)
-        Part of each ordinate that the regressors take.
-    log_likelihood : float
-        Up to a constant that all fits of the ordinates share.
-    """
+    """Noise and regressors fitted together."""
 
     regressors: tuple[Regressor, ...]
-    sizes: Array
-    covariance: Array
+    sizes: Array  # (p,): amplitudes, SI, in the order of the regressors' columns
+    covariance: Array  # (p, p): of the amplitudes, for the noise as fitted
     noise: Maximum
-    density: Array
-    residual: Array
-    leverage: Array
-    log_likelihood: float
+    density: Array  # (k,): of the noise at each ordinate, SI²/Hz
+    residual: Array  # (k,): coefficients less the regressors
+    leverage: Array  # (k,): part of each ordinate that the regressors take
+    log_likelihood: float  # up to a constant that all fits of the ordinates share
 
 
 class Ordinates:
-    """The ordinates of all parts of a log.
-
-    Parameters
-    ----------
-    means : Means
-    highest : float, optional
-        Frequency up to which they are used, Hz.
-    """
+    """The ordinates of all parts of a log, used up to a frequency in Hz, by default all."""
 
     def __init__(self, means: Means, highest: float | None = None) -> None:
         self.means = means
@@ -179,13 +154,7 @@ class Ordinates:
     ) -> Fit:
         """Fit noise and regressors together.
 
-        Parameters
-        ----------
-        regressors : sequence of Regressor
-        start : ndarray, shape (k,), optional
-            Density of the noise that the first weights are taken from.
-        terms : Terms
-            The noise model.
+        ``start``, shape (k,), is a density of the noise that the first weights are taken from.
         """
         weight = np.ones_like(self.coefficient)
         residual, leverage = self.coefficient, np.zeros_like(weight)
@@ -268,14 +237,10 @@ class Ordinates:
 
 
 def covariance_of_sizes(ordinates: Ordinates, fit: Fit) -> Array:
-    """Return the covariance of the amplitudes of a fit, over the walks that the log allows.
+    """Return the covariance of the amplitudes of a fit, (p, p), over the walks that the log allows.
 
     All K are as likely beforehand; each counts by its restricted likelihood, in which the
     amplitudes are integrated over. The other noise is held.
-
-    Returns
-    -------
-    ndarray, shape (p, p)
     """
     if not fit.regressors:
         return fit.covariance

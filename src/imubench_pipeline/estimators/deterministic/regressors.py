@@ -23,27 +23,17 @@ Kind = Literal["step", "restart", "exponential", "sinusoid", "ramp", "pulse"]
 
 @dataclass(frozen=True)
 class Regressor:
-    """A deterministic course of unit size in one part of a log.
-
-    Attributes
-    ----------
-    kind : str
-        ``step``: 0 before its place, 1 from it on; ``restart``: the same at a pause, over which its
-        means are interpolated as those of the log are; ``exponential``: 1 at the beginning of the
-        part; ``sinusoid``: a cosine and a sine; ``ramp``: 1 a block; ``pulse``: 1 in one block.
-    part : int
-        Number of the part.
-    where : float
-        Place of a step or pulse, time constant of an exponential, both in blocks; frequency of a
-        sinusoid in cycles a block.
-    length : float
-        Of the pause of a restart, blocks.
-    """
+    """A deterministic course of unit size in one part of a log."""
 
     kind: Kind
-    part: int
+    """``step``: 0 before its place, 1 from it on; ``restart``: the same at a pause, over which its
+    means are interpolated as those of the log are; ``exponential``: 1 at the beginning of the part;
+    ``sinusoid``: a cosine and a sine; ``ramp``: 1 a block; ``pulse``: 1 in one block."""
+    part: int  # number of the part
     where: float = 0.0
-    length: float = 0.0
+    """Place of a step or pulse, time constant of an exponential, both in blocks; frequency of a
+    sinusoid in cycles a block."""
+    length: float = 0.0  # of the pause of a restart, blocks
 
     @property
     def columns(self) -> int:
@@ -78,12 +68,7 @@ class Regressor:
         return np.asarray(scipy.fft.dct(self.means(n), type=2, norm="ortho", axis=1)[:, 1:])
 
     def at(self, blocks: Array) -> Array:
-        """Return its values at times in blocks from the beginning of the part.
-
-        Returns
-        -------
-        ndarray, shape (columns, s)
-        """
+        """Return its values, shape (columns, s), at times in blocks from where its part begins."""
         if self.kind in ("step", "restart"):
             return (blocks >= self.where).astype(np.float64)[None]
         if self.kind == "pulse":

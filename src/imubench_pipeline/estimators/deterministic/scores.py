@@ -55,36 +55,20 @@ _KNOWN = 1e-3
 
 @dataclass(frozen=True)
 class Score:
-    """The best regressor of a kind.
-
-    Attributes
-    ----------
-    regressor : Regressor
-    gain : float
-        Twice the log likelihood that it adds, for given noise.
-    threshold : float
-        What it must reach (`FALSE_ALARM`).
-    """
+    """The best regressor of a kind."""
 
     regressor: Regressor
-    gain: float
-    threshold: float
+    gain: float  # twice the log likelihood that it adds, for given noise
+    threshold: float  # what it must reach (`FALSE_ALARM`)
 
 
 def best_scores(
     ordinates: Ordinates, fit: Fit, density: Array, *, smooth: bool = False
 ) -> Iterator[Score]:
-    """Yield the best further regressor of each kind in each part.
+    """Yield the best further regressor of each kind in each part, beside those of a fit.
 
-    Parameters
-    ----------
-    ordinates : Ordinates
-    fit : Fit
-        Its regressors are there already.
-    density : ndarray, shape (k,)
-        Of the noise, SI²/Hz.
-    smooth : bool
-        Look for slow courses only, not for steps and pulses.
+    ``density``, shape (k,), is that of the noise, SI²/Hz; ``smooth`` asks for slow courses only,
+    not for steps and pulses.
     """
     weight = ordinates.weights(density)
     residual = ordinates.coefficient
@@ -108,14 +92,7 @@ def best_scores(
 class Gain:
     """What regressors of one part add to the likelihood beside others, for given noise.
 
-    Parameters
-    ----------
-    ordinates : Ordinates
-    regressors : sequence of Regressor
-        Those that are there already.
-    density : ndarray, shape (k,)
-        Of the noise, SI²/Hz.
-    part : int
+    ``regressors`` are there already; ``density``, shape (k,), is that of the noise, SI²/Hz.
     """
 
     def __init__(

@@ -25,26 +25,16 @@ _TAKEN_OUT = "it is taken out of the noise"
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a log that changes in time means for its estimates.
-
-    Attributes
-    ----------
-    findings : tuple of Finding
-    caveats : mapping of str to (str, str)
-        Status and reason of the parameters that are not to be relied on.
-    widening : float
-        Times the interval of N that a normal distribution would give.
-    growth : float
-        Logarithm of N at the end of the log over that at its beginning, where it grows.
-    scatter : float
-        Standard deviation of the logarithm of N over the log, where it varies otherwise.
-    """
+    """What a log that changes in time means for its estimates."""
 
     findings: tuple[Finding, ...]
     caveats: Mapping[str, tuple[Status, str]]
-    widening: float = 1.0
+    """Status and reason of the parameters that are not to be relied on."""
+    widening: float = 1.0  # times the interval of N that a normal distribution would give
     growth: float = 0.0
+    """Logarithm of N at the end of the log over that at its beginning, where it grows."""
     scatter: float = 0.0
+    """Standard deviation of the logarithm of N over the log, where it varies otherwise."""
 
     def applied(self, estimate: Estimate) -> Estimate:
         """Return an estimate with the caveats on the parameters that have a value."""
@@ -119,21 +109,13 @@ def _widened(parameter: Parameter, times: float) -> Parameter:
 
 
 def verdict_of(channel: str, unit: str, courses: Courses) -> Verdict:
-    """Return what was found of a channel, and what it casts doubt on.
-
-    Parameters
-    ----------
-    channel : str
-    unit : str
-        SI unit of its samples.
-    courses : Courses
-    """
+    """Return what was found of a channel, with its SI unit, and what it casts doubt on."""
     findings = [_finding(channel, unit, course) for course in courses.courses]
     caveats: dict[str, tuple[Status, str]] = {}
     if courses.means is None or courses.searched is None:
         return Verdict((), {})
     widening = 1.0
-    kurtosis = max(courses.means.parts, key=lambda part: len(part.mean)).kurtosis
+    kurtosis = courses.means.longest.kurtosis
     if kurtosis > _HEAVY:
         # The power of L samples has a relative variance of (2 + kurtosis) / L.
         widening = math.sqrt(1.0 + 0.5 * kurtosis)
@@ -168,16 +150,7 @@ def verdict_of(channel: str, unit: str, courses: Courses) -> Verdict:
 
 
 def deterministic_rows(key: Mapping[str, str], unit: str, courses: Courses) -> Iterator[Row]:
-    """Yield the rows of the table ``deterministic``.
-
-    Parameters
-    ----------
-    key : mapping
-        Sensor, recording and channel.
-    unit : str
-        SI unit of the samples.
-    courses : Courses
-    """
+    """Yield the rows of the table ``deterministic``; the key is sensor, recording and channel."""
     for course in courses.courses:
         yield {
             **key,

@@ -15,6 +15,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from imubench_pipeline.allan.phase import Span
 from imubench_pipeline.estimators import likelihood
 from imubench_pipeline.estimators.estimate import SIGMAS, Parameter
 from imubench_pipeline.estimators.frame import Frame, frame_of
@@ -25,7 +26,6 @@ from imubench_pipeline.estimators.spectrum import LineSpectrum, Spectrum, block_
 from imubench_pipeline.estimators.thermal.path import TemperaturePath
 from imubench_pipeline.estimators.thermal.path_errors import without_errors
 from imubench_pipeline.estimators.thermal.products import BlockSeries, Coefficients
-from imubench_pipeline.estimators.thermal.register import Span
 from imubench_pipeline.estimators.thermal.regression import Regression, Regressors
 from imubench_pipeline.estimators.thermal.result import ThermalFit, complete_log, shift_by_effect
 from imubench_pipeline.estimators.thermal.uncertainty import (
@@ -35,8 +35,7 @@ from imubench_pipeline.estimators.thermal.uncertainty import (
     shares,
     with_likely_walk,
 )
-from imubench_pipeline.estimators.whittle import Whittle, model_of
-from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.estimators.whittle import Maximum, Whittle, model_of
 from imubench_pipeline.typing import Array
 
 _MOST_ROUNDS = 10
@@ -138,7 +137,7 @@ def fit_temperature(
             if not (fit.possible and varies):
                 break
             settled = fit.settle(quadratic)
-            model, effect = _model_of(settled), settled.regressors.effect(settled.regression)
+            model, effect = model_of(settled.noise), settled.regressors.effect(settled.regression)
     else:
         fit = _Fit(blocks(), samples, rate, spans, path, frame, longest_lag)
         plain = plain or likelihood.fit_spectrum(fit.spectrum, fit.frame, rng=rng)
@@ -157,7 +156,7 @@ def fit_temperature(
     def spectra_left() -> tuple[Spectrum, list[LineSpectrum]]:
         effect, log = settled.regressors.effect(settled.regression), blocks()
         if holes:
-            log = complete_log(blocks, spans, _model_of(settled), path, effect, rate, rng)
+            log = complete_log(blocks, spans, model_of(settled.noise), path, effect, rate, rng)
         return spectra(shift_by_effect(log, path, effect, -1.0), samples, rate, spans)
 
     lines = fit.lines
@@ -180,6 +179,11 @@ class _Settled:
     whittle: Whittle
     candidates: Sequence[Candidate]
     cost: float
+
+    @property
+    def noise(self) -> Maximum:
+        """The best noise model of what temperature leaves."""
+        return self.candidates[0].maximum
 
 
 class _Fit:
@@ -249,14 +253,16 @@ class _Fit:
             if not gains or max(gains) < needed:
                 break
             wider = self._best(extended[int(np.argmax(gains))])
-            if wider.cost > settled.cost - _BEYOND or _error(wider) > _MOST_LOST * _error(settled):
+            if wider.cost > settled.cost - _BEYOND:
+                break
+            if wider.regression.error > _MOST_LOST * settled.regression.error:
                 break
             settled = wider
         return settled
 
     def _gained(self, settled: _Settled, regressors: Regressors) -> float:
         """Return the log likelihood that more regressors gain, for the noise as it is fitted."""
-        density = settled.whittle.density(settled.candidates[0].maximum)
+        density = settled.whittle.density(settled.noise)
         wider = regressors.at(settled.regression.lag, self.chosen.ordinates / density)
         return wider.log_likelihood_gain - settled.regression.log_likelihood_gain
 
@@ -291,8 +297,8 @@ class _Fit:
                 before = None
                 continue
             if before is not None:
-                spread = math.sqrt(regression.covariance[0, 0])
-                if abs(regression.beta[0] - before.beta[0]) < _SETTLED * spread:
+                moved = abs(regression.beta[0] - before.beta[0])
+                if moved < _SETTLED * regression.error:
                     break
             before = regression
         free = candidates[0].terms.parameters + len(regression.beta) - ramp + (regression.lag > 0.0)
@@ -334,15 +340,6 @@ class _Fit:
         return self._compared(self.whittle)
 
 
-def _error(settled: _Settled) -> float:
-    """Return the standard deviation of s, for given noise."""
-    return math.sqrt(float(settled.regression.covariance[0, 0]))
-
-
-def _model_of(settled: _Settled) -> NoiseModel:
-    return model_of(settled.candidates[0].maximum)
-
-
 def _described(
     fit: _Fit,
     settled: _Settled,
@@ -362,7 +359,7 @@ def _described(
     if verdict.compensated:
         regressors = settled.regressors.also(used=np.ones(len(fit.used), dtype=np.bool_))
         weights = np.zeros(len(fit.used))
-        best = settled.candidates[0].maximum
+        best = settled.noise
         weights[fit.used] = fit.chosen.ordinates / settled.whittle.density(best)
         left = regressors.without(fit.spectrum, settled.regression, weights)
         left = without_errors(left, fit.used, settled.whittle, best.terms, verdict.path_errors)

@@ -25,10 +25,10 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import ndtri
 
+from imubench_pipeline.allan.phase import Span
 from imubench_pipeline.estimators.thermal.path_kernels import draw_paths, propagate
 from imubench_pipeline.estimators.thermal.register import (
     Readings,
-    Span,
     cut_at_jumps,
     dwells,
     readings,
@@ -91,17 +91,9 @@ class TemperaturePath:
     def at(self, points: NDArray[Any], values: Array) -> Array:
         """Return what is known at the knots, between them; no segment tells of another.
 
-        Parameters
-        ----------
-        points : ndarray, shape (n,)
-            Places on the grid of the log, rising. Those after a segment and before the next are
-            given what its last knot has.
-        values : ndarray, shape (k,)
-            At the knots, in any unit.
-
-        Returns
-        -------
-        ndarray, shape (n,)
+        ``points``, shape (n,), are places on the grid of the log, rising; those after a segment and
+        before the next are given what its last knot has. ``values``, shape (k,), are those at the
+        knots.
         """
         cuts = np.searchsorted(points, [start for start, _ in self.segments[1:]])
         pieces = zip(np.split(points, cuts), self.parts, strict=True)
@@ -111,20 +103,9 @@ class TemperaturePath:
     def means(self, first: int, block: int, count: int, values: Array) -> Array:
         """Return the means over blocks of what is known at the knots, linear between them.
 
-        Parameters
-        ----------
-        first : int
-            First sample of the first block.
-        block : int
-            Samples in a block.
-        count : int
-            n, number of blocks; they follow each other in one segment.
-        values : ndarray, shape (..., k)
-            At the knots, in any unit.
-
-        Returns
-        -------
-        ndarray, shape (..., n)
+        ``first`` is the first sample of the first of ``count`` blocks of ``block`` samples, which
+        follow each other in one segment. ``values``, shape (..., k), are those at the knots; the
+        means have the shape (..., count).
         """
         part = self.parts[sum(start <= first for start, _ in self.segments) - 1]
         edges = first - 0.5 + block * np.arange(count + 1)
@@ -349,24 +330,10 @@ def _lagged(times: Array, values: Array, lag: float) -> Array:
 
 
 def lagged(times: Array, values: Array, lag: float) -> Array:
-    """Return a temperature behind a first-order lag: L dT_lag/dt = T - T_lag.
+    """Return a temperature, shape (k,), behind a first-order lag: L dT_lag/dt = T - T_lag.
 
-    Exact at the knots for a temperature that is linear between them. It is in equilibrium at the
-    first knot.
-
-    Parameters
-    ----------
-    times : ndarray, shape (k,)
-        Knots, s, rising.
-    values : ndarray, shape (k,)
-        Temperature, °C.
-    lag : float
-        L, s; 0: none.
-
-    Returns
-    -------
-    ndarray, shape (k,)
-        °C.
+    Exact at the knots ``times``, s, rising, for a temperature that is linear between them. It is in
+    equilibrium at the first knot. The lag is in s; 0: none.
 
     Raises
     ------
@@ -382,27 +349,10 @@ def lagged(times: Array, values: Array, lag: float) -> Array:
 
 
 def lagged_path(path: TemperaturePath, values: Array, rate: float, lag: float) -> Array:
-    """Return a path's knots behind a lag; each segment begins in equilibrium.
+    """Return a path's knots, shape (k,), behind a lag in s; each segment begins in equilibrium.
 
-    Parameters
-    ----------
-    path : TemperaturePath
-    values : ndarray, shape (k,)
-        Temperatures at its knots, °C: its own, or one of its draws.
-    rate : float
-        Of the log, Hz.
-    lag : float
-        s; 0: none.
-
-    Returns
-    -------
-    ndarray, shape (k,)
-        °C.
-
-    Raises
-    ------
-    ValueError
-        If the lag is below 0 or not finite.
+    ``values`` are temperatures at the knots: its own, or one of its draws. Errors are those of
+    `lagged`.
     """
     return np.concatenate(
         [lagged(path.sample[part] / rate, values[part], lag) for part in path.parts]

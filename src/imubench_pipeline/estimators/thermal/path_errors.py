@@ -28,30 +28,20 @@ _LEAST_KNOWN = 0.1
 
 @dataclass(frozen=True)
 class PathErrors:
-    """What the drawn paths of a temperature do.
-
-    Attributes
-    ----------
-    moved : ndarray, shape (d, p + 1)
-        How each draw moves the regressors of temperature (p), SI per K and K², and the lag, s.
-    density : ndarray, shape (b,)
-        Mean density of what they leave in each bin of the spectrum, (rad/s)²/Hz or (m/s²)²/Hz.
-    """
+    """What the drawn paths of a temperature do."""
 
     moved: Array
+    """(d, p + 1): how each draw moves the regressors of temperature (p), SI per K and K², and the
+    lag, s."""
     density: Array
+    """(b,): mean density of what they leave in each bin of the spectrum, (rad/s)²/Hz or
+    (m/s²)²/Hz."""
 
 
 def path_errors(regressors: Regressors, regression: Regression, weights: Array) -> PathErrors:
     """Return what the drawn paths do to an estimate, to first order.
 
-    Parameters
-    ----------
-    regressors : Regressors
-    regression : Regression
-        Of these regressors.
-    weights : ndarray, shape (b,)
-        nu / S of the bins used, as `Regressors.at` takes them.
+    ``weights``, shape (b,), are nu / S of the bins used, as `Regressors.at` takes them.
     """
     path, p = regressors.path, regressors.thermal
     knots, slope = regressors.knots(regression.lag), regressors.slope(regression)
@@ -90,27 +80,19 @@ def without_errors(
 ) -> Spectrum:
     """Return the spectrum that tells of the noise alone, not of what errors of the path leave.
 
-    A bin of density S of noise and P of errors tells of the noise as one of density S, measured
-    S / (S + P) times as high, with (S / (S + P))^2 of its ordinates. S is that of a noise model
-    fitted to what is left so, in turn with the parts.
+    A bin of density S of noise and P of errors tells of the noise as one of density S, measured S /
+    (S + P) times as high, with (S / (S + P))^2 of its ordinates. S is that of a noise model fitted
+    to what is left so, in turn with the parts. Bins that are not ``used``, and all where P is small
+    beside S, stay as they are.
 
     Parameters
     ----------
     left : Spectrum
         Of what temperature leaves, errors of the path and all.
-    used : ndarray of bool, shape (b,)
-        Its bins that are fitted.
     whittle : Whittle
-        The likelihood in those.
-    terms : Terms
-        The noise model.
+        The likelihood in the bins used.
     errors : ndarray, shape (b,)
         P, (rad/s)²/Hz or (m/s²)²/Hz.
-
-    Returns
-    -------
-    Spectrum
-        Other bins, and all where P is small beside S, as they are.
 
     References
     ----------

@@ -28,19 +28,7 @@ _FAR = 30.0
 def cell_moments(m: float, v: float, low: float, high: float, noise: float) -> tuple[float, ...]:
     """Return log P, mean and variance of x ~ N(m, v), given that x + noise lies in a cell.
 
-    Parameters
-    ----------
-    m, v : float
-        Mean and variance of x.
-    low, high : float
-        Edges of the cell.
-    noise : float
-        Variance of the noise.
-
-    Returns
-    -------
-    tuple of float
-        log P, mean and variance.
+    ``low`` and ``high`` are the edges of the cell, ``noise`` is the variance of the noise.
     """
     spread = math.sqrt(v + noise)
     a, b = (low - m) / spread, (high - m) / spread
@@ -289,21 +277,10 @@ def _joined(x: float, s: float, a: float, b: float, c: float, future: Array) -> 
 def draw_paths(
     steps: Array, q: float, spread: float, precision: Array, shift: Array, normals: Array
 ) -> Array:
-    """Return draws of the path from its Gaussian posterior: filter forwards, sample backwards.
+    """Return draws of the path from its Gaussian posterior, shape (draws, n), °C.
 
-    Parameters
-    ----------
-    steps : ndarray, shape (n,)
-    q, spread : float
-    precision, shift : ndarray, shape (n,)
-        All as `propagate` left them.
-    normals : ndarray, shape (draws, n, 2)
-        Standard normal deviates.
-
-    Returns
-    -------
-    ndarray, shape (draws, n)
-        °C.
+    Filter forwards, sample backwards. ``precision`` and ``shift`` are as `propagate` left them,
+    ``normals``, shape (draws, n, 2), standard normal deviates.
     """
     draws, n = normals.shape[0], normals.shape[1]
     means, covs = np.empty((n, 2)), np.empty((n, 3))

@@ -13,21 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.fft
 
+from imubench_pipeline.allan.phase import Span
 from imubench_pipeline.estimators.spectrum import BLOCK_BAND, Spectrum
 from imubench_pipeline.estimators.thermal.path import TemperaturePath
-from imubench_pipeline.estimators.thermal.register import Span
 from imubench_pipeline.typing import Array
 
 
 class BlockSeries:
     """The means of blocks of a log, taken while it goes by.
 
-    Parameters
-    ----------
-    segments : sequence of (int, int)
-        First and one-past-last sample of each part.
-    block : int
-        Samples in a block; what is left over at the end of a part is dropped.
+    Of each segment, first and one-past-last sample, what is left over at the end is dropped.
     """
 
     def __init__(self, segments: Sequence[Span], block: int) -> None:
@@ -35,18 +30,7 @@ class BlockSeries:
         self._sums: list[Array] = [np.zeros((stop - start) // block) for start, stop in segments]
 
     def watch(self, blocks: Iterable[Array]) -> Iterator[Array]:
-        """Yield the blocks of a log as they are, and keep the means.
-
-        Parameters
-        ----------
-        blocks : iterable of ndarray
-            The log in order, complete, SI.
-
-        Yields
-        ------
-        ndarray
-            Each as it came.
-        """
+        """Yield the blocks of a complete log, in order, SI, as they are, and keep the means."""
         reached = 0
         for values in blocks:
             for sums, (start, _) in zip(self._sums, self.segments, strict=True):
@@ -85,29 +69,17 @@ class BlockSeries:
 
 @dataclass(frozen=True)
 class Products:
-    """Mean products of coefficients in each bin of a spectrum, as densities.
+    """Mean products of coefficients in each bin of a spectrum, as densities."""
 
-    Attributes
-    ----------
-    cross : ndarray, shape (b, p)
-        Of the log and each of p regressors, SI times its unit, per Hz.
-    gram : ndarray, shape (b, p, p)
-        Of the regressors, in the product of their units, per Hz.
-    """
-
-    cross: Array
-    gram: Array
+    cross: Array  # (b, p): of the log and each of p regressors, SI times its unit, per Hz
+    gram: Array  # (b, p, p): of the regressors, in the product of their units, per Hz
 
 
 class Coefficients:
     """The DCT coefficients of a log at low frequencies, to be multiplied by those of regressors.
 
-    Parameters
-    ----------
-    spectrum : Spectrum
-        Of the log: its bins are used.
-    series : BlockSeries
-        The same log's, of `imubench_pipeline.estimators.spectrum.block_of` samples in a block.
+    They are in the bins of the spectrum of the log, from its series of blocks of
+    `imubench_pipeline.estimators.spectrum.block_of` samples.
     """
 
     def __init__(self, spectrum: Spectrum, series: BlockSeries) -> None:
@@ -136,64 +108,24 @@ class Coefficients:
         return np.asarray(np.concatenate(transformed, axis=-1)[..., self._order])
 
     def of_knots(self, path: TemperaturePath, values: Sequence[Array]) -> Array:
-        """Return the coefficients of regressors that are linear between knots.
+        """Return the coefficients of regressors that are linear between knots, shape (p, n).
 
-        Several together take half the time of one after the other, and less where the length of
-        the log has great prime factors.
-
-        Parameters
-        ----------
-        path : TemperaturePath
-            Whose knots they are.
-        values : sequence of ndarray, shape (k,)
-            The regressors at the knots.
-
-        Returns
-        -------
-        ndarray, shape (p, n)
-            A row for each, in the unit of its values.
+        A row for each, in the unit of its values, shape (k,). Several together take half the time
+        of one after the other, and less where the length of the log has great prime factors.
         """
         rows = np.array(values)
         return self._of([path.means(*place, rows) for place in self.places])
 
     def of_time(self, rate: float) -> Array:
-        """Return the coefficients of a ramp of 1 a second.
-
-        Parameters
-        ----------
-        rate : float
-            Of the log, Hz.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            s.
-        """
+        """Return the coefficients of a ramp of 1 a second, shape (n,), s."""
         return self._of([centres / rate for centres in self.centres])
 
     def density(self) -> Array:
-        """Return the log's own density in each bin that has these coefficients, else 0.
-
-        Returns
-        -------
-        ndarray, shape (b,)
-            (rad/s)²/Hz or (m/s²)²/Hz, two-sided.
-        """
+        """Return the log's own density in each bin that has these coefficients, else 0."""
         return self._binned(self.log**2)
 
     def products(self, regressors: Sequence[Array]) -> Products:
-        """Return the products of the log and regressors in every bin.
-
-        Parameters
-        ----------
-        regressors : sequence of ndarray, shape (n,)
-            Their coefficients (`of_knots`, `of_time`).
-
-        Returns
-        -------
-        Products
-            0 in bins that have no coefficients.
-        """
+        """Return the products of log and regressors in every bin, 0 where there are none."""
         p = len(regressors)
         cross, gram = np.zeros((self._bins, p)), np.zeros((self._bins, p, p))
         for i, left in enumerate(regressors):

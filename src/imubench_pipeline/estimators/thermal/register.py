@@ -24,10 +24,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from imubench_pipeline.allan.phase import Span
 from imubench_pipeline.estimators.missing import samples_present
 from imubench_pipeline.typing import Array
-
-Span = tuple[int, int]
 
 KNOTS = 8192
 """Blocks that a log is divided into, at most (and one more a segment)."""
@@ -68,33 +67,20 @@ _LONG = 3.0
 
 @dataclass(frozen=True)
 class Readings:
-    """The readings of a register in blocks.
-
-    Attributes
-    ----------
-    begin, end : ndarray of int, shape (k,)
-        First and one-past-last sample of each block.
-    count : ndarray of int, shape (k,)
-        Readings present.
-    mean, low, high : ndarray, shape (k,)
-        °C; NaN where none is present.
-    step : float
-        Least significant bit of the register, °C; 0: none shows.
-    parts : tuple of slice
-        Blocks of each segment.
-    pieces : tuple of slice
-        Blocks between which the temperature jumps: the parts, where it does not.
-    """
+    """The readings of a register in blocks."""
 
     begin: NDArray[np.int64]
     end: NDArray[np.int64]
-    count: NDArray[np.int64]
+    """(k,): first and one-past-last sample of each block."""
+    count: NDArray[np.int64]  # (k,): readings present
     mean: Array
     low: Array
     high: Array
-    step: float
-    parts: tuple[slice, ...]
+    """(k,): °C; NaN where none is present."""
+    step: float  # least significant bit of the register, °C; 0: none shows
+    parts: tuple[slice, ...]  # blocks of each segment
     pieces: tuple[slice, ...]
+    """Blocks between which the temperature jumps: the parts, where it does not."""
 
     @property
     def centre(self) -> Array:
@@ -105,12 +91,9 @@ class Readings:
 def readings(blocks: Iterable[Array], segments: Sequence[Span]) -> Readings:
     """Gather the readings of a temperature in one pass, in bounded memory.
 
-    Parameters
-    ----------
-    blocks : iterable of ndarray
-        Temperature in order on the grid of the log, °C; NaN where missing.
-    segments : sequence of (int, int)
-        First and one-past-last sample of each part that no time relates to the others.
+    The blocks are the readings in order on the grid of the log, °C, of any shape (n,), NaN where
+    missing; ``segments`` first and one-past-last sample of each part that no time relates to the
+    others.
 
     Raises
     ------
@@ -156,21 +139,11 @@ def readings(blocks: Iterable[Array], segments: Sequence[Span]) -> Readings:
 
 
 def step_of(levels: Array, present: int) -> float:
-    """Return the least significant bit of a register from the different values that it gave.
+    """Return the least significant bit of a register from the different values that it gave, °C.
 
-    Parameters
-    ----------
-    levels : ndarray, shape (n,)
-        The values, rising, °C.
-    present : int
-        Readings that were made.
-
-    Returns
-    -------
-    float
-        °C. The smallest gap between values, of which all gaps are multiples, as closely as
-        decimals may have rounded them; 0 where there is none, or where only one value was read
-        (no step is known then) or hardly any was read twice.
+    The smallest gap between the levels, shape (n,), rising, of which all gaps are multiples, as
+    closely as decimals may have rounded them; 0 where there is none, or where only one value was
+    read (no step is known then) or hardly any of the readings ``present`` was read twice.
     """
     if len(levels) < 2 or present < _FEWEST_REPEATS * len(levels):
         return 0.0
@@ -219,11 +192,7 @@ def cut_at_jumps(read: Readings) -> Readings:
 
     The sample of a jump follows from the mean of the block that it falls into. A single sample
     stands on each side, so that a path that is linear between the middles of blocks jumps there.
-
-    Returns
-    -------
-    Readings
-        The same where there is none.
+    Readings without a jump stay as they are.
     """
     parts = [_of_part(read, part) for part in read.parts]
     if not any(jumps for jumps in parts):
@@ -305,19 +274,12 @@ def _cut(read: Readings, part: slice, jumps: Sequence[tuple[int, int]]) -> tuple
 
 @dataclass(frozen=True)
 class CellStay:
-    """A long time in one cell.
+    """A long time in one cell."""
 
-    Attributes
-    ----------
-    blocks : slice
-        Of a segment.
-    taper : ndarray, shape (b,)
-        From 0 at the moments when the path crosses an edge of the cell, which say where it is, to
-        1 a crossing time away from them.
-    """
-
-    blocks: slice
+    blocks: slice  # of a segment
     taper: Array
+    """(b,): from 0 at the moments when the path crosses an edge of the cell, which say where it is,
+    to 1 a crossing time away from them."""
 
 
 def dwells(inside: NDArray[np.bool_], level: Array, half: float, q: float) -> Iterator[CellStay]:

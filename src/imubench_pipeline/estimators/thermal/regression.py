@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -27,34 +28,28 @@ _TOGETHER = 8
 
 @dataclass(frozen=True)
 class Regression:
-    """A fit for given noise.
-
-    Attributes
-    ----------
-    beta : ndarray, shape (p,)
-        s, then q and what the beginning adds to s where they are in the model, then R where there
-        is a ramp; SI per K, K², K and s.
-    information : ndarray, shape (p, p)
-        Inverse of their covariance.
-    lag : float
-        s.
-    log_likelihood_gain : float
-        Log likelihood over that of beta = 0.
-    """
+    """A fit for given noise."""
 
     beta: Array
-    information: Array
-    lag: float
-    log_likelihood_gain: float
+    """(p,): s, then q and what the beginning adds to s where they are in the model, then R where
+    there is a ramp; SI per K, K², K and s."""
+    information: Array  # (p, p): inverse of their covariance
+    lag: float  # s
+    log_likelihood_gain: float  # log likelihood over that of beta = 0
 
     @property
     def covariance(self) -> Array:
         """Covariance of beta, for given noise and lag."""
         return np.asarray(np.linalg.inv(self.information))
 
+    @property
+    def error(self) -> float:
+        """Standard deviation of s, for given noise and lag."""
+        return math.sqrt(float(self.covariance[0, 0]))
+
 
 class Regressors:
-    """The regressors of a log, and their products with it, for any lag.
+    """The regressors of a log, and their products with it, for any lag; `also` has further ones.
 
     Parameters
     ----------
@@ -67,11 +62,6 @@ class Regressors:
         T_0, °C.
     used : ndarray of bool, shape (b,)
         Bins to use.
-    quadratic, ramp : bool
-        Whether the square of the temperature, and time, are regressors too.
-    settling : float
-        s from the beginning of the log in which a sensor that settles may follow the temperature
-        otherwise; 0: none.
     """
 
     def __init__(
@@ -81,14 +71,12 @@ class Regressors:
         rate: float,
         reference: float,
         used: NDArray[np.bool_],
-        *,
-        quadratic: bool = False,
-        ramp: bool = False,
-        settling: float = 0.0,
     ) -> None:
         self.coefficients, self.path, self.rate = coefficients, path, rate
         self.reference, self.used = reference, used
-        self.quadratic, self.ramp, self.settling = quadratic, ramp, settling
+        # Whether the square of the temperature, and time, are regressors too; and for how many s
+        # from the beginning a sensor that settles may follow the temperature otherwise.
+        self.quadratic, self.ramp, self.settling = False, False, 0.0
         self._products: dict[float, Products] = {}
         self._time = coefficients.of_time(rate)
         # With the ramp and in all bins, for `also` to share: the transforms are the costly part.
@@ -103,15 +91,7 @@ class Regressors:
         settling: float | None = None,
         used: NDArray[np.bool_] | None = None,
     ) -> Regressors:
-        """Return the regressors with other terms, or in other bins; None: as they are.
-
-        Parameters
-        ----------
-        quadratic, ramp : bool, optional
-        settling : float, optional
-            s.
-        used : ndarray of bool, shape (b,), optional
-        """
+        """Return the regressors with other terms, or in other bins; None: as they are."""
         other = copy.copy(self)
         other.used = self.used if used is None else used
         other.quadratic = self.quadratic if quadratic is None else quadratic
@@ -127,33 +107,11 @@ class Regressors:
         return 1 + self.quadratic + (self.settling > 0.0)
 
     def knots(self, lag: float) -> Array:
-        """Return T_lag - T_0 at the knots of the path.
-
-        Parameters
-        ----------
-        lag : float
-            s.
-
-        Returns
-        -------
-        ndarray, shape (k,)
-            K.
-        """
+        """Return T_lag - T_0 at the knots of the path, shape (k,), K, for a lag in s."""
         return lagged_path(self.path, self.path.value, self.rate, lag) - self.reference
 
     def effect(self, regression: Regression) -> Array:
-        """Return what temperature adds to the log, at the knots of the path.
-
-        Parameters
-        ----------
-        regression : Regression
-            Of these regressors.
-
-        Returns
-        -------
-        ndarray, shape (k,)
-            rad/s or m/s².
-        """
+        """Return what temperature adds to the log, at the knots of the path, shape (k,), SI."""
         of_knots = self._of(self.knots(regression.lag))
         return np.asarray(np.einsum("i,ik->k", regression.beta[: self.thermal], np.array(of_knots)))
 
@@ -167,15 +125,7 @@ class Regressors:
         return terms
 
     def slope(self, regression: Regression) -> Array:
-        """Return how what temperature adds to the log changes with it, at the knots of the path.
-
-        `regression`: as of `effect`.
-
-        Returns
-        -------
-        ndarray, shape (k,)
-            SI per K.
-        """
+        """Return how what temperature adds changes with it, at the knots, shape (k,), SI per K."""
         knots = self.knots(regression.lag)
         slope = np.full(len(knots), regression.beta[0])
         if self.quadratic:
@@ -190,38 +140,19 @@ class Regressors:
         return int(np.searchsorted(self.path.sample, begin))
 
     def means(self, lag: float) -> Array:
-        """Return the mean over the log of each regressor of temperature.
-
-        `lag`: as of `knots`.
-
-        Returns
-        -------
-        ndarray, shape (thermal,)
-            K, or K² of the square.
-        """
+        """Return the mean over the log of each regressor of temperature, K, or K² of the square."""
         return np.array([float(term.mean()) for term in self._of(self.knots(lag))])
 
     def columns(self, lag: float) -> list[Array]:
-        """Return the coefficients of the regressors, in the order of `Regression.beta`.
+        """Return the coefficients of the regressors in the order of `Regression.beta`.
 
-        `lag`: as of `knots`.
-
-        Returns
-        -------
-        list of ndarray, shape (n,)
-            K, or K² of the square; s of the ramp.
+        Of shape (n,) each, in K, or K² of the square; s of the ramp.
         """
         columns = self.coefficients.of_knots(self.path, self._of(self.knots(lag)))
         return [*columns] + [self._time] * self.ramp
 
     def prepare(self, lags: Sequence[float] | Array) -> None:
-        """Compute the products for several lags together, which takes less time.
-
-        Parameters
-        ----------
-        lags : sequence of float
-            s.
-        """
+        """Compute the products for several lags together, which takes less time."""
         lags_to_do = [float(lag) for lag in lags if self._key(float(lag)) not in self._full]
         for first in range(0, len(lags_to_do), _TOGETHER):
             batch = lags_to_do[first : first + _TOGETHER]
@@ -236,10 +167,7 @@ class Regressors:
         return lag, self.quadratic, self.settling
 
     def products(self, lag: float) -> Products:
-        """Return the products of log and regressors in the bins used.
-
-        `lag`: as of `knots`.
-        """
+        """Return the products of log and regressors at a lag in the bins used."""
         if lag not in self._products:
             self.prepare([lag])
             full, own = self._full[self._key(lag)], slice(None if self.ramp else self.thermal)
@@ -248,14 +176,10 @@ class Regressors:
         return self._products[lag]
 
     def at(self, lag: float, weights: Array) -> Regression:
-        """Return the fit at a lag.
+        """Return the fit at a lag in s.
 
-        Parameters
-        ----------
-        lag : float
-            s.
-        weights : ndarray, shape (b,)
-            nu / S of the bins used: their ordinates over the density of the noise, Hz/SI².
+        ``weights``, shape (b,), are nu / S of the bins used: their ordinates over the density of
+        the noise, Hz/SI².
         """
         products = self.products(lag)
         information = np.einsum("b,bij->ij", weights, products.gram)
@@ -265,17 +189,9 @@ class Regressors:
         return Regression(beta, information, lag, 0.5 * float(target @ beta))
 
     def lags(self, longest: float | None = None) -> Array:
-        """Return the lags to scan.
+        """Return the lags to scan, s: 0, then rising; 0 alone where the knots lie too far apart.
 
-        Parameters
-        ----------
-        longest : float, optional
-            s; by default a twentieth of the longest segment, at most half an hour.
-
-        Returns
-        -------
-        ndarray, shape (l,)
-            s, 0 first, then rising; 0 alone where the knots lie too far apart for more.
+        The longest is by default a twentieth of the longest segment, at most half an hour.
         """
         duration = max(stop - start for start, stop in self.path.segments) / self.rate
         knot = float(np.median(np.diff(self.path.sample))) / self.rate
@@ -286,14 +202,9 @@ class Regressors:
         return np.concatenate(([0.0], np.geomspace(first, last, _LAGS)))
 
     def best(self, weights: Array, lags: Array) -> Regression:
-        """Return the fit of the greatest log likelihood: scan the lags, then polish.
+        """Return the fit of the greatest log likelihood: scan the lags, rising, then polish.
 
-        Parameters
-        ----------
-        weights : ndarray, shape (b,)
-            As for `at`.
-        lags : ndarray, shape (l,)
-            s, rising (`lags`).
+        ``weights``: as for `at`.
         """
         self.prepare(lags)
         fits = [self.at(float(lag), weights) for lag in lags]
@@ -314,17 +225,8 @@ class Regressors:
     def without(self, spectrum: Spectrum, regression: Regression, weights: Array) -> Spectrum:
         """Return the spectrum (of the bins used) less what temperature explains.
 
-        The degrees of freedom that the fit takes from a bin are taken from its ordinates, so
-        that the density keeps its mean.
-
-        Parameters
-        ----------
-        spectrum : Spectrum
-            Of the bins used.
-        regression : Regression
-            Of these regressors.
-        weights : ndarray, shape (b,)
-            As for `at`: those that the fit was made with.
+        The degrees of freedom that the fit takes from a bin are taken from its ordinates, so that
+        the density keeps its mean. ``weights``: as for `at`, those that the fit was made with.
         """
         products = self.products(regression.lag)
         p = self.thermal

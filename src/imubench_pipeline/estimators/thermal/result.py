@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from imubench_pipeline.allan.phase import Span
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.missing import block_means, fill_missing, slow_part
 from imubench_pipeline.estimators.thermal.path import TemperaturePath
-from imubench_pipeline.estimators.thermal.register import Span
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
@@ -19,22 +19,9 @@ from imubench_pipeline.typing import Array
 def shift_by_effect(
     blocks: Iterable[Array], path: TemperaturePath, effect: Array, sign: float
 ) -> Iterator[Array]:
-    """Yield the blocks of a log with what temperature adds to it, put in or taken out.
+    """Yield the blocks of a log with what temperature adds to it, put in (1) or taken out (-1).
 
-    Parameters
-    ----------
-    blocks : iterable of ndarray
-        The log in order, SI.
-    path : TemperaturePath
-    effect : ndarray, shape (k,)
-        What temperature adds at the knots of the path, SI.
-    sign : float
-        1 puts it in, -1 takes it out.
-
-    Yields
-    ------
-    ndarray
-        SI, in the shape of each block.
+    ``effect``, shape (k,), is what temperature adds at the knots of the path, SI as the log.
     """
     reached = 0
     for values in blocks:
@@ -52,28 +39,11 @@ def complete_log(
     rate: float,
     rng: np.random.Generator,
 ) -> Iterator[Array]:
-    """Return a log with its missing samples drawn: temperature's effect, and noise.
+    """Return the blocks of a log with its missing samples drawn: temperature's effect, and noise.
 
-    Parameters
-    ----------
-    blocks : callable
-        Gives the log in order, SI, as often as it is called; NaN where a sample is missing.
-    spans : sequence of (int, int)
-        First and one-past-last sample of each part whose holes can be filled
-        (`imubench_pipeline.estimators.missing.divide_at_holes`).
-    model : NoiseModel
-        Of what temperature leaves.
-    path : TemperaturePath
-    effect : ndarray, shape (k,)
-        What temperature adds at the knots of the path, SI.
-    rate : float
-        Hz.
-    rng : numpy.random.Generator
-
-    Returns
-    -------
-    iterator of ndarray
-        The blocks, SI.
+    The blocks come in order, SI, NaN where a sample is missing; ``spans`` are the parts whose holes
+    can be filled (`imubench_pipeline.estimators.missing.divide_at_holes`), the model is that of
+    what temperature leaves, and ``effect``, shape (k,), as of `shift_by_effect`.
     """
     means = block_means(shift_by_effect(blocks(), path, effect, -1.0), spans)
     slow = slow_part(means, spans, model, rate, rng)
@@ -123,16 +93,5 @@ class ThermalFit:
     path: TemperaturePath
 
     def compensate(self, blocks: Iterable[Array]) -> Iterator[Array]:
-        """Return the blocks of the log less what temperature adds to it.
-
-        Parameters
-        ----------
-        blocks : iterable of ndarray
-            The log in order from its first sample, SI.
-
-        Returns
-        -------
-        iterator of ndarray
-            SI, in the shape of each block.
-        """
+        """Return the blocks of the log, in order, SI, less what temperature adds to it."""
         return shift_by_effect(blocks, self.path, self.effect, -1.0)

@@ -56,18 +56,7 @@ _UPPER_OF_RMS = 2.24
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the log tells.
-
-    Attributes
-    ----------
-    sensitivity, quadratic, lag : Parameter
-    compensated : bool
-    reason : str
-    temperature_error : float
-        Standard deviation of the mean of what temperature adds to the log, SI.
-    path_errors : ndarray, shape (b,)
-        Density of what errors of the path leave in each bin, (rad/s)²/Hz or (m/s²)²/Hz.
-    """
+    """What the log tells."""
 
     sensitivity: Parameter
     quadratic: Parameter
@@ -75,7 +64,9 @@ class Verdict:
     compensated: bool
     reason: str
     temperature_error: float
+    """Standard deviation of the mean of what temperature adds to the log, SI."""
     path_errors: Array
+    """(b,): density of what errors of the path leave in each bin, (rad/s)²/Hz or (m/s²)²/Hz."""
 
 
 def judge(
@@ -90,19 +81,9 @@ def judge(
 ) -> Verdict:
     """Say what a settled fit tells.
 
-    Parameters
-    ----------
-    regressors : Regressors
-    regression : Regression
-    whittle : Whittle
-        Of what temperature leaves.
-    candidates : sequence of Candidate
-        Noise models of that, the best first.
-    lags : ndarray, shape (l,)
-        Lags that were scanned, s.
-    gained : float
-        BIC of the best noise without temperature, less that of the fit.
-    rng : numpy.random.Generator
+    ``whittle`` and the noise models, the best first, are of what temperature leaves; the lags,
+    shape (l,), s, are those that were scanned; ``gained`` is BIC of the best noise without
+    temperature, less that of the fit.
     """
     weights = whittle.spectrum.ordinates / whittle.density(candidates[0].maximum)
     p = regressors.thermal
@@ -156,18 +137,9 @@ def _parameter(value: float, lower: float, upper: float, confused: str | None) -
 def lag_parameter(value: float, draws: Array, longest: float, compensated: bool) -> Parameter:
     """Return the lag as it is told, with the shortest interval that holds 95 % of its draws.
 
-    Equal tails would leave out a lag of 0 in every other log that has none.
-
-    Parameters
-    ----------
-    value : float
-        The most likely lag, s.
-    draws : ndarray, shape (d,)
-        s.
-    longest : float
-        The longest lag that was looked for, s.
-    compensated : bool
-        Temperature is taken out of the noise.
+    Equal tails would leave out a lag of 0 in every other log that has none. ``value`` is the most
+    likely lag, ``longest`` the longest that was looked for, ``draws`` have shape (d,), all in s;
+    ``compensated`` says that temperature is taken out of the noise.
     """
     if longest == 0.0:
         return Parameter(None, "absent", "no lag was asked for")
@@ -211,7 +183,7 @@ def _confused(
         )
     value = regressors.path.value
     if abs(value[-1] - value[0]) > _MONOTONE * regressors.path.range:
-        z = both.beta[0] / math.sqrt(both.covariance[0, 0])
+        z = both.beta[0] / both.error
         if excluded and abs(z) < SIGMAS:
             return "the temperature only rises or falls, and a drift with time explains as much"
     if not excluded and _explained(regressors, regression) > _EXPLAINED:
@@ -254,10 +226,7 @@ def _about_the_likely(regressors: Regressors, weights: Array, lags: Array) -> tu
 def shares(candidates: Sequence[Candidate]) -> list[tuple[Candidate, float]]:
     """Return the noise models that the log does not rule out, each with its share of 1.
 
-    Parameters
-    ----------
-    candidates : sequence of Candidate
-        The best first.
+    They come with the best first.
     """
     chosen = candidates[0]
     alike = {
@@ -329,15 +298,8 @@ def _densities(whittle: Whittle, maximum: Maximum, number: int, rng: np.random.G
 def with_likely_walk(model: NoiseModel, K: Parameter) -> NoiseModel:
     """Return a model with a random walk as strong as it may be where the log does not show one.
 
-    The most likely walk is then often none at all, which would leave the mean all too sure: the
-    rms of K over its posterior, half a normal distribution, is taken.
-
-    Parameters
-    ----------
-    model : NoiseModel
-        With a random walk, of which nothing may be left.
-    K : Parameter
-        As it is told: its upper limit counts where it is absent.
+    The most likely walk is then often none at all, which would leave the mean all too sure: the rms
+    of K over its posterior, half a normal distribution, is taken, from its upper limit.
     """
     if K.status != "absent" or K.upper is None:
         return model
@@ -345,23 +307,12 @@ def with_likely_walk(model: NoiseModel, K: Parameter) -> NoiseModel:
 
 
 def mean_error(models: Iterable[tuple[NoiseModel, float]], spectrum: Spectrum) -> float:
-    """Return the standard deviation of the mean of a log about the bias at its beginning.
+    """Return the standard deviation of the mean of a log about the bias at its beginning, SI.
 
-    A random walk counts from 0 at the beginning of the log: sigma^2 = N^2 / D + K^2 D / 3 and, of
-    a process of variance v, 2 v T_B / D (1 - T_B / D (1 - e^(-D / T_B))), D long.
-
-    Parameters
-    ----------
-    models : iterable of (NoiseModel, float)
-        Models that the log does not rule out and their shares of 1: a walk that is too weak to be
-        the choice may still carry the mean away.
-    spectrum : Spectrum
-        Of the log: its rate, and its length.
-
-    Returns
-    -------
-    float
-        rad/s or m/s².
+    A random walk counts from 0 at the beginning of the log: sigma^2 = N^2 / D + K^2 D / 3 and, of a
+    process of variance v, 2 v T_B / D (1 - T_B / D (1 - e^(-D / T_B))), D long. The models are
+    those that the log does not rule out, with their shares of 1: a walk that is too weak to be the
+    choice may still carry the mean away.
     """
     return math.sqrt(sum(share * _variance(model, spectrum) for model, share in models))
 

@@ -1,10 +1,10 @@
-"""What is asked of every noise term."""
+"""What is asked of every noise term, and what several put into a filter together."""
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar, Self
 
@@ -12,7 +12,14 @@ import numpy as np
 
 from imubench_pipeline.noise.growth import SensorStart, Uncalibrated
 from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace, root_of
-from imubench_pipeline.noise.terms.traits import Drive, Reading, Role, SampleBlocks, TermParameter
+from imubench_pipeline.noise.terms.traits import (
+    Drive,
+    Process,
+    Reading,
+    Role,
+    SampleBlocks,
+    TermParameter,
+)
 from imubench_pipeline.typing import Array
 
 if TYPE_CHECKING:
@@ -138,46 +145,18 @@ class Term(ABC):
 
     @abstractmethod
     def mean_covariance(self, blocks: SampleBlocks) -> Array:
-        """Return the covariance of the means of blocks of samples, in closed form.
+        """Return the covariance of the means of b blocks of samples, in closed form, shape (b, b).
 
-        Parameters
-        ----------
-        blocks : SampleBlocks
-            b of them; a walk counts from the first sample of the first.
-
-        Returns
-        -------
-        ndarray, shape (b, b)
-            (rad/s)^2 or (m/s^2)^2.
+        A walk counts from the first sample of the first.
         """
 
     @abstractmethod
     def block_sums(self, blocks: int, width: int, rate: float, rng: np.random.Generator) -> Array:
-        """Draw the sums over adjacent blocks of samples of a simulated log, exactly.
-
-        Parameters
-        ----------
-        blocks : int
-        width : int
-            Samples a block.
-        rate : float
-            Hz.
-        rng : numpy.random.Generator
-
-        Returns
-        -------
-        ndarray, shape (blocks,)
-        """
+        """Draw the sums over adjacent blocks of ``width`` samples of a simulated log, exactly."""
 
     @abstractmethod
     def reading(self, lowest_tau: float) -> Reading | None:
-        """Return where a curve shows its parameter; None: nowhere.
-
-        Parameters
-        ----------
-        lowest_tau : float
-            Where the curve is lowest, s.
-        """
+        """Return where a curve, lowest at a tau in s, shows its parameter; None: nowhere."""
 
     @property
     def values(self) -> dict[str, float]:
@@ -202,12 +181,7 @@ class Term(ABC):
     def realised(self, interval: float, longest: float) -> Sequence[Term]:
         """Return terms of a finite state space that stand for it, by default itself.
 
-        Parameters
-        ----------
-        interval : float
-            Sampling interval, s.
-        longest : float
-            Tau up to which it is followed, s.
+        Up to a tau ``longest`` it is followed; the sampling interval, too, is in s.
         """
         return [self]
 
@@ -233,29 +207,17 @@ class Term(ABC):
         yield self.source, math.sqrt(self.growth(order, time, start))
 
     def mean_variance(self, time: float, on_time: float) -> float:
-        """Return the variance of its mean over a window.
+        """Return the variance of its mean over a window, (rad/s)^2 or (m/s^2)^2.
 
-        Parameters
-        ----------
-        time : float
-            Length of the window, s.
-        on_time : float
-            Time from switch-on to the beginning of the window, s (see `noise.growth`).
-
-        Returns
-        -------
-        float
-            (rad/s)^2 or (m/s^2)^2.
+        ``time`` is the length of the window, ``on_time`` that from switch-on to its beginning, s
+        (see `noise.growth`).
         """
         return self.growth(0, time, Uncalibrated(bias=0.0, on_time=on_time)) / time**2
 
     def passed(self, power: Callable[[float], Array]) -> float:
         """Return the part of its Allan variance that a low-pass leaves; only asked without `drive`.
 
-        Parameters
-        ----------
-        power : callable
-            Squared gain at a frequency in Hz.
+        ``power`` is the squared gain at a frequency in Hz.
         """
         return 1.0
 
@@ -274,12 +236,7 @@ class Deterministic(Term):
     def swing(self, weights: Array, block: float) -> tuple[float, float]:
         """Return the mean square and the frequency, Hz, of a weighted sum of means over blocks.
 
-        Parameters
-        ----------
-        weights : ndarray
-            Of adjacent blocks.
-        block : float
-            Length of a block, s.
+        ``weights`` are those of adjacent blocks, ``block`` is the length of one, s.
         """
 
     @property
@@ -299,12 +256,32 @@ class Deterministic(Term):
         """0: a filter that knows it predicts it."""
         return np.zeros_like(time), np.zeros_like(time)
 
-    def block_covariance(self, lags: Array, block: float) -> Array:
-        """Raise: it has a course instead (`swing`).
+    def reading(self, lowest_tau: float) -> Reading | None:
+        """None."""
+        return None
 
-        Raises
-        ------
-        TypeError
-            Always.
-        """
+    def block_covariance(self, lags: Array, block: float) -> Array:
+        """Raise TypeError: it has a course instead (`swing`)."""
         raise TypeError(f"{self} is deterministic")
+
+
+@dataclass(frozen=True)
+class Drives:
+    """The sum of what terms put into a filter."""
+
+    white: float  # density N^2, SI^2/Hz
+    flicker: float  # B^2 of flicker noise, SI^2
+    processes: tuple[Process, ...]  # Gauss-Markov processes
+    walks: tuple[Process, ...]  # random walks, whose correlation time is infinite
+
+
+def drives_of(terms: Iterable[Term]) -> Drives:
+    """Return what terms put into a filter; those without a density have no part in it."""
+    drives = [term.drive for term in terms if term.drive is not None]
+    processes = [drive.process for drive in drives if drive.process is not None]
+    return Drives(
+        sum(drive.white for drive in drives),
+        sum(drive.flicker**2 for drive in drives),
+        tuple(process for process in processes if math.isfinite(process.T_B)),
+        tuple(process for process in processes if math.isinf(process.T_B)),
+    )

@@ -1,4 +1,4 @@
-"""Flicker noise, and the bank of Gauss-Markov processes that realises it."""
+"""Flicker noise, sampled too, and the bank of Gauss-Markov processes that realises it."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.optimize import nnls
 
 from imubench_pipeline.noise.flicker_growth import after_window, since_switch_on
 from imubench_pipeline.noise.growth import Calibrated, SensorStart
-from imubench_pipeline.noise.sampled_flicker import sampled_flicker_shape, sampled_flicker_sums
 from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace
 from imubench_pipeline.noise.terms.base import Term
 from imubench_pipeline.noise.terms.gauss_markov import (
@@ -33,6 +33,9 @@ _MEMBERS_A_DECADE = 2.5
 _POINTS_A_DECADE = 20
 _BEYOND = 4.0
 """How far the correlation times of the bank go beyond the one that peaks at the end of its band."""
+
+_TABLE = 1 << 12
+"""Cluster sizes up to which the Allan variance of sampled flicker is summed up exactly."""
 
 
 @dataclass(frozen=True)
@@ -72,13 +75,7 @@ class Flicker(Term):
         return 0.5 / np.pi * self.B**2 * sampled_flicker_sums(np.abs(lags))
 
     def state_space(self, interval: float) -> StateSpace:
-        """Raise: there is none.
-
-        Raises
-        ------
-        ValueError
-            Always.
-        """
+        """Raise ValueError: there is none."""
         raise ValueError("flicker noise has no finite state space; take its Gauss-Markov bank")
 
     def continuous_space(self) -> ContinuousSpace | None:
@@ -120,23 +117,11 @@ class Flicker(Term):
         return -(self.B**2) / math.pi * _mean_logarithm(lags)
 
     def mean_covariance(self, blocks: SampleBlocks) -> Array:
-        """Raise: it has no covariance.
-
-        Raises
-        ------
-        TypeError
-            Always.
-        """
+        """Raise TypeError: it has no covariance."""
         raise TypeError("flicker noise has no covariance; take its Gauss-Markov bank")
 
     def block_sums(self, blocks: int, width: int, rate: float, rng: np.random.Generator) -> Array:
-        """Raise: those of its bank are drawn.
-
-        Raises
-        ------
-        TypeError
-            Always.
-        """
+        """Raise TypeError: those of its bank are drawn."""
         raise TypeError("flicker noise has no finite state space; take its Gauss-Markov bank")
 
     def reading(self, lowest_tau: float) -> Reading:
@@ -204,12 +189,8 @@ def bank(B: float, interval: float, longest: float) -> list[Term]:
 def ripple(interval: float, longest: float) -> tuple[float, float]:
     """Return the largest relative errors of a bank inside its band.
 
-    Returns
-    -------
-    (float, float)
-        Of the sampled Allan variance at tau from ``interval`` to ``longest``, and of the
-        spectrum of the samples at frequencies from 1 / (2 longest) to Nyquist, both against
-        sampled flicker noise.
+    Of the sampled Allan variance at tau from ``interval`` to ``longest``, and of the spectrum of
+    the samples at frequencies from 1 / (2 longest) to Nyquist, both against sampled flicker noise.
     """
     terms = bank(1.0, interval, longest)
     points = math.ceil(math.log10(longest / interval) * _POINTS_A_DECADE * 2)
@@ -237,3 +218,48 @@ def _unit_bank(decades: float) -> tuple[Array, Array, float]:
     ]
     powers, _ = nnls(np.column_stack([*shapes, 1.0 / n]) / wanted[:, None], np.ones_like(n))
     return times, np.sqrt(powers[:-1]), math.sqrt(powers[-1])
+
+
+def sampled_flicker_shape(n: ArrayLike) -> Array:
+    """Return n^-2 times the integral of sin^4(n x) / sin^3(x) from 0 to pi/2; ln 2 for large n."""
+    sizes = np.asarray(n, dtype=np.float64)
+    table = _flicker_integrals()
+    # 1/sin^3(x) = 1/x^3 + 1/(2x) + ...: the second term adds (3/16) ln n and a constant.
+    beyond = table[-1] - math.log(2.0) * _TABLE**2 - 3.0 / 16.0 * math.log(_TABLE)
+    index = np.clip(np.rint(sizes), 1, _TABLE).astype(np.int64)
+    large = math.log(2.0) + (3.0 / 16.0 * np.log(sizes) + beyond) / sizes**2
+    return np.where(sizes <= _TABLE, table[index - 1] / index**2, large)
+
+
+def sampled_flicker_sums(lags: Array) -> Array:
+    """Return the covariance of cumulative sums at whole lags from 0, up to a square of the lag.
+
+    Minus half the integral of (1 - cos(2 k x)) / sin^3(x) from 0 to pi/2, which for long lags is
+    k^2 ln(k), as in continuous time. All lags of a call are taken alike.
+    """
+    if lags.max() <= 2 * _TABLE:
+        return -0.5 * _flicker_sums()[np.rint(lags).astype(np.int64)]
+    return np.asarray(lags**2 * np.log(np.maximum(lags, 1.0)))
+
+
+@lru_cache(maxsize=1)
+def _flicker_integrals() -> Array:
+    """Return the integral of sin^4(n x) / sin^3(x) from 0 to pi/2 for n = 1 to `_TABLE`.
+
+    sin^4(n x) = (3 - 4 cos(2 n x) + cos(4 n x)) / 8.
+    """
+    integral = _flicker_sums()
+    sizes = np.arange(1, _TABLE + 1)
+    return np.asarray((4.0 * integral[sizes] - integral[2 * sizes]) / 8.0)
+
+
+@lru_cache(maxsize=1)
+def _flicker_sums() -> Array:
+    """Return the integral of (1 - cos(2 m x)) / sin^3(x) from 0 to pi/2, m to 2 `_TABLE`.
+
+    Its second difference over m is a constant, which drops out of the second differences of
+    sums, less 8 (1 + 1/3 + ... + 1/(2m - 1)).
+    """
+    m = np.arange(1, 2 * _TABLE)
+    steps = np.cumsum(np.concatenate(([0.0], -8.0 * np.cumsum(1.0 / (2.0 * m - 1.0)))))
+    return np.concatenate(([0.0, 0.0], np.cumsum(steps)[1:]))  # of m = 0, 1, 2 ...

@@ -10,10 +10,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from imubench_pipeline.noise.block_sums import of_scalar
 from imubench_pipeline.noise.exponentials import decay, squared_response
 from imubench_pipeline.noise.growth import SensorStart, Uncalibrated, of_constant
-from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace
+from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace, draw_block_sums
 from imubench_pipeline.noise.terms.base import Term
 from imubench_pipeline.noise.terms.random_walk import RandomWalk
 from imubench_pipeline.noise.terms.traits import (
@@ -79,6 +78,11 @@ class GaussMarkov(Term):
         """S_B = 2 B^2 ln 2 / (pi 0.4365^2 T_B), density of the driving white noise."""
         return driving_density(self.B, self.T_B)
 
+    @property
+    def _variance(self) -> float:
+        """V = S_B T_B / 2, of the process where it is stationary."""
+        return self.density * self.T_B / 2.0
+
     def psd(self, frequency: Array, interval: float | None = None) -> Array:
         """S_B T_B^2 / (1 + (2 pi f T_B)^2)."""
         return self.density * self.T_B**2 / (1.0 + (2.0 * np.pi * frequency * self.T_B) ** 2)
@@ -94,9 +98,8 @@ class GaussMarkov(Term):
     def sampled_spectrum(self, omega: Array, interval: float) -> Array:
         """(S_B T_B / 2) (1 - p^2) / (1 - 2 p cos(omega) + p^2) with p = e^(-T/T_B)."""
         p = math.exp(-interval / self.T_B)
-        variance = self.density * self.T_B / 2.0
         gap = math.expm1(-interval / self.T_B) ** 2 + p * 4.0 * np.sin(omega / 2.0) ** 2
-        return -variance * math.expm1(-2.0 * interval / self.T_B) / gap
+        return -self._variance * math.expm1(-2.0 * interval / self.T_B) / gap
 
     def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
         """-v (p e^(-|k| T/T_B) / (1 - p)^2 + |k| (1 + p) / (2 (1 - p))), p = e^(-T/T_B).
@@ -106,18 +109,13 @@ class GaussMarkov(Term):
         if n * interval < _WALK_BELOW * self.T_B:
             return RandomWalk(math.sqrt(self.density)).sum_covariance(lags, n, interval)
         k, p, rest = np.abs(lags), math.exp(-interval / self.T_B), -math.expm1(-interval / self.T_B)
-        variance = self.density * self.T_B / 2.0
         decayed = p / rest**2 * np.exp(-k * (interval / self.T_B))
-        return -variance * (decayed + k * ((1.0 + p) / (2.0 * rest)))
+        return -self._variance * (decayed + k * ((1.0 + p) / (2.0 * rest)))
 
     def state_space(self, interval: float) -> StateSpace:
         """Phi = e^(-T/T_B), Q_d = S_B T_B / 2 (1 - e^(-2T/T_B)); it starts stationary."""
-        stationary = self.density * self.T_B / 2.0
-        return StateSpace.scalar(
-            math.exp(-interval / self.T_B),
-            -stationary * math.expm1(-2.0 * interval / self.T_B),
-            stationary,
-        )
+        drive = -self._variance * math.expm1(-2.0 * interval / self.T_B)
+        return StateSpace.scalar(math.exp(-interval / self.T_B), drive, self._variance)
 
     def continuous_space(self) -> ContinuousSpace:
         """F = -1/T_B, Q = S_B."""
@@ -161,9 +159,8 @@ class GaussMarkov(Term):
         x = d / T_B, v = S_B T_B / 2.
         """
         x = block / self.T_B
-        variance = self.density * self.T_B / 2.0
         apart = (math.expm1(-x) / x) ** 2 * np.exp(-(np.maximum(lags, 1.0) - 1.0) * x)
-        return variance * np.where(lags == 0.0, 2.0 * (x + math.expm1(-x)) / x**2, apart)
+        return self._variance * np.where(lags == 0.0, 2.0 * (x + math.expm1(-x)) / x**2, apart)
 
     def mean_covariance(self, blocks: SampleBlocks) -> Array:
         """V s_n s_m p^lag, with s_n = (1 - p^n) / (n (1 - p)), p = e^(-T/T_B), v = S_B T_B / 2.
@@ -175,8 +172,7 @@ class GaussMarkov(Term):
         x = 1.0 / (blocks.rate * self.T_B)
         lost = -math.expm1(-x)
         decayed = -np.expm1(-n * x)
-        gain = decayed / (n * lost)
-        variance = 0.5 * self.density * self.T_B
+        gain, variance = decayed / (n * lost), self._variance
         covariance = np.empty((len(n), len(n)))
         for later in range(len(n)):  # row by row: there may be thousands, and one matrix is enough
             lag = blocks.start[later] - blocks.stop[:later] + 1
@@ -191,7 +187,7 @@ class GaussMarkov(Term):
         """Draw them with the states at their ends."""
         interval = 1.0 / rate
         space = self.state_space(interval)
-        return of_scalar(space, self.start(rng, interval), blocks, width, rng)
+        return draw_block_sums(space, self.start(rng, interval), blocks, width, rng)
 
     def reading(self, lowest_tau: float) -> Reading:
         """0.664 B at the peak."""

@@ -9,7 +9,7 @@ import numpy as np
 from imubench_pipeline.noise.growth import Calibrated, SensorStart, of_constant
 from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace
 from imubench_pipeline.noise.terms.base import Deterministic
-from imubench_pipeline.noise.terms.traits import Reading, Role, SampleBlocks, TermParameter
+from imubench_pipeline.noise.terms.traits import Role, SampleBlocks, TermParameter
 from imubench_pipeline.typing import Array
 
 
@@ -77,7 +77,3 @@ class Ramp(Deterministic):
         """Return the square of what it rises, at the frequency 0."""
         middle = np.arange(len(weights)) + 0.5
         return float(self.R * block * (weights @ middle)) ** 2, 0.0
-
-    def reading(self, lowest_tau: float) -> Reading | None:
-        """None."""
-        return None

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imubench_pipeline.noise.block_sums import of_scalar
 from imubench_pipeline.noise.growth import Calibrated, SensorStart, of_constant, of_walk
-from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace
+from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace, draw_block_sums
 from imubench_pipeline.noise.terms.base import Term
 from imubench_pipeline.noise.terms.traits import (
     Drive,
@@ -103,7 +102,7 @@ class RandomWalk(Term):
         """Draw them with the states at their ends."""
         interval = 1.0 / rate
         space = self.state_space(interval)
-        return of_scalar(space, self.start(rng, interval), blocks, width, rng)
+        return draw_block_sums(space, self.start(rng, interval), blocks, width, rng)
 
     def reading(self, lowest_tau: float) -> Reading:
         """K at 3 s."""

@@ -15,10 +15,6 @@ _STATED = ("symbol", "label", "standard_name", "word", "role", "parameters", "st
 def register_terms(*kinds: type[Term]) -> tuple[type[Term], ...]:
     """Return the kinds of terms, each of which lacks nothing.
 
-    Parameters
-    ----------
-    *kinds : type of Term
-
     Raises
     ------
     TypeError

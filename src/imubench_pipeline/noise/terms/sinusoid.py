@@ -12,7 +12,7 @@ from imubench_pipeline.noise.exponentials import phi
 from imubench_pipeline.noise.growth import SensorStart, Uncalibrated, of_constant
 from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace
 from imubench_pipeline.noise.terms.base import Deterministic
-from imubench_pipeline.noise.terms.traits import Reading, Role, SampleBlocks, TermParameter
+from imubench_pipeline.noise.terms.traits import Role, SampleBlocks, TermParameter
 from imubench_pipeline.typing import Array
 
 
@@ -120,10 +120,6 @@ class Sinusoid(Deterministic):
     def passed(self, power: Callable[[float], Array]) -> float:
         """Return the squared gain at its frequency."""
         return float(power(self.frequency))
-
-    def reading(self, lowest_tau: float) -> Reading | None:
-        """None."""
-        return None
 
     @property
     def in_words(self) -> str:

@@ -26,18 +26,10 @@ class Role(Enum):
 
 @dataclass(frozen=True)
 class SearchRange:
-    """The times between which a fit looks for a time constant.
+    """The times between which a fit looks for a time constant."""
 
-    Attributes
-    ----------
-    samples : float
-        Shortest, sampling intervals.
-    of_log : float
-        Longest, as a part of the log.
-    """
-
-    samples: float
-    of_log: float
+    samples: float  # shortest, sampling intervals
+    of_log: float  # longest, as a part of the log
 
 
 @dataclass(frozen=True)
@@ -84,58 +76,31 @@ class TermParameter:
 
 @dataclass(frozen=True)
 class Process:
-    """White noise through a first-order lag.
+    """White noise through a first-order lag."""
 
-    Attributes
-    ----------
-    T_B : float
-        Correlation time, s; infinite: a random walk.
-    density : float
-        Of the driving white noise, SI^2/s.
-    """
-
-    T_B: float
-    density: float
+    T_B: float  # correlation time, s; infinite: a random walk
+    density: float  # of the driving white noise, SI^2/s
 
 
 @dataclass(frozen=True)
 class Drive:
-    """What a term puts into a filter behind it.
+    """What a term puts into a filter behind it."""
 
-    Attributes
-    ----------
-    white : float
-        Density N^2, SI^2/Hz.
-    flicker : float
-        B of flicker noise, SI.
-    process : Process or None
-    """
-
-    white: float = 0.0
-    flicker: float = 0.0
+    white: float = 0.0  # density N^2, SI^2/Hz
+    flicker: float = 0.0  # B of flicker noise, SI
     process: Process | None = None
 
 
 @dataclass(frozen=True)
 class Reading:
-    """Where a curve shows a parameter.
-
-    Attributes
-    ----------
-    tau, level : float
-        s, and Allan deviation, SI.
-    symbol : str
-    factor : float
-        Level over the parameter.
-    peak : bool
-        The term is nowhere higher.
-    """
+    """Where a curve shows a parameter."""
 
     tau: float
     level: float
+    """s, and Allan deviation, SI."""
     symbol: str
-    factor: float = 1.0
-    peak: bool = False
+    factor: float = 1.0  # level over the parameter
+    peak: bool = False  # the term is nowhere higher
 
 
 class SampleBlocks(Protocol):
