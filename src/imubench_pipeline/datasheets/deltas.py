@@ -226,22 +226,13 @@ def _relative(value: float | None, printed: float | None) -> float | None:
 
 @dataclass(frozen=True)
 class CurveRms:
-    """How far a measured curve is from the lines of a datasheet.
+    """How far a measured curve is from the lines of a datasheet."""
 
-    Attributes
-    ----------
-    noise, floor : Comparable or None
-        The printed figures that the lines are of.
-    rms : float
-        Root mean square over tau of measured minus printed Allan deviation, rad/s or m/s².
-    rms_log10 : float
-        The same of the difference of log10, decades.
-    """
-
+    # noise, floor: the printed figures that the lines are of
     noise: Comparable | None
     floor: Comparable | None
-    rms: float
-    rms_log10: float
+    rms: float  # root mean square over tau of measured minus printed Allan deviation, rad/s or m/s²
+    rms_log10: float  # the same of the difference of log10, decades
 
 
 def curve_rms(

@@ -102,29 +102,14 @@ _MEND = "state the right 'unit' in the sensor file"
 
 @dataclass(frozen=True)
 class Expected:
-    """What is usual of a quantity of a sensor at rest.
+    """What is usual of a quantity of a sensor at rest."""
 
-    Attributes
-    ----------
-    noise : (float, float) or None
-        Least and most white noise density, SI/√Hz, two-sided.
-    noise_from : str
-        What says so.
-    offset : float
-        Largest mean of a gyro that an offset explains, rad/s.
-    offset_from : str
-    bandwidth : float or None
-        The widest that is printed, Hz.
-    printed : float or None
-        White noise density that the datasheet prints, SI/√Hz, two-sided.
-    """
-
-    noise: tuple[float, float] | None
-    noise_from: str
-    offset: float = _LARGEST_OFFSET
+    noise: tuple[float, float] | None  # least and most white noise density, SI/√Hz, two-sided
+    noise_from: str  # what says so
+    offset: float = _LARGEST_OFFSET  # largest mean of a gyro that an offset explains, rad/s
     offset_from: str = "of any gyro"
-    bandwidth: float | None = None
-    printed: float | None = None
+    bandwidth: float | None = None  # the widest that is printed, Hz
+    printed: float | None = None  # white noise density that the datasheet prints, SI/√Hz, two-sided
 
 
 def expected(sensor: Sensor | None, quantity: str) -> Expected:

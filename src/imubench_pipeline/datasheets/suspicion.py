@@ -54,20 +54,13 @@ _SHOWN: dict[tuple[str, str], tuple[str, str]] = {
 
 @dataclass(frozen=True)
 class Usual:
-    """What is usual of a figure.
+    """What is usual of a figure."""
 
-    Attributes
-    ----------
-    median, least, most : float
-        SI.
-    sensors : int
-        How many there are.
-    """
-
+    # median, least, most: SI
     median: float
     least: float
     most: float
-    sensors: int
+    sensors: int  # how many there are
 
 
 UsualFigures = Mapping[tuple[str, str], Usual]

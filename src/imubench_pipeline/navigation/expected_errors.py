@@ -60,34 +60,16 @@ _NOTHING = AxisErrors()
 
 @dataclass(frozen=True)
 class Question:
-    """One error that is asked for.
+    """One error that is asked for."""
 
-    Attributes
-    ----------
-    requirement : str or None
-        Name of the requirement; None for the times that are always given.
-    error : str
-    time : float
-        s.
-    start : Start
-    axis : str
-        Which axis of the sensor answers.
-    latitude : float or None
-        rad; for ``north``.
-    limit : float or None
-        Largest standard deviation that fulfils the requirement, SI.
-    use : Use
-        What happens besides.
-    """
-
-    requirement: str | None
+    requirement: str | None  # name of the requirement; None for the times that are always given
     error: Error
-    time: float
+    time: float  # s
     start: Start
-    axis: Axis
-    latitude: float | None = None
-    limit: float | None = None
-    use: Use = NO_USE
+    axis: Axis  # which axis of the sensor answers
+    latitude: float | None = None  # rad; for ``north``
+    limit: float | None = None  # largest standard deviation that fulfils the requirement, SI
+    use: Use = NO_USE  # what happens besides
 
     @property
     def needs(self) -> tuple[str, ...]:

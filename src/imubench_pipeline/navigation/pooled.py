@@ -62,55 +62,43 @@ _Present = tuple[str, Row]  # a device, and the row of one of its recordings
 
 @dataclass(frozen=True)
 class Pool:
-    """One noise parameter of several recordings.
+    """One noise parameter of several recordings."""
 
-    Attributes
-    ----------
-    value, lower, upper : float or None
-        Pooled value and its 95 % limits, in the unit of the values; None where no recording has
-        a value with limits. Of one recording its own.
-    recordings, left_out, contradicting : int
-        Used; left out; of those, the ones whose limits lie outside what the others predict.
-    error, spread, spread_lower, spread_upper : float or None
-        Standard error of ln value; tau, the standard deviation of the logarithm between recordings
-        (relative, where small), with 95 % limits: both 0 where values agree better than errors do.
-    p_value, verdict : float or None, str or None
-        Of Cochran's Q, chi-squared with K - 1 degrees of freedom where recordings agree;
-        ``differ`` where it is below `LEVEL`, else ``agree``: no difference is shown.
-    """
-
+    # value, lower, upper: pooled value and its 95 % limits, in the unit of the values; None where
+    # no recording has a value with limits. Of one recording its own
     value: float | None
     lower: float | None
     upper: float | None
+    # recordings, left_out, contradicting: used; left out; of those, the ones whose limits lie
+    # outside what the others predict
     recordings: int
     left_out: int
     contradicting: int = 0
+    # error, spread, spread_lower, spread_upper: standard error of ln value; tau, the standard
+    # deviation of the logarithm between recordings (relative, where small), with 95 % limits: both
+    # 0 where values agree better than errors do
     error: float | None = None
     spread: float | None = None
     spread_lower: float | None = None
     spread_upper: float | None = None
+    # p_value, verdict: of Cochran's Q, chi-squared with K - 1 degrees of freedom where recordings
+    # agree; ``differ`` where it is below `LEVEL`, else ``agree``: no difference is shown
     p_value: float | None = None
     verdict: Verdict | None = None
 
 
 @dataclass(frozen=True)
 class TurnOnBias:
-    """The fixed bias of a channel, of d(u) in equation 1 of paper 000, over recordings.
-
-    Attributes
-    ----------
-    recordings, left_out : int
-    mean, lower, upper : float or None
-        rad/s or m/s^2; the limits are the mean's, 95 %, by Student's t.
-    deviation, deviation_lower, deviation_upper : float or None
-        Standard deviation between recordings with its chi-squared 95 % limits.
-    """
+    """The fixed bias of a channel, of d(u) in equation 1 of paper 000, over recordings."""
 
     recordings: int
     left_out: int
+    # mean, lower, upper: rad/s or m/s^2; the limits are the mean's, 95 %, by Student's t
     mean: float | None = None
     lower: float | None = None
     upper: float | None = None
+    # deviation, deviation_lower, deviation_upper: standard deviation between recordings with its
+    # chi-squared 95 % limits
     deviation: float | None = None
     deviation_lower: float | None = None
     deviation_upper: float | None = None

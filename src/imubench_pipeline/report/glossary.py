@@ -30,26 +30,13 @@ class _Sections(RootModel[dict[str, dict[str, _Entry]]]):
 
 @dataclass(frozen=True)
 class Term:
-    """A term of the report.
-
-    Attributes
-    ----------
-    key : str
-    name : str
-        As it is shown.
-    short : str
-        One plain sentence: what it is, and why it matters.
-    section : str
-        Anchor on the theory page.
-    action : str or None
-        What to do; of a finding alone.
-    """
+    """A term of the report."""
 
     key: str
-    name: str
-    short: str
-    section: str
-    action: str | None = None
+    name: str  # as it is shown
+    short: str  # one plain sentence: what it is, and why it matters
+    section: str  # anchor on the theory page
+    action: str | None = None  # what to do; of a finding alone
 
 
 class UnknownTermError(KeyError):

@@ -36,28 +36,15 @@ class SlowSources:
     """Slow states and the filter's lack of each, over one sampling interval.
 
     The density of every driving noise is 1; all arrays are for n sources and a filter of order m.
-
-    Attributes
-    ----------
-    decay : ndarray, shape (n,)
-        e^(-interval / T); 1 of a random walk.
-    lost : ndarray, shape (n,)
-        1 - decay, without loss of digits.
-    own : ndarray, shape (n,)
-        Standard deviation of the noise of x.
-    coupling : ndarray, shape (n, m)
-        What e gains from x.
-    shared : ndarray, shape (n, m)
-        What e gains from the noise of x of unit variance.
-    residual : ndarray, shape (n, m, m)
-        Factors of the rest of the noise of e: its covariance is ``residual.T @ residual``.
     """
 
-    decay: Array
-    lost: Array
-    own: Array
-    coupling: Array
-    shared: Array
+    decay: Array  # shape (n,); e^(-interval / T); 1 of a random walk
+    lost: Array  # shape (n,); 1 - decay, without loss of digits
+    own: Array  # shape (n,); standard deviation of the noise of x
+    coupling: Array  # shape (n, m); what e gains from x
+    shared: Array  # shape (n, m); what e gains from the noise of x of unit variance
+    # shape (n, m, m); factors of the rest of the noise of e: its covariance is ``residual.T @
+    # residual``
     residual: Array
 
 
@@ -160,22 +147,15 @@ def _integrated(system: Array, impulse: Array, interval: float) -> tuple[Array, 
 
 @dataclass(frozen=True)
 class HeldInput:
-    """What a filter lacks of an input that is linear between samples, over one interval.
+    """What a filter lacks of an input that is linear between samples, over one interval."""
 
-    Attributes
-    ----------
-    step : ndarray, shape (m,)
-        e gains ``step`` times the change of the input.
-    lag_decay, lag_step : float
-        The lag ε = lagged - input of a first-order lag becomes ``lag_decay * ε + lag_step *
-        change``.
-    lag_coupling, lagged_step : ndarray, shape (m,)
-        e gains ``lag_coupling * ε + lagged_step * change`` of an input that is lagged.
-    """
-
-    step: Array
+    step: Array  # shape (m,); e gains ``step`` times the change of the input
+    # lag_decay, lag_step: the lag ε = lagged - input of a first-order lag becomes ``lag_decay * ε +
+    # lag_step * change``
     lag_decay: float
     lag_step: float
+    # lag_coupling, lagged_step: shape (m,); e gains ``lag_coupling * ε + lagged_step * change`` of
+    # an input that is lagged
     lag_coupling: Array
     lagged_step: Array
 

@@ -85,26 +85,13 @@ def imu_model(axes: Mapping[Channel, AxisSettings], settings: ImuSettings) -> Im
 
 @dataclass(frozen=True)
 class TrueFigure:
-    """One true figure.
+    """One true figure."""
 
-    Attributes
-    ----------
-    name : str
-        Of the parameter, as the tables have it.
-    value : float
-        SI; degC for a temperature.
-    unit : str
-    setting : str
-        Key of `AxisSettings` that it is from.
-    component : int
-        Number of a repeated term, from 1.
-    """
-
-    name: str
-    value: float
+    name: str  # of the parameter, as the tables have it
+    value: float  # SI; degC for a temperature
     unit: str
-    setting: str
-    component: int = 1
+    setting: str  # key of `AxisSettings` that it is from
+    component: int = 1  # number of a repeated term, from 1
 
 
 def figures_of(settings: AxisSettings, channel: str, rate: float) -> Iterator[TrueFigure]:

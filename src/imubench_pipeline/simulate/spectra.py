@@ -33,21 +33,12 @@ _SLOWEST = 1e5
 
 @dataclass(frozen=True)
 class Sources:
-    """What drives a filter.
+    """What drives a filter."""
 
-    Attributes
-    ----------
-    white : float
-        N^2.
-    flicker : float
-        B^2 of flicker noise.
-    times, densities : ndarray, shape (n,)
-        Correlation time, s, and driving density of Gauss-Markov processes; an infinite time: a
-        random walk.
-    """
-
-    white: float
-    flicker: float
+    white: float  # N^2
+    flicker: float  # B^2 of flicker noise
+    # times, densities: shape (n,); correlation time, s, and driving density of Gauss-Markov
+    # processes; an infinite time: a random walk
     times: Array
     densities: Array
 
@@ -160,21 +151,14 @@ def allan_variance(sources: Sources, low_pass: LowPass, n: Array, rate: float) -
 
 @dataclass(frozen=True)
 class _Cluster:
-    """Consecutive samples of independent systems z = (x, e): what becomes of state and sum.
+    """Consecutive samples of independent systems z = (x, e): what becomes of state and sum."""
 
-    Attributes
-    ----------
-    transition, lost : ndarray, shape (n, k, k)
-        Of the state over the samples, and 1 less it.
-    sums : ndarray, shape (n, k)
-        What the sum of the samples has of the state before them.
-    state, both, total : ndarray, shapes (n, k, k), (n, k), (n,)
-        Covariance of what noise adds to the state after them and to their sum.
-    """
-
+    # transition, lost: shape (n, k, k); of the state over the samples, and 1 less it
     transition: Array
     lost: Array
-    sums: Array
+    sums: Array  # shape (n, k); what the sum of the samples has of the state before them
+    # state, both, total: shapes (n, k, k), (n, k), (n,); covariance of what noise adds to the state
+    # after them and to their sum
     state: Array
     both: Array
     total: Array

@@ -30,17 +30,11 @@ from imubench_pipeline.typing import Array
 
 @dataclass(frozen=True)
 class TriadRuns:
-    """Simulated runs of one design, and their truth.
+    """Simulated runs of one design, and their truth."""
 
-    Attributes
-    ----------
-    means : ndarray, shape (runs, b, 6)
-        Block means of gyros and accelerometers x, y, z, rad/s and m/s^2.
-    drift : ndarray, shape (runs, b, 6)
-        Mean of each axis' slow error over each block, its bias included.
-    """
-
+    # shape (runs, b, 6); block means of gyros and accelerometers x, y, z, rad/s and m/s^2
     means: Array
+    # shape (runs, b, 6); mean of each axis' slow error over each block, its bias included
     drift: Array
 
 
@@ -111,30 +105,15 @@ _LEVEL = np.eye(3)
 
 @dataclass(frozen=True)
 class Accuracy:
-    """How well attitude is known after a time.
+    """How well attitude is known after a time."""
 
-    Attributes
-    ----------
-    positions : int
-        1 or 2.
-    method : str
-        ``coarse`` or ``fine``.
-    time : float
-        s.
-    sigma : ndarray, shape (3,)
-        Of roll, pitch and heading, rad.
-    errors : ndarray, shape (3,), or None
-        Rms of simulated errors over these; NaN where there is no heading.
-    simulated : int
-        Triads of that check.
-    """
-
-    positions: int
-    method: str
-    time: float
-    sigma: Array
+    positions: int  # 1 or 2
+    method: str  # ``coarse`` or ``fine``
+    time: float  # s
+    sigma: Array  # shape (3,); of roll, pitch and heading, rad
+    # shape (3,); rms of simulated errors over these; NaN where there is no heading
     errors: Array | None = None
-    simulated: int = 0
+    simulated: int = 0  # triads of that check
 
     @property
     def reason(self) -> str | None:

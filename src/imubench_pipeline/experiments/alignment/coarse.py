@@ -23,18 +23,10 @@ from imubench_pipeline.typing import Array
 
 @dataclass(frozen=True)
 class CoarseAccuracy:
-    """How well an attitude is known.
+    """How well an attitude is known."""
 
-    Attributes
-    ----------
-    psi : ndarray, shape (3, 3)
-        Covariance of the small errors about north, east and down, rad^2.
-    sigma : ndarray, shape (3,)
-        Standard deviations of roll, pitch and heading, rad.
-    """
-
-    psi: Array
-    sigma: Array
+    psi: Array  # shape (3, 3); covariance of the small errors about north, east and down, rad^2
+    sigma: Array  # shape (3,); standard deviations of roll, pitch and heading, rad
 
 
 def coarse_alignment(force: Array, rate: Array, site: Site) -> Array:

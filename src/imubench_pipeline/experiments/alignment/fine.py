@@ -52,23 +52,17 @@ _MOST = 20
 
 @dataclass(frozen=True)
 class Aligned:
-    """Attitudes of runs of one design.
+    """Attitudes of runs of one design."""
 
-    Attributes
-    ----------
-    attitude : ndarray, shape (runs, 3, 3)
-        From body to navigation frame, in the first position, from all the data.
-    psi : ndarray, shape (runs, b, 3)
-        What the filter held for the error of the attitude that it was given, after each block, rad.
-    drift : ndarray, shape (runs, b, 6)
-        Mean of each axis' error over each block, its bias included, as known then, rad/s and m/s^2.
-    nis : ndarray, shape (runs, b)
-        Normalised innovation squared: chi-squared of six degrees of freedom.
-    """
-
+    # shape (runs, 3, 3); from body to navigation frame, in the first position, from all the data
     attitude: Array
+    # shape (runs, b, 3); what the filter held for the error of the attitude that it was given,
+    # after each block, rad
     psi: Array
+    # shape (runs, b, 6); mean of each axis' error over each block, its bias included, as known
+    # then, rad/s and m/s^2
     drift: Array
+    # shape (runs, b); normalised innovation squared: chi-squared of six degrees of freedom
     nis: Array
 
 

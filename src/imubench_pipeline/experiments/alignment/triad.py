@@ -22,21 +22,14 @@ _NEAREST_POLE = 1e-6
 class Site:
     """A place on the Earth, and what a triad at rest there is exposed to.
 
-    Parameters
-    ----------
-    latitude : float
-        rad, north positive.
-    gravity : float
-        m/s^2.
-
     Raises
     ------
     ValueError
         If the latitude is not between the poles, where there is no north, or gravity not above 0.
     """
 
-    latitude: float
-    gravity: float = STANDARD_GRAVITY
+    latitude: float  # rad, north positive
+    gravity: float = STANDARD_GRAVITY  # m/s^2
 
     def __post_init__(self) -> None:
         if not (abs(self.latitude) < math.pi and math.cos(self.latitude) > _NEAREST_POLE):
@@ -122,20 +115,14 @@ class Triad:
 class Positions:
     """Blocks of a run at rest, in one position or in several that are known from the first.
 
-    Parameters
-    ----------
-    blocks : Blocks
-        Neither their sense nor their latitude is used.
-    turned : ndarray, shape (dwells, 3, 3)
-        Turns vectors of the body frame in each dwell into that of the first.
-
     Raises
     ------
     ValueError
         If there is no rotation matrix for every dwell.
     """
 
-    blocks: Blocks
+    blocks: Blocks  # neither their sense nor their latitude is used
+    # shape (dwells, 3, 3); turns vectors of the body frame in each dwell into that of the first
     turned: Array
 
     def __post_init__(self) -> None:

@@ -43,20 +43,12 @@ Quantity = Literal[
 
 @dataclass(frozen=True)
 class NotObservable:
-    """A quantity that the recording does not tell.
-
-    Attributes
-    ----------
-    quantity : str
-    reason : str
-        In words.
-    half_width : float or None
-        What is known of its effect all the same: half of the range of the bias that it leaves
-        open, rad/s; None where nothing bounds it.
-    """
+    """A quantity that the recording does not tell."""
 
     quantity: Quantity
-    reason: str
+    reason: str  # in words
+    # what is known of its effect all the same: half of the range of the bias that it leaves open,
+    # rad/s; None where nothing bounds it
     half_width: float | None = None
 
 
@@ -69,24 +61,12 @@ Limits = tuple[Array, Array]
 
 @dataclass(frozen=True)
 class Fit:
-    """What generalised least squares finds in runs of one design.
+    """What generalised least squares finds in runs of one design."""
 
-    Attributes
-    ----------
-    value : ndarray, shape (runs, p)
-        Estimates, SI.
-    covariance : ndarray, shape (p, p)
-        Of their errors, by the noise model.
-    chi_squared : ndarray, shape (runs,)
-        Squared residuals in units of the noise model.
-    freedom : int
-        Their degrees of freedom, b - p.
-    """
-
-    value: Array
-    covariance: Array
-    chi_squared: Array
-    freedom: int
+    value: Array  # shape (runs, p); estimates, SI
+    covariance: Array  # shape (p, p); of their errors, by the noise model
+    chi_squared: Array  # shape (runs,); squared residuals in units of the noise model
+    freedom: int  # their degrees of freedom, b - p
 
     @property
     def sigma(self) -> Array:

@@ -20,14 +20,9 @@ _WHITE = 16.0 / 6.0
 
 @dataclass(frozen=True)
 class Alternation:
-    """How far the dwells of the first sense lie above the mean, the others below it.
+    """How far the dwells of the first sense lie above the mean, the others below it."""
 
-    Attributes
-    ----------
-    value, sigma : float
-        rad/s; of one sense less the mean of both, and its standard error.
-    """
-
+    # value, sigma: rad/s; of one sense less the mean of both, and its standard error
     value: float
     sigma: float
 

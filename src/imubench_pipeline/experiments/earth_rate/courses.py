@@ -41,48 +41,26 @@ Range = dict[str, float]
 
 @dataclass(frozen=True)
 class Course:
-    """What one method says as the data come in.
+    """What one method says as the data come in."""
 
-    Attributes
-    ----------
-    method : str
-        One of `METHODS`.
-    time : ndarray, shape (k,)
-        s from the first sample of the log.
-    rate : ndarray, shape (k,)
-        Estimate from the data up to then, rad/s; by the smoother from all of the data.
-    sigma : ndarray, shape (k,), or None
-        Its standard deviation, rad/s; None where the method has none.
-    reason : str or None
-        Why there is no estimate: the arrays are empty then.
-    """
-
-    method: str
-    time: Array
+    method: str  # one of `METHODS`
+    time: Array  # shape (k,); s from the first sample of the log
+    # shape (k,); estimate from the data up to then, rad/s; by the smoother from all of the data
     rate: Array
-    sigma: Array | None
-    reason: str | None = None
+    sigma: Array | None  # shape (k,); its standard deviation, rad/s; None where the method has none
+    reason: str | None = None  # why there is no estimate: the arrays are empty then
 
 
 @dataclass(frozen=True)
 class Courses:
-    """The estimates of one experiment, and what they are made of.
+    """The estimates of one experiment, and what they are made of."""
 
-    Attributes
-    ----------
-    courses : tuple of Course
-        One a method.
-    measured : Measured
-    longest : int
-        Samples of a block at most.
-    drift_time, drift, drift_sigma : ndarray, shape (b,)
-        Middle of each block in s from the first sample of the log; the gyro's slow error in it
-        with its bias, from all of the data, and its standard deviation, rad/s.
-    """
-
-    courses: tuple[Course, ...]
+    courses: tuple[Course, ...]  # one a method
     measured: Measured
-    longest: int
+    longest: int  # samples of a block at most
+    # drift_time, drift, drift_sigma: shape (b,); middle of each block in s from the first sample of
+    # the log; the gyro's slow error in it with its bias, from all of the data, and its standard
+    # deviation, rad/s
     drift_time: Array
     drift: Array
     drift_sigma: Array

@@ -29,22 +29,16 @@ _LEAST_PRESENT = 0.5
 class Dwell:
     """A time at rest in one position.
 
-    Parameters
-    ----------
-    start, stop : int
-        First sample of the log, and the one past the last.
-    sense : {1, -1}
-        1: the axis points north; -1: south.
-
     Raises
     ------
     ValueError
         If there is no sample, or the sense is neither.
     """
 
+    # start, stop: first sample of the log, and the one past the last
     start: int
     stop: int
-    sense: int
+    sense: int  # 1: the axis points north; -1: south
 
     def __post_init__(self) -> None:
         if not 0 <= self.start < self.stop:
@@ -57,16 +51,6 @@ class Dwell:
 class Experiment:
     """Dwells in their order.
 
-    Parameters
-    ----------
-    dwells : sequence of Dwell
-        At least one; what lies between them is turning. Two that follow each other may have the
-        same sense: a turn was missed.
-    rate : float
-        Sampling rate, Hz.
-    latitude : float
-        rad.
-
     Raises
     ------
     ValueError
@@ -74,9 +58,11 @@ class Experiment:
         between the poles.
     """
 
+    # at least one; what lies between them is turning. Two that follow each other may have the same
+    # sense: a turn was missed
     dwells: Sequence[Dwell]
-    rate: float
-    latitude: float
+    rate: float  # sampling rate, Hz
+    latitude: float  # rad
 
     def __post_init__(self) -> None:
         if not self.dwells:
@@ -165,31 +151,16 @@ class Experiment:
 
 @dataclass(frozen=True)
 class Blocks:
-    """Blocks of samples, each within one dwell, in their order.
+    """Blocks of samples, each within one dwell, in their order."""
 
-    Attributes
-    ----------
-    start, stop : ndarray of int, shape (b,)
-        First sample of the log, and the one past the last.
-    count : ndarray of int, shape (b,)
-        Samples that are present.
-    sense : ndarray, shape (b,)
-        1 north, -1 south.
-    dwell : ndarray of int, shape (b,)
-        Number of the dwell, from 0, rising.
-    rate : float
-        Hz.
-    latitude : float
-        rad.
-    """
-
+    # start, stop: shape (b,); first sample of the log, and the one past the last
     start: Integers
     stop: Integers
-    count: Integers
-    sense: Array
-    dwell: Integers
-    rate: float
-    latitude: float
+    count: Integers  # shape (b,); samples that are present
+    sense: Array  # shape (b,); 1 north, -1 south
+    dwell: Integers  # shape (b,); number of the dwell, from 0, rising
+    rate: float  # Hz
+    latitude: float  # rad
 
     def __len__(self) -> int:
         return len(self.start)
@@ -281,27 +252,13 @@ class Blocks:
 
 @dataclass(frozen=True)
 class Measured:
-    """The block means of a log, and what was left out.
+    """The block means of a log, and what was left out."""
 
-    Attributes
-    ----------
-    blocks : Blocks
-        Those of which enough samples are present.
-    means : ndarray, shape (1, b)
-        rad/s, a row for the one log.
-    missing : int
-        Samples within dwells that are not there (NaN).
-    left_out : int
-        Samples present in blocks that have too few.
-    turning : int
-        Samples of the log, present or not, outside of dwells.
-    """
-
-    blocks: Blocks
-    means: Array
-    missing: int
-    left_out: int
-    turning: int
+    blocks: Blocks  # those of which enough samples are present
+    means: Array  # shape (1, b); rad/s, a row for the one log
+    missing: int  # samples within dwells that are not there (NaN)
+    left_out: int  # samples present in blocks that have too few
+    turning: int  # samples of the log, present or not, outside of dwells
 
 
 def block_means(parts: Iterable[Array], experiment: Experiment, longest: int) -> Measured:

@@ -38,39 +38,21 @@ _NOTHING = 1e-12
 
 @dataclass(frozen=True)
 class Filtered:
-    """What a filter knows after each block, from the data up to there.
+    """What a filter knows after each block, from the data up to there."""
 
-    Attributes
-    ----------
-    time : ndarray, shape (b,)
-        End of each block, s from the first sample of the first.
-    rate : ndarray, shape (runs, b)
-        Estimated Earth's rate, rad/s.
-    rate_sigma : ndarray, shape (b,)
-        Its standard deviation, rad/s.
-    drift : ndarray, shape (runs, b)
-        Estimated mean of the gyro's slow error over the block, its bias included, rad/s.
-    drift_sigma : ndarray, shape (b,)
-        Its standard deviation, rad/s.
-    innovation : ndarray, shape (runs, b)
-        Each block mean less its prediction, rad/s.
-    innovation_sigma : ndarray, shape (b,)
-        Its standard deviation, rad/s.
-    states : ndarray, shape (runs, b, m + 2)
-        Rate, the states of `RateFilter.names` at the sample after the block, and the drift.
-    roots : ndarray, shape (b, m + 2, m + 2)
-        Lower triangular roots of their covariances.
-    """
-
-    time: Array
-    rate: Array
-    rate_sigma: Array
+    time: Array  # shape (b,); end of each block, s from the first sample of the first
+    rate: Array  # shape (runs, b); estimated Earth's rate, rad/s
+    rate_sigma: Array  # shape (b,); its standard deviation, rad/s
+    # shape (runs, b); estimated mean of the gyro's slow error over the block, its bias included,
+    # rad/s
     drift: Array
-    drift_sigma: Array
-    innovation: Array
-    innovation_sigma: Array
+    drift_sigma: Array  # shape (b,); its standard deviation, rad/s
+    innovation: Array  # shape (runs, b); each block mean less its prediction, rad/s
+    innovation_sigma: Array  # shape (b,); its standard deviation, rad/s
+    # shape (runs, b, m + 2); rate, the states of `RateFilter.names` at the sample after the block,
+    # and the drift
     states: Array
-    roots: Array
+    roots: Array  # shape (b, m + 2, m + 2); lower triangular roots of their covariances
 
     @property
     def nis(self) -> Array:
@@ -121,27 +103,16 @@ class Filtered:
 
 @dataclass(frozen=True)
 class Smoothed:
-    """What is known of each block from all the data.
+    """What is known of each block from all the data."""
 
-    Attributes
-    ----------
-    rate : ndarray, shape (runs,)
-        Estimated Earth's rate, rad/s: a constant, which the filter has found at the end.
-    rate_sigma : float
-        Its standard deviation, rad/s.
-    drift : ndarray, shape (runs, b)
-        Mean of the gyro's slow error over each block, its bias included, rad/s.
-    drift_sigma : ndarray, shape (b,)
-        Its standard deviation, rad/s.
-    states : ndarray, shape (runs, b, m + 2)
-        As those of `Filtered`.
-    """
-
+    # shape (runs,); estimated Earth's rate, rad/s: a constant, which the filter has found at the
+    # end
     rate: Array
-    rate_sigma: float
+    rate_sigma: float  # its standard deviation, rad/s
+    # shape (runs, b); mean of the gyro's slow error over each block, its bias included, rad/s
     drift: Array
-    drift_sigma: Array
-    states: Array
+    drift_sigma: Array  # shape (b,); its standard deviation, rad/s
+    states: Array  # shape (runs, b, m + 2); as those of `Filtered`
 
 
 class RateFilter:

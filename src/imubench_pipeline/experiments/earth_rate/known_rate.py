@@ -28,21 +28,12 @@ _START = 0.1
 
 @dataclass(frozen=True)
 class Tracked:
-    """What comes of the filter that is given the rate, for the samples in dwells.
+    """What comes of the filter that is given the rate, for the samples in dwells."""
 
-    Attributes
-    ----------
-    sample : ndarray of int, shape (n,)
-        Number of each sample in the log.
-    drift : ndarray, shape (n,)
-        Tracked error of the gyro, z_f + z_rrw, rad/s.
-    mean : ndarray, shape (n,)
-        Cumulative mean of what it calls the Earth's rate, reading less drift, as in the paper's
-        figures 10 to 13, rad/s.
-    """
-
-    sample: NDArray[np.int64]
-    drift: Array
+    sample: NDArray[np.int64]  # shape (n,); number of each sample in the log
+    drift: Array  # shape (n,); tracked error of the gyro, z_f + z_rrw, rad/s
+    # shape (n,); cumulative mean of what it calls the Earth's rate, reading less drift, as in the
+    # paper's figures 10 to 13, rad/s
     mean: Array
 
 

@@ -54,40 +54,20 @@ _MOST_TURNS = 20_000
 
 @dataclass(frozen=True)
 class Prediction:
-    """The least standard deviation of the rate as a run grows.
+    """The least standard deviation of the rate as a run grows."""
 
-    Attributes
-    ----------
-    turns : ndarray of int, shape (k,)
-        Turns done, from 1.
-    time : ndarray, shape (k,)
-        End of the dwell after the last turn, s.
-    sigma : ndarray, shape (k,)
-        rad/s.
-    """
-
-    turns: NDArray[np.int64]
-    time: Array
-    sigma: Array
+    turns: NDArray[np.int64]  # shape (k,); turns done, from 1
+    time: Array  # shape (k,); end of the dwell after the last turn, s
+    sigma: Array  # shape (k,); rad/s
 
 
 @dataclass(frozen=True)
 class DwellCurve:
-    """The least standard deviation of the rate for a given run time, over the dwell.
+    """The least standard deviation of the rate for a given run time, over the dwell."""
 
-    Attributes
-    ----------
-    dwells : ndarray of int, shape (k,)
-        How many, rising.
-    dwell : ndarray, shape (k,)
-        Data in each, s.
-    sigma : ndarray, shape (k,)
-        rad/s.
-    """
-
-    dwells: NDArray[np.int64]
-    dwell: Array
-    sigma: Array
+    dwells: NDArray[np.int64]  # shape (k,); how many, rising
+    dwell: Array  # shape (k,); data in each, s
+    sigma: Array  # shape (k,); rad/s
 
     @property
     def best(self) -> int:
@@ -115,24 +95,13 @@ class Outlook:
 
     Beyond 64 dwells the information of the rate grows by as much a dwell as before: what turns
     at a steady pace sees the noise at the frequency of the turns and its odd multiples alone.
-
-    Parameters
-    ----------
-    model : NoiseModel
-    latitude : float
-        rad.
-    turning : float
-        Time that a turn takes, s.
-    rate : float
-        Sampling rate, Hz.
-    turn_on_bias : float
-        Standard deviation of the fixed bias, rad/s; by default it is not known.
     """
 
     model: NoiseModel
-    latitude: float
-    turning: float
-    rate: float
+    latitude: float  # rad
+    turning: float  # time that a turn takes, s
+    rate: float  # sampling rate, Hz
+    # standard deviation of the fixed bias, rad/s; by default it is not known
     turn_on_bias: float = math.inf
 
     def against_time(self, dwell: float, turns: int) -> Prediction:

@@ -30,24 +30,12 @@ _WITHIN = 1.96
 
 @dataclass(frozen=True)
 class RunDesign:
-    """A run as its source describes it.
+    """A run as its source describes it."""
 
-    Attributes
-    ----------
-    dwell : float
-        From turn to turn, s.
-    turning : float
-        Of it that turning takes, s.
-    rate : float
-        Sampling rate, Hz.
-    latitude : float
-        rad.
-    """
-
-    dwell: float
-    turning: float
-    rate: float
-    latitude: float
+    dwell: float  # from turn to turn, s
+    turning: float  # of it that turning takes, s
+    rate: float  # sampling rate, Hz
+    latitude: float  # rad
 
     def experiment(self, duration: float) -> Experiment:
         """Return the design of a run of so many s."""

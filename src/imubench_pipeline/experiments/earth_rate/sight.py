@@ -35,25 +35,18 @@ _CALMING = 0.25
 
 @dataclass(frozen=True)
 class TurnSchedule:
-    """The turns as they are stated, before the log is looked at.
+    """The turns as they are stated, before the log is looked at."""
 
-    Attributes
-    ----------
-    dwell, start, turning, margin : float
-        As `imubench_pipeline.experiments.earth_rate.turning.find_turning` takes them, s.
-    tolerance : float
-        How far a turn may be from the schedule, s (a standard deviation): a tenth of a dwell, and
-        at least 2 s. So much is left out on both sides of a turn that is not seen.
-    duration : float
-        Of the log, s.
-    """
-
+    # dwell, start, turning, margin: as
+    # `imubench_pipeline.experiments.earth_rate.turning.find_turning` takes them, s
     dwell: float
     start: float
     turning: float
+    # how far a turn may be from the schedule, s (a standard deviation): a tenth of a dwell, and at
+    # least 2 s. So much is left out on both sides of a turn that is not seen
     tolerance: float
     margin: float
-    duration: float
+    duration: float  # of the log, s
 
 
 def by_sight(

@@ -60,20 +60,12 @@ def paper_run(minutes: float) -> Experiment:
 
 @dataclass(frozen=True)
 class Runs:
-    """Simulated runs of one design, and their truth.
+    """Simulated runs of one design, and their truth."""
 
-    Attributes
-    ----------
-    means : ndarray, shape (runs, b)
-        Block means, rad/s.
-    drift : ndarray, shape (runs, b)
-        Mean of the slow error over each block, its bias included, rad/s.
-    states : ndarray, shape (runs, b, m)
-        States at the sample after each block (`states.BlockStates`).
-    """
-
-    means: Array
+    means: Array  # shape (runs, b); block means, rad/s
+    # shape (runs, b); mean of the slow error over each block, its bias included, rad/s
     drift: Array
+    # shape (runs, b, m); states at the sample after each block (`states.BlockStates`)
     states: Array
 
 

@@ -61,59 +61,33 @@ _MOST = 2000
 
 @dataclass(frozen=True)
 class LevelBlocks:
-    """A log as means of short blocks.
+    """A log as means of short blocks."""
 
-    Attributes
-    ----------
-    length : float
-        Of a block, s.
-    mean, level : ndarray, shape (b,)
-        Mean of the samples present (NaN where there are none), and the running median, rad/s.
-    z : ndarray, shape (b,)
-        Mean less level in standard deviations; 0 where there are no samples.
-    present : ndarray of bool, shape (b,)
-        Where there are samples.
-    sigma : float
-        Standard deviation of the noise of a full block, rad/s.
-    rough : bool
-        Whether the log is noisier, or calmer, by half than the noise model given.
-    """
-
-    length: float
+    length: float  # of a block, s
+    # mean, level: shape (b,); mean of the samples present (NaN where there are none), and the
+    # running median, rad/s
     mean: Array
     level: Array
-    z: Array
-    present: NDArray[np.bool_]
-    sigma: float
-    rough: bool
+    z: Array  # shape (b,); mean less level in standard deviations; 0 where there are no samples
+    present: NDArray[np.bool_]  # shape (b,); where there are samples
+    sigma: float  # standard deviation of the noise of a full block, rad/s
+    rough: bool  # whether the log is noisier, or calmer, by half than the noise model given
 
 
 @dataclass(frozen=True)
 class Event:
-    """A transient or a step: perhaps a turn, perhaps not.
+    """A transient or a step: perhaps a turn, perhaps not."""
 
-    Attributes
-    ----------
-    start, stop : float
-        s from the first sample; equal for a step.
-    kind : "transient" or "step"
-    likelihood : float
-        Logarithm of the likelihood ratio against noise alone, its outliers clipped.
-    peak : float
-        Largest distance from the level of a block, or of a sample that is far out; or height of
-        the step; rad/s.
-    strength : float
-        Logarithm of the likelihood ratio over the least that can be found.
-    haste : float
-        Logarithm of how much likelier a knock is over so soon than a turn; 0 where it lasted.
-    """
-
+    # start, stop: s from the first sample; equal for a step
     start: float
     stop: float
     kind: Literal["transient", "step"]
-    likelihood: float
+    likelihood: float  # logarithm of the likelihood ratio against noise alone, its outliers clipped
+    # largest distance from the level of a block, or of a sample that is far out; or height of the
+    # step; rad/s
     peak: float
-    strength: float
+    strength: float  # logarithm of the likelihood ratio over the least that can be found
+    # logarithm of how much likelier a knock is over so soon than a turn; 0 where it lasted
     haste: float
 
     @property

@@ -42,25 +42,16 @@ _NEAR = 0.1
 
 @dataclass(frozen=True)
 class Stays:
-    """Where the sensor stood.
+    """Where the sensor stood."""
 
-    Attributes
-    ----------
-    start, stop : ndarray, shape (n,)
-        s; what lies between two of them is turning.
-    high : ndarray of bool, shape (n,)
-        Whether it is the position of the larger number; alternates.
-    senses : bool
-        Whether the column has +1 and -1: then it says the sense itself.
-    away : bool
-        Whether more than a twentieth of the column is in neither position for longer than a turn
-        takes: perhaps there are more than two.
-    """
-
+    # start, stop: shape (n,); s; what lies between two of them is turning
     start: Array
     stop: Array
+    # shape (n,); whether it is the position of the larger number; alternates
     high: NDArray[np.bool_]
-    senses: bool
+    senses: bool  # whether the column has +1 and -1: then it says the sense itself
+    # whether more than a twentieth of the column is in neither position for longer than a turn
+    # takes: perhaps there are more than two
     away: bool
 
 

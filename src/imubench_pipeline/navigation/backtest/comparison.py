@@ -50,18 +50,11 @@ SHORTEST = 3
 
 @dataclass(frozen=True)
 class Predicted:
-    """The mean square of the errors of a log, by the noise models that the log allows.
+    """The mean square of the errors of a log, by the noise models that the log allows."""
 
-    Parameters
-    ----------
-    spreads : sequence of Spread
-        By each model drawn, at least one.
-    efficient : bool
-        The models are drawn jointly from a likelihood, as sure as the log allows; else the
-        uncertainty of the model is taken to be independent of the scatter, and adds to it.
-    """
-
-    spreads: Sequence[Spread]
+    spreads: Sequence[Spread]  # by each model drawn, at least one
+    # the models are drawn jointly from a likelihood, as sure as the log allows; else the
+    # uncertainty of the model is taken to be independent of the scatter, and adds to it
     efficient: bool = True
 
     def limits(self, level: float = 0.95) -> tuple[float, float]:
@@ -107,22 +100,13 @@ class Predicted:
 
 @dataclass(frozen=True)
 class DeadReckoning:
-    """An error of one channel.
+    """An error of one channel."""
 
-    Attributes
-    ----------
-    order : int
-        m: integrations but one.
-    rest, time : float
-        W at rest, over which the bias is the mean, and t in motion, s.
-    factor : float
-        By which the integral is multiplied.
-    """
-
-    order: int
+    order: int  # m: integrations but one
+    # rest, time: W at rest, over which the bias is the mean, and t in motion, s
     rest: float
     time: float
-    factor: float = 1.0
+    factor: float = 1.0  # by which the integral is multiplied
 
     @property
     def duration_needed(self) -> float:
@@ -138,33 +122,19 @@ class DeadReckoning:
 
 @dataclass(frozen=True)
 class Comparison:
-    """The rms error over the windows of a log, and what its noise model predicts.
+    """The rms error over the windows of a log, and what its noise model predicts."""
 
-    Attributes
-    ----------
-    windows : int
-        Of the log; those with gaps are left out.
-    predicted, lower, upper : float
-        Standard deviation, with 95 % limits: rad, m/s or m.
-    measured : float or None
-        Rms over the windows; None where ``reason`` says why.
-    independent : float or None
-        Windows that would scatter as little, if independent.
-    least, most : float or None
-        Limits of measured in 95 % of logs, if the model is right.
-    chance : float or None
-        Of such an rms or a larger one, if the model is right (`Predicted.chance_above`).
-    reason : str or None
-    """
-
-    windows: int
+    windows: int  # of the log; those with gaps are left out
+    # predicted, lower, upper: standard deviation, with 95 % limits: rad, m/s or m
     predicted: float
     lower: float
     upper: float
-    measured: float | None = None
-    independent: float | None = None
+    measured: float | None = None  # rms over the windows; None where ``reason`` says why
+    independent: float | None = None  # windows that would scatter as little, if independent
+    # least, most: limits of measured in 95 % of logs, if the model is right
     least: float | None = None
     most: float | None = None
+    # of such an rms or a larger one, if the model is right (`Predicted.chance_above`)
     chance: float | None = None
     reason: str | None = None
 

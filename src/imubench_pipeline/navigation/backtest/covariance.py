@@ -29,14 +29,9 @@ _ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class Spread:
-    """What the mean square of the errors of a log is by a noise model.
+    """What the mean square of the errors of a log is by a noise model."""
 
-    Attributes
-    ----------
-    mean, variance : float
-        Of the mean square: rad^2, (m/s)^2 or m^2, and its square.
-    """
-
+    # mean, variance: of the mean square: rad^2, (m/s)^2 or m^2, and its square
     mean: float
     variance: float
 
@@ -48,19 +43,11 @@ class Spread:
 
 @dataclass(frozen=True)
 class WindowCovariance:
-    """The covariance of the errors of windows, for any noise model.
-
-    Parameters
-    ----------
-    window : Window
-    order : int
-        m: integrations but one.
-    factor : float
-        By which the errors are multiplied: g, where a gyro's attitude turns gravity.
-    """
+    """The covariance of the errors of windows, for any noise model."""
 
     window: Window
-    order: int
+    order: int  # m: integrations but one
+    # by which the errors are multiplied: g, where a gyro's attitude turns gravity
     factor: float = 1.0
 
     @cached_property

@@ -34,17 +34,10 @@ PRESENT = 0.9
 
 @dataclass(frozen=True)
 class Window:
-    """The parts of a window in blocks of a log.
+    """The parts of a window in blocks of a log."""
 
-    Attributes
-    ----------
-    block : float
-        Length of a block, s.
-    resting, moving : int
-        Blocks at rest and in motion.
-    """
-
-    block: float
+    block: float  # length of a block, s
+    # resting, moving: blocks at rest and in motion
     resting: int
     moving: int
 
@@ -121,20 +114,11 @@ def _uneven(number: int, shorter: float, longer: float, rate: float) -> float:
 
 @dataclass(frozen=True)
 class Errors:
-    """The errors of the windows of a log.
+    """The errors of the windows of a log."""
 
-    Attributes
-    ----------
-    mean_square : float
-        Of the errors; rad^2, (m/s)^2 or m^2. NaN where there is no window.
-    count : int
-        Windows; those with a gap in them are left out.
-    pairs : ndarray, shape (lags,)
-        Pairs of windows that begin so many blocks apart, from 0; in one segment only.
-    """
-
-    mean_square: float
-    count: int
+    mean_square: float  # of the errors; rad^2, (m/s)^2 or m^2. NaN where there is no window
+    count: int  # windows; those with a gap in them are left out
+    # shape (lags,); pairs of windows that begin so many blocks apart, from 0; in one segment only
     pairs: Array
 
 

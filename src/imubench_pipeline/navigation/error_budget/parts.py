@@ -148,17 +148,10 @@ class Largest:
 
     A printed turn-on bias counts as delivered; where it alone breaks the limit, a calibration may
     take it down to what there is room for. All these figures share the room.
-
-    Attributes
-    ----------
-    room : float
-        Of each of them: the error that it may add, 1 sigma; 0 where there is none.
-    biases : tuple of Contribution
-        The printed biases that break the limit.
     """
 
-    room: float
-    biases: tuple[Contribution, ...] = ()
+    room: float  # of each of them: the error that it may add, 1 sigma; 0 where there is none
+    biases: tuple[Contribution, ...] = ()  # the printed biases that break the limit
 
     @classmethod
     def of(cls, budget: Budget, limit: float | None, upper: float) -> Largest:

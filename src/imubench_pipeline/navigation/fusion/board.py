@@ -26,17 +26,11 @@ class Shared:
 
     Such are the temperature of a board, the noise of its supply, and a motion that is not wanted
     (sensitivity 1): the errors that come of it go together and are not averaged away.
-
-    Attributes
-    ----------
-    model : NoiseModel
-        The process in its own unit, say K (kelvin); it is taken at the fused rate.
-    sensitivity : sequence of float
-        SI unit of the sensors per that unit, one a sensor; the sign is kept: sensors of opposite
-        signs can cancel it.
     """
 
-    model: NoiseModel
+    model: NoiseModel  # the process in its own unit, say K (kelvin); it is taken at the fused rate
+    # SI unit of the sensors per that unit, one a sensor; the sign is kept: sensors of opposite
+    # signs can cancel it
     sensitivity: Sequence[float]
 
 
@@ -46,20 +40,11 @@ class Parts:
 
     The covariance of the sensors is diag(own) + sum over s of shared_s g_s g_s^T. It is kept in
     these parts: where what is common is far the largest, the sum would have lost the rest.
-
-    Attributes
-    ----------
-    own : ndarray, shape (m, n)
-        Of what each sensor has alone, SI^2.
-    shared : ndarray, shape (m, s)
-        Of the shared processes, in their squared units.
-    sensitivities : ndarray, shape (s, n)
-        g: SI per these units.
     """
 
-    own: Array
-    shared: Array
-    sensitivities: Array
+    own: Array  # shape (m, n); of what each sensor has alone, SI^2
+    shared: Array  # shape (m, s); of the shared processes, in their squared units
+    sensitivities: Array  # shape (s, n); g: SI per these units
 
     def of_sum(self, weights: NDArray[Any]) -> Array:
         """Return the variances of weighed sums, alone and in common.

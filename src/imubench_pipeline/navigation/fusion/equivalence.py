@@ -53,21 +53,11 @@ def number_needed(own: ArrayLike, common: ArrayLike, wanted: ArrayLike) -> Array
 
 @dataclass(frozen=True)
 class TemperaturePart:
-    """What temperature adds to a channel: all specimens on a board follow it together.
+    """What temperature adds to a channel: all specimens on a board follow it together."""
 
-    Attributes
-    ----------
-    tau : ndarray, shape (t,)
-        s.
-    deviation : ndarray, shape (t,)
-        Its Allan deviation over the recording, (rad/s) or (m/s²).
-    relative_error : float
-        Standard deviation of the sensitivity over its value.
-    """
-
-    tau: Array
-    deviation: Array
-    relative_error: float
+    tau: Array  # shape (t,); s
+    deviation: Array  # shape (t,); its Allan deviation over the recording, (rad/s) or (m/s²)
+    relative_error: float  # standard deviation of the sensitivity over its value
 
     def variance(self, tau: float) -> float:
         """Return its Allan variance at a tau in s, (rad/s)² or (m/s²)²."""
@@ -82,30 +72,18 @@ class TemperaturePart:
 
 @dataclass(frozen=True)
 class FusionChannel:
-    """A channel that may answer for its sensor.
-
-    Attributes
-    ----------
-    sensor, recording, channel : str
-    simulated : bool
-    duration : float
-        Of the recording, s.
-    estimate : Estimate
-        The recommended one; where temperature is taken out, that of what it leaves.
-    temperature : TemperaturePart, optional
-        What is taken out.
-    joint : callable, optional
-        Gives the joint draws of the estimate where the estimate has not got them with it: of a
-        run they are read of the channels that answer alone.
-    """
+    """A channel that may answer for its sensor."""
 
     sensor: str
     recording: str
     channel: str
     simulated: bool
-    duration: float
+    duration: float  # of the recording, s
+    # the recommended one; where temperature is taken out, that of what it leaves
     estimate: Estimate
-    temperature: TemperaturePart | None = None
+    temperature: TemperaturePart | None = None  # what is taken out
+    # gives the joint draws of the estimate where the estimate has not got them with it: of a run
+    # they are read of the channels that answer alone
     joint: Callable[[], JointDraws | None] | None = None
 
     def drawn(self, draws: int, rng: np.random.Generator) -> list[NoiseModel]:
@@ -159,26 +137,16 @@ def _alone(name: str, group: Mapping[str, Parameter], tau: float) -> float:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a sensor has at one tau.
+    """What a sensor has at one tau."""
 
-    Attributes
-    ----------
-    candidate : FusionChannel
-        The channel that answers.
-    own, common : float
-        Allan variance of one specimen without the common part, and this, SI.
-    drawn_own, drawn_common : ndarray, shape (draws,)
-        The same of the models that the log allows.
-    unknown : str or None
-        The parameters that matter and are not known: there is no plain number.
-    """
-
-    candidate: FusionChannel
+    candidate: FusionChannel  # the channel that answers
+    # own, common: Allan variance of one specimen without the common part, and this, SI
     own: float
     common: float
+    # drawn_own, drawn_common: shape (draws,); the same of the models that the log allows
     drawn_own: Array
     drawn_common: Array
-    unknown: str | None
+    unknown: str | None  # the parameters that matter and are not known: there is no plain number
 
 
 def answer(

@@ -125,20 +125,11 @@ def _octaves(start: float, end: float) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class FusedCurve:
-    """The predicted Allan variance of a virtual sensor.
+    """The predicted Allan variance of a virtual sensor."""
 
-    Attributes
-    ----------
-    tau : ndarray, shape (m,)
-        s.
-    variance : ndarray, shape (m,)
-        (rad/s)^2 or (m/s^2)^2.
-    common : ndarray, shape (m,)
-        The part of it that comes of what the sensors share: more sensors do not lower it.
-    """
-
-    tau: Array
-    variance: Array
+    tau: Array  # shape (m,); s
+    variance: Array  # shape (m,); (rad/s)^2 or (m/s^2)^2
+    # shape (m,); the part of it that comes of what the sensors share: more sensors do not lower it
     common: Array
 
     @property

@@ -37,18 +37,13 @@ class Weights(Protocol):
 class Constant:
     """Weights that are the same at every frequency.
 
-    Attributes
-    ----------
-    values : ndarray, shape (n,)
-        Their sum is 1: what all sensors measure alike passes unchanged.
-
     Raises
     ------
     ValueError
         If there is not one weight a sensor, or their sum is not 1 or not a number.
     """
 
-    values: Array
+    values: Array  # shape (n,); their sum is 1: what all sensors measure alike passes unchanged
 
     def __post_init__(self) -> None:
         if self.values.ndim != 1 or not abs(self.values.sum() - 1.0) <= 1e-9:

@@ -17,37 +17,22 @@ _TAKEN = {"N": "N", "B_curve": "B", "K": "K", "T_B": "T_B"}
 
 @dataclass(frozen=True)
 class Span:
-    """The least and the largest value that a figure may have.
+    """The least and the largest value that a figure may have."""
 
-    Attributes
-    ----------
-    low, high : float
-        SI.
-    words : str
-        What it is from, where it is assumed; empty: as printed.
-    """
-
+    # low, high: SI
     low: float
     high: float
-    words: str = ""
+    words: str = ""  # what it is from, where it is assumed; empty: as printed
 
 
 @dataclass(frozen=True)
 class MeasuredRanges:
-    """Ranges of measured parameters, by sensor, quantity and figure.
+    """Ranges of measured parameters, by sensor, quantity and figure."""
 
-    Attributes
-    ----------
-    of_sensor : dict
-        (sensor, quantity, figure) -> (low, high), SI.
-    classes : dict of str to str
-        The class of each sensor that states one.
-    printed : dict
-        (sensor, quantity) -> (low, high) of B, SI, as datasheets have it: where none is measured.
-    """
-
+    # (sensor, quantity, figure) -> (low, high), SI
     of_sensor: Mapping[tuple[str, str, str], tuple[float, float]]
-    classes: Mapping[str, str]
+    classes: Mapping[str, str]  # the class of each sensor that states one
+    # (sensor, quantity) -> (low, high) of B, SI, as datasheets have it: where none is measured
     printed: Mapping[tuple[str, str], tuple[float, float]] = field(default_factory=dict)
 
     def span(self, price_class: str | None, quantity: str, figure: str) -> Span | None:

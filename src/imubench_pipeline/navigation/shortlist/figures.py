@@ -25,24 +25,16 @@ End = Literal["best", "worst"]
 
 @dataclass(frozen=True)
 class Figures:
-    """What a quantity of a sensor may have.
+    """What a quantity of a sensor may have."""
 
-    Attributes
-    ----------
-    N, B, K : Span or None
-        SI; None: not published, and known of no other sensor. It is 0 at best then, and the worst
-        is not known.
-    times : tuple of (float or None)
-        Correlation times of the process that B may be, s; None: flicker noise.
-    assumed : tuple of str
-        What stands for what is not printed, in words.
-    """
-
+    # N, B, K: SI; None: not published, and known of no other sensor. It is 0 at best then, and the
+    # worst is not known
     N: Span
     B: Span | None
     K: Span | None
+    # correlation times of the process that B may be, s; None: flicker noise
     times: tuple[float | None, ...]
-    assumed: tuple[str, ...]
+    assumed: tuple[str, ...]  # what stands for what is not printed, in words
 
     @property
     def bounded(self) -> bool:

@@ -64,21 +64,12 @@ _DIMENSIONS = {
 
 @dataclass(frozen=True)
 class Rests:
-    """What a verdict on a sensor rests on.
+    """What a verdict on a sensor rests on."""
 
-    Attributes
-    ----------
-    lacking : tuple of str
-        What it must have and has not.
-    unknown : tuple of str
-        What it must have, and nobody knows whether it has.
-    figures : mapping of (str, str) to float
-        Figures that are not known, or too large, by ``gyro`` or ``accel`` and cause, with the
-        largest with which every limit is kept, SI.
-    """
-
-    lacking: tuple[str, ...]
-    unknown: tuple[str, ...]
+    lacking: tuple[str, ...]  # what it must have and has not
+    unknown: tuple[str, ...]  # what it must have, and nobody knows whether it has
+    # figures that are not known, or too large, by ``gyro`` or ``accel`` and cause, with the largest
+    # with which every limit is kept, SI
     figures: Mapping[tuple[str, str], float]
 
     @classmethod

@@ -18,26 +18,17 @@ _BACKTEST = ("requirement", "sensor", "recording", "channel", "error", "time")
 
 @dataclass(frozen=True)
 class Basis:
-    """The recordings of a run, by sensor and name.
+    """The recordings of a run, by sensor and name."""
 
-    Attributes
-    ----------
-    recordings : mapping
-        The row of the table ``recordings``.
-    doubts : mapping
-        The rows of the table ``doubts``.
-    channels : mapping
-        The channels that were analysed, and whether anything is known of their noise.
-    apart : mapping
-        Why a recording does not decide, of those that do not.
-    backtests : mapping
-        What the logs themselves show, by what names the rows of the table ``backtest``.
-    """
-
+    # the row of the table ``recordings``
     recordings: Mapping[Key, Row] = field(default_factory=dict)
+    # the rows of the table ``doubts``
     doubts: Mapping[Key, Sequence[Row]] = field(default_factory=dict)
+    # the channels that were analysed, and whether anything is known of their noise
     channels: Mapping[Key, Mapping[str, bool]] = field(default_factory=dict)
+    # why a recording does not decide, of those that do not
     apart: Mapping[Key, str] = field(default_factory=dict)
+    # what the logs themselves show, by what names the rows of the table ``backtest``
     backtests: Mapping[tuple[Any, ...], Row] = field(default_factory=dict)
 
     @classmethod

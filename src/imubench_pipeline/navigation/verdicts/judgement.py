@@ -30,37 +30,18 @@ _WORST_FIRST = (
 
 @dataclass(frozen=True)
 class Judgement:
-    """A sensor and a requirement.
+    """A sensor and a requirement."""
 
-    Attributes
-    ----------
-    name : str
-        Of the requirement.
-    requirement : Requirement
-    sensor : str
-    standings : sequence of Standing
-        One a limit.
-    decides : Standing
-        The one of them with which the sensor stands.
-    weak : sequence of list of str
-        What makes the evidence of each limit weak; empty also where nothing is known.
-    outside : str or None
-        Why the requirement does not admit the sensor.
-    rests : Rests
-        On what the verdict rests beside the errors that are known.
-    unless : Unless or None
-        What the verdict would be, if what is doubted were mended.
-    """
-
-    name: str
+    name: str  # of the requirement
     requirement: Requirement
     sensor: str
-    standings: Sequence[Standing]
-    decides: Standing
+    standings: Sequence[Standing]  # one a limit
+    decides: Standing  # the one of them with which the sensor stands
+    # what makes the evidence of each limit weak; empty also where nothing is known
     weak: Sequence[Sequence[str]]
-    outside: str | None
-    rests: Rests
-    unless: Unless | None
+    outside: str | None  # why the requirement does not admit the sensor
+    rests: Rests  # on what the verdict rests beside the errors that are known
+    unless: Unless | None  # what the verdict would be, if what is doubted were mended
 
     @property
     def verdict(self) -> str:

@@ -41,24 +41,13 @@ _MEANT = {
 
 @dataclass(frozen=True)
 class Unless:
-    """What the verdict on a sensor would be.
+    """What the verdict on a sensor would be."""
 
-    Attributes
-    ----------
-    logged : Standing or None
-        The limit that would decide with the figures as they were logged; None: as it does.
-    mended : Standing or None
-        With the factors of the doubts; None where there are none.
-    factors : mapping of str to float
-        By quantity.
-    doubts : mapping of (str, str) to str
-        What is doubted of each recording that is concerned.
-    """
-
+    # the limit that would decide with the figures as they were logged; None: as it does
     logged: Standing | None
-    mended: Standing | None
-    factors: Factors
-    doubts: Mapping[tuple[str, str], str]
+    mended: Standing | None  # with the factors of the doubts; None where there are none
+    factors: Factors  # by quantity
+    doubts: Mapping[tuple[str, str], str]  # what is doubted of each recording that is concerned
 
 
 def unless(sensor: str, rows: Sequence[Row], basis: Basis) -> Unless | None:

@@ -14,22 +14,13 @@ Kind = Literal["estimate", "not identified", "limit"]
 
 @dataclass(frozen=True)
 class Mark:
-    """What the figure shows of one estimate.
+    """What the figure shows of one estimate."""
 
-    Attributes
-    ----------
-    place : float
-        Distance from the top, mm.
-    kind : str
-    value : float or None
-        The estimate; of a limit the limit; of what is not identified what the model has.
-    lower, upper : float or None
-        95 % limits.
-    """
-
-    place: float
+    place: float  # distance from the top, mm
     kind: Kind
+    # the estimate; of a limit the limit; of what is not identified what the model has
     value: float | None
+    # lower, upper: 95 % limits
     lower: float | None = None
     upper: float | None = None
 
