@@ -121,15 +121,7 @@ def standard(
 ) -> Iterator[Question]:
     """Yield the questions that every recording answers.
 
-    Parameters
-    ----------
-    times : sequence of float
-        s.
-    window : float
-        Static window before, s.
-    latitude : float
-        rad.
-    axes : sequence of str
+    Of each time, s, after a static window, s, for these axes; north at a latitude in rad.
     """
     start = Start.calibrated(window)
     quantities: tuple[Quantity, ...] = ("attitude", "heading", "velocity", "position")

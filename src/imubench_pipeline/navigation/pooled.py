@@ -109,17 +109,13 @@ def pool(
 ) -> Pool:
     """Pool the estimates of a positive parameter (model and sources: see the module).
 
+    tau is by Paule and Mandel, Q(tau^2) = K - 1; its limits by Viechtbauer's Q-profile.
+
     Parameters
     ----------
-    values : iterable of float or None, shape (K,)
-        Estimates, in any one unit; None or NaN where there is none.
-    lower, upper : iterable of float or None, shape (K,)
-        Their 95 % limits. A recording counts if 0 < lower < value < upper < infinity.
-
-    Returns
-    -------
-    Pool
-        tau by Paule and Mandel, Q(tau^2) = K - 1; its limits by Viechtbauer's Q-profile.
+    values, lower, upper : iterable of float or None, shape (K,)
+        Estimates in any one unit, and their 95 % limits. One counts if 0 < lower < value < upper <
+        infinity.
 
     Raises
     ------
@@ -246,17 +242,8 @@ def turn_on_bias(means: Iterable[float | None]) -> TurnOnBias:
     """Return the spread of the fixed bias from recording to recording.
 
     Its limits: (K - 1) s^2 / sigma^2 is chi-squared. Whatever else a mean holds is in it too: the
-    slow noise of a recording and, of an accelerometer, gravity as it lay.
-
-    Parameters
-    ----------
-    means : iterable of float or None, shape (K,)
-        Mean of the channel in each recording, rad/s or m/s^2; None and NaN are left out.
-
-    Returns
-    -------
-    TurnOnBias
-        Of one mean only itself, of none only the counts.
+    slow noise of a recording and, of an accelerometer, gravity as it lay. The means are in rad/s or
+    m/s^2; None and NaN are left out. Of one mean it has only itself, of none only the counts.
     """
     listed = list(means)
     present = [mean for mean in listed if mean is not None and math.isfinite(mean)]
@@ -298,10 +285,14 @@ def _same_devices(pairs: Sequence[tuple[float, str]]) -> float | None:
 def pooled_rows(
     parameters: Iterable[Row], biases: Iterable[Row], devices: Mapping[tuple[str, str], str]
 ) -> Iterator[dict[str, Any]]:
-    """Yield the rows of the table ``pooled``.
+    """Yield the rows of the table ``pooled``, with the `COLUMNS`.
 
     One (device None) for each sensor with two recordings or more and, where it has more than one
-    device, one for each device with two or more. None where no recording has the parameter.
+    device, one for each device with two or more. None where no recording has the parameter, of
+    `POOLED` or ``bias``. All numbers are in ``unit``: of a noise parameter the spread is ``value``
+    times tau (see `Pool`), of a bias the deviation. A parameter that some recordings have and
+    others lack is never ``agree``; those without T_B (models without a Gauss-Markov term) do not
+    count for it. A bias has no verdict.
 
     Parameters
     ----------
@@ -312,14 +303,6 @@ def pooled_rows(
         ``sensor, recording, channel, value, unit``: the mean of the channel, SI.
     devices : mapping of (sensor, recording) to str
         The device; a recording that is not there is a device of its own.
-
-    Yields
-    ------
-    dict
-        The `COLUMNS`; ``parameter`` is of `POOLED`, or ``bias``. All numbers are in ``unit``: of a
-        noise parameter the spread is ``value`` times tau (see `Pool`), of a bias the deviation. A
-        parameter that some recordings have and others lack is never ``agree``; those without T_B
-        (models without a Gauss-Markov term) do not count for it. A bias has no verdict.
     """
     # By channel, parameter and recording; under "" every recording, as one that lacks the term.
     tables: dict[tuple[str, str], dict[str, dict[str, Row | None]]] = {}

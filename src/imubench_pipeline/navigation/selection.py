@@ -15,18 +15,12 @@ _SHOWN = 3
 
 
 def ranked(judged: Sequence[Judgement], basis: Basis) -> Iterator[Row]:
-    """Yield the rows of the table ``ranking``.
+    """Yield the rows of the table ``ranking``, of judgements and the recordings that they stand on.
 
     A sensor stands where its limit with the least margin stands. Its rank is one more than the
-    number of sensors that are surely better, whose interval lies wholly above its own: sensors
-    with overlapping intervals are tied. One with a figure that is not known is surely better than
+    number of sensors that are surely better, whose interval lies wholly above its own: sensors with
+    overlapping intervals are tied. One with a figure that is not known is surely better than
     another only where that of the other is not known, too.
-
-    Parameters
-    ----------
-    judged : sequence of Judgement
-    basis : Basis
-        Of the recordings that they stand on.
     """
     for name in dict.fromkeys(judgement.name for judgement in judged):
         own = [judgement for judgement in judged if judgement.name == name]

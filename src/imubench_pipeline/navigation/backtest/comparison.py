@@ -58,17 +58,9 @@ class Predicted:
     efficient: bool = True
 
     def limits(self, level: float = 0.95) -> tuple[float, float]:
-        """Return between what limits the mean square of the log lies, if the model is right.
+        """Return between what limits the mean square of a part ``level`` of all logs lies.
 
-        Parameters
-        ----------
-        level : float
-            In that part of all logs.
-
-        Returns
-        -------
-        (float, float)
-            rad^2, (m/s)^2 or m^2.
+        If the model is right; in rad^2, (m/s)^2 or m^2.
         """
         means = np.array([spread.mean for spread in self.spreads])
         logarithms = np.log(means)
@@ -85,13 +77,8 @@ class Predicted:
     def chance_above(self, mean_square: float) -> float:
         """Return the chance of so large a mean square, or a larger one, if the model is right.
 
-        Here the uncertainty of the model counts in full beside the scatter: to doubt a log, more
-        is asked than that a ratio is outside its range.
-
-        Parameters
-        ----------
-        mean_square : float
-            Of the log; rad^2, (m/s)^2 or m^2.
+        Here the uncertainty of the model counts in full beside the scatter: to doubt a log, more is
+        asked than that a ratio is outside its range. The mean square is in rad^2, (m/s)^2 or m^2.
         """
         means = np.array([spread.mean for spread in self.spreads])
         variances = np.array([spread.variance for spread in self.spreads])
@@ -228,12 +215,7 @@ def words(row: Row) -> str:
 def findings(rows: Iterable[Row]) -> Iterator[Row]:
     """Yield the rows of the table ``findings`` of logs that contradict their own budgets.
 
-    One a channel, of the error whose ratio is least likely.
-
-    Parameters
-    ----------
-    rows : iterable of mapping
-        Of the table ``backtest``.
+    One a channel, of the error whose ratio is least likely; from rows of the table ``backtest``.
     """
     worst: dict[tuple[str, str, str], Row] = {}
     for row in rows:

@@ -57,20 +57,10 @@ class Window:
         return self.moving * self.block
 
     def weights(self, order: int) -> Array:
-        """Return what each block mean counts in the error; their sum is 0.
+        """Return what each block mean counts in the error, s^(m+1), shape (blocks,); their sum: 0.
 
         In motion it is the integral of (t - s)^m / m! over the block, at rest -c / W times the
-        length of the block, with c = t^(m+1) / (m+1)!.
-
-        Parameters
-        ----------
-        order : int
-            m: integrations but one.
-
-        Returns
-        -------
-        ndarray, shape (blocks,)
-            s^(m+1).
+        length of the block, with c = t^(m+1) / (m+1)!; ``order`` is m, integrations but one.
         """
         left = self.block * np.arange(self.moving, -1, -1, dtype=np.float64)
         grown = left ** (order + 1) / math.factorial(order + 1)
@@ -80,17 +70,7 @@ class Window:
 def window(rest: float, time: float, rate: float) -> Window | None:
     """Return a window in blocks that divide both its parts as evenly as possible.
 
-    Parameters
-    ----------
-    rest, time : float
-        W and t, s.
-    rate : float
-        Hz.
-
-    Returns
-    -------
-    Window or None
-        None where its shorter part has no sample.
+    Its parts W and t in s, the rate in Hz; None where the shorter part has no sample.
     """
     shorter, longer = sorted((rest, time))
     # A rate that is found from stamps may be a little low.
@@ -154,15 +134,7 @@ def errors(means: Sequence[Array], weights: Array, lags: int) -> Errors:
 def correlated(values: Array, weights: Array) -> Array:
     """Return the sums of weights times values, one for every place that the weights fit in.
 
-    Parameters
-    ----------
-    values : ndarray, shape (n,)
-    weights : ndarray, shape (p,)
-        p <= n.
-
-    Returns
-    -------
-    ndarray, shape (n - p + 1,)
+    Of values, shape (n,), and weights, shape (p,), p <= n, they have the shape (n - p + 1,).
     """
     length = 1 << (len(values) - 1).bit_length()
     # What wraps around comes to the places that are cut off.

@@ -47,17 +47,9 @@ class Parts:
     sensitivities: Array  # shape (s, n); g: SI per these units
 
     def of_sum(self, weights: NDArray[Any]) -> Array:
-        """Return the variances of weighed sums, alone and in common.
+        """Return the variances of weighed sums, alone and in common, SI^2, shape (m, 2).
 
-        Parameters
-        ----------
-        weights : ndarray, shape (m, n)
-            Real or complex.
-
-        Returns
-        -------
-        ndarray, shape (m, 2)
-            SI^2.
+        The weights have the shape (m, n), real or complex.
         """
         alone = np.sum(self.own * np.abs(weights) ** 2, axis=1)
         common = np.sum(self.shared * np.abs(weights @ self.sensitivities.T) ** 2, axis=1)
@@ -168,10 +160,8 @@ class Board:
     def allan_parts(self, tau: ArrayLike) -> Parts:
         """Return the Allan variances of what the sensors have alone and in common.
 
-        Parameters
-        ----------
-        tau : array_like, shape (m,)
-            s; taken to the nearest whole number of fused samples, at least one.
+        At tau, s, array_like of shape (m,): taken to the nearest whole number of fused samples, at
+        least one.
         """
         t = np.atleast_1d(np.asarray(tau, dtype=np.float64))
         t = np.maximum(np.rint(t * self.rate), 1.0) / self.rate
@@ -182,10 +172,7 @@ class Board:
     def spectral_parts(self, omega: ArrayLike) -> Parts:
         """Return the spectra of the fused samples; ramps and lines have none.
 
-        Parameters
-        ----------
-        omega : array_like, shape (m,)
-            rad a fused sample, above 0.
+        At omega, rad a fused sample, above 0, array_like of shape (m,).
         """
         w = np.atleast_1d(np.asarray(omega, dtype=np.float64))
         spectra: dict[tuple[int, int], Array] = {}  # specimens of one sensor have one spectrum
@@ -245,20 +232,9 @@ def divided(model: NoiseModel, correlation: Mapping[str, float]) -> tuple[NoiseM
 def block_mean_spectrum(model: NoiseModel, omega: Array, rate: float, size: int) -> Array:
     """Return the spectrum of the means of blocks of samples, with all that is folded into it.
 
-    Parameters
-    ----------
-    model : NoiseModel
-    omega : ndarray, shape (m,)
-        rad a block, above 0 and up to pi.
-    rate : float
-        Of the samples, Hz.
-    size : int
-        Samples in a block.
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        SI^2: sum over k of P((w + 2 pi k)/m) sin^2(w/2) / (m^3 sin^2((w + 2 pi k)/(2m))).
+    sum over k of P((w + 2 pi k)/m) sin^2(w/2) / (m^3 sin^2((w + 2 pi k)/(2m))), SI^2, with w
+    ``omega`` of shape (m,), rad a block, above 0 and up to pi, the rate of the samples in Hz, and m
+    ``size``, samples in a block.
     """
     if size == 1:
         return model.sampled_spectrum(omega, rate)

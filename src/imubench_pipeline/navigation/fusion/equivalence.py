@@ -30,21 +30,14 @@ def number_needed(own: ArrayLike, common: ArrayLike, wanted: ArrayLike) -> Array
     """Return how many sensors of one kind have together the Allan variance that is wanted.
 
     n of them with equal weights have ``own / n + common``: n = own / (wanted - common). Where
-    nothing is common, n is the ratio of the Allan variances.
+    nothing is common, n is the ratio of the Allan variances. It is not rounded, below 1 where less
+    than one would do, and infinite where no number is enough.
 
     Parameters
     ----------
-    own : array_like
-        Allan variance of one, without what all have in common, (rad/s)^2 or (m/s^2)^2.
-    common : array_like
-        What all have in common.
-    wanted : array_like
-        Such as that of one better sensor.
-
-    Returns
-    -------
-    ndarray
-        Not rounded, below 1 where less than one would do; infinite where no number is enough.
+    own, common, wanted : array_like
+        Allan variance of one without what all have in common, that, and such as that of one better
+        sensor; (rad/s)^2 or (m/s^2)^2, in shapes that go together.
     """
     own, common, wanted = np.broadcast_arrays(own, common, wanted)
     room = np.asarray(wanted - common, dtype=np.float64)
@@ -165,8 +158,8 @@ def answer(
     ----------
     sensor : str
     candidates : sequence of FusionChannel
-        All channels of one quantity of the sensor, at least one; where some are measured,
-        simulated ones are left out. Of two the worse one is the median.
+        All channels of one quantity of the sensor, at least one; where some are measured, simulated
+        ones are left out. Of two the worse one is the median.
     tau : float
         s.
     correlation : mapping of str to float
@@ -177,11 +170,6 @@ def answer(
         Models that are drawn of those that the log allows.
     seed : int
         Each channel has a stream of its own.
-
-    Returns
-    -------
-    Answer or str
-        The reason, where there is no answer.
     """
     measured = [channel for channel in candidates if not channel.simulated] or list(candidates)
     long = [channel for channel in measured if tau <= longest * channel.duration]
@@ -219,26 +207,9 @@ def equivalence_rows(
     draws: int,
     seed: int,
 ) -> Iterator[Row]:
-    """Yield the rows of the table ``fusion``: every ordered pair of sensors at every tau.
+    """Yield the rows of the table ``fusion``: every ordered pair of sensors at every tau, s.
 
-    Parameters
-    ----------
-    candidates : iterable of FusionChannel
-        The channels of all sensors.
-    taus : sequence of float
-        s.
-    correlation : mapping of str to float
-        Part of the variance of N, B, K and R that specimens of one sensor have in common.
-    longest : float
-        Longest tau that a log tells, as a part of it.
-    draws : int
-        Noise models that give the interval.
-    seed : int
-
-    Yields
-    ------
-    mapping
-        By column of the table.
+    The candidates are the channels of all sensors; the other parameters are those of `answer`.
     """
     listed = sorted(candidates, key=lambda channel: channel.sensor)
     for quantity in ("gyro", "accel"):

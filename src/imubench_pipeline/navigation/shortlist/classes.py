@@ -36,20 +36,11 @@ class MeasuredRanges:
     printed: Mapping[tuple[str, str], tuple[float, float]] = field(default_factory=dict)
 
     def span(self, price_class: str | None, quantity: str, figure: str) -> Span | None:
-        """Return the range of a figure over the measured sensors of a class.
+        """Return the range of a figure (N, B, K or T_B) over the measured sensors of a class.
 
-        Parameters
-        ----------
-        price_class : str or None
-            As stated; only what stands before a comma or parenthesis counts.
-        quantity, figure : str
-            ``gyro`` or ``accel``; ``N``, ``B``, ``K`` or ``T_B``.
-
-        Returns
-        -------
-        Span or None
-            Over all measured sensors where none of the class is measured; of B where no sensor is
-        measured over datasheets; None: nothing is known.
+        Of the class as stated, only what stands before a comma or parenthesis counts. It is over
+        all measured sensors where none of the class is measured; of B where no sensor is measured
+        over datasheets; None: nothing is known.
         """
         by_sensor = {
             sensor: ends
@@ -83,18 +74,9 @@ def measured_ranges(
 ) -> MeasuredRanges:
     """Return what the logs of a run say, of real sensors and recordings that decide.
 
-    Parameters
-    ----------
-    parameters, recordings : iterable of mapping
-        Rows of the tables.
-    price_classes : mapping of str to str or None
-        Of each sensor.
-
-    Returns
-    -------
-    MeasuredRanges
-        The 95 % limits of what has a value. A random walk that a log does not show may be 0; its
-        upper limit counts only where no log of the sensor shows one.
+    From rows of the tables ``parameters`` and ``recordings``: the 95 % limits of what has a value.
+    A random walk that a log does not show may be 0; its upper limit counts only where no log of the
+    sensor shows one.
     """
     about = list(recordings)
     apart = left_out(about)

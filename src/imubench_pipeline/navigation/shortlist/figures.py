@@ -44,10 +44,6 @@ class Figures:
     def models(self, end: End) -> list[NoiseModel]:
         """Return the models of one end: all figures there, for each correlation time.
 
-        Parameters
-        ----------
-        end : {"best", "worst"}
-
         Raises
         ------
         ValueError
@@ -65,19 +61,7 @@ class Figures:
 
 
 def figures_of(sensor: Sensor, quantity: str, ranges: MeasuredRanges) -> Figures | str:
-    """Return what a datasheet allows of a quantity.
-
-    Parameters
-    ----------
-    sensor : Sensor
-    quantity : {"gyro", "accel"}
-    ranges : MeasuredRanges
-
-    Returns
-    -------
-    Figures or str
-        str: why nothing can be said.
-    """
+    """Return what a datasheet allows of a quantity, or why nothing can be said."""
     if getattr(sensor.datasheet, quantity) is None:
         return f"it has no {SENSORS[quantity]}"
     printed, options = _printed(sensor.datasheet, quantity)
@@ -120,12 +104,9 @@ def figures_of(sensor: Sensor, quantity: str, ranges: MeasuredRanges) -> Figures
 
 
 def printed_ranges(sensors: Mapping[str, Sensor]) -> dict[tuple[str, str], tuple[float, float]]:
-    """Return the range of B that each datasheet of a catalogue allows.
+    """Return the range of B, SI, that each datasheet of a catalogue allows, where it prints one.
 
-    Returns
-    -------
-    dict
-        (sensor, quantity) -> (low, high), SI; without those that print none.
+    (sensor, quantity) -> (low, high).
     """
     ranges = {}
     for name, sensor in sensors.items():

@@ -39,15 +39,7 @@ class Basis:
         parameters: Iterable[Row] = (),
         backtests: Iterable[Row] = (),
     ) -> Basis:
-        """Return it from rows of the tables of these names.
-
-        Parameters
-        ----------
-        recordings, doubts : iterable of mapping
-        parameters : iterable of mapping
-            Those of other methods than the recommended one do not count.
-        backtests : iterable of mapping
-        """
+        """Return it from rows of these tables; of parameters the recommended ones count."""
         about = {_key(row): row for row in recordings}
         doubted: dict[Key, list[Row]] = {}
         for row in doubts:

@@ -81,15 +81,8 @@ def judgements(
 ) -> Iterator[Judgement]:
     """Yield how each sensor stands to each requirement.
 
-    Parameters
-    ----------
-    errors : iterable of mapping
-        Rows of the table ``error_budget``.
-    requirements : mapping of str to Requirement
-    sensors : mapping of str to mapping
-        ``price_class`` of each sensor, and its ``abilities``, where known.
-    basis : Basis
-        The recordings; those that do not decide are left out.
+    Of rows of the table ``error_budget``, ``price_class`` and, where known, ``abilities`` of each
+    sensor, and the recordings, of which those that do not decide are left out.
     """
     by_requirement: dict[str, dict[str, list[Row]]] = {}
     for row in errors:

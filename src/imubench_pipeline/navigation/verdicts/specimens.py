@@ -76,15 +76,9 @@ def expected(
 ) -> Expected:
     """Return the error that the next specimen of a sensor will have.
 
-    Parameters
-    ----------
-    totals : sequence of mapping
-        Rows ``total`` of the table ``error_budget`` of one limit, one a recording; those without a
-        figure do not count.
-    devices : mapping of str to str
-        The specimen of each recording.
-    usual : Spread, optional
-        Of other sensors, for one specimen.
+    Of rows ``total`` of the table ``error_budget`` of one limit, one a recording, of which those
+    without a figure do not count; the specimen of each recording; and the spread of other sensors,
+    for one specimen.
     """
     with_figure = [row for row in totals if row["sigma"] is not None]
     if not with_figure:
@@ -120,10 +114,7 @@ def expected(
 def usual_spread(spreads: Iterable[Spread]) -> Spread | None:
     """Return the spread of several sensors together; None where they tell too little.
 
-    Parameters
-    ----------
-    spreads : iterable of Spread
-        Between specimens, of one sensor each.
+    Each is between specimens, of one sensor.
     """
     listed = list(spreads)
     freedom = sum(spread.freedom for spread in listed)

@@ -87,14 +87,8 @@ def standings(
 ) -> list[Standing]:
     """Return how one sensor stands to each limit of one requirement.
 
-    Parameters
-    ----------
-    rows : iterable of mapping
-        Of the table ``error_budget``.
-    devices : mapping of str to str
-        The specimen of each recording.
-    usual : mapping, optional
-        The spread of other sensors by `limit_of`.
+    Of rows of the table ``error_budget``, the specimen of each recording, and the spread of other
+    sensors by `limit_of`.
     """
     by_limit: dict[tuple[Any, ...], list[Row]] = {}
     for row in rows:
@@ -130,13 +124,7 @@ def _standing(parts: Sequence[Row], devices: Mapping[str, str], usual: Spread | 
 
 
 def deciding(by_limit: Sequence[Standing]) -> Standing:
-    """Return the limit that decides: one that surely fails, whatever is not known of others.
-
-    Parameters
-    ----------
-    by_limit : sequence of Standing
-        Of one sensor.
-    """
+    """Return the limit that decides for a sensor: one that surely fails, whatever is not known."""
     known = [standing for standing in by_limit if standing.known]
     worst = min(known, key=lambda standing: standing.margin, default=by_limit[0])
     unknown = [standing for standing in by_limit if not standing.known]
