@@ -39,19 +39,9 @@ class TriadRuns:
 
 
 def true_means(positions: Positions, site: Site, attitude: Array) -> Array:
-    """Return what a triad without error shows.
+    """Return what a triad without error shows, rad/s and m/s^2, shape (b, 6).
 
-    Parameters
-    ----------
-    positions : Positions
-    site : Site
-    attitude : ndarray, shape (3, 3)
-        In the first position.
-
-    Returns
-    -------
-    ndarray, shape (b, 6)
-        Gyros and accelerometers x, y, z, rad/s and m/s^2.
+    Gyros and accelerometers x, y, z, at an attitude in the first position, shape (3, 3).
     """
     to_body = np.swapaxes(attitude @ positions.of_blocks, 1, 2)
     return np.concatenate([to_body @ site.earth_rate, to_body @ site.specific_force], axis=1)
@@ -66,18 +56,9 @@ def simulate_triad(
     runs: int,
     rng: np.random.Generator,
 ) -> TriadRuns:
-    """Draw the block means of many runs.
+    """Draw the block means of many runs; the fixed biases are drawn for each.
 
-    Parameters
-    ----------
-    triad : Triad
-        The fixed biases are drawn for each run.
-    positions : Positions
-    site : Site
-    attitude : ndarray, shape (3, 3)
-        In the first position.
-    runs : int
-    rng : numpy.random.Generator
+    The attitude is that in the first position, shape (3, 3).
     """
     drawn = [
         simulate_runs(
@@ -142,18 +123,9 @@ def accuracies(
 ) -> Iterator[Accuracy]:
     """Yield how well a triad aligns itself in these times, in one position and in two.
 
-    Parameters
-    ----------
-    triad : Triad
-    site : Site
-    rate : float
-        Sampling rate, Hz.
-    times : sequence of float
-        Rising; each longer than the turn between two positions, s.
-    runs : int
-        Triads that are simulated at the last time, for fine alignment; 0: none.
-    rng : numpy.random.Generator, optional
-        Needed where some are.
+    The rate is that of sampling, Hz; the times rise, each longer than the turn between two
+    positions, s. So many ``runs`` are simulated by ``rng`` at the last time, for fine alignment; 0:
+    none.
     """
     for number in (1, 2):
         for time in times:

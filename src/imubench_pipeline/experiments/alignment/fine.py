@@ -174,23 +174,10 @@ def align(
 ) -> tuple[Aligned, FineAlignment]:
     """Align one run: coarsely, then by filters about the attitude last found until it settles.
 
-    With the filter about a better attitude each time this is Gauss and Newton's method: what is
-    not linear in a large error of the coarse heading goes.
-
-    Parameters
-    ----------
-    means : ndarray, shape (b, 6)
-        Block means of gyros and accelerometers x, y, z, rad/s and m/s^2.
-    triad : Triad
-    positions : Positions
-    site : Site
-
-    Returns
-    -------
-    Aligned
-        Of one run.
-    FineAlignment
-        The last filter, with the standard deviations.
+    With the filter about a better attitude each time this is Gauss and Newton's method: what is not
+    linear in a large error of the coarse heading goes. The means of blocks are of gyros and
+    accelerometers x, y, z, rad/s and m/s^2, shape (b, 6). Beside the attitude of one run the last
+    filter is returned, which has the standard deviations.
 
     Raises
     ------

@@ -88,14 +88,7 @@ class Triad:
         gyro_bias: float,
         accelerometer_bias: float,
     ) -> Triad:
-        """Return a triad whose axes are alike.
-
-        Parameters
-        ----------
-        gyro, accelerometer : NoiseModel
-        gyro_bias, accelerometer_bias : float
-            rad/s and m/s^2.
-        """
+        """Return a triad whose axes are alike; the biases are in rad/s and m/s^2."""
         return cls(
             gyros=(gyro,) * 3,
             accelerometers=(accelerometer,) * 3,
@@ -137,17 +130,7 @@ class Positions:
 
     @classmethod
     def at_rest(cls, duration: float, block: float, rate: float) -> Positions:
-        """Return one position.
-
-        Parameters
-        ----------
-        duration : float
-            s.
-        block : float
-            Of a block at most, s.
-        rate : float
-            Sampling rate, Hz.
-        """
+        """Return one position, in blocks of so many s at most; the sampling rate is in Hz."""
         samples = max(round(duration * rate), 1)
         run = Experiment((Dwell(0, samples, 1),), rate, 0.0)
         return cls(run.blocks(max(round(block * rate), 1)), np.eye(3)[None])
@@ -158,16 +141,9 @@ class Positions:
     ) -> Positions:
         """Return positions that differ by turns about the z axis, exactly known.
 
-        Parameters
-        ----------
-        headings : sequence of float
-            Angle of each position from the first, rad; 0, pi is the classical pair.
-        dwell, turning : float
-            Data in each position, and the time between two, s.
-        block : float
-            Of a block at most, s.
-        rate : float
-            Sampling rate, Hz.
+        The headings are angles from the first, rad; 0, pi is the classical pair. ``dwell`` is the
+        data in each position, ``turning`` the time between two, ``block`` that of a block at most,
+        s; the sampling rate is in Hz.
         """
         run = Experiment.regular(
             dwell=dwell, turning=turning, dwells=len(headings), rate=rate, latitude=0.0

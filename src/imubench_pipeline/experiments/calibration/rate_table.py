@@ -234,12 +234,7 @@ class RateTable:
         return math.hypot(bias, self._earth_sigma), float(scale)
 
     def fit(self, means: Array) -> Calibration:
-        """Estimate bias and scale factor in runs of this design.
-
-        Parameters
-        ----------
-        means : ndarray, shape (runs, b)
-            Block means, rad/s.
+        """Estimate bias and scale factor in runs of this design from block means, rad/s, (runs, b).
 
         Raises
         ------
@@ -295,26 +290,10 @@ def calibrate(
     *,
     setting_sigma: float = 0.0,
 ) -> tuple[Calibration, Measured]:
-    """Return bias and scale factor of a gyro from a log on a rate table.
+    """Return bias and scale factor of a gyro from a log on a rate table, and its block means.
 
-    Parameters
-    ----------
-    log : ndarray, shape (n,)
-        rad/s; NaN where a sample is missing.
-    schedule : Schedule
-    model : NoiseModel
-        Of the gyro.
-    pointing : Pointing, optional
-        Direction of the table's axis.
-    setting_sigma : float
-        Of the table's rate, see `RateTable`, rad/s.
-
-    Returns
-    -------
-    Calibration
-        Of one run.
-    Measured
-        The block means, and what was left out.
+    The log is in rad/s, shape (n,); NaN where a sample is missing. The other parameters are those
+    of `RateTable`.
 
     Raises
     ------
@@ -375,19 +354,10 @@ def residuals(
     model: NoiseModel,
     setting_sigma: float = 0.0,
 ) -> Residuals:
-    """Return what the line leaves of each steady rate.
+    """Return what the line leaves of each steady rate, of a calibration of one run.
 
-    Parameters
-    ----------
-    calibration : Calibration
-        Of one run.
-    measured : Measured
-        Its block means.
-    rates : ndarray, shape (b,)
-        Rate that each block sensed, table and Earth, rad/s.
-    model : NoiseModel
-    setting_sigma : float
-        Standard deviation of the table's true rate about the stated one, rad/s.
+    The rates, table and Earth, are those that each block sensed, shape (b,), rad/s; the true rate
+    is about the stated one by ``setting_sigma``, rad/s.
     """
     blocks = measured.blocks
     dwell, place = np.unique(blocks.dwell, return_inverse=True)

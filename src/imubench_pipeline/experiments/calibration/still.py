@@ -114,12 +114,7 @@ class StillRun:
         return float(self._fixed.sigma[0])
 
     def fit(self, means: Array) -> StillBias:
-        """Estimate the bias in runs of this design.
-
-        Parameters
-        ----------
-        means : ndarray, shape (runs, b)
-            Block means, rad/s.
+        """Estimate the bias in runs of this design from block means, rad/s, shape (runs, b).
 
         Raises
         ------
@@ -175,22 +170,8 @@ def bias_at_rest(
 ) -> StillBias:
     """Return the bias of a gyro from a log at rest.
 
-    Parameters
-    ----------
-    log : ndarray, shape (n,)
-        rad/s; NaN where a sample is missing.
-    rate : float
-        Hz.
-    model : NoiseModel
-        Of the gyro.
-    pointing : Pointing
-    longest : int, optional
-        Samples of a block at most; by default so many that nothing is lost.
-
-    Returns
-    -------
-    StillBias
-        Of one run.
+    The log is in rad/s, shape (n,); NaN where a sample is missing; the rate in Hz. A block has
+    ``longest`` samples at most; by default so many that nothing is lost.
 
     Raises
     ------

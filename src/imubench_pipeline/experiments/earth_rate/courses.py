@@ -67,13 +67,9 @@ class Courses:
 
 
 def white_sigma(model: NoiseModel, blocks: Blocks) -> float:
-    """Return N / sqrt(T) / cos(latitude), below which no estimate from T s of data can be, rad/s.
+    """Return N / sqrt(T) / cos(latitude), rad/s, below which no estimate from T s of data can be.
 
-    Parameters
-    ----------
-    model : NoiseModel
-    blocks : Blocks
-        T is the time that their samples stand for.
+    T is the time that the samples of the blocks stand for.
     """
     return model.N / math.sqrt(blocks.time_in_blocks) / math.cos(blocks.latitude)
 
@@ -159,10 +155,7 @@ def _tracked(log: Array, experiment: Experiment, papers: NoiseModel) -> Course:
 def thin(points: int) -> Iterator[int]:
     """Yield places of a course that show it: as many at its begin as later, and its end.
 
-    Parameters
-    ----------
-    points : int
-        Of the course; about 400 are kept.
+    About 400 are kept.
     """
     if points <= _KEPT:
         yield from range(points)
@@ -177,21 +170,9 @@ def sigma_ranges(
 ) -> dict[str, Range]:
     """Return the limits of the standard deviation of each method at the end of a run.
 
-    Parameters
-    ----------
-    blocks : Blocks
-    model : NoiseModel
-        As estimated.
-    drawn : sequence of NoiseModel
-        From the limits of its parameters.
-    turn_on_bias : float or None
-        Standard deviation of the fixed bias, rad/s; None: not known.
-
-    Returns
-    -------
-    dict
-        By method, ``sigma_lower`` and ``sigma_upper``, rad/s; none where nothing is drawn, or the
-        method has no estimate.
+    By method ``sigma_lower`` and ``sigma_upper``, rad/s, over models drawn from the limits of the
+    parameters of the estimated one; none where nothing is drawn, or the method has no estimate. The
+    standard deviation of the fixed bias is in rad/s; None: not known.
     """
     if not drawn:
         return {}

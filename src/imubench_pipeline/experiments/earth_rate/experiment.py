@@ -90,20 +90,9 @@ class Experiment:
     ) -> Experiment:
         """Return an experiment that keeps to a schedule.
 
-        Parameters
-        ----------
-        dwell : float
-            Data in each dwell, s; taken to the nearest whole number of samples, at least one.
-        turning : float
-            Time between dwells, s; likewise, from 0.
-        dwells : int
-            How many, one more than turns.
-        rate : float
-            Hz.
-        latitude : float
-            rad.
-        first : {1, -1}
-            Sense of the first dwell.
+        Data in each of so many dwells (at least one sample) and time between them are in s, taken
+        to the nearest whole number of samples; the rate is in Hz, the latitude in rad. ``first`` is
+        the sense of the first dwell.
         """
         length = max(round(dwell * rate), 1)
         period = length + max(round(turning * rate), 0)
@@ -121,10 +110,7 @@ class Experiment:
     def blocks(self, longest: int) -> Blocks:
         """Return the blocks of a log without missing samples.
 
-        Parameters
-        ----------
-        longest : int
-            Samples of a block at most; a dwell is divided evenly (`block_length`).
+        Of ``longest`` samples at most; a dwell is divided evenly (`block_length`).
 
         Raises
         ------
@@ -191,17 +177,9 @@ class Blocks:
         return float(self.count.sum()) / self.rate
 
     def check_means(self, means: Array) -> None:
-        """Check that there is one finite mean a block: without one a block is none.
+        """Raise a ValueError if there is not one finite mean a block: without one a block is none.
 
-        Parameters
-        ----------
-        means : ndarray, shape (runs, b)
-            See `block_means`.
-
-        Raises
-        ------
-        ValueError
-            If it is not so.
+        The means have the shape (runs, b), see `block_means`.
         """
         if means.ndim != 2 or means.shape[1] != len(self):
             raise ValueError(
@@ -211,12 +189,7 @@ class Blocks:
             raise ValueError("a block mean is not finite; leave its block out")
 
     def chosen(self, which: NDArray[np.bool_] | NDArray[np.int64] | slice) -> Blocks:
-        """Return some of the blocks.
-
-        Parameters
-        ----------
-        which : ndarray of bool, shape (b,), or of int, or slice
-        """
+        """Return some of the blocks: by bool, shape (b,), by number, or a slice."""
         return replace(
             self,
             start=self.start[which],
@@ -234,16 +207,9 @@ class Blocks:
         return replace(self.chosen(first), stop=self.stop[last], count=count)
 
     def means_of_dwells(self, means: Array) -> Array:
-        """Return the mean of each dwell over its samples present.
+        """Return the mean of each dwell over its samples present, shape (runs, dwells).
 
-        Parameters
-        ----------
-        means : ndarray, shape (runs, b)
-            Of the blocks, rad/s.
-
-        Returns
-        -------
-        ndarray, shape (runs, dwells)
+        Of the means of blocks, rad/s, shape (runs, b).
         """
         first = np.flatnonzero(np.diff(self.dwell, prepend=-1))
         total = np.add.reduceat(means * self.count, first, axis=1)
@@ -262,21 +228,14 @@ class Measured:
 
 
 def block_means(parts: Iterable[Array], experiment: Experiment, longest: int) -> Measured:
-    """Return the means of blocks of a log, in one pass.
+    """Return the means of blocks, of ``longest`` samples at most, of a log, in one pass.
 
     The mean is over the samples present. White noise in it counts by their number; the slow noise
     in it is taken as that of a complete block, which is why a block of which more than half is
     missing is left out; the blocks beside it know how long that hole is. With a third of all
-    samples missing, a standard deviation is right to 1 %, and 3 % too small where most of the
-    noise is a process of a correlation time of two samples.
-
-    Parameters
-    ----------
-    parts : iterable of ndarray
-        The log in order, rad/s; NaN where a sample is missing.
-    experiment : Experiment
-    longest : int
-        Samples of a block at most.
+    samples missing, a standard deviation is right to 1 %, and 3 % too small where most of the noise
+    is a process of a correlation time of two samples. The parts of the log are in order, rad/s,
+    each ndarray of one axis; NaN where a sample is missing.
 
     Raises
     ------

@@ -60,36 +60,19 @@ class Filtered:
         return np.asarray((self.innovation / self.innovation_sigma) ** 2)
 
     def rate_nees(self, rate: float) -> Array:
-        """Return the squared error of the rate over its variance.
+        """Return the squared error of the rate over its variance, shape (runs, b).
 
-        Parameters
-        ----------
-        rate : float
-            The true one, rad/s.
-
-        Returns
-        -------
-        ndarray, shape (runs, b)
-            Chi-squared of one degree of freedom, where the filter is consistent and what it knew
-            at the start no longer counts: once both positions have been seen.
+        Chi-squared of one degree of freedom, where the filter is consistent and what it knew at the
+        start no longer counts: once both positions have been seen. The true rate is in rad/s.
         """
         return np.asarray(((self.rate - rate) / self.rate_sigma) ** 2)
 
     def nees(self, rate: float, states: Array) -> Array:
-        """Return the normalised estimation error squared of the rate and all states.
+        """Return the normalised estimation error squared of rate and all states, shape (runs, b).
 
-        Parameters
-        ----------
-        rate : float
-            The true one, rad/s.
-        states : ndarray, shape (runs, b, m)
-            The true ones, at the sample after each block.
-
-        Returns
-        -------
-        ndarray, shape (runs, b)
-            Chi-squared of m + 1 degrees of freedom; see `rate_nees`. Not finite where a state is
-            known exactly.
+        Chi-squared of m + 1 degrees of freedom; see `rate_nees`. Not finite where a state is known
+        exactly. The true rate is in rad/s, the true states, at the sample after each block, are of
+        shape (runs, b, m).
         """
         error = self.states[:, :, :-1].copy()
         error[:, :, 0] -= rate
@@ -163,12 +146,7 @@ class RateFilter:
         return deviation(self._filter.roots, 0)
 
     def run(self, means: Array) -> Filtered:
-        """Filter runs of one design.
-
-        Parameters
-        ----------
-        means : ndarray, shape (runs, b)
-            Block means, rad/s.
+        """Filter runs of one design from block means, rad/s, shape (runs, b).
 
         Raises
         ------

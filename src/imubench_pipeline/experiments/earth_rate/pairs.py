@@ -41,15 +41,8 @@ class Differences:
 def by_pairs(means: Array, blocks: Blocks, model: NoiseModel) -> Differences:
     """Estimate the rate by 003 eq. 14 from pairs of dwells, each dwell in one pair at most.
 
-    A dwell that the same sense follows, a turn having been missed, is left out.
-
-    Parameters
-    ----------
-    means : ndarray, shape (runs, b)
-        Block means, rad/s.
-    blocks : Blocks
-    model : NoiseModel
-        Of the gyro, for the standard errors.
+    A dwell that the same sense follows, a turn having been missed, is left out. The block means are
+    in rad/s, shape (runs, b); the noise model is for the standard errors.
 
     Raises
     ------

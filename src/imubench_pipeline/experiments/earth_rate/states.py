@@ -51,15 +51,9 @@ class BlockStates:
 def block_states(model: NoiseModel, blocks: Blocks, turn_on_bias: float = WIDE) -> BlockStates:
     """Return the states of a noise model over blocks.
 
-    Parameters
-    ----------
-    model : NoiseModel
-        Gauss-Markov processes start in their stationary distribution; flicker noise is its bank
-        up to the duration of the blocks; a ramp has a slope of variance R^2, of either sign; a
-        line's phase is not known.
-    blocks : Blocks
-    turn_on_bias : float
-        Standard deviation of the fixed bias, rad/s, with which z_K starts.
+    Gauss-Markov processes start in their stationary distribution; flicker noise is its bank up to
+    the duration of the blocks; a ramp has a slope of variance R^2, of either sign; a line's phase
+    is not known; z_K starts with the standard deviation of the fixed bias, rad/s.
 
     Raises
     ------

@@ -58,19 +58,11 @@ class Stays:
 def stays(position: Array, rate: float, shortest: float) -> Stays:
     """Find the stays in two positions.
 
-    The positions are the medians of the column's lower and upper half, by range. A sample within
-    a tenth of their distance of one is in it; other samples are turning, or overrun. Stays of the
-    same position that follow each other are one.
-
-    Parameters
-    ----------
-    position : ndarray, shape (n,)
-        Two positions as numbers in any unit, such as angles, 0 and 1, or -1 and +1; NaN where it
-        is not known. An angle must not wrap at one of them.
-    rate : float
-        Hz.
-    shortest : float
-        Shorter stays are overruns, s.
+    The positions are the medians of the column's lower and upper half, by range. A sample within a
+    tenth of their distance of one is in it; other samples are turning, or overrun. Stays of the
+    same position that follow each other are one. The column, shape (n,), has two positions as
+    numbers in any unit, such as angles, 0 and 1, or -1 and +1; NaN where it is not known. An angle
+    must not wrap at one of them. The rate is in Hz; stays below the shortest, s, are overruns.
 
     Raises
     ------

@@ -43,17 +43,7 @@ class FoundDwell:
     doubts: tuple[str, ...] = ()
 
     def in_samples(self, rate: float) -> Dwell:
-        """Return the dwell as an experiment has it.
-
-        Parameters
-        ----------
-        rate : float
-            Hz.
-
-        Returns
-        -------
-        Dwell
-            The samples that lie in it.
+        """Return the dwell as an experiment at a rate, Hz, has it: the samples that lie in it.
 
         Raises
         ------
@@ -84,19 +74,9 @@ class Turning:
         return sum(turn.found_by == "schedule" for turn in self.turns)
 
     def senses(self, samples: int, rate: float) -> NDArray[np.int8]:
-        """Return the sense of each sample, 0 where it is not to be used.
+        """Return the sense of each sample, 1 or -1, and 0 where it is not to be used.
 
-        Parameters
-        ----------
-        samples : int
-            Of the log.
-        rate : float
-            Hz.
-
-        Returns
-        -------
-        ndarray of int8, shape (samples,)
-            1, -1 or 0. Missing samples are not told apart.
+        The shape is (samples,), the rate in Hz. Missing samples are not told apart.
         """
         sense = np.zeros(samples, dtype=np.int8)
         for dwell in self.dwells:
