@@ -168,12 +168,9 @@ def _with_interval(row: Comparable, rows: Sequence[Comparable]) -> Comparable:
 
 
 def comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
-    """Yield what a datasheet says of N, bias instability, K and T_B of a channel.
+    """Yield what a datasheet says of N, bias instability, K and T_B of a channel, SI.
 
-    Yields
-    ------
-    Comparable
-        In SI; without a figure where none is published, or nobody looked it up.
+    Without a figure where none is published, or nobody looked it up.
     """
     axis = PrintedAxis.of(datasheet, channel)
     noise = [*_densities(axis), *_random_walks(axis), *_rms(axis)]
@@ -192,13 +189,10 @@ def comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
 
 
 def bias_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
-    """Yield what a datasheet says of the fixed bias of a channel, and of how it changes.
+    """Yield what a datasheet says of the fixed bias of a channel, and of how it changes, SI.
 
-    Yields
-    ------
-    Comparable
-        In SI; the offset always, the others where they are published: the coefficient of
-        temperature to be compared with the sensitivity, the rest with the obstacle.
+    The offset always, the others where they are published: the coefficient of temperature to be
+    compared with the sensitivity, the rest with the obstacle.
     """
     axis = PrintedAxis.of(datasheet, channel)
     like = Comparable("offset", "mean", None)
@@ -212,12 +206,9 @@ def bias_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]
 
 
 def repeatability_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
-    """Yield what a datasheet says of how a bias differs from one turn-on to the next.
+    """Yield what a datasheet says of how a bias differs from one turn-on to the next, SI.
 
-    Yields
-    ------
-    Comparable
-        In SI, to be compared with a standard deviation; nothing where none is published.
+    To be compared with a standard deviation; nothing where none is published.
     """
     axis, name = PrintedAxis.of(datasheet, channel), "bias_repeatability"
     yield from axis.read(name, Comparable(name, "spread", None), axis.si(name))

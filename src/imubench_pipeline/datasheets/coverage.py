@@ -59,17 +59,9 @@ class VendorCoverage:
 
 
 def coverage(sensors: Mapping[str, Sensor]) -> list[Coverage]:
-    """Return what the vendors of a catalogue publish.
+    """Return what the vendors of a catalogue, by sensor file, publish.
 
-    Parameters
-    ----------
-    sensors : mapping of str to Sensor
-        By name of the sensor file.
-
-    Returns
-    -------
-    list of Coverage
-        One a sensor, quantity that it has, and figure, in the order of the sensors.
+    One row a sensor, quantity that it has, and figure, in the order of the sensors.
     """
     return [
         _row(name, sensor, quantity, figure)
