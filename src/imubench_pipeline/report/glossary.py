@@ -57,17 +57,13 @@ class _Glossary(dict[str, Term]):
 def glossary() -> dict[str, Term]:
     """Return all terms by their keys, in the order of the file; read once, not to be changed.
 
-    Returns
-    -------
-    dict
-        One that says which terms are close to one that it does not have.
+    Where it is asked for an unknown key, the result raises an UnknownTermError, which says which
+    terms are close.
 
     Raises
     ------
     ConfigError
         If the file cannot be used, or a key stands in two sections.
-    UnknownTermError
-        From the result, where an unknown key is asked for.
     """
     terms = _Glossary()
     for section, entries in parse(_Sections, read_yaml(_FILE), str(_FILE)).root.items():

@@ -36,16 +36,8 @@ def rankings(
 ) -> Iterator[dict[str, Any]]:
     """Yield each requirement with the sensors in their order, and how they stand to its limits.
 
-    Parameters
-    ----------
-    rows : sequence of mapping
-        The table ``ranking``.
-    requirements : mapping
-        By name, as the plan wrote them.
-    simulated : mapping
-        Which recordings are.
-    system : str
-        Units of the page.
+    Of the table ``ranking``, the requirements as the plan wrote them, and which recordings are
+    simulated.
     """
     for name, declared in requirements.items():
         requirement = Requirement.model_validate(declared)
@@ -117,14 +109,8 @@ def budget_tables(
 ) -> Iterator[dict[str, Any]]:
     """Yield the error budget of each recording: a line an error and axis, a column a time.
 
-    Parameters
-    ----------
-    rows : sequence of mapping
-        The table ``error_budget``; what requirements ask for is left out.
-    simulated : mapping
-        Which recordings are.
-    system : str
-        Units of the page.
+    Of the table ``error_budget``, less what requirements ask for, and which recordings are
+    simulated.
     """
     own = [row for row in rows if row["requirement"] is None]
     for key in dict.fromkeys((row["sensor"], row["recording"]) for row in own):
@@ -196,13 +182,7 @@ def _percent(share: float) -> str:
 
 
 def budget_words(settings: Mapping[str, Any]) -> str:
-    """Return what the errors of a budget mean.
-
-    Parameters
-    ----------
-    settings : mapping
-        The section ``error_budget`` of the run's settings.
-    """
+    """Return what the errors of a budget mean, by the section ``error_budget`` of the settings."""
     return (
         "Errors that the noise causes in dead reckoning, with 95 % intervals and the parts of the "
         f"variance of 1 % or more. Biases and tilt are taken over {settings['static_window']} at "

@@ -240,14 +240,7 @@ def _spectrum(
 def samples_payload(
     envelope: Sequence[Row], histogram: Sequence[Row], arrays: Arrays
 ) -> dict[str, Any]:
-    """Return the envelope of the samples and their histogram, by channel.
-
-    Parameters
-    ----------
-    envelope, histogram : sequence of mapping
-        Rows of these tables, of one recording.
-    arrays : Arrays
-    """
+    """Return the envelope of the samples of a recording and their histogram, by channel."""
     payload: dict[str, Any] = {"envelope": {}, "histogram": {}}
     for channel in dict.fromkeys(row["channel"] for row in envelope):
         rows = [row for row in envelope if row["channel"] == channel]

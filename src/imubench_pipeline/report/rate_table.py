@@ -24,14 +24,7 @@ from imubench_pipeline.typing import Row
 
 
 def table_page(site: Site, view: RecordingView) -> Page:
-    """Return the page of a recording on a rate table.
-
-    Parameters
-    ----------
-    site : Site
-    view : RecordingView
-        One that was not rejected.
-    """
+    """Return the page of a recording on a rate table, one that was not rejected."""
     return page_of(site, view, "rate_table.html.jinja", _context)
 
 

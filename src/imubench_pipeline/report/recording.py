@@ -51,13 +51,7 @@ def page_of(
 ) -> Page:
     """Return the page of a recording of any kind.
 
-    Parameters
-    ----------
-    site : Site
-    view : RecordingView
-    template : str
-    context : callable
-        Gives what the template needs, from these and the folder of the recording.
+    ``context`` gives what the template needs, from these and the folder of the recording.
     """
     folder = site.results / "recordings" / view.sensor / view.name
     key = recording_key(site, view, folder)

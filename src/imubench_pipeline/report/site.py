@@ -265,11 +265,7 @@ def sensor_names(
 ) -> dict[str, str]:
     """Return vendor and model of each sensor, with the name of its file where two are alike.
 
-    Parameters
-    ----------
-    sensors : iterable of str
-    described : mapping of str to mapping
-        ``vendor`` and ``model`` of those that have a file.
+    Of those described, which have a file.
     """
     plain = {
         sensor: f"{described[sensor]['vendor']} {described[sensor]['model']}"

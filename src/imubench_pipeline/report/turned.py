@@ -46,14 +46,7 @@ ESTIMATES = ("filter", "pairs", "triples")
 
 
 def turned_page(site: Site, view: RecordingView) -> Page:
-    """Return the page of a recording whose sensor was turned.
-
-    Parameters
-    ----------
-    site : Site
-    view : RecordingView
-        One that was not rejected.
-    """
+    """Return the page of a recording whose sensor was turned, one that was not rejected."""
     return page_of(site, view, "turned.html.jinja", _context)
 
 
@@ -107,24 +100,14 @@ def _summary(view: RecordingView, turning: Sequence[Row], rows: Sequence[Row]) -
 
 
 def latitude_text(rows: Sequence[Row]) -> str:
-    """Return the latitude of a recording in degrees.
-
-    Parameters
-    ----------
-    rows : sequence of mapping
-        Of a table with the latitude, at least one.
-    """
+    """Return the latitude of a recording in degrees, of rows that have it, at least one."""
     return f"{number_text(math.degrees(rows[0]['latitude']))}°"
 
 
 def answer(rows: Sequence[Row], system: System) -> str:
     """Return what was found in a sentence: the filter's estimate, or why there is none.
 
-    Parameters
-    ----------
-    rows : sequence of mapping
-        Of the table ``earth_rate``, of the whole recording.
-    system : str
+    Of rows of the table ``earth_rate``, of the whole recording.
     """
     by_method = {row["method"]: row for row in rows}
     best = by_method.get("filter")
@@ -152,13 +135,7 @@ _FAR = 4.0
 
 
 def line(row: Row) -> dict[str, Any]:
-    """Return a line of the table of estimates.
-
-    Parameters
-    ----------
-    row : mapping
-        Of the table ``earth_rate``.
-    """
+    """Return a line of the table of estimates, of a row of ``earth_rate``."""
     return {
         **row,
         "term": METHOD_TERMS[row["method"]],
@@ -171,13 +148,7 @@ def line(row: Row) -> dict[str, Any]:
 
 
 def published_lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
-    """Yield the lines of the table of what a source prints of its runs.
-
-    Parameters
-    ----------
-    rows : sequence of mapping
-        Of the table ``earth_rate_published``.
-    """
+    """Yield the lines of the table of what a source prints of its runs."""
     for row in rows:
         yield {
             **row,
@@ -189,10 +160,7 @@ def published_lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
 def needs(rows: Sequence[Row]) -> dict[str, Any] | None:
     """Return what it takes to find the Earth's rate, for a table and a sentence.
 
-    Parameters
-    ----------
-    rows : sequence of mapping
-        Of the table ``earth_rate_prediction``, of one recording.
+    Of rows of the table ``earth_rate_prediction``, of one recording.
     """
     goals = [row for row in rows if row["of"] == "goal"]
     if not goals:
@@ -309,14 +277,7 @@ def _range(series: Sequence[Row], truth: float) -> list[float]:
 
 
 def prediction_payload(rows: Sequence[Row], arrays: Arrays) -> dict[str, Any]:
-    """Return what the figures of the prediction are drawn from.
-
-    Parameters
-    ----------
-    rows : sequence of mapping
-        Of the table ``earth_rate_prediction``, of one recording.
-    arrays : Arrays
-    """
+    """Return what the figures of the prediction of a recording are drawn from."""
     goals = [row["goal"] for row in rows if row["of"] == "goal"]
     payload: dict[str, Any] = {"goals": goals, "truth": EARTH_RATE}
     for of, x in (("time", "time"), ("dwell", "dwell")):

@@ -70,16 +70,7 @@ def forest_figure(
 ) -> Figure:
     """Draw parameters of one channel across sensors, with their 95 % limits.
 
-    Parameters
-    ----------
-    views : sequence of ChannelView
-        Of one channel.
-    sensors : sequence of str
-        All sensors of the run: the place in it gives the look.
-    symbol : str or sequence of str
-        Parameters, as they stand in the table; each has a panel.
-    system : str
-        ``practical`` or ``si``.
+    A panel each; the look is by the place among all sensors of the run.
     """
     symbols = [symbol] if isinstance(symbol, str) else list(symbol)
     looks = sensor_appearances(list(sensors))

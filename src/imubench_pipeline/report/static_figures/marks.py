@@ -28,14 +28,7 @@ class Mark:
 def marks(view: ChannelView, symbol: str, place: float, spread: float = 0.0) -> Iterator[Mark]:
     """Yield what is known of a parameter, one mark a component of the model.
 
-    Parameters
-    ----------
-    view : ChannelView
-    symbol : str
-    place : float
-        Of the recording.
-    spread : float
-        Height for its components, in the unit of ``place``.
+    ``spread`` is the height for these about the place of the recording, in the same unit.
     """
     if view.recommended not in view.parameters:
         return
