@@ -61,12 +61,8 @@ def answer(rows: Sequence[Row], system: System) -> str:
         doubted = straight["chance"] < _DOUBTED
         largest = number_text(_PERCENT * straight["value"], 3)
         text += f"The largest deviation from the line is {largest} % of the largest rate. "
-        text += (
-            "A straight line does not fit: noise alone departs"
-            if doubted
-            else "A straight line fits: noise alone departs"
-        )
-        text += f" as far from it with a chance of {number_text(100 * straight['chance'], 2)} %."
+        text += f"A straight line {'does not fit' if doubted else 'fits'}: noise alone departs as "
+        text += f"far from it with a chance of {number_text(100 * straight['chance'], 2)} %."
     return text.strip()
 
 

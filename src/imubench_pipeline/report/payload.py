@@ -247,9 +247,7 @@ def samples_payload(
         payload["envelope"][channel] = {
             "start": rows[0]["start"],
             "end": rows[-1]["end"],
-            "low": arrays.even([_number(row["low"]) for row in rows]),
-            "high": arrays.even([_number(row["high"]) for row in rows]),
-            "mean": arrays.even([_number(row["mean"]) for row in rows]),
+            **{name: arrays.even(numbers(rows, name)) for name in ("low", "high", "mean")},
         }
     for channel in dict.fromkeys(row["channel"] for row in histogram):
         rows = [row for row in histogram if row["channel"] == channel]
@@ -264,5 +262,6 @@ def _rounded(value: float | None) -> float | None:
     return None if value is None else float(f"{value:.6g}")
 
 
-def _number(value: float | None) -> float:
-    return np.nan if value is None else value
+def numbers(rows: Sequence[Row], name: str) -> list[float]:
+    """Return a column of rows; NaN where it has no value."""
+    return [np.nan if row[name] is None else row[name] for row in rows]

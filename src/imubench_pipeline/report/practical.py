@@ -94,7 +94,12 @@ _OF_DIMENSION: dict[System, dict[str, str]] = {
 }
 
 
-_SYMBOL_TEXTS = {"B_curve": "B (curve)", "sigma_min": "σ_min", "tau_min": "τ_min"}
+_SYMBOL_TEXTS = {
+    "B_curve": "B (curve)",
+    "sigma_min": "σ_min",
+    "tau_min": "τ_min",
+    "bias": "fixed bias",
+}
 
 
 def symbol_text(symbol: str) -> str:
