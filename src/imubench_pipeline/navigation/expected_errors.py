@@ -80,16 +80,7 @@ class Question:
         """Return the budget with these axes."""
         if self.error == "north":
             return self._compass(gyro).heading(self.time)
-        return budget(
-            self.error,
-            self.time,
-            gyro=gyro.model,
-            accel=accel.model,
-            start=self.start,
-            use=self.use,
-            gyro_figures=gyro.figures,
-            accel_figures=accel.figures,
-        )
+        return budget(self.error, self.time, **self._conditions(gyro, accel))
 
     def reached(self, gyro: AxisErrors, accel: AxisErrors) -> float | None:
         """Return after which time the limit is reached, s; for north, the rest that it takes."""
@@ -97,16 +88,18 @@ class Question:
             return None
         if self.error == "north":
             return self._compass(gyro).time_needed(self.limit)
-        return time_until(
-            self.limit,
-            self.error,
-            gyro=gyro.model,
-            accel=accel.model,
-            start=self.start,
-            use=self.use,
-            gyro_figures=gyro.figures,
-            accel_figures=accel.figures,
-        )
+        return time_until(self.limit, self.error, **self._conditions(gyro, accel))
+
+    def _conditions(self, gyro: AxisErrors, accel: AxisErrors) -> dict[str, Any]:
+        """Return what a budget takes beside the error and its time."""
+        return {
+            "gyro": gyro.model,
+            "accel": accel.model,
+            "start": self.start,
+            "use": self.use,
+            "gyro_figures": gyro.figures,
+            "accel_figures": accel.figures,
+        }
 
     def _compass(self, gyro: AxisErrors) -> Gyrocompass:
         assert self.latitude is not None  # checked with the requirement

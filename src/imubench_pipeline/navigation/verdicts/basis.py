@@ -68,6 +68,11 @@ class Basis:
         row = self.recordings.get(key)
         return row["duration"] if row else None
 
+    def longest(self, rows: Iterable[Row]) -> float | None:
+        """Return the length of the longest recording of rows, s; None where none is known."""
+        durations = (self.duration(_key(row)) for row in rows)
+        return max((duration for duration in durations if duration is not None), default=None)
+
     def simulated(self, key: Key) -> bool:
         """Tell whether a recording is simulated."""
         row = self.recordings.get(key)

@@ -9,7 +9,6 @@ What a contribution to an error comes of, quantity and noise parameter, is told 
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Iterator
 from typing import Literal, get_args
@@ -74,9 +73,9 @@ def weaknesses(standing: Standing, requirement: Requirement, basis: Basis) -> li
     reasons = []
     if standing.expected.specimens == 1:
         reasons.append("one_specimen")
-    durations = [basis.duration((row["sensor"], row["recording"])) for row in standing.totals]
-    longest = max((duration for duration in durations if duration is not None), default=math.inf)
-    if longest_asked(standing.total, requirement) > LONGEST_PART * longest:
+    longest = basis.longest(standing.totals)
+    asked = longest_asked(standing.total, requirement)
+    if longest is not None and asked > LONGEST_PART * longest:
         reasons.append("short_log")
     if standing.wide:
         reasons.append("wide_interval")

@@ -92,9 +92,7 @@ def judgements(
         of_sensors = by_requirement.get(name, {})
         usual = {made: _usual(of_sensors, basis, simulated=made) for made in (False, True)}
         for sensor, rows in of_sensors.items():
-            keys = [(sensor, row["recording"]) for row in rows]
-            devices = {key[1]: basis.device(key) for key in keys}
-            made = all(basis.simulated(key) for key in keys)
+            devices, made = _specimens(sensor, rows, basis)
             by_limit = standings(_deciding_rows(rows, basis), devices, usual[made])
             decides = deciding(by_limit)
             yield Judgement(
@@ -114,14 +112,20 @@ def judgements(
             )
 
 
-def _deciding_rows(rows: Iterable[Row], basis: Basis) -> list[Row]:
+def _specimens(sensor: str, rows: Iterable[Row], basis: Basis) -> tuple[dict[str, str], bool]:
+    """Return the specimen of each recording of rows, and whether all of these are simulated."""
+    keys = [(sensor, row["recording"]) for row in rows]
+    devices = {recording: basis.device((sensor, recording)) for _, recording in keys}
+    return devices, all(basis.simulated(key) for key in keys)
+
+
+def _deciding_rows(rows: Sequence[Row], basis: Basis) -> list[Row]:
     """Return rows without the figures of recordings that do not decide."""
-    deciding_rows = []
-    for row in rows:
-        key = row["sensor"], row["recording"]
-        apart = basis.apart.get(key)
-        deciding_rows.append(row if apart is None else {**row, **_NOTHING, "reason": apart})
-    return deciding_rows
+    apart = [basis.apart.get((row["sensor"], row["recording"])) for row in rows]
+    return [
+        row if reason is None else {**row, **_NOTHING, "reason": reason}
+        for row, reason in zip(rows, apart, strict=True)
+    ]
 
 
 def _usual(
@@ -130,10 +134,9 @@ def _usual(
     """Return the spread between specimens of all sensors that have several, by limit."""
     by_limit: dict[tuple[Any, ...], list[Spread]] = {}
     for sensor, rows in of_sensors.items():
-        keys = [(sensor, row["recording"]) for row in rows]
-        if all(basis.simulated(key) for key in keys) is not simulated:
+        devices, made = _specimens(sensor, rows, basis)
+        if made is not simulated:
             continue
-        devices = {key[1]: basis.device(key) for key in keys}
         for standing in standings(_deciding_rows(rows, basis), devices):
             if standing.expected.spread is not None and standing.expected.spread_of == "specimens":
                 by_limit.setdefault(limit_of(standing.total), []).append(standing.expected.spread)
