@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
@@ -28,7 +29,7 @@ _NAMES = {
     "position": "position, one axis",
     "north": "north, found at rest",
 }
-_HALF_TURN = 3.141592653589793
+_QUARTER_TURN = math.pi / 2.0
 
 
 def rankings(
@@ -168,12 +169,12 @@ def _cell(rows: Sequence[Row], unit: PageUnit) -> dict[str, Any]:
 
 def _sensible(row: Row, sigma: float) -> bool:
     """Tell whether an error is below a quarter turn, beyond which an angle means nothing."""
-    return DIMENSIONS[row["error"]] != "angle" or sigma <= 0.5 * _HALF_TURN
+    return DIMENSIONS[row["error"]] != "angle" or sigma <= _QUARTER_TURN
 
 
 def _shown(error: str, sigma: float, unit: PageUnit) -> str:
-    if DIMENSIONS[error] == "angle" and sigma > 0.5 * _HALF_TURN:  # type: ignore[index]  # the table has known errors alone
-        return "not to be found" if error == "north" else f"over {unit.text(0.5 * _HALF_TURN, 3)}"
+    if DIMENSIONS[error] == "angle" and sigma > _QUARTER_TURN:  # type: ignore[index]  # the table has known errors alone
+        return "not to be found" if error == "north" else f"over {unit.text(_QUARTER_TURN, 3)}"
     return unit.text(sigma, 3)
 
 

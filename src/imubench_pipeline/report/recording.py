@@ -249,6 +249,7 @@ def about_of(
         "sensor_page": site.sensor_page(view.sensor),
         "provenance": list(_provenance(view, channels, folder)),
         "sources": metadata_of(folder).get("sources", []),
+        "figures_command": None,
     }
 
 
