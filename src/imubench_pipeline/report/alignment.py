@@ -22,7 +22,7 @@ _ANGLES = ("roll", "pitch", "heading")
 
 
 def alignments(site: Site, arrays: Arrays) -> list[dict[str, Any]]:
-    """Return what is said of each sensor with gyros and accelerometers, as figures take arrays."""
+    """Return what is said of each sensor with gyros and accelerometers; arrays take its figures."""
     entries = []
     for view in site.views:
         rows = view.rows("alignment")

@@ -186,7 +186,7 @@ class LeastSquares:
 def block_length(
     experiment: Experiment, model: NoiseModel, regressors: Callable[[Blocks], Array]
 ) -> int:
-    """Return the longest block, in samples, whose means tell as much of the parameters as these.
+    """Return the longest block, in samples, whose means tell as much as the samples themselves.
 
     Blocks are shortened by halves until a fourth of their length would lower no standard error by
     0.1 %; with 1,024 blocks at most, none longer than the longest dwell. The regressors are those

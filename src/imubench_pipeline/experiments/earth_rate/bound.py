@@ -146,7 +146,7 @@ def bound(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> 
 
 
 def block_length(experiment: Experiment, model: NoiseModel) -> int:
-    """Return the longest block, in samples, whose means tell as much of the rate as these.
+    """Return the longest block, in samples, whose means tell as much of the rate as the samples.
 
     Blocks are shortened, by halves, until a fourth of their length would lower the bound by less
     than 0.1 %; tried on the first four dwells, with 2,048 blocks at most, none longer than the
