@@ -23,8 +23,7 @@ from imubench_pipeline.report.static_figures.comparison import comparison_figure
 from imubench_pipeline.report.static_figures.curves import allan_figure, methods_figure
 from imubench_pipeline.report.static_figures.datasheet import datasheet_figure
 from imubench_pipeline.report.static_figures.files import channel_figures, cross_figures, save
-from imubench_pipeline.report.static_figures.forest import forest_figure
-from imubench_pipeline.report.static_figures.marks import marks
+from imubench_pipeline.report.static_figures.forest import forest_figure, marks
 from imubench_pipeline.report.static_figures.spectrum import spectrum_figure
 from imubench_pipeline.report.static_figures.terms import terms_figure
 from imubench_pipeline.report.static_figures.theory import CHARACTERISTIC, theory_figure

@@ -49,64 +49,34 @@ SENSITIVITY = "sensitivity"
 
 @dataclass(frozen=True)
 class Comparable:
-    """A printed figure in SI, in the convention of the estimate that it is compared with.
+    """A printed figure in SI, in the convention of the estimate that it is compared with."""
 
-    Attributes
-    ----------
-    quantity, statistic : str
-        What is printed, and what of an estimate it is compared with.
-    figure : PrintedFigure or None
-        None: not published, or not looked up.
-    sidedness : str or None
-        Of a noise density, as this reading takes it.
-    value : float or None
-        SI; None where nothing is published, or it cannot be compared. Of a range, its worse end.
-    reason : str or None
-        How it was read, or why there is nothing to read.
-    printed : float or None
-        As printed for the axis.
-    least : float or None
-        The better end of a printed range.
-    lower, upper : float or None
-        The least and the largest figure that the vendor prints of it, such as typ and max.
-    obstacle : str or None
-        Why it cannot be compared with a static log.
-    tau : float or None
-        Averaging time of a printed Allan deviation, s.
-    looked_up : bool
-        False: the sensor file does not say whether the vendor publishes it.
-    """
-
+    # quantity, statistic: what is printed, and what of an estimate it is compared with
     quantity: str
     statistic: str
-    figure: PrintedFigure | None
-    sidedness: str | None = None
+    figure: PrintedFigure | None  # None: not published, or not looked up
+    sidedness: str | None = None  # of a noise density, as this reading takes it
+    # SI; None where nothing is published, or it cannot be compared. Of a range, its worse end
     value: float | None = None
-    reason: str | None = None
-    printed: float | None = None
-    least: float | None = None
+    reason: str | None = None  # how it was read, or why there is nothing to read
+    printed: float | None = None  # as printed for the axis
+    least: float | None = None  # the better end of a printed range
+    # lower, upper: the least and the largest figure that the vendor prints of it, such as typ and
+    # max
     lower: float | None = None
     upper: float | None = None
-    obstacle: str | None = None
-    tau: float | None = None
-    looked_up: bool = True
+    obstacle: str | None = None  # why it cannot be compared with a static log
+    tau: float | None = None  # averaging time of a printed Allan deviation, s
+    looked_up: bool = True  # False: the sensor file does not say whether the vendor publishes it
 
 
 @dataclass(frozen=True)
 class PrintedAxis:
-    """What a datasheet says of one axis of a quantity.
-
-    Attributes
-    ----------
-    sheet : QuantityDatasheet
-    options : sequence of str
-        Grades, ranges and modes that the logged sensors have.
-    quantity, axis : str
-        ``gyro`` or ``accel``; ``x``, ``y`` or ``z``.
-    """
+    """What a datasheet says of one axis of a quantity."""
 
     sheet: QuantityDatasheet
-    options: Sequence[str]
+    options: Sequence[str]  # grades, ranges and modes that the logged sensors have
+    # quantity, axis: ``gyro`` or ``accel``; ``x``, ``y`` or ``z``
     quantity: str
     axis: str
 
@@ -198,12 +168,9 @@ def _with_interval(row: Comparable, rows: Sequence[Comparable]) -> Comparable:
 
 
 def comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
-    """Yield what a datasheet says of N, bias instability, K and T_B of a channel.
+    """Yield what a datasheet says of N, bias instability, K and T_B of a channel, SI.
 
-    Yields
-    ------
-    Comparable
-        In SI; without a figure where none is published, or nobody looked it up.
+    Without a figure where none is published, or nobody looked it up.
     """
     axis = PrintedAxis.of(datasheet, channel)
     noise = [*_densities(axis), *_random_walks(axis), *_rms(axis)]
@@ -222,13 +189,10 @@ def comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
 
 
 def bias_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
-    """Yield what a datasheet says of the fixed bias of a channel, and of how it changes.
+    """Yield what a datasheet says of the fixed bias of a channel, and of how it changes, SI.
 
-    Yields
-    ------
-    Comparable
-        In SI; the offset always, the others where they are published: the coefficient of
-        temperature to be compared with the sensitivity, the rest with the obstacle.
+    The offset always, the others where they are published: the coefficient of temperature to be
+    compared with the sensitivity, the rest with the obstacle.
     """
     axis = PrintedAxis.of(datasheet, channel)
     like = Comparable("offset", "mean", None)
@@ -242,12 +206,9 @@ def bias_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]
 
 
 def repeatability_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
-    """Yield what a datasheet says of how a bias differs from one turn-on to the next.
+    """Yield what a datasheet says of how a bias differs from one turn-on to the next, SI.
 
-    Yields
-    ------
-    Comparable
-        In SI, to be compared with a standard deviation; nothing where none is published.
+    To be compared with a standard deviation; nothing where none is published.
     """
     axis, name = PrintedAxis.of(datasheet, channel), "bias_repeatability"
     yield from axis.read(name, Comparable(name, "spread", None), axis.si(name))

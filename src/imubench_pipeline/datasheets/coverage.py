@@ -28,36 +28,20 @@ _FIGURES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
 
 @dataclass(frozen=True)
 class Coverage:
-    """Whether a vendor publishes one figure of one sensor.
-
-    Attributes
-    ----------
-    sensor, vendor, model : str
-    quantity : str
-        ``gyro`` or ``accel``.
-    figure : str
-        ``N``, ``B``, ``K``, ``T_B``, ``temperature_coefficient`` or ``offset``.
-    published : str
-        ``yes``; ``other convention``: something akin, such as an rms for N or a total over
-        temperature for the coefficient; ``no``: looked up (null), and not published; ``not looked
-        up``: the sensor file does not say, so that it counts neither way.
-    as_printed : str or None
-        Every figure of it, with its unit and kind.
-    document : str or None
-        With its revision.
-    source : str or None
-        ``primary`` or ``secondary``, of the figures or else of the datasheet.
-    """
+    """Whether a vendor publishes one figure of one sensor."""
 
     sensor: str
     vendor: str
     model: str
-    quantity: str
-    figure: str
+    quantity: str  # ``gyro`` or ``accel``
+    figure: str  # ``N``, ``B``, ``K``, ``T_B``, ``temperature_coefficient`` or ``offset``
+    # ``yes``; ``other convention``: something akin, such as an rms for N or a total over
+    # temperature for the coefficient; ``no``: looked up (null), and not published; ``not looked
+    # up``: the sensor file does not say, so that it counts neither way
     published: Published
-    as_printed: str | None
-    document: str | None
-    source: str | None
+    as_printed: str | None  # every figure of it, with its unit and kind
+    document: str | None  # with its revision
+    source: str | None  # ``primary`` or ``secondary``, of the figures or else of the datasheet
 
 
 @dataclass(frozen=True)
@@ -75,17 +59,9 @@ class VendorCoverage:
 
 
 def coverage(sensors: Mapping[str, Sensor]) -> list[Coverage]:
-    """Return what the vendors of a catalogue publish.
+    """Return what the vendors of a catalogue, by sensor file, publish.
 
-    Parameters
-    ----------
-    sensors : mapping of str to Sensor
-        By name of the sensor file.
-
-    Returns
-    -------
-    list of Coverage
-        One a sensor, quantity that it has, and figure, in the order of the sensors.
+    One row a sensor, quantity that it has, and figure, in the order of the sensors.
     """
     return [
         _row(name, sensor, quantity, figure)

@@ -71,23 +71,11 @@ def deltas(
     tau: NDArray[np.float64],
     tolerance: float,
 ) -> Iterator[Delta]:
-    """Compare an estimate with what a datasheet prints.
+    """Compare an estimate, SI, with what a datasheet prints.
 
-    Parameters
-    ----------
-    datasheet : Datasheet
-    channel : str
-    estimate : Estimate
-        In SI.
-    tau : ndarray, shape (m,)
-        Where the log shows the curve well enough for its minimum, s.
-    tolerance : float
-        Relative difference that still counts as printed.
-
-    Yields
-    ------
-    Delta
-        One a printed figure and reading of it; K and T_B are mostly not published.
+    One a printed figure and reading of it; K and T_B are mostly not published. tau, shape (m,), s,
+    is where the log shows the curve well enough for its minimum; the tolerance is the relative
+    difference that still counts as printed.
     """
     for entry in comparables(datasheet, channel):
         yield compare(entry, measured(entry, estimate, tau), tolerance)
@@ -102,6 +90,9 @@ def bias_deltas(
 ) -> Iterator[Delta]:
     """Compare the fixed bias of a recording, and how temperature moves it, with what is printed.
 
+    The offset; the coefficient of temperature, where one is printed; and what is printed of
+    repeatability and temperature that one log cannot be compared with.
+
     Parameters
     ----------
     datasheet : Datasheet
@@ -111,14 +102,8 @@ def bias_deltas(
     tolerance : float
         Relative difference that still counts as printed.
     sensitivity : Parameter, optional
-        Size of the fitted sensitivity to temperature (`datasheets.measured.sensitivity`);
-        None: the log has no readings of the temperature.
-
-    Yields
-    ------
-    Delta
-        The offset; the coefficient of temperature, where one is printed; and what is printed of
-        repeatability and temperature that one log cannot be compared with.
+        Size of the fitted sensitivity to temperature (`datasheets.measured.sensitivity`); None: the
+        log has no readings of the temperature.
     """
     bias = fixed_bias(channel, means)
     for entry in bias_comparables(datasheet, channel):
@@ -134,22 +119,12 @@ def bias_deltas(
 
 
 def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
-    """Compare a printed figure with what was measured.
+    """Compare a printed figure with what was measured of it, SI.
 
-    Parameters
-    ----------
-    entry : Comparable
-    parameter : Parameter
-        What was measured of it, SI; without limits, its value alone decides.
-    tolerance : float
-        Relative difference from a typical figure that still counts as printed.
-
-    Returns
-    -------
-    Delta
-        ``delta`` is measured / comparable - 1; ``delta_lower`` and ``delta_upper`` are the least
-        and the largest that the interval of the measurement and that of the printed figures
-        allow.
+    Without limits, the value alone decides; the tolerance is the relative difference from a typical
+    figure that still counts as printed. ``delta`` is measured / comparable - 1; ``delta_lower`` and
+    ``delta_upper`` are the least and the largest that the interval of the measurement and that of
+    the printed figures allow.
     """
     figure = entry.figure
     value, lower, upper = parameter.value, parameter.lower, parameter.upper
@@ -226,22 +201,13 @@ def _relative(value: float | None, printed: float | None) -> float | None:
 
 @dataclass(frozen=True)
 class CurveRms:
-    """How far a measured curve is from the lines of a datasheet.
+    """How far a measured curve is from the lines of a datasheet."""
 
-    Attributes
-    ----------
-    noise, floor : Comparable or None
-        The printed figures that the lines are of.
-    rms : float
-        Root mean square over tau of measured minus printed Allan deviation, rad/s or m/s².
-    rms_log10 : float
-        The same of the difference of log10, decades.
-    """
-
+    # noise, floor: the printed figures that the lines are of
     noise: Comparable | None
     floor: Comparable | None
-    rms: float
-    rms_log10: float
+    rms: float  # root mean square over tau of measured minus printed Allan deviation, rad/s or m/s²
+    rms_log10: float  # the same of the difference of log10, decades
 
 
 def curve_rms(
@@ -249,23 +215,16 @@ def curve_rms(
 ) -> list[CurveRms]:
     """Compare a measured curve with the lines N/√τ and bias instability of a datasheet.
 
-    The two add as variances: σ²(τ) = N²/τ + floor². A datasheet that prints one of them gives
-    that line alone, and one that does not say the side of its density gives two curves.
+    The two add as variances: σ²(τ) = N²/τ + floor². A datasheet that prints one of them gives that
+    line alone, one that does not say the side of its density gives two curves, and one without a
+    line none. Typical figures are taken where there are any, else the others.
 
     Parameters
     ----------
     printed : sequence of Comparable
-        What `comparable.comparables` gives of a channel. Typical figures are taken where there
-        are any, else the others.
-    tau : ndarray, shape (m,)
-        s.
-    adev : ndarray, shape (m,)
-        Measured Allan deviation, rad/s or m/s².
-
-    Returns
-    -------
-    list of CurveRms
-        One a reading of the noise; empty if the datasheet has no line.
+        What `comparable.comparables` gives of a channel.
+    tau, adev : ndarray, shape (m,)
+        s, and measured Allan deviation, rad/s or m/s².
 
     Raises
     ------

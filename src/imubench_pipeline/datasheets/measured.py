@@ -28,22 +28,12 @@ _AT_REST = 0.15
 
 
 def measured(entry: Comparable, estimate: Estimate, tau: NDArray[np.float64]) -> Parameter:
-    """Return what an estimate says of the statistic that a printed figure is compared with.
+    """Return what an estimate says of the statistic that a printed figure is compared with, SI.
 
-    Parameters
-    ----------
-    entry : Comparable
-    estimate : Estimate
-        In SI.
-    tau : ndarray, shape (m,)
-        Where the log shows the curve well enough, s.
-
-    Returns
-    -------
-    Parameter
-        SI. The minimum and the plateau are those of `imubench_pipeline.estimators.curve_bias`.
-        The limits of another point of the curve are at least as wide as 95 %: all amplitudes are
-        taken at the same end of their intervals, each correlation time at either end.
+    The minimum and the plateau are those of `imubench_pipeline.estimators.curve_bias`, of the curve
+    where the log shows it well enough, at tau, s, shape (m,). The limits of another point of the
+    curve are at least as wide as 95 %: all amplitudes are taken at the same end of their intervals,
+    each correlation time at either end.
     """
     statistic = entry.statistic
     if statistic in ("plateau", "adev_minimum"):
@@ -101,21 +91,11 @@ def _ends(estimate: Estimate) -> Iterator[Estimate]:
 def fixed_bias(channel: str, means: Mapping[str, float]) -> Parameter:
     """Return the size of the fixed bias of a channel, as far as a recording at rest shows it.
 
-    That of a gyro is its mean; the rotation of the Earth is in it, up to 15.04 °/h either way.
-    That of an accelerometer is hidden in gravity: on a vertical axis it is the norm of the three
-    axes less that of gravity, with the error of the scale factor in it; on any other axis it
-    cannot be told from a tilt.
-
-    Parameters
-    ----------
-    channel : str
-    means : mapping of str to float
-        Mean of every channel of the recording, rad/s or m/s².
-
-    Returns
-    -------
-    Parameter
-        Without sign, rad/s or m/s²; the limits are those of what is not known of the Earth.
+    That of a gyro is its mean; the rotation of the Earth is in it, up to 15.04 °/h either way. That
+    of an accelerometer is hidden in gravity: on a vertical axis it is the norm of the three axes
+    less that of gravity, with the error of the scale factor in it; on any other axis it cannot be
+    told from a tilt. The limits are those of what is not known of the Earth. It is in rad/s or
+    m/s², as the means of all channels.
     """
     if channel.startswith("gyro"):
         reason = "mean of the recording; the Earth's rotation is in it, 15 °/h either way at most"
@@ -147,21 +127,10 @@ def sensitivity(
 ) -> Parameter:
     """Return the size of the sensitivity of a channel to temperature, as its thermal fit tells it.
 
-    A vendor prints ± so much per kelvin: the sign is left out.
-
-    Parameters
-    ----------
-    rows : iterable of mapping
-        Of the table ``temperature``, of the channel.
-    lowest, highest : float or None
-        Temperatures of the recording, °C.
-
-    Returns
-    -------
-    Parameter
-        rad/s/K or m/s²/K; the reason says at what temperature and over which range it holds.
-        Where temperature is not taken out of the log, the upper limit alone; where it cannot be
-        told from time, nothing.
+    A vendor prints ± so much per kelvin: the sign is left out. It is in rad/s/K or m/s²/K, from
+    rows of the table ``temperature``; the reason says at what temperature and over which range, °C,
+    it holds. Where temperature is not taken out of the log, the upper limit alone; where it cannot
+    be told from time, nothing.
     """
     by_parameter = {row["parameter"]: row for row in rows}
     row = by_parameter.get("sensitivity")

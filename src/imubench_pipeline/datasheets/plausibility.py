@@ -102,41 +102,18 @@ _MEND = "state the right 'unit' in the sensor file"
 
 @dataclass(frozen=True)
 class Expected:
-    """What is usual of a quantity of a sensor at rest.
+    """What is usual of a quantity of a sensor at rest."""
 
-    Attributes
-    ----------
-    noise : (float, float) or None
-        Least and most white noise density, SI/√Hz, two-sided.
-    noise_from : str
-        What says so.
-    offset : float
-        Largest mean of a gyro that an offset explains, rad/s.
-    offset_from : str
-    bandwidth : float or None
-        The widest that is printed, Hz.
-    printed : float or None
-        White noise density that the datasheet prints, SI/√Hz, two-sided.
-    """
-
-    noise: tuple[float, float] | None
-    noise_from: str
-    offset: float = _LARGEST_OFFSET
+    noise: tuple[float, float] | None  # least and most white noise density, SI/√Hz, two-sided
+    noise_from: str  # what says so
+    offset: float = _LARGEST_OFFSET  # largest mean of a gyro that an offset explains, rad/s
     offset_from: str = "of any gyro"
-    bandwidth: float | None = None
-    printed: float | None = None
+    bandwidth: float | None = None  # the widest that is printed, Hz
+    printed: float | None = None  # white noise density that the datasheet prints, SI/√Hz, two-sided
 
 
 def expected(sensor: Sensor | None, quantity: str) -> Expected:
-    """Return what is usual of a quantity of a sensor, by its file where that prints it.
-
-    Parameters
-    ----------
-    sensor : Sensor or None
-        None: nothing is known of it.
-    quantity : str
-        ``gyro`` or ``accel``.
-    """
+    """Return what is usual of a quantity of a sensor, by its file where that prints it."""
     usual = _USUAL_GYRO if quantity == "gyro" else None
     if sensor is None:
         return Expected(usual, "of a gyro")
@@ -188,19 +165,9 @@ def _values(printed: float | tuple[float, ...] | None) -> tuple[float, ...]:
 def implausible_rates(
     rates: Mapping[str, float], bandwidths: Mapping[str, float | None]
 ) -> list[Finding]:
-    """Return the rates that are far from what a sensor can do.
+    """Return the rates, Hz, that are far from what a sensor can do, each with what mends times.
 
-    Parameters
-    ----------
-    rates : mapping of str to float
-        Of each channel, Hz.
-    bandwidths : mapping of str to float or None
-        The widest that the datasheet of the sensor prints for each channel, Hz.
-
-    Returns
-    -------
-    list of Finding
-        The value of each is the factor that mends times.
+    The bandwidths are the widest that the datasheet prints for each channel, Hz.
     """
     by_rate: dict[tuple[float, float], list[str]] = {}
     for name, rate in rates.items():
@@ -224,14 +191,9 @@ def implausible_rates(
 
 
 def time_factor(rate: float, fastest: float = _FASTEST) -> float:
-    """Return by what times are to be multiplied, so that a rate is likely.
+    """Return by what times are to be multiplied, so that a rate, Hz, is likely.
 
-    Parameters
-    ----------
-    rate : float
-        Hz.
-    fastest : float
-        That the sensor can do, Hz.
+    ``fastest`` is what the sensor can do, Hz.
     """
     sign = 1.0 if rate > fastest else -1.0
     return min(
@@ -256,16 +218,8 @@ def implausible(
 ) -> list[Finding]:
     """Return what speaks against a sensor at rest whose figures are in the stated unit.
 
-    Parameters
-    ----------
-    channels : mapping of str to mapping
-        The levels of each channel.
-    gravity : GravityTurn or None
-        How gravity turns against the sensor.
-    sensor : Sensor or None
-        What its file says; None: there is none.
-    static : bool
-        The sensor was to be at rest.
+    Of the levels of each channel, how gravity turns against the sensor, and what its file says;
+    ``static``: it was to be at rest.
     """
     of = {quantity: expected(sensor, quantity) for quantity in QUANTITIES}
     rates = {name: level["rate"] for name, level in channels.items()}
@@ -289,14 +243,7 @@ def implausible(
 
 
 def implausible_of(quality: Quality, sensor: Sensor | None) -> list[dict[str, Any]]:
-    """Return the rows of findings on what can be of no sensor at rest in its unit.
-
-    Parameters
-    ----------
-    quality : Quality
-    sensor : Sensor or None
-        What the file of the sensor says; None: there is none.
-    """
+    """Return the rows of findings on what can be of no sensor at rest in its unit."""
     about = quality.recording
     turn = GravityTurn(**quality.gravity) if quality.gravity else None
     static = about.get("kind", "static") == "static"
@@ -305,15 +252,7 @@ def implausible_of(quality: Quality, sensor: Sensor | None) -> list[dict[str, An
 
 
 def mistakes(unit: str, quantity: str) -> Iterator[tuple[str, float]]:
-    """Yield the units that may be meant instead of one, and the factor that mends the figures.
-
-    Parameters
-    ----------
-    unit : str
-        As stated.
-    quantity : str
-        ``gyro`` or ``accel``.
-    """
+    """Yield the units that may be meant instead of one, and the factor that mends the figures."""
     dimension = QUANTITIES[quantity]
     stated = conversion(unit, dimension)[0]
     for other in _UNITS[quantity]:

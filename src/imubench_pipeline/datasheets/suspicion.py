@@ -54,33 +54,20 @@ _SHOWN: dict[tuple[str, str], tuple[str, str]] = {
 
 @dataclass(frozen=True)
 class Usual:
-    """What is usual of a figure.
+    """What is usual of a figure."""
 
-    Attributes
-    ----------
-    median, least, most : float
-        SI.
-    sensors : int
-        How many there are.
-    """
-
+    # median, least, most: SI
     median: float
     least: float
     most: float
-    sensors: int
+    sensors: int  # how many there are
 
 
 UsualFigures = Mapping[tuple[str, str], Usual]
 
 
 def usual_figures(sensors: Mapping[str, Sensor]) -> dict[tuple[str, str], Usual]:
-    """Return what is usual of N and B in a catalogue.
-
-    Returns
-    -------
-    dict
-        By quantity and figure (``N``, ``B``), where at least five sensors have it.
-    """
+    """Return what is usual of N and B in a catalogue, where at least five sensors have them."""
     by_figure: dict[tuple[str, str], list[float]] = {}
     for sensor in sensors.values():
         for quantity in QUANTITIES:
@@ -94,18 +81,9 @@ def usual_figures(sensors: Mapping[str, Sensor]) -> dict[tuple[str, str], Usual]
 
 
 def printed_figures(sensor: Sensor, quantity: str) -> dict[str, float]:
-    """Return N and B of a sensor as its datasheet prints them, of the first axis that has them.
+    """Return N and B of a sensor, SI, as its datasheet prints them, of the first axis with them.
 
-    Parameters
-    ----------
-    sensor : Sensor
-    quantity : str
-        ``gyro`` or ``accel``.
-
-    Returns
-    -------
-    dict
-        SI, under ``N`` and ``B``; B is the minimum of the curve, as vendors print it.
+    B is the minimum of the curve, as vendors print it.
     """
     figures: dict[str, float] = {}
     for axis in "xyz":
@@ -132,26 +110,11 @@ def suspicious(
 ) -> list[str]:
     """Say which figures are twenty times off what is usual, and in which unit they would not be.
 
-    Too large is what is above twenty times the median of the catalogue; too small, since there
-    are sensors of every price, what is below a twentieth of its least. A figure as the sensor's own
-    datasheet prints it is neither. Another unit is named where its factor explains the figure: what
-    is left is usual of the sensor, or of the catalogue where its datasheet prints nothing.
-
-    Parameters
-    ----------
-    quantity : str
-        ``gyro`` or ``accel``.
-    figures : mapping of str to float
-        ``N`` and ``B``, printed or estimated, SI.
-    usual : mapping
-        What `usual_figures` returns.
-    printed : mapping of str to float, optional
-        The same figures as the datasheet of the sensor prints them, SI.
-
-    Returns
-    -------
-    list of str
-        A sentence a figure.
+    A sentence a figure, of N and B, printed or estimated, SI. Too large is what is above twenty
+    times the median of the catalogue (`usual_figures`); too small, since there are sensors of every
+    price, what is below a twentieth of its least. A figure as the sensor's own datasheet prints it,
+    SI, is neither. Another unit is named where its factor explains the figure: what is left is
+    usual of the sensor, or of the catalogue where its datasheet prints nothing.
     """
     sentences = []
     for figure, value in figures.items():
@@ -199,12 +162,7 @@ def unusual_rows(
 ) -> Iterator[Mapping[str, Any]]:
     """Yield the rows of the table ``findings`` about estimates far from what vendors print.
 
-    Parameters
-    ----------
-    parameters : iterable of mapping
-        Rows of the table ``parameters``.
-    sensors : mapping of str to Sensor
-        The catalogue.
+    Of rows of the table ``parameters``, and the sensors of the catalogue.
     """
     usual = usual_figures(sensors)
     for row in parameters:

@@ -115,26 +115,22 @@ def series_of(recordings: Iterable[Row]) -> Iterator[Series]:
 def drift_rows(
     parameters: Iterable[Row], fixed_bias: Iterable[Row], recordings: Iterable[Row]
 ) -> Iterator[Row]:
-    """Yield the rows of the table ``drift``.
+    """Yield the rows of the table ``drift``, with the `COLUMNS`.
 
     One for each recording of a series, and channel and parameter that any recording of it has;
-    those of the gyro come first, those of a parameter follow one another in time.
+    those of the gyro come first, those of a parameter follow one another in time. The limits of
+    ``expected`` are 95 %, of this recording's estimate. Where there is no verdict (``changed`` or
+    ``as before``), ``reason`` says why.
 
     Parameters
     ----------
     parameters : iterable of mapping
         Rows of the table ``parameters``, of the recommended method. Used are component 1 and the
-        parameters of `navigation.pooled.POOLED`; only a value with status ``ok`` is an
-        estimate. B and T_B are compared with those of the same terms: B of flicker noise and of a
-        Gauss-Markov process are different quantities; that of the curve is the same of all models.
+        parameters of `navigation.pooled.POOLED`; only a value with status ``ok`` is an estimate. B
+        and T_B are compared with those of the same terms: B of flicker noise and of a Gauss-Markov
+        process are different quantities; that of the curve is the same of all models.
     fixed_bias, recordings : iterable of mapping
         Rows of these tables.
-
-    Yields
-    ------
-    dict
-        The `COLUMNS`. The limits of ``expected`` are 95 %, of this recording's estimate. Where
-        there is no verdict (``changed`` or ``as before``), ``reason`` says why.
     """
     cells: dict[tuple[str, str], dict[tuple[str, str], Row]] = {}
     for row in (*parameters, *fixed_bias):

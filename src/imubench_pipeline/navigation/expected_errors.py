@@ -60,34 +60,16 @@ _NOTHING = AxisErrors()
 
 @dataclass(frozen=True)
 class Question:
-    """One error that is asked for.
+    """One error that is asked for."""
 
-    Attributes
-    ----------
-    requirement : str or None
-        Name of the requirement; None for the times that are always given.
-    error : str
-    time : float
-        s.
-    start : Start
-    axis : str
-        Which axis of the sensor answers.
-    latitude : float or None
-        rad; for ``north``.
-    limit : float or None
-        Largest standard deviation that fulfils the requirement, SI.
-    use : Use
-        What happens besides.
-    """
-
-    requirement: str | None
+    requirement: str | None  # name of the requirement; None for the times that are always given
     error: Error
-    time: float
+    time: float  # s
     start: Start
-    axis: Axis
-    latitude: float | None = None
-    limit: float | None = None
-    use: Use = NO_USE
+    axis: Axis  # which axis of the sensor answers
+    latitude: float | None = None  # rad; for ``north``
+    limit: float | None = None  # largest standard deviation that fulfils the requirement, SI
+    use: Use = NO_USE  # what happens besides
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -98,16 +80,7 @@ class Question:
         """Return the budget with these axes."""
         if self.error == "north":
             return self._compass(gyro).heading(self.time)
-        return budget(
-            self.error,
-            self.time,
-            gyro=gyro.model,
-            accel=accel.model,
-            start=self.start,
-            use=self.use,
-            gyro_figures=gyro.figures,
-            accel_figures=accel.figures,
-        )
+        return budget(self.error, self.time, **self._conditions(gyro, accel))
 
     def reached(self, gyro: AxisErrors, accel: AxisErrors) -> float | None:
         """Return after which time the limit is reached, s; for north, the rest that it takes."""
@@ -115,16 +88,18 @@ class Question:
             return None
         if self.error == "north":
             return self._compass(gyro).time_needed(self.limit)
-        return time_until(
-            self.limit,
-            self.error,
-            gyro=gyro.model,
-            accel=accel.model,
-            start=self.start,
-            use=self.use,
-            gyro_figures=gyro.figures,
-            accel_figures=accel.figures,
-        )
+        return time_until(self.limit, self.error, **self._conditions(gyro, accel))
+
+    def _conditions(self, gyro: AxisErrors, accel: AxisErrors) -> dict[str, Any]:
+        """Return what a budget takes beside the error and its time."""
+        return {
+            "gyro": gyro.model,
+            "accel": accel.model,
+            "start": self.start,
+            "use": self.use,
+            "gyro_figures": gyro.figures,
+            "accel_figures": accel.figures,
+        }
 
     def _compass(self, gyro: AxisErrors) -> Gyrocompass:
         assert self.latitude is not None  # checked with the requirement
@@ -139,15 +114,7 @@ def standard(
 ) -> Iterator[Question]:
     """Yield the questions that every recording answers.
 
-    Parameters
-    ----------
-    times : sequence of float
-        s.
-    window : float
-        Static window before, s.
-    latitude : float
-        rad.
-    axes : sequence of str
+    Of each time, s, after a static window, s, for these axes; north at a latitude in rad.
     """
     start = Start.calibrated(window)
     quantities: tuple[Quantity, ...] = ("attitude", "heading", "velocity", "position")

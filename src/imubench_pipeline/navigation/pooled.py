@@ -62,55 +62,43 @@ _Present = tuple[str, Row]  # a device, and the row of one of its recordings
 
 @dataclass(frozen=True)
 class Pool:
-    """One noise parameter of several recordings.
+    """One noise parameter of several recordings."""
 
-    Attributes
-    ----------
-    value, lower, upper : float or None
-        Pooled value and its 95 % limits, in the unit of the values; None where no recording has
-        a value with limits. Of one recording its own.
-    recordings, left_out, contradicting : int
-        Used; left out; of those, the ones whose limits lie outside what the others predict.
-    error, spread, spread_lower, spread_upper : float or None
-        Standard error of ln value; tau, the standard deviation of the logarithm between recordings
-        (relative, where small), with 95 % limits: both 0 where values agree better than errors do.
-    p_value, verdict : float or None, str or None
-        Of Cochran's Q, chi-squared with K - 1 degrees of freedom where recordings agree;
-        ``differ`` where it is below `LEVEL`, else ``agree``: no difference is shown.
-    """
-
+    # value, lower, upper: pooled value and its 95 % limits, in the unit of the values; None where
+    # no recording has a value with limits. Of one recording its own
     value: float | None
     lower: float | None
     upper: float | None
+    # recordings, left_out, contradicting: used; left out; of those, the ones whose limits lie
+    # outside what the others predict
     recordings: int
     left_out: int
     contradicting: int = 0
+    # error, spread, spread_lower, spread_upper: standard error of ln value; tau, the standard
+    # deviation of the logarithm between recordings (relative, where small), with 95 % limits: both
+    # 0 where values agree better than errors do
     error: float | None = None
     spread: float | None = None
     spread_lower: float | None = None
     spread_upper: float | None = None
+    # p_value, verdict: of Cochran's Q, chi-squared with K - 1 degrees of freedom where recordings
+    # agree; ``differ`` where it is below `LEVEL`, else ``agree``: no difference is shown
     p_value: float | None = None
     verdict: Verdict | None = None
 
 
 @dataclass(frozen=True)
 class TurnOnBias:
-    """The fixed bias of a channel, of d(u) in equation 1 of paper 000, over recordings.
-
-    Attributes
-    ----------
-    recordings, left_out : int
-    mean, lower, upper : float or None
-        rad/s or m/s^2; the limits are the mean's, 95 %, by Student's t.
-    deviation, deviation_lower, deviation_upper : float or None
-        Standard deviation between recordings with its chi-squared 95 % limits.
-    """
+    """The fixed bias of a channel, of d(u) in equation 1 of paper 000, over recordings."""
 
     recordings: int
     left_out: int
+    # mean, lower, upper: rad/s or m/s^2; the limits are the mean's, 95 %, by Student's t
     mean: float | None = None
     lower: float | None = None
     upper: float | None = None
+    # deviation, deviation_lower, deviation_upper: standard deviation between recordings with its
+    # chi-squared 95 % limits
     deviation: float | None = None
     deviation_lower: float | None = None
     deviation_upper: float | None = None
@@ -121,17 +109,13 @@ def pool(
 ) -> Pool:
     """Pool the estimates of a positive parameter (model and sources: see the module).
 
+    tau is by Paule and Mandel, Q(tau^2) = K - 1; its limits by Viechtbauer's Q-profile.
+
     Parameters
     ----------
-    values : iterable of float or None, shape (K,)
-        Estimates, in any one unit; None or NaN where there is none.
-    lower, upper : iterable of float or None, shape (K,)
-        Their 95 % limits. A recording counts if 0 < lower < value < upper < infinity.
-
-    Returns
-    -------
-    Pool
-        tau by Paule and Mandel, Q(tau^2) = K - 1; its limits by Viechtbauer's Q-profile.
+    values, lower, upper : iterable of float or None, shape (K,)
+        Estimates in any one unit, and their 95 % limits. One counts if 0 < lower < value < upper <
+        infinity.
 
     Raises
     ------
@@ -258,17 +242,8 @@ def turn_on_bias(means: Iterable[float | None]) -> TurnOnBias:
     """Return the spread of the fixed bias from recording to recording.
 
     Its limits: (K - 1) s^2 / sigma^2 is chi-squared. Whatever else a mean holds is in it too: the
-    slow noise of a recording and, of an accelerometer, gravity as it lay.
-
-    Parameters
-    ----------
-    means : iterable of float or None, shape (K,)
-        Mean of the channel in each recording, rad/s or m/s^2; None and NaN are left out.
-
-    Returns
-    -------
-    TurnOnBias
-        Of one mean only itself, of none only the counts.
+    slow noise of a recording and, of an accelerometer, gravity as it lay. The means are in rad/s or
+    m/s^2; None and NaN are left out. Of one mean it has only itself, of none only the counts.
     """
     listed = list(means)
     present = [mean for mean in listed if mean is not None and math.isfinite(mean)]
@@ -310,10 +285,14 @@ def _same_devices(pairs: Sequence[tuple[float, str]]) -> float | None:
 def pooled_rows(
     parameters: Iterable[Row], biases: Iterable[Row], devices: Mapping[tuple[str, str], str]
 ) -> Iterator[dict[str, Any]]:
-    """Yield the rows of the table ``pooled``.
+    """Yield the rows of the table ``pooled``, with the `COLUMNS`.
 
     One (device None) for each sensor with two recordings or more and, where it has more than one
-    device, one for each device with two or more. None where no recording has the parameter.
+    device, one for each device with two or more. None where no recording has the parameter, of
+    `POOLED` or ``bias``. All numbers are in ``unit``: of a noise parameter the spread is ``value``
+    times tau (see `Pool`), of a bias the deviation. A parameter that some recordings have and
+    others lack is never ``agree``; those without T_B (models without a Gauss-Markov term) do not
+    count for it. A bias has no verdict.
 
     Parameters
     ----------
@@ -324,14 +303,6 @@ def pooled_rows(
         ``sensor, recording, channel, value, unit``: the mean of the channel, SI.
     devices : mapping of (sensor, recording) to str
         The device; a recording that is not there is a device of its own.
-
-    Yields
-    ------
-    dict
-        The `COLUMNS`; ``parameter`` is of `POOLED`, or ``bias``. All numbers are in ``unit``: of a
-        noise parameter the spread is ``value`` times tau (see `Pool`), of a bias the deviation. A
-        parameter that some recordings have and others lack is never ``agree``; those without T_B
-        (models without a Gauss-Markov term) do not count for it. A bias has no verdict.
     """
     # By channel, parameter and recording; under "" every recording, as one that lacks the term.
     tables: dict[tuple[str, str], dict[str, dict[str, Row | None]]] = {}

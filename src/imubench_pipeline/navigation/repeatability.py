@@ -27,17 +27,9 @@ def repeatability_rows(
     """Yield the rows of the table ``repeatability``: biases of a device against what is printed.
 
     A printed repeatability is the spread of the bias from one turn-on to the next. A recording
-    before which the power stayed on is of the turn-on of the one before, and does not count.
-
-    Parameters
-    ----------
-    biases : iterable of mapping
-        Rows of the table ``fixed_bias``.
-    recordings : iterable of mapping
-        Rows of the table ``recordings``; those that do not decide are left out.
-    sensors : mapping of str to Sensor
-    tolerance : float
-        Relative difference that still counts as printed.
+    before which the power stayed on is of the turn-on of the one before, and does not count; nor do
+    rows of the table ``recordings`` that do not decide. The biases are rows of ``fixed_bias``; the
+    tolerance is the relative difference that still counts as printed.
     """
     about = {(row["sensor"], row["recording"]): row for row in recordings if row["decides"]}
     by_channel: dict[tuple[str, str, str], list[tuple[Row, float]]] = {}

@@ -15,18 +15,12 @@ _SHOWN = 3
 
 
 def ranked(judged: Sequence[Judgement], basis: Basis) -> Iterator[Row]:
-    """Yield the rows of the table ``ranking``.
+    """Yield the rows of the table ``ranking``, of judgements and the recordings that they stand on.
 
     A sensor stands where its limit with the least margin stands. Its rank is one more than the
-    number of sensors that are surely better, whose interval lies wholly above its own: sensors
-    with overlapping intervals are tied. One with a figure that is not known is surely better than
+    number of sensors that are surely better, whose interval lies wholly above its own: sensors with
+    overlapping intervals are tied. One with a figure that is not known is surely better than
     another only where that of the other is not known, too.
-
-    Parameters
-    ----------
-    judged : sequence of Judgement
-    basis : Basis
-        Of the recordings that they stand on.
     """
     for name in dict.fromkeys(judgement.name for judgement in judged):
         own = [judgement for judgement in judged if judgement.name == name]
@@ -52,7 +46,9 @@ def ranked(judged: Sequence[Judgement], basis: Basis) -> Iterator[Row]:
                     "at_most": standing.total["limit"] * judgement.requirement.sigmas,
                     "decides": standing is judgement.decides,
                     **_limit_row(standing),
-                    **_evidence_row(sensor, standing, weak, basis),
+                    "longest_log": basis.longest(standing.totals),
+                    "evidence": ("weak" if weak else "strong") if standing.known else None,
+                    "evidence_reasons": ", ".join(weak) or None,
                     **_backtest_row(name, standing, basis),
                     "doubts": _doubts(sensor, standing, basis),
                 }
@@ -88,17 +84,6 @@ def _limit_row(standing: Standing) -> Row:
         "recordings": expected.recordings,
         "spread": expected.spread.variance**0.5 if expected.spread else None,
         "spread_of": expected.spread_of,
-    }
-
-
-def _evidence_row(sensor: str, standing: Standing, weak: Sequence[str], basis: Basis) -> Row:
-    durations = (basis.duration((sensor, row["recording"])) for row in standing.totals)
-    return {
-        "longest_log": max(
-            (duration for duration in durations if duration is not None), default=None
-        ),
-        "evidence": ("weak" if weak else "strong") if standing.known else None,
-        "evidence_reasons": ", ".join(weak) or None,
     }
 
 

@@ -22,14 +22,7 @@ _ANGLES = ("roll", "pitch", "heading")
 
 
 def alignments(site: Site, arrays: Arrays) -> list[dict[str, Any]]:
-    """Return what is said of each sensor with gyros and accelerometers.
-
-    Parameters
-    ----------
-    site : Site
-    arrays : Arrays
-        Takes what the figures are drawn from.
-    """
+    """Return what is said of each sensor with gyros and accelerometers; arrays take its figures."""
     entries = []
     for view in site.views:
         rows = view.rows("alignment")

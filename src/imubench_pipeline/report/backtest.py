@@ -13,17 +13,7 @@ from imubench_pipeline.typing import Row
 def backtest_lines(
     rows: Sequence[Row], requirements: Mapping[str, Any], system: System
 ) -> list[dict[str, Any]]:
-    """Return the lines of the table of a recording's back-test.
-
-    Parameters
-    ----------
-    rows : sequence of mapping
-        Of the table ``backtest``.
-    requirements : mapping
-        By name, as the plan wrote them.
-    system : str
-        Units of the page.
-    """
+    """Return the lines of the table of a recording's back-test, of rows of ``backtest``."""
     lines = []
     for row in rows:
         unit = unit_of(DIMENSIONS[row["error"]], system)
@@ -55,24 +45,16 @@ def backtest_lines(
 def range_text(row: Row, prefix: str = "") -> str:
     """Return between what limits a ratio is to be expected.
 
-    Parameters
-    ----------
-    row : mapping
-        Of the table ``backtest``, or ``ranking``.
-    prefix : str
-        Of the names of its columns.
+    Of a row of ``backtest``, or of ``ranking`` with a prefix of its columns.
     """
     lower, upper = (number_text(row[f"{prefix}ratio_{end}"], 2) for end in ("lower", "upper"))
     return f"{lower} to {upper}"
 
 
 def standing_text(row: Row) -> str:
-    """Return what the log shows of the error by which a sensor stands; empty where nothing.
+    """Return what the log shows of the error by which a sensor stands, a row of ``ranking``.
 
-    Parameters
-    ----------
-    row : mapping
-        Of the table ``ranking``.
+    Empty where it shows nothing.
     """
     if row["backtest_ratio"] is None:
         return ""

@@ -39,13 +39,9 @@ _DOUBTED = 0.05
 
 
 def answer(rows: Sequence[Row], system: System) -> str:
-    """Return scale factor and bias in a sentence, or why there are none.
+    """Return scale factor and bias of a recording in a sentence, or why there are none.
 
-    Parameters
-    ----------
-    rows : sequence of mapping
-        Of the table ``calibration``, of one recording.
-    system : str
+    Of its rows of the table ``calibration``, as all below.
     """
     by_parameter = {row["parameter"]: row for row in rows}
     bias = by_parameter.get("bias")
@@ -65,12 +61,8 @@ def answer(rows: Sequence[Row], system: System) -> str:
         doubted = straight["chance"] < _DOUBTED
         largest = number_text(_PERCENT * straight["value"], 3)
         text += f"The largest deviation from the line is {largest} % of the largest rate. "
-        text += (
-            "A straight line does not fit: noise alone departs"
-            if doubted
-            else "A straight line fits: noise alone departs"
-        )
-        text += f" as far from it with a chance of {number_text(100 * straight['chance'], 2)} %."
+        text += f"A straight line {'does not fit' if doubted else 'fits'}: noise alone departs as "
+        text += f"far from it with a chance of {number_text(100 * straight['chance'], 2)} %."
     return text.strip()
 
 
@@ -81,13 +73,7 @@ def _around(row: Row, as_text: Any) -> str:
 
 
 def lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
-    """Yield the lines of the table of what was found; a figure that is no rate as text.
-
-    Parameters
-    ----------
-    rows : sequence of mapping
-        Of the table ``calibration``, of one recording.
-    """
+    """Yield the lines of the table of what was found; a figure that is no rate as text."""
     for row in rows:
         if row["status"] == "not_observable" and row["parameter"] in ("earth_rate", "heading"):
             continue
@@ -131,13 +117,7 @@ def _texts(row: Row) -> dict[str, str]:
 
 
 def not_observable(rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """Return what a recording cannot tell, each with the reason.
-
-    Parameters
-    ----------
-    rows : sequence of mapping
-        Of the table ``calibration``, of one recording.
-    """
+    """Return what a recording cannot tell, each with the reason."""
     return [
         {"words": WORDS[row["parameter"]], "why": sentence(row["reason"]), **row}
         for row in rows
@@ -146,13 +126,7 @@ def not_observable(rows: Sequence[Row]) -> list[dict[str, Any]]:
 
 
 def scatter_words(rows: Sequence[Row]) -> str:
-    """Return whether the scatter is that of the noise model, in a sentence.
-
-    Parameters
-    ----------
-    rows : sequence of mapping
-        Of the table ``calibration``, of one recording.
-    """
+    """Return whether the scatter is that of the noise model, in a sentence."""
     chance = next((row["scatter"] for row in rows if row["scatter"] is not None), None)
     if chance is None:
         return ""
@@ -167,14 +141,7 @@ def scatter_words(rows: Sequence[Row]) -> str:
 
 
 def earth_words(rows: Sequence[Row], system: System) -> str:
-    """Return what was taken off for the rotation of the Earth, in a sentence.
-
-    Parameters
-    ----------
-    rows : sequence of mapping
-        Of the table ``calibration``, of one recording.
-    system : str
-    """
+    """Return what was taken off for the rotation of the Earth, in a sentence."""
     row = next((row for row in rows if row["earth_rate"] is not None), None)
     if row is None:
         return "What the Earth's rotation adds along the axis is a part of the bias."

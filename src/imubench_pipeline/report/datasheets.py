@@ -39,13 +39,7 @@ def delta_rows(
 ) -> Iterator[dict[str, Any]]:
     """Yield each figure of the datasheet, what was measured, and the difference.
 
-    Parameters
-    ----------
-    view : ChannelView
-    coverage : mapping
-        Whether sensor, quantity and figure are published, as the table ``coverage`` says.
-    system : str
-        Units of the pages.
+    ``coverage`` tells whether sensor, quantity and figure are published.
     """
     for row in view.datasheet:
         if row["method"] not in (view.recommended, *_BESIDE):
@@ -70,14 +64,7 @@ def delta_rows(
 
 
 def deltas_of_sensors(views: Sequence[RecordingView], system: System) -> Iterator[dict[str, Any]]:
-    """Yield each printed figure of a channel against all recordings of the sensor.
-
-    Parameters
-    ----------
-    views : sequence of RecordingView
-    system : str
-        Units of the pages.
-    """
+    """Yield each printed figure of a channel against all recordings of the sensor."""
     groups: dict[tuple[Any, ...], list[Row]] = {}
     for view in views:
         recommended = view.recommended()
@@ -120,13 +107,7 @@ def repeatability_lines(
 ) -> Iterator[dict[str, Any]]:
     """Yield how the fixed biases of each device of a sensor differ, against what is printed.
 
-    Parameters
-    ----------
-    rows : sequence of mapping
-        The table ``repeatability``.
-    sensor : str
-    system : str
-        Units of the pages.
+    Of the table ``repeatability``.
     """
     for row in rows:
         if row["sensor"] != sensor:
@@ -181,13 +162,7 @@ def _with_limits(row: Row, text: Callable[[float | None], str], of: str = "") ->
 
 
 def coverage_tables(rows: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
-    """Yield a table a quantity: a line a sensor, a column a figure.
-
-    Parameters
-    ----------
-    rows : sequence of mapping
-        The table ``coverage``.
-    """
+    """Yield a table a quantity: a line a sensor, a column a figure, of the table ``coverage``."""
     for quantity, title in _TITLES.items():
         own = [row for row in rows if row["quantity"] == quantity]
         figures = list(dict.fromkeys(row["figure"] for row in own))

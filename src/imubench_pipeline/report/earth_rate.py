@@ -110,13 +110,7 @@ def _drawn(line: Row) -> dict[str, Any]:
 
 
 def published_words(lines: Sequence[Row]) -> str:
-    """Return whether published estimates lie within what noise allows, in sentences.
-
-    Parameters
-    ----------
-    lines : sequence of mapping
-        Of `imubench_pipeline.report.turned.published_lines`.
-    """
+    """Return whether published estimates (`published_lines`) are within the noise, in sentences."""
     if not lines:
         return ""
     beyond = [line for line in lines if line["verdict"] == "beyond the noise"]

@@ -6,12 +6,7 @@ from pathlib import Path
 
 
 def files_of_report(folder: Path) -> list[Path]:
-    """Return the files and folders of the report, without its figures, which another step draws.
-
-    Parameters
-    ----------
-    folder : Path
-    """
+    """Return the files and folders of the report, without its figures, which another step draws."""
     return [
         path
         for path in sorted(folder.iterdir())

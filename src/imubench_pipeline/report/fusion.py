@@ -40,10 +40,7 @@ FUSION = Entry(file="fusion.html", title="Fusion", context=_context, tables=("fu
 def shared_words(common: Mapping[str, float]) -> str:
     """Return what specimens of one sensor are taken to have in common, in words.
 
-    Parameters
-    ----------
-    common : mapping of str to float
-        Part of the variance of N, B, K and R.
+    Parts of the variance of N, B, K and R.
     """
     named = [
         f"{number_text(100.0 * share, 3)} % of the variance of the {_PARAMETERS[name]} ({name})"
@@ -62,13 +59,7 @@ def shared_words(common: Mapping[str, float]) -> str:
 
 
 def equal_numbers(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
-    """Yield the lines of the table: pairs of which the first is the worse one, or not known.
-
-    Parameters
-    ----------
-    rows : sequence of mapping
-        The table ``fusion``.
-    """
+    """Yield the lines of the table: pairs of which the first is the worse one, or not known."""
     for row in rows:
         if row["adev"] is not None and row["other_adev"] is not None:
             if row["adev"] <= row["other_adev"]:

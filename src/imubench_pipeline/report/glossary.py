@@ -30,26 +30,13 @@ class _Sections(RootModel[dict[str, dict[str, _Entry]]]):
 
 @dataclass(frozen=True)
 class Term:
-    """A term of the report.
-
-    Attributes
-    ----------
-    key : str
-    name : str
-        As it is shown.
-    short : str
-        One plain sentence: what it is, and why it matters.
-    section : str
-        Anchor on the theory page.
-    action : str or None
-        What to do; of a finding alone.
-    """
+    """A term of the report."""
 
     key: str
-    name: str
-    short: str
-    section: str
-    action: str | None = None
+    name: str  # as it is shown
+    short: str  # one plain sentence: what it is, and why it matters
+    section: str  # anchor on the theory page
+    action: str | None = None  # what to do; of a finding alone
 
 
 class UnknownTermError(KeyError):
@@ -70,17 +57,13 @@ class _Glossary(dict[str, Term]):
 def glossary() -> dict[str, Term]:
     """Return all terms by their keys, in the order of the file; read once, not to be changed.
 
-    Returns
-    -------
-    dict
-        One that says which terms are close to one that it does not have.
+    Where it is asked for an unknown key, the result raises an UnknownTermError, which says which
+    terms are close.
 
     Raises
     ------
     ConfigError
         If the file cannot be used, or a key stands in two sections.
-    UnknownTermError
-        From the result, where an unknown key is asked for.
     """
     terms = _Glossary()
     for section, entries in parse(_Sections, read_yaml(_FILE), str(_FILE)).root.items():

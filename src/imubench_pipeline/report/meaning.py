@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
@@ -28,7 +29,7 @@ _NAMES = {
     "position": "position, one axis",
     "north": "north, found at rest",
 }
-_HALF_TURN = 3.141592653589793
+_QUARTER_TURN = math.pi / 2.0
 
 
 def rankings(
@@ -36,16 +37,8 @@ def rankings(
 ) -> Iterator[dict[str, Any]]:
     """Yield each requirement with the sensors in their order, and how they stand to its limits.
 
-    Parameters
-    ----------
-    rows : sequence of mapping
-        The table ``ranking``.
-    requirements : mapping
-        By name, as the plan wrote them.
-    simulated : mapping
-        Which recordings are.
-    system : str
-        Units of the page.
+    Of the table ``ranking``, the requirements as the plan wrote them, and which recordings are
+    simulated.
     """
     for name, declared in requirements.items():
         requirement = Requirement.model_validate(declared)
@@ -117,14 +110,8 @@ def budget_tables(
 ) -> Iterator[dict[str, Any]]:
     """Yield the error budget of each recording: a line an error and axis, a column a time.
 
-    Parameters
-    ----------
-    rows : sequence of mapping
-        The table ``error_budget``; what requirements ask for is left out.
-    simulated : mapping
-        Which recordings are.
-    system : str
-        Units of the page.
+    Of the table ``error_budget``, less what requirements ask for, and which recordings are
+    simulated.
     """
     own = [row for row in rows if row["requirement"] is None]
     for key in dict.fromkeys((row["sensor"], row["recording"]) for row in own):
@@ -182,12 +169,12 @@ def _cell(rows: Sequence[Row], unit: PageUnit) -> dict[str, Any]:
 
 def _sensible(row: Row, sigma: float) -> bool:
     """Tell whether an error is below a quarter turn, beyond which an angle means nothing."""
-    return DIMENSIONS[row["error"]] != "angle" or sigma <= 0.5 * _HALF_TURN
+    return DIMENSIONS[row["error"]] != "angle" or sigma <= _QUARTER_TURN
 
 
 def _shown(error: str, sigma: float, unit: PageUnit) -> str:
-    if DIMENSIONS[error] == "angle" and sigma > 0.5 * _HALF_TURN:  # type: ignore[index]  # the table has known errors alone
-        return "not to be found" if error == "north" else f"over {unit.text(0.5 * _HALF_TURN, 3)}"
+    if DIMENSIONS[error] == "angle" and sigma > _QUARTER_TURN:  # type: ignore[index]  # the table has known errors alone
+        return "not to be found" if error == "north" else f"over {unit.text(_QUARTER_TURN, 3)}"
     return unit.text(sigma, 3)
 
 
@@ -196,13 +183,7 @@ def _percent(share: float) -> str:
 
 
 def budget_words(settings: Mapping[str, Any]) -> str:
-    """Return what the errors of a budget mean.
-
-    Parameters
-    ----------
-    settings : mapping
-        The section ``error_budget`` of the run's settings.
-    """
+    """Return what the errors of a budget mean, by the section ``error_budget`` of the settings."""
     return (
         "Errors that the noise causes in dead reckoning, with 95 % intervals and the parts of the "
         f"variance of 1 % or more. Biases and tilt are taken over {settings['static_window']} at "

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
-from imubench_pipeline.report import boards, earth_rate, fusion, made, shortlist, start, theory
-from imubench_pipeline.report.rate_table import table_page
-from imubench_pipeline.report.recording import recording_page
+from imubench_pipeline.report import (
+    boards,
+    earth_rate,
+    fusion,
+    made,
+    rate_table,
+    recording,
+    shortlist,
+    start,
+    theory,
+    turned,
+)
 from imubench_pipeline.report.sensor import device_page, sensor_page
 from imubench_pipeline.report.site import Entry, Page, Site
-from imubench_pipeline.report.turned import turned_page
-from imubench_pipeline.report.view import RecordingView
 
 ENTRIES: Sequence[Entry] = (
     start.START,
@@ -25,18 +32,19 @@ ENTRIES: Sequence[Entry] = (
 )
 """The pages that there is one of, in the order of the navigation; the first is the start page."""
 
-_OF_RECORDING: Mapping[str, Callable[[Site, RecordingView], Page]] = {
-    "two_position": turned_page,
-    "rate_table": table_page,
+_STATIC = ("recording.html.jinja", recording.context)
+_OF_KIND: Mapping[str, tuple[str, recording.Context]] = {
+    "two_position": ("turned.html.jinja", turned.context),
+    "rate_table": ("rate_table.html.jinja", rate_table.context),
 }
-"""Makes the page of a recording that is not static, by its kind."""
+"""Template and context of the page of a recording that is not static, by its kind."""
 
 
 def pages(site: Site) -> Iterator[Page]:
     """Yield the pages of the report, the start page last: it stands for the finished report."""
     for view in site.views:
         kind = "" if view.left_out else view.row["kind"]
-        yield _OF_RECORDING.get(kind, recording_page)(site, view)
+        yield recording.page_of(site, view, *_OF_KIND.get(kind, _STATIC))
     for sensor in site.sensors:
         yield sensor_page(site, sensor)
     for path in dict.fromkeys(view.device_page for view in site.views):

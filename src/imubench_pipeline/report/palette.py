@@ -12,21 +12,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Appearance:
-    """The look of a line.
+    """The look of a line."""
 
-    Attributes
-    ----------
-    light, dark : str
-        Colour on a light and on a dark background.
-    dash : str
-        ``solid``, ``dash``, ``dot``, ``dashdot``, ``longdash`` or ``longdashdot``.
-    marker : str
-        ``circle``, ``square``, ``diamond``, ``triangle-up``, ``triangle-down``, ``cross``, ``x``.
-    """
-
+    # light, dark: colour on a light and on a dark background
     light: str
     dark: str
-    dash: str
+    dash: str  # ``solid``, ``dash``, ``dot``, ``dashdot``, ``longdash`` or ``longdashdot``
+    # ``circle``, ``square``, ``diamond``, ``triangle-up``, ``triangle-down``, ``cross``, ``x``
     marker: str
 
 

@@ -22,14 +22,7 @@ def shown_symbols(rows: Iterable[Row]) -> list[str]:
 def methods_table(
     channel: ChannelView, duration: float | None, system: System
 ) -> tuple[list[str], list[dict[str, Any]]]:
-    """Return the parameters of all methods side by side, and the truth of a simulation.
-
-    Returns
-    -------
-    symbols : list of str
-    lines : list of dict
-        One a method.
-    """
+    """Return symbols, and a line a method with its parameters; and the truth of a simulation."""
     symbols = shown_symbols(chain(*channel.parameters.values()))
     lines: list[dict[str, Any]] = [
         {

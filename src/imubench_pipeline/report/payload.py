@@ -240,23 +240,14 @@ def _spectrum(
 def samples_payload(
     envelope: Sequence[Row], histogram: Sequence[Row], arrays: Arrays
 ) -> dict[str, Any]:
-    """Return the envelope of the samples and their histogram, by channel.
-
-    Parameters
-    ----------
-    envelope, histogram : sequence of mapping
-        Rows of these tables, of one recording.
-    arrays : Arrays
-    """
+    """Return the envelope of the samples of a recording and their histogram, by channel."""
     payload: dict[str, Any] = {"envelope": {}, "histogram": {}}
     for channel in dict.fromkeys(row["channel"] for row in envelope):
         rows = [row for row in envelope if row["channel"] == channel]
         payload["envelope"][channel] = {
             "start": rows[0]["start"],
             "end": rows[-1]["end"],
-            "low": arrays.even([_number(row["low"]) for row in rows]),
-            "high": arrays.even([_number(row["high"]) for row in rows]),
-            "mean": arrays.even([_number(row["mean"]) for row in rows]),
+            **{name: arrays.even(numbers(rows, name)) for name in ("low", "high", "mean")},
         }
     for channel in dict.fromkeys(row["channel"] for row in histogram):
         rows = [row for row in histogram if row["channel"] == channel]
@@ -271,5 +262,6 @@ def _rounded(value: float | None) -> float | None:
     return None if value is None else float(f"{value:.6g}")
 
 
-def _number(value: float | None) -> float:
-    return np.nan if value is None else value
+def numbers(rows: Sequence[Row], name: str) -> list[float]:
+    """Return a column of rows; NaN where it has no value."""
+    return [np.nan if row[name] is None else row[name] for row in rows]

@@ -94,7 +94,12 @@ _OF_DIMENSION: dict[System, dict[str, str]] = {
 }
 
 
-_SYMBOL_TEXTS = {"B_curve": "B (curve)", "sigma_min": "σ_min", "tau_min": "τ_min"}
+_SYMBOL_TEXTS = {
+    "B_curve": "B (curve)",
+    "sigma_min": "σ_min",
+    "tau_min": "τ_min",
+    "bias": "fixed bias",
+}
 
 
 def symbol_text(symbol: str) -> str:
@@ -105,14 +110,8 @@ def symbol_text(symbol: str) -> str:
 def page_unit(quantity: str, symbol: str, system: System) -> PageUnit:
     """Return the unit in which a page first shows a figure of a quantity.
 
-    Parameters
-    ----------
-    quantity : str
-        ``gyro`` or ``accel``.
-    symbol : str
-        A parameter, or ``adev``, ``psd`` (root of a density) or ``signal`` (the log itself).
-    system : str
-        ``practical`` or ``si``.
+    The symbol is a parameter, or ``adev``, ``psd`` (root of a density) or ``signal`` (the log
+    itself).
     """
     return _unit(quantity, symbol, _chosen(quantity, system))
 

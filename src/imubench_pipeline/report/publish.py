@@ -45,18 +45,7 @@ Progress = Callable[[str], None]
 def publish(site: Site, folder: Path, say: Progress = lambda _: None) -> list[str]:
     """Write the pages of the report whose data changed, and remove those that are no more.
 
-    Parameters
-    ----------
-    site : Site
-    folder : Path
-        Of the report.
-    say : callable
-        Is told what is being written.
-
-    Returns
-    -------
-    list of str
-        What was written, below ``folder``.
+    ``say`` is told what is being written; returned is what was, below the folder.
     """
     written = []
     for path, content in _assets().items():
@@ -181,15 +170,7 @@ def one_file(site: Site) -> str:
 
 
 def site_of(tables: Mapping[str, pa.Table], settings: str, results: Path) -> Site:
-    """Return the site of a run.
-
-    Parameters
-    ----------
-    tables : mapping of str to pyarrow.Table
-    settings : str
-        As `imubench_pipeline.run.plan.Plan.report_settings` gives them.
-    results : Path
-    """
+    """Return the site of a run, by its settings as the plan gives them."""
     return Site(tables, json.loads(settings), results, ENTRIES, source_digest("report.publish"))
 
 

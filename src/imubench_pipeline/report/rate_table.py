@@ -16,26 +16,15 @@ from imubench_pipeline.report.calibration import (
 )
 from imubench_pipeline.report.payload import Arrays
 from imubench_pipeline.report.practical import number_text
-from imubench_pipeline.report.recording import about_of, page_of, summary_words
-from imubench_pipeline.report.site import Page, Site
+from imubench_pipeline.report.recording import about_of, summary_words
+from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.report.words import counted, noise_words
 from imubench_pipeline.typing import Row
 
 
-def table_page(site: Site, view: RecordingView) -> Page:
-    """Return the page of a recording on a rate table.
-
-    Parameters
-    ----------
-    site : Site
-    view : RecordingView
-        One that was not rejected.
-    """
-    return page_of(site, view, "rate_table.html.jinja", _context)
-
-
-def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
+def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
+    """Return what the template needs; ``folder`` is the recording's."""
     rows = view.rows("calibration")
     points = view.rows("calibration_points")
     return {

@@ -38,27 +38,12 @@ _SHOWN_MODELS = 4
 _RATE_FROM = {"stamps": "from the stamps", "stated": "as stated"}
 
 
-def recording_page(site: Site, view: RecordingView) -> Page:
-    """Return the page of a recording."""
-    return page_of(site, view, "recording.html.jinja", _context)
+Context = Callable[[Site, RecordingView, Path], dict[str, Any]]
+"""Gives what a template needs of a recording, from its folder, too."""
 
 
-def page_of(
-    site: Site,
-    view: RecordingView,
-    template: str,
-    context: Callable[[Site, RecordingView, Path], dict[str, Any]],
-) -> Page:
-    """Return the page of a recording of any kind.
-
-    Parameters
-    ----------
-    site : Site
-    view : RecordingView
-    template : str
-    context : callable
-        Gives what the template needs, from these and the folder of the recording.
-    """
+def page_of(site: Site, view: RecordingView, template: str, context: Context) -> Page:
+    """Return the page of a recording of any kind."""
     folder = site.results / "recordings" / view.sensor / view.name
     key = recording_key(site, view, folder)
     return Page(view.page, template, key, lambda: context(site, view, folder))
@@ -73,12 +58,16 @@ def recording_key(site: Site, view: RecordingView, folder: Path) -> str:
     return site.key_of(view.key, view.device_page, look, published, metadata_of(folder), *own)
 
 
-def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
+def rows_of_samples(folder: Path, table: str) -> list[Row]:
+    """Return the rows of ``envelope`` or ``histogram`` in the folder of a recording, if any."""
+    path = folder / f"{table}.parquet"
+    return list(read(table, [path]).to_pylist()) if path.is_file() else []
+
+
+def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
+    """Return what the template needs; ``folder`` is the recording's."""
     arrays = Arrays()
-    envelope, histogram = (
-        read(table, [path]).to_pylist() if (path := folder / f"{table}.parquet").is_file() else []
-        for table in ("envelope", "histogram")
-    )
+    envelope, histogram = (rows_of_samples(folder, table) for table in ("envelope", "histogram"))
     order = {"fatal": 0, "warning": 1, "note": 2}
     channels = view.channels()
     names = {channel.channel for channel in channels}
@@ -260,6 +249,7 @@ def about_of(
         "sensor_page": site.sensor_page(view.sensor),
         "provenance": list(_provenance(view, channels, folder)),
         "sources": metadata_of(folder).get("sources", []),
+        "figures_command": None,
     }
 
 

@@ -34,13 +34,7 @@ _INTERRUPTED = "Terminating processes on user request"
 
 
 def summary(results: Path) -> str:
-    """Return what a finished run says; nothing where there are no tables.
-
-    Parameters
-    ----------
-    results : Path
-        Folder of the results.
-    """
+    """Return what a finished run says; nothing where there are no tables."""
     tables = {name: results / f"tables/{name}.parquet" for name in _NEEDED}
     if not all(path.is_file() for path in tables.values()):
         return ""
@@ -72,12 +66,7 @@ def summary(results: Path) -> str:
 def failure(logs: Sequence[str], results: Path) -> str:
     """Return what a run says that did not come to its end: what failed, and how to go on.
 
-    Parameters
-    ----------
-    logs : sequence of str
-        Files that Snakemake logs to.
-    results : Path
-        Folder of the results.
+    By the files that Snakemake logs to.
     """
     texts = [Path(log).read_text(encoding="utf-8", errors="replace") for log in logs]
     steps = dict.fromkeys(step for text in texts for step in _failed_steps(text, results))
@@ -115,39 +104,21 @@ def _failed_steps(log: str, results: Path) -> Iterator[str]:
 
 
 def rejections(recordings: Iterable[Row]) -> Iterator[str]:
-    """Yield a line for each rejected recording: its name and the reason.
-
-    Parameters
-    ----------
-    recordings : iterable of mapping
-        The table ``recordings``.
-    """
+    """Yield a line for each rejected recording: its name and the reason."""
     for row in recordings:
         if row["status"] == "rejected":
             yield one_line(f"{row['sensor']}/{row['recording']}: {row['reason']}")
 
 
 def left_out(failures: Iterable[Row]) -> Iterator[str]:
-    """Yield a line for each step that failed: what is left out for it, and why.
-
-    Parameters
-    ----------
-    failures : iterable of mapping
-        The table ``failures``.
-    """
+    """Yield a line for each step that failed: what is left out for it, and why."""
     for row in failures:
         of = f"{row['sensor']}/{row['recording']}" if row["recording"] else row["sensor"]
         yield one_line(f"{of}: {row['reason']}")
 
 
 def warnings(findings: Iterable[Row]) -> Iterator[str]:
-    """Yield a line for each recording that has warnings, the one with the worst first.
-
-    Parameters
-    ----------
-    findings : iterable of mapping
-        The table ``findings``; notes, and that a recording is left out, are not.
-    """
+    """Yield a line for each recording that has warnings, the one with the worst first."""
     by_recording: dict[str, Counter[str]] = {}
     left_out: Counter[str] = Counter()
     for row in serious(findings):
@@ -164,26 +135,14 @@ def warnings(findings: Iterable[Row]) -> Iterator[str]:
 
 
 def serious(findings: Iterable[Row]) -> Iterator[Row]:
-    """Yield the findings that put results in doubt.
-
-    Parameters
-    ----------
-    findings : iterable of mapping
-        The table ``findings``; notes, and that a recording is left out, are not.
-    """
+    """Yield the findings that put results in doubt: no notes, nor that a recording is left out."""
     for row in findings:
         if row["severity"] != "note" and row["finding"] not in LEFT_OUT:
             yield row
 
 
 def leaders(ranking: Iterable[Row], recordings: Iterable[Row]) -> Iterator[str]:
-    """Yield a line for each requirement: the sensor that comes first, and whether it passes.
-
-    Parameters
-    ----------
-    ranking, recordings : iterable of mapping
-        The tables of these names.
-    """
+    """Yield a line for each requirement: the sensor that comes first, and whether it passes."""
     deciding = [row for row in ranking if row["decides"]]
     simulated = {(row["sensor"], row["recording"]) for row in recordings if row["simulated"]}
     for name in dict.fromkeys(row["requirement"] for row in deciding):
@@ -203,12 +162,7 @@ def leaders(ranking: Iterable[Row], recordings: Iterable[Row]) -> Iterator[str]:
 def one_line(text: str, longest: int = _MOST_LETTERS) -> str:
     """Return a text on one line, without what a terminal takes for a command.
 
-    Parameters
-    ----------
-    text : str
-        May hold names and values as they stand in logs.
-    longest : int
-        Letters; the rest becomes an ellipsis.
+    It may hold names and values as they stand in logs; beyond ``longest`` letters is an ellipsis.
     """
     shown = "".join(letter if letter.isprintable() else " " for letter in text)
     shown = " ".join(shown.split())

@@ -121,12 +121,12 @@ def _devices(own: Sequence[RecordingView]) -> Iterator[dict[str, Any]]:
 
 def _pooled(row: Row) -> Row:
     quantity = row["channel"].split("_", maxsplit=1)[0]
-    bias = row["parameter"] == "bias"
+    symbol = "signal" if row["parameter"] == "bias" else row["parameter"]
     return row | {  # type: ignore[operator]  # a row of a table is a dict
         "axis": row["channel"].replace("_", " "),
         "digits": limit_digits(row["lower"], row["upper"], 4),
-        "ref": f"{quantity}.{'signal' if bias else row['parameter']}",
-        "name": "fixed bias" if bias else symbol_text(row["parameter"]),
+        "ref": f"{quantity}.{symbol}",
+        "name": symbol_text(row["parameter"]),
     }
 
 
@@ -182,7 +182,7 @@ def _trends(
             continue
         quantity, axis = channel.split("_")
         title = f"{QUANTITY_NAMES[quantity]} {axis}"
-        name = "fixed bias" if parameter == "bias" else symbol_text(parameter)
+        name = symbol_text(parameter)
         changes = [row["recording"] + mark for row in series if row["verdict"] == "changed"]
         outside = [
             row["recording"] + mark
@@ -223,7 +223,7 @@ def _trend_words(changes: Sequence[str], outside: Sequence[str]) -> str:
 
 def change_words(row: Row, *, simulated: bool) -> str:
     """Return a change of a device in words."""
-    name = "fixed bias" if row["parameter"] == "bias" else symbol_text(row["parameter"])
+    name = symbol_text(row["parameter"])
     by = ""
     if row["change"] is not None:
         by = f" by {100 * row['change']:+.0f} %".replace("-", "−")

@@ -7,17 +7,10 @@ from collections.abc import Mapping, Sequence
 
 
 def imubench(name: str, results: str, options: Mapping[str, str] | None = None) -> str:
-    """Return a command of `imubench` for the results of a run.
+    """Return a command of `imubench`, such as ``figures``, for the results of a run.
 
-    Parameters
-    ----------
-    name : str
-        Of the command, such as ``figures``.
-    results : str
-        Folder of the results.
-    options : mapping of str to str, optional
-        What is asked by which option, such as ``--sensor``; a word in capitals stands for what the
-        reader puts there.
+    By option, such as ``--sensor``, what is asked; a word in capitals stands for what the reader
+    puts there.
     """
     asked = [word for key, value in (options or {}).items() for word in _option(key, value)]
     return shlex.join(["imubench", name, _place(results), *asked])
@@ -26,12 +19,7 @@ def imubench(name: str, results: str, options: Mapping[str, str] | None = None) 
 def made_again(target: str, overrides: Sequence[str] = ()) -> str:
     """Return the command that makes a file of a recording again, from its log.
 
-    Parameters
-    ----------
-    target : str
-        The file.
-    overrides : sequence of str
-        What the run has beside its configuration, as ``snakemake --config`` takes it.
+    The overrides are what the run has beside its configuration, as ``snakemake --config`` takes it.
     """
     stated = ["--config", *overrides] if overrides else []
     # What follows the two dashes is no option, whatever it begins with.

@@ -30,23 +30,12 @@ _NOT_IN_NAMES = re.compile(r"[^\w .+()-]")
 
 @dataclass(frozen=True)
 class Page:
-    """One page.
+    """One page."""
 
-    Attributes
-    ----------
-    path : str
-        Below the folder of the report.
-    template : str
-    key : str
-        Digest of what it shows: the page is written again only if it changes.
-    context : callable
-        Returns what the template is given.
-    """
-
-    path: str
+    path: str  # below the folder of the report
     template: str
-    key: str
-    context: Callable[[], Mapping[str, Any]]
+    key: str  # digest of what it shows: the page is written again only if it changes
+    context: Callable[[], Mapping[str, Any]]  # returns what the template is given
 
     @property
     def root(self) -> str:
@@ -56,30 +45,16 @@ class Page:
 
 @dataclass(frozen=True, kw_only=True)
 class Entry:
-    """A page that a report has once, as it is declared beside what it shows.
+    """A page that a report has once, as it is declared beside what it shows."""
 
-    Attributes
-    ----------
-    file : str
-        Its name; its template is called so, too, with ``.jinja``.
-    title : str
-        What the navigation calls it.
-    context : callable
-        Returns what the template is given.
-    tables : tuple of str
-        The joined tables that it shows: it is written again if one of them changes.
-    views : callable
-        Returns the recordings that it shows: likewise, whatever any table says of them alone.
-    exists : callable
-        Tells whether a report has it.
-    """
-
-    file: str
-    title: str
-    context: Callable[[Site], Mapping[str, Any]]
+    file: str  # its name; its template is called so, too, with ``.jinja``
+    title: str  # what the navigation calls it
+    context: Callable[[Site], Mapping[str, Any]]  # returns what the template is given
+    # the joined tables that it shows: it is written again if one of them changes
     tables: tuple[str, ...] = ()
+    # returns the recordings that it shows: likewise, whatever any table says of them alone
     views: Callable[[Site], Sequence[RecordingView]] = lambda _: ()
-    exists: Callable[[Site], bool] = lambda _: True
+    exists: Callable[[Site], bool] = lambda _: True  # tells whether a report has it
 
     def page(self, site: Site) -> Page:
         """Return the page of a report."""
@@ -90,27 +65,13 @@ class Entry:
 
 @dataclass
 class Site:
-    """What the pages are made of.
+    """What the pages are made of."""
 
-    Parameters
-    ----------
-    tables : mapping of str to pyarrow.Table
-        All joined tables.
-    settings : mapping
-        As `imubench_pipeline.run.plan.Plan.report_settings` gives them.
-    results : Path
-        Folder of the results, for what is kept of each recording alone.
-    entries : sequence of Entry
-        The pages that there is one of, in the order of the navigation.
-    code : str
-        Digest of the code that makes the pages.
-    """
-
-    tables: Mapping[str, pa.Table]
-    settings: Mapping[str, Any]
-    results: Path
-    entries: Sequence[Entry]
-    code: str = ""
+    tables: Mapping[str, pa.Table]  # all joined tables
+    settings: Mapping[str, Any]  # as `imubench_pipeline.run.plan.Plan.report_settings` gives them
+    results: Path  # folder of the results, for what is kept of each recording alone
+    entries: Sequence[Entry]  # the pages that there is one of, in the order of the navigation
+    code: str = ""  # digest of the code that makes the pages
     _rows: dict[str, list[Row]] = field(default_factory=dict, init=False)
 
     @property
@@ -304,11 +265,7 @@ def sensor_names(
 ) -> dict[str, str]:
     """Return vendor and model of each sensor, with the name of its file where two are alike.
 
-    Parameters
-    ----------
-    sensors : iterable of str
-    described : mapping of str to mapping
-        ``vendor`` and ``model`` of those that have a file.
+    Of those described, which have a file.
     """
     plain = {
         sensor: f"{described[sensor]['vendor']} {described[sensor]['model']}"

@@ -54,22 +54,9 @@ def parts(
 ) -> Iterator[RenderableType]:
     """Yield what is shown, from top to bottom.
 
-    Parameters
-    ----------
-    tables : mapping of str to sequence of mapping
-        ``recordings``, ``findings``, ``failures``, ``ranking``, ``next_steps`` and ``parameters``
-        of a run.
-    requirement : str or None
-        The ranking for this one alone, with every limit; None: for all, with the limit that
-        decides.
-    channel : str or None
-        Parameters of this one alone.
-    method : str or None
-        Of the parameters; None: the recommended one.
-    system : {"practical", "si"}
-        Units.
-    width : int
-        Columns of the terminal.
+    The ranking is for one requirement alone, with every limit, or for all, with the limit that
+    decides; parameters are of one channel or all, by one method or the recommended one. The width
+    is in columns of the terminal.
     """
     about = {(row["sensor"], row["recording"]): row for row in tables["recordings"]}
     yield _compared(tables["recordings"])

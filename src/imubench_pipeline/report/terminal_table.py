@@ -24,19 +24,9 @@ def fitting(
 ) -> Table:
     """Return a table in which no word or number is broken, but the names.
 
-    Columns for which there is no room are left out from the right.
-
-    Parameters
-    ----------
-    title : str
-    heads : sequence of str
-        Columns of numbers have their unit on a second line.
-    lines : sequence of sequence
-        A cell a head.
-    width : int
-        Columns of the terminal.
-    names : int
-        Which column may be broken anywhere.
+    Columns for which there is no room in the width are left out from the right. The head of a
+    column of numbers has their unit on a second line; ``names`` is the column that may be broken
+    anywhere.
     """
     cells = [["-", *column] for column in zip(heads, *lines, strict=True)]
     widths = [max(cell_len(word) for cell in column for word in _words(cell)) for column in cells]

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.report.payload import Arrays, samples_payload
+from imubench_pipeline.report.payload import Arrays, numbers, samples_payload
 from imubench_pipeline.report.practical import (
     System,
     duration_text,
@@ -18,11 +16,10 @@ from imubench_pipeline.report.practical import (
     number_text,
     page_unit,
 )
-from imubench_pipeline.report.recording import about_of, page_of, summary_words
-from imubench_pipeline.report.site import Page, Site
+from imubench_pipeline.report.recording import about_of, rows_of_samples, summary_words
+from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.report.words import counted, noise_words, sentence
-from imubench_pipeline.tables import read
 from imubench_pipeline.typing import Row
 
 METHOD_TERMS = {
@@ -45,27 +42,15 @@ ESTIMATES = ("filter", "pairs", "triples")
 """The methods that find the rate, the one to use first; the smoother's is that of the filter."""
 
 
-def turned_page(site: Site, view: RecordingView) -> Page:
-    """Return the page of a recording whose sensor was turned.
-
-    Parameters
-    ----------
-    site : Site
-    view : RecordingView
-        One that was not rejected.
-    """
-    return page_of(site, view, "turned.html.jinja", _context)
-
-
-def _context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
+def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
+    """Return what the template needs; ``folder`` is the recording's."""
     arrays = Arrays()
     rows = view.rows("earth_rate")
     channel = rows[0]["channel"] if rows else ""
     whole = [row for row in rows if row["part"] == "whole"]
     turning = view.rows("turning")
     parts = list(dict.fromkeys(row["part"] for row in rows if row["value"] is not None))
-    path = folder / "envelope.parquet"
-    envelope = read("envelope", [path]).to_pylist() if path.is_file() else []
+    envelope = rows_of_samples(folder, "envelope")
     prediction = view.rows("earth_rate_prediction")
     return {
         **about_of(site, view, [], folder),
@@ -107,24 +92,14 @@ def _summary(view: RecordingView, turning: Sequence[Row], rows: Sequence[Row]) -
 
 
 def latitude_text(rows: Sequence[Row]) -> str:
-    """Return the latitude of a recording in degrees.
-
-    Parameters
-    ----------
-    rows : sequence of mapping
-        Of a table with the latitude, at least one.
-    """
+    """Return the latitude of a recording in degrees, of rows that have it, at least one."""
     return f"{number_text(math.degrees(rows[0]['latitude']))}°"
 
 
 def answer(rows: Sequence[Row], system: System) -> str:
     """Return what was found in a sentence: the filter's estimate, or why there is none.
 
-    Parameters
-    ----------
-    rows : sequence of mapping
-        Of the table ``earth_rate``, of the whole recording.
-    system : str
+    Of rows of the table ``earth_rate``, of the whole recording.
     """
     by_method = {row["method"]: row for row in rows}
     best = by_method.get("filter")
@@ -152,13 +127,7 @@ _FAR = 4.0
 
 
 def line(row: Row) -> dict[str, Any]:
-    """Return a line of the table of estimates.
-
-    Parameters
-    ----------
-    row : mapping
-        Of the table ``earth_rate``.
-    """
+    """Return a line of the table of estimates, of a row of ``earth_rate``."""
     return {
         **row,
         "term": METHOD_TERMS[row["method"]],
@@ -171,13 +140,7 @@ def line(row: Row) -> dict[str, Any]:
 
 
 def published_lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
-    """Yield the lines of the table of what a source prints of its runs.
-
-    Parameters
-    ----------
-    rows : sequence of mapping
-        Of the table ``earth_rate_published``.
-    """
+    """Yield the lines of the table of what a source prints of its runs."""
     for row in rows:
         yield {
             **row,
@@ -189,10 +152,7 @@ def published_lines(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
 def needs(rows: Sequence[Row]) -> dict[str, Any] | None:
     """Return what it takes to find the Earth's rate, for a table and a sentence.
 
-    Parameters
-    ----------
-    rows : sequence of mapping
-        Of the table ``earth_rate_prediction``, of one recording.
+    Of rows of the table ``earth_rate_prediction``, of one recording.
     """
     goals = [row for row in rows if row["of"] == "goal"]
     if not goals:
@@ -269,7 +229,7 @@ def _payload(
         "dwells": {
             "start": arrays.exact([row["start"] for row in dwells]),
             "stop": arrays.exact([row["stop"] for row in dwells]),
-            "mean": arrays.exact(_numbers(dwells, "mean")),
+            "mean": arrays.exact(numbers(dwells, "mean")),
             "north": [row["sense"] == 1 for row in dwells],
         },
         "turns": arrays.exact([row["time"] for row in turning if row["what"] == "turn"]),
@@ -291,8 +251,8 @@ def _courses(series: Sequence[Row], arrays: Arrays) -> dict[str, Any]:
         courses["drift" if name[0] == "drift" else name[1]] = {
             "name": "drift" if name[0] == "drift" else METHOD_WORDS[name[1]],
             "time": arrays.exact([row["time"] for row in own]),
-            "value": arrays.exact(_numbers(own, "value")),
-            "sigma": arrays.exact(_numbers(own, "sigma")),
+            "value": arrays.exact(numbers(own, "value")),
+            "sigma": arrays.exact(numbers(own, "sigma")),
         }
     return courses
 
@@ -309,14 +269,7 @@ def _range(series: Sequence[Row], truth: float) -> list[float]:
 
 
 def prediction_payload(rows: Sequence[Row], arrays: Arrays) -> dict[str, Any]:
-    """Return what the figures of the prediction are drawn from.
-
-    Parameters
-    ----------
-    rows : sequence of mapping
-        Of the table ``earth_rate_prediction``, of one recording.
-    arrays : Arrays
-    """
+    """Return what the figures of the prediction of a recording are drawn from."""
     goals = [row["goal"] for row in rows if row["of"] == "goal"]
     payload: dict[str, Any] = {"goals": goals, "truth": EARTH_RATE}
     for of, x in (("time", "time"), ("dwell", "dwell")):
@@ -332,7 +285,3 @@ def prediction_payload(rows: Sequence[Row], arrays: Arrays) -> dict[str, Any]:
             "nearly": [row["dwell"] for row in own if row["nearly_best"]],
         }
     return payload
-
-
-def _numbers(rows: Sequence[Mapping[str, Any]], name: str) -> list[float]:
-    return [np.nan if row[name] is None else row[name] for row in rows]

@@ -114,25 +114,14 @@ class RecordingView:
 
     The channels of a thousand recordings do not fit into memory at once: they are made when they
     are asked for, and are not kept.
-
-    Attributes
-    ----------
-    row : mapping
-        Of the table ``recordings``.
-    parts : mapping of str to pyarrow.Table
-        Its rows of each table.
-    keys : callable
-        Returns the digests of all recordings, by sensor and name.
-    page : str
-        Its page.
-    device_page : str or None
-        That of its device, where the device has a name of its own or several recordings.
     """
 
-    row: Row
-    parts: Mapping[str, pa.Table]
+    row: Row  # of the table ``recordings``
+    parts: Mapping[str, pa.Table]  # its rows of each table
+    # returns the digests of all recordings, by sensor and name
     keys: Callable[[], Mapping[Name, str]]
-    page: str = ""
+    page: str = ""  # its page
+    # that of its device, where the device has a name of its own or several recordings
     device_page: str | None = None
 
     @property

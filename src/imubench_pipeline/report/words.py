@@ -36,13 +36,7 @@ _VERDICTS = (
 def untold(row: Row, unit: PageUnit, duration: float | None) -> str:
     """Return in a sentence why a parameter has no plain value; empty where it has one.
 
-    Parameters
-    ----------
-    row : mapping
-        Of the table ``parameters``.
-    unit : PageUnit
-    duration : float or None
-        Length of the recording, s.
+    Of a row of ``parameters``, and the length of the recording, s.
     """
     symbol, status = symbol_text(row["parameter"]), row["status"]
     if status == "ok":
@@ -81,25 +75,13 @@ def precision(row: Row, unit: PageUnit) -> str:
 
 
 def verdict_words(row: Row) -> str:
-    """Return a verdict with what makes its evidence weak.
-
-    Parameters
-    ----------
-    row : mapping
-        Of the table ``ranking``, of the limit that decides.
-    """
+    """Return a verdict, a row of ``ranking`` that decides, with what makes its evidence weak."""
     weak = evidence_words(row)
     return f"{row['verdict']}, on weak evidence ({weak})" if weak else row["verdict"]
 
 
 def evidence_words(row: Row) -> str:
-    """Return what makes the evidence of a verdict weak; empty where it is strong or not known.
-
-    Parameters
-    ----------
-    row : mapping
-        Of the table ``ranking``.
-    """
+    """Return what makes the evidence of a verdict weak; empty where it is strong or not known."""
     if row["evidence"] != "weak":
         return ""
     return "; ".join(_weakness(code, row) for code in row["evidence_reasons"].split(", "))
@@ -129,19 +111,8 @@ def requirement_verdict(
 ) -> list[str]:
     """Return which sensor fulfils a requirement best, and how the others stand, in sentences.
 
-    Parameters
-    ----------
-    groups : sequence of mapping
-        As `imubench_pipeline.report.meaning.rankings` gives them, the best first.
-    names : mapping
-        Name of each sensor as it is shown.
-    basis : mapping
-        On which data each sensor is judged, in words.
-
-    Returns
-    -------
-    list of str
-        The answer, and what is to be known beside it, a line each.
+    The answer, and what is to be known beside it, a line each: of groups as `meaning.rankings`
+    gives them, the best first, and on which data each sensor is judged, in words.
     """
     if not groups:
         return ["No recording answers it."]
@@ -299,12 +270,6 @@ _ISO = re.compile(r"^(\d{4}-\d\d-\d\d)T(\d\d:\d\d(?::\d\d)?)(?:\.0+(?!\d))?")
 
 
 def noise_words(rows: Sequence[Row]) -> str:
-    """Return by which noise model figures are weighed, in a sentence.
-
-    Parameters
-    ----------
-    rows : sequence of mapping
-        Of a table with ``model`` and ``model_from``, of one recording.
-    """
+    """Return by which noise model figures of a recording are weighed, in a sentence."""
     fitted = next((row for row in rows if row["model"]), None)
     return f"Noise model: {fitted['model']}, from {fitted['model_from']}." if fitted else ""

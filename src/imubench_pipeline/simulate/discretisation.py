@@ -36,43 +36,22 @@ class SlowSources:
     """Slow states and the filter's lack of each, over one sampling interval.
 
     The density of every driving noise is 1; all arrays are for n sources and a filter of order m.
-
-    Attributes
-    ----------
-    decay : ndarray, shape (n,)
-        e^(-interval / T); 1 of a random walk.
-    lost : ndarray, shape (n,)
-        1 - decay, without loss of digits.
-    own : ndarray, shape (n,)
-        Standard deviation of the noise of x.
-    coupling : ndarray, shape (n, m)
-        What e gains from x.
-    shared : ndarray, shape (n, m)
-        What e gains from the noise of x of unit variance.
-    residual : ndarray, shape (n, m, m)
-        Factors of the rest of the noise of e: its covariance is ``residual.T @ residual``.
     """
 
-    decay: Array
-    lost: Array
-    own: Array
-    coupling: Array
-    shared: Array
+    decay: Array  # shape (n,); e^(-interval / T); 1 of a random walk
+    lost: Array  # shape (n,); 1 - decay, without loss of digits
+    own: Array  # shape (n,); standard deviation of the noise of x
+    coupling: Array  # shape (n, m); what e gains from x
+    shared: Array  # shape (n, m); what e gains from the noise of x of unit variance
+    # shape (n, m, m); factors of the rest of the noise of e: its covariance is ``residual.T @
+    # residual``
     residual: Array
 
 
 def filter_transition(low_pass: LowPass, interval: float) -> Array:
-    """Return what becomes of the states of a filter without input, e^(F interval).
+    """Return what becomes of the states of a filter in an interval, s, without input.
 
-    Parameters
-    ----------
-    low_pass : LowPass
-    interval : float
-        s.
-
-    Returns
-    -------
-    ndarray, shape (m, m)
+    e^(F interval), shape (m, m).
     """
     return np.asarray(expm(low_pass.transition * interval))
 
@@ -80,14 +59,8 @@ def filter_transition(low_pass: LowPass, interval: float) -> Array:
 def slow_sources(times: Array, interval: float, low_pass: LowPass | None) -> SlowSources:
     """Discretise Gauss-Markov processes and random walks, and the filter that they drive.
 
-    Parameters
-    ----------
-    times : ndarray, shape (n,)
-        Correlation time of each, s; infinite for a random walk.
-    interval : float
-        Sampling interval, s.
-    low_pass : LowPass or None
-        None: m = 0.
+    The correlation times, s, shape (n,), are infinite for a random walk; the interval is that of
+    sampling, s. Without a filter m = 0.
     """
     n, m = len(times), low_pass.order if low_pass else 0
     x = interval / times
@@ -113,14 +86,9 @@ def slow_sources(times: Array, interval: float, low_pass: LowPass | None) -> Slo
 
 
 def white_factor(low_pass: LowPass, interval: float) -> Array:
-    """Return a factor of the noise that white noise of density 1 leaves in the filter.
+    """Return a factor R of the noise that white noise of density 1 leaves in the filter.
 
-    `low_pass` and `interval`: as of `filter_transition`.
-
-    Returns
-    -------
-    ndarray, shape (m, m)
-        R; the covariance is R.T @ R.
+    The covariance is R.T @ R; the interval is in s, the shape (m, m).
     """
     _, factor = _integrated(low_pass.transition[None], low_pass.input[None], interval)
     return np.asarray(factor[0])
@@ -129,11 +97,7 @@ def white_factor(low_pass: LowPass, interval: float) -> Array:
 def _integrated(system: Array, impulse: Array, interval: float) -> tuple[Array, Array]:
     """Return transitions, and factors of the integral of g g' with g = e^(system t) impulse.
 
-    Parameters
-    ----------
-    system : ndarray, shape (n, k, k)
-    impulse : ndarray, shape (n, k)
-    interval : float
+    Of systems of shape (n, k, k) and impulses of shape (n, k).
     """
     fastest = float(np.abs(system).sum(axis=2).max()) * interval
     doublings = max(0, math.ceil(math.log2(max(fastest, 1.0))))
@@ -160,22 +124,15 @@ def _integrated(system: Array, impulse: Array, interval: float) -> tuple[Array, 
 
 @dataclass(frozen=True)
 class HeldInput:
-    """What a filter lacks of an input that is linear between samples, over one interval.
+    """What a filter lacks of an input that is linear between samples, over one interval."""
 
-    Attributes
-    ----------
-    step : ndarray, shape (m,)
-        e gains ``step`` times the change of the input.
-    lag_decay, lag_step : float
-        The lag ε = lagged - input of a first-order lag becomes ``lag_decay * ε + lag_step *
-        change``.
-    lag_coupling, lagged_step : ndarray, shape (m,)
-        e gains ``lag_coupling * ε + lagged_step * change`` of an input that is lagged.
-    """
-
-    step: Array
+    step: Array  # shape (m,); e gains ``step`` times the change of the input
+    # lag_decay, lag_step: the lag ε = lagged - input of a first-order lag becomes ``lag_decay * ε +
+    # lag_step * change``
     lag_decay: float
     lag_step: float
+    # lag_coupling, lagged_step: shape (m,); e gains ``lag_coupling * ε + lagged_step * change`` of
+    # an input that is lagged
     lag_coupling: Array
     lagged_step: Array
 
@@ -183,13 +140,7 @@ class HeldInput:
 def held_input(low_pass: LowPass | None, lag: float, interval: float) -> HeldInput:
     """Discretise filter and thermal lag for an input with first-order hold, exactly.
 
-    Parameters
-    ----------
-    low_pass : LowPass or None
-    lag : float
-        Time constant, s; 0: none.
-    interval : float
-        s.
+    Lag (a time constant; 0: none) and interval are in s.
     """
     m = low_pass.order if low_pass else 0
     x = interval / lag if lag > 0 else math.inf

@@ -31,14 +31,8 @@ _BEYOND = 4.0
 def bank(B: float, lowest: float, highest: float) -> list[GaussMarkov]:
     """Return Gauss-Markov processes that together have the density of flicker noise.
 
-    The variances are fitted by non-negative least squares of the relative error.
-
-    Parameters
-    ----------
-    B : float
-        Bias instability, rad/s or m/s^2; the plateau is 0.664 B.
-    lowest, highest : float
-        The band, Hz.
+    The variances are fitted by non-negative least squares of the relative error. B is the bias
+    instability, rad/s or m/s^2, whose plateau is 0.664 B; the band is in Hz.
 
     Raises
     ------
@@ -57,15 +51,7 @@ def bank(B: float, lowest: float, highest: float) -> list[GaussMarkov]:
 
 
 def ripple(lowest: float, highest: float) -> float:
-    """Return the largest relative error of the density of a bank inside its band.
-
-    `lowest` and `highest`: as of `bank`.
-
-    Returns
-    -------
-    float
-        Of any B.
-    """
+    """Return the largest relative error of the density of a bank inside its band, Hz, of any B."""
     terms = bank(1.0, lowest, highest)
     decades = math.log10(highest / lowest)
     f = np.geomspace(lowest, highest, 2 + math.ceil(decades * 10 * _POINTS_A_DECADE))
@@ -76,17 +62,9 @@ def ripple(lowest: float, highest: float) -> float:
 def mixture(shortest: float, longest: float) -> tuple[Array, float]:
     """Return correlation times of equal processes that make up flicker noise of B = 1.
 
-    Parameters
-    ----------
-    shortest, longest : float
-        s; well beyond the band in which the sum is needed.
-
-    Returns
-    -------
-    times : ndarray, shape (n,)
-        s, evenly spaced in log, five a decade: a ripple below 1e-8.
-    variance : float
-        Of each.
+    They go from the shortest to the longest, s, well beyond the band in which the sum is needed,
+    evenly spaced in log, five a decade: a ripple below 1e-8. Beside them stands the variance of
+    each.
     """
     count = 2 + math.ceil(5.0 * math.log10(longest / shortest))
     times = np.geomspace(shortest, longest, count)

@@ -23,19 +23,11 @@ _REGISTER = 1 << 15
 
 
 def from_datasheet(name: str, sensor: Sensor, seed: int) -> Origin:
-    """Build the model that a datasheet describes.
+    """Build the model that the datasheet of a sensor, by the name of its file, describes.
 
-    Typical figures are taken. The bias is the printed offset with a sign that is drawn, and so is
-    the coefficient of temperature; bias instability is flicker noise where no correlation time is
-    printed.
-
-    Parameters
-    ----------
-    name : str
-        Of the sensor file.
-    sensor : Sensor
-    seed : int
-        For the signs.
+    Typical figures are taken. The bias is the printed offset with a sign that is drawn by the seed,
+    and so is the coefficient of temperature; bias instability is flicker noise where no correlation
+    time is printed.
 
     Raises
     ------

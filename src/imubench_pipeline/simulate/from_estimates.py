@@ -26,21 +26,12 @@ _NEEDED = ("recordings", "parameters", "fixed_bias", "temperature", "low_pass")
 def with_estimates(
     printed: Origin, results: Path, name: str, recording: str | None = None
 ) -> Origin:
-    """Put what a run has estimated in the place of printed figures.
+    """Put what a run has estimated in the place of printed figures, of which there may be none.
 
-    They are those of the longest recording: the noise, by the recommended method, and the bias;
-    where temperature was taken out, the noise that it leaves, the bias and the drift; the cut-off
-    where it is told. Resolution and full scale stay as the datasheet has them.
-
-    Parameters
-    ----------
-    printed : Origin
-        What is known without them; its channels may be none.
-    results : Path
-        Folder of the results of a run.
-    name : str
-        Of the sensor file.
-    recording : str, optional
+    They are those of the longest recording, or of the one that is named: the noise, by the
+    recommended method, and the bias; where temperature was taken out, the noise that it leaves, the
+    bias and the drift; the cut-off where it is told. Resolution and full scale stay as the
+    datasheet has them.
 
     Raises
     ------

@@ -53,17 +53,9 @@ class ImuModel:
             raise ValueError(f"temperature_step is {self.temperature_step}, expected from 0")
 
     def sensed(self, channel: str) -> dict[str, float]:
-        """Return which true channels an axis senses, and how much of each.
+        """Return which true channels an axis, such as ``gyro_x``, senses, and how much of each.
 
-        Parameters
-        ----------
-        channel : str
-            Such as ``gyro_x``.
-
-        Returns
-        -------
-        dict of str to float
-            By channel; those of which it senses nothing are left out.
+        Those of which it senses nothing are left out.
         """
         quantity, row = quantity_of(channel), "xyz".index(channel[-1])
         matrix = np.asarray(self.misalignment.get(quantity, np.eye(3)))
@@ -84,6 +76,8 @@ def simulate_imu(
 ) -> Iterator[dict[str, Array]]:
     """Yield the log of a sensor in blocks of `BLOCK` samples; memory does not grow with it.
 
+    The channels are in SI, ``temperature`` in °C, as its register has it, where it is given.
+
     Parameters
     ----------
     imu : ImuModel
@@ -101,11 +95,6 @@ def simulate_imu(
         °C. Without one there is no drift.
     threads : int
         Axes that are simulated at the same time.
-
-    Yields
-    ------
-    dict of str to ndarray, shape (block,)
-        The channels in SI; ``temperature`` in °C, as its register has it, where it is given.
     """
     shared = _Shared(rate, motion or {}, temperature)
     streams = {

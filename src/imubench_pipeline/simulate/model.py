@@ -125,16 +125,9 @@ class SensorModel:
     def psd(self, frequency: ArrayLike) -> Array:
         """Return the two-sided power spectral density of the noise behind the low-pass.
 
-        Parameters
-        ----------
-        frequency : array_like
-            Hz, not 0.
-
-        Returns
-        -------
-        ndarray
-            (rad/s)²/Hz or (m/s²)²/Hz, in the shape of ``frequency``: in continuous time, before
-            sampling folds it and adds quantization and rounding. Lines and a ramp have none.
+        In (rad/s)²/Hz or (m/s²)²/Hz, in the shape of the frequencies, Hz, not 0: in continuous
+        time, before sampling folds it and adds quantization and rounding. Lines and a ramp have
+        none.
         """
         f = np.asarray(frequency, dtype=np.float64)
         parts = [term.psd(f) for term in self.noise.terms if term.drive is not None]
@@ -142,19 +135,10 @@ class SensorModel:
         return density * self.low_pass.power(f) if self.low_pass else density
 
     def sampled_spectrum(self, omega: ArrayLike, rate: float) -> Array:
-        """Return the spectrum of the samples, with everything that sampling folds into it.
+        """Return the spectrum of the samples, with everything that sampling folds into it, SI^2.
 
-        Parameters
-        ----------
-        omega : array_like
-            rad a sample, not 0.
-        rate : float
-            Hz.
-
-        Returns
-        -------
-        ndarray
-            SI^2; its mean over -pi..pi is the variance of the samples. Rounding counts as white.
+        At omega, rad a sample, not 0, and in its shape; the rate is in Hz. Its mean over -pi..pi is
+        the variance of the samples. Rounding counts as white.
         """
         w = np.asarray(omega, dtype=np.float64)
         rounding = self.resolution**2 / 12.0
@@ -167,20 +151,11 @@ class SensorModel:
         return np.asarray(spectrum + spectra.sampled_spectrum(self.sources, self.low_pass, w, rate))
 
     def allan_variance(self, tau: ArrayLike, rate: float) -> Array:
-        """Return the Allan variance of the samples, exactly.
+        """Return the Allan variance of the samples, exactly, (rad/s)² or (m/s²)².
 
-        Parameters
-        ----------
-        tau : array_like
-            Cluster lengths, s; taken to the nearest whole number of samples, at least one.
-        rate : float
-            Hz.
-
-        Returns
-        -------
-        ndarray
-            (rad/s)² or (m/s²)², in the shape of ``tau``. Rounding counts as white noise; drift
-            and motion are not in it.
+        In the shape of the cluster lengths tau, s, taken to the nearest whole number of samples, at
+        least one; the rate is in Hz. Rounding counts as white noise; drift and motion are not in
+        it.
         """
         t = np.asarray(tau, dtype=np.float64)
         n = np.maximum(np.rint(t * rate), 1.0)
@@ -203,10 +178,7 @@ class SensorModel:
 def sources_of(terms: Sequence[Term]) -> spectra.Sources:
     """Return the terms that drive a filter with a density.
 
-    Returns
-    -------
-    Sources
-        White and flicker noise, Gauss-Markov processes and random walks; others have no density.
+    White and flicker noise, Gauss-Markov processes and random walks; others have no density.
     """
     drives = drives_of(terms)
     slow = [(part.T_B, part.density) for part in (*drives.processes, *drives.walks)]
@@ -217,18 +189,8 @@ def sources_of(terms: Sequence[Term]) -> spectra.Sources:
 def bank_for(model: SensorModel, rate: float, duration: float) -> list[GaussMarkov]:
     """Return the processes that stand for flicker noise in front of the model's filter.
 
-    Parameters
-    ----------
-    model : SensorModel
-    rate : float
-        Hz.
-    duration : float
-        s; the density is followed down to 1 / (2 duration).
-
-    Returns
-    -------
-    list of GaussMarkov
-        None without flicker noise, or without a filter.
+    There are none without flicker noise, or without a filter. The rate is in Hz; the density is
+    followed down to 1 / (2 duration), s.
     """
     processes: list[GaussMarkov] = []
     for term in model.noise.terms:
@@ -239,39 +201,21 @@ def bank_for(model: SensorModel, rate: float, duration: float) -> list[GaussMark
 
 
 def in_the_log(model: SensorModel, rate: float) -> float:
-    """Return N as the low frequencies of a log show it, SI.
-
-    Parameters
-    ----------
-    model : SensorModel
-        Its noise is that before the low-pass.
-    rate : float
-        Of the log, Hz.
-    """
+    """Return N as the low frequencies of a log of a rate in Hz show it, SI."""
     return math.sqrt(model.noise.N**2 * folding(model, rate) + _rounding(model, rate))
 
 
 def before_the_filter(model: SensorModel, noise: NoiseModel, rate: float) -> NoiseModel:
     """Return noise with N as it is before filter and rounding, from N as a log shows it.
 
-    Parameters
-    ----------
-    model : SensorModel
-        Of which filter and resolution are taken.
-    noise : NoiseModel
-        As estimated from a log.
-    rate : float
-        Of the log, Hz.
+    Of the model filter and resolution are taken; the rate is that of the log, Hz.
     """
     left = max(noise.N**2 - _rounding(model, rate), 0.0)
     return replace(noise, N=math.sqrt(left / folding(model, rate)))
 
 
 def folding(model: SensorModel, rate: float) -> float:
-    """Return how many times N^2 the density of the samples is at low frequencies.
-
-    `model` and `rate`: as of `bank_for`.
-    """
+    """Return how many times N^2 the density of the samples is at low frequencies."""
     unit = replace(model, noise=NoiseModel(N=1.0), resolution=0.0)
     return float(unit.sampled_spectrum(np.array([_LOW]), rate)[0]) / rate
 

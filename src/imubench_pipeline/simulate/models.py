@@ -20,13 +20,7 @@ _OF_NOISE = ("N", "B", "T_B", "K", "R", "Q")
 
 
 def axis_model(settings: AxisSettings, channel: str) -> SensorModel:
-    """Return the model of an axis, in SI.
-
-    Parameters
-    ----------
-    settings : AxisSettings
-    channel : str
-        ``gyro_x`` to ``accel_z``.
+    """Return the model of an axis, ``gyro_x`` to ``accel_z``, in SI.
 
     Raises
     ------
@@ -55,14 +49,7 @@ def axis_model(settings: AxisSettings, channel: str) -> SensorModel:
 
 
 def imu_model(axes: Mapping[Channel, AxisSettings], settings: ImuSettings) -> ImuModel:
-    """Return the model of a sensor, in SI.
-
-    Parameters
-    ----------
-    axes : mapping of str to AxisSettings
-        By channel.
-    settings : ImuSettings
-        What the axes have together.
+    """Return the model of a sensor, in SI, of its axes by channel and what these have together.
 
     Raises
     ------
@@ -85,40 +72,20 @@ def imu_model(axes: Mapping[Channel, AxisSettings], settings: ImuSettings) -> Im
 
 @dataclass(frozen=True)
 class TrueFigure:
-    """One true figure.
+    """One true figure."""
 
-    Attributes
-    ----------
-    name : str
-        Of the parameter, as the tables have it.
-    value : float
-        SI; degC for a temperature.
-    unit : str
-    setting : str
-        Key of `AxisSettings` that it is from.
-    component : int
-        Number of a repeated term, from 1.
-    """
-
-    name: str
-    value: float
+    name: str  # of the parameter, as the tables have it
+    value: float  # SI; degC for a temperature
     unit: str
-    setting: str
-    component: int = 1
+    setting: str  # key of `AxisSettings` that it is from
+    component: int = 1  # number of a repeated term, from 1
 
 
 def figures_of(settings: AxisSettings, channel: str, rate: float) -> Iterator[TrueFigure]:
-    """Yield the true figures of an axis.
+    """Yield the true figures of an axis, in a log of a rate in Hz.
 
     N is the density before the low-pass; ``N in the log``, that its low frequencies show, stands
     beside it where there is one.
-
-    Parameters
-    ----------
-    settings : AxisSettings
-    channel : str
-    rate : float
-        Of the log, Hz.
     """
     quantity = quantity_of(channel)
     units, plain = SI_UNITS[quantity], SI_UNITS[quantity]["B"]

@@ -55,14 +55,7 @@ class FileSeries:
         return tuple(name for name in self._headings if name != _TIME)
 
     def take(self, name: str, dimension: str) -> None:
-        """Say that a column will be asked for.
-
-        Parameters
-        ----------
-        name : str
-            Without its unit.
-        dimension : str
-            A key of `imubench_pipeline.units.SI_UNITS`.
+        """Say that a column, named without its unit, will be asked for, in its dimension.
 
         Raises
         ------
@@ -101,19 +94,9 @@ class FileSeries:
         return float(first), float(last)
 
     def at(self, name: str, times: Array) -> Array:
-        """Return a column, linear between rows, its ends held.
+        """Return a column that was taken (`take`), in SI, temperature in °C, shape (k,).
 
-        Parameters
-        ----------
-        name : str
-            That was taken (`take`).
-        times : ndarray, shape (k,)
-            s, ascending.
-
-        Returns
-        -------
-        ndarray, shape (k,)
-            In SI; temperature in °C.
+        It is linear between rows, its ends held; the times, shape (k,), are in s, ascending.
 
         Raises
         ------

@@ -113,13 +113,7 @@ class FileColumn(Profile):
 
 
 def profiles_of(around: Surroundings, folder: Path) -> tuple[dict[str, Profile], Profile | None]:
-    """Return motion by channel, and temperature, in SI.
-
-    Parameters
-    ----------
-    around : Surroundings
-    folder : Path
-        That files are named from.
+    """Return motion by channel, and temperature, in SI; files are named from a folder.
 
     Raises
     ------
@@ -138,17 +132,10 @@ def profiles_of(around: Surroundings, folder: Path) -> tuple[dict[str, Profile],
 
 
 def make_profile(form: Form, name: str, folder: Path, opened: dict[Path, FileSeries]) -> Profile:
-    """Return a profile in SI.
+    """Return a profile, in SI, of a channel or of ``temperature``.
 
-    Parameters
-    ----------
-    form : Form
-    name : str
-        What it is a profile of: a channel, or ``temperature``.
-    folder : Path
-        That its file is named from.
-    opened : dict of Path to FileSeries
-        Files that are read already; one that is read for this profile is added.
+    Files, which are named from a folder, are opened once; one that is read for this profile is
+    added to those that are.
 
     Raises
     ------

@@ -151,13 +151,7 @@ def simulate(
     true: Signal | None = None,
     temperature: Signal | None = None,
 ) -> Array:
-    """Return a simulated log of one axis, in memory (see `simulate_blocks`).
-
-    Returns
-    -------
-    ndarray, shape (samples,)
-        rad/s or m/s².
-    """
+    """Return a simulated log of one axis, in memory, shape (samples,): see `simulate_blocks`."""
     blocks = simulate_blocks(model, rate, samples, rng, true=true, temperature=temperature)
     return np.concatenate([*blocks, np.empty(0)])
 

@@ -27,26 +27,14 @@ class Remark:
 
 @dataclass
 class Origin:
-    """A model, and what it stands on.
-
-    Attributes
-    ----------
-    imu : ImuModel
-    source : str
-        What the figures are from, in words.
-    figures : dict of str to list of Remark
-        The figures of each channel, with their source.
-    assumed : list of Remark
-        What no source says.
-    sensor : str or None
-        Name of the sensor file that its logs go with.
-    """
+    """A model, and what it stands on."""
 
     imu: ImuModel
-    source: str
+    source: str  # what the figures are from, in words
+    # the figures of each channel, with their source
     figures: dict[str, list[Remark]] = field(default_factory=dict)
-    assumed: list[Remark] = field(default_factory=list)
-    sensor: str | None = None
+    assumed: list[Remark] = field(default_factory=list)  # what no source says
+    sensor: str | None = None  # name of the sensor file that its logs go with
 
     def assume(self, topic: Topic, text: str) -> None:
         """Add what no source says, once."""

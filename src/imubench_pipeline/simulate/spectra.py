@@ -33,38 +33,19 @@ _SLOWEST = 1e5
 
 @dataclass(frozen=True)
 class Sources:
-    """What drives a filter.
+    """What drives a filter."""
 
-    Attributes
-    ----------
-    white : float
-        N^2.
-    flicker : float
-        B^2 of flicker noise.
-    times, densities : ndarray, shape (n,)
-        Correlation time, s, and driving density of Gauss-Markov processes; an infinite time: a
-        random walk.
-    """
-
-    white: float
-    flicker: float
+    white: float  # N^2
+    flicker: float  # B^2 of flicker noise
+    # times, densities: shape (n,); correlation time, s, and driving density of Gauss-Markov
+    # processes; an infinite time: a random walk
     times: Array
     densities: Array
 
     def realised(self, low_pass: LowPass, interval: float, longest: float) -> tuple[Array, Array]:
-        """Return times and densities with those of the processes that make up flicker noise.
+        """Return times and densities with those of the processes that make up flicker noise, (n,).
 
-        Parameters
-        ----------
-        low_pass : LowPass
-        interval : float
-            Sampling interval, s.
-        longest : float
-            Longest time that is asked for, s.
-
-        Returns
-        -------
-        times, densities : ndarray, shape (n,)
+        The sampling interval and the longest time that is asked for are in s.
         """
         if self.flicker == 0.0:
             return self.times, self.densities
@@ -75,21 +56,9 @@ class Sources:
 
 
 def sampled_spectrum(sources: Sources, low_pass: LowPass, omega: Array, rate: float) -> Array:
-    """Return the spectrum of the samples, SI^2.
+    """Return the spectrum of the samples, SI^2, in the shape of omega, rad a sample, not 0.
 
-    Parameters
-    ----------
-    sources : Sources
-    low_pass : LowPass
-    omega : ndarray
-        rad a sample, not 0.
-    rate : float
-        Hz.
-
-    Returns
-    -------
-    ndarray
-        In the shape of ``omega``.
+    The rate is in Hz.
     """
     interval = 1.0 / rate
     flat = np.ravel(omega)
@@ -120,25 +89,11 @@ def sampled_spectrum(sources: Sources, low_pass: LowPass, omega: Array, rate: fl
 
 
 def allan_variance(sources: Sources, low_pass: LowPass, n: Array, rate: float) -> Array:
-    """Return the Allan variance of the samples, SI^2.
+    """Return the Allan variance of the samples, SI^2, in the shape of n, samples a cluster.
 
-    The difference of the sums over two adjacent clusters is a linear function of the state
-    before them and of the noise inside them. Both are built up by doubling, as sums of positive
-    parts, so that the cost grows with log n.
-
-    Parameters
-    ----------
-    sources : Sources
-    low_pass : LowPass
-    n : ndarray
-        Samples a cluster, whole numbers from 1.
-    rate : float
-        Hz.
-
-    Returns
-    -------
-    ndarray
-        In the shape of ``n``.
+    The difference of the sums over two adjacent clusters is a linear function of the state before
+    them and of the noise inside them. Both are built up by doubling, as sums of positive parts, so
+    that the cost grows with log n. The rate is in Hz.
     """
     interval = 1.0 / rate
     sizes = np.ravel(n).astype(np.int64)
@@ -160,21 +115,14 @@ def allan_variance(sources: Sources, low_pass: LowPass, n: Array, rate: float) -
 
 @dataclass(frozen=True)
 class _Cluster:
-    """Consecutive samples of independent systems z = (x, e): what becomes of state and sum.
+    """Consecutive samples of independent systems z = (x, e): what becomes of state and sum."""
 
-    Attributes
-    ----------
-    transition, lost : ndarray, shape (n, k, k)
-        Of the state over the samples, and 1 less it.
-    sums : ndarray, shape (n, k)
-        What the sum of the samples has of the state before them.
-    state, both, total : ndarray, shapes (n, k, k), (n, k), (n,)
-        Covariance of what noise adds to the state after them and to their sum.
-    """
-
+    # transition, lost: shape (n, k, k); of the state over the samples, and 1 less it
     transition: Array
     lost: Array
-    sums: Array
+    sums: Array  # shape (n, k); what the sum of the samples has of the state before them
+    # state, both, total: shapes (n, k, k), (n, k), (n,); covariance of what noise adds to the state
+    # after them and to their sum
     state: Array
     both: Array
     total: Array

@@ -45,24 +45,11 @@ def write_log(
     remarks: Iterable[str],
     progress: Callable[[int], None],
 ) -> None:
-    """Write a simulated log, atomically.
+    """Write a simulated log, atomically, as Parquet or CSV, which its suffix says.
 
-    Parameters
-    ----------
-    path : Path
-        Its suffix, ``.parquet`` or ``.csv``, is the format.
-    blocks : iterable of mapping of str to ndarray
-        Columns in SI.
-    columns : iterable of str
-        Their names.
-    log : LogFormat
-        As `layout` gives it.
-    metadata : mapping
-        Of the Parquet file.
-    remarks : iterable of str
-        Comments at the top of a CSV file.
-    progress : callable
-        Is told after each block how many samples there are.
+    The columns are in SI; the format is as `layout` gives it. The metadata is that of a Parquet
+    file, the remarks are comments at the top of a CSV file. Progress is told after each block how
+    many samples there are.
     """
     names = list(columns)
     known_sources = {str(name): source for name, source in log.channels.items()}
@@ -90,16 +77,7 @@ def write_log(
 def write_notes(path: Path, log: LogFormat, sensor: LogFormat | None, words: str) -> None:
     """Write the notes beside a log: what of its format the sensor file says otherwise.
 
-    Parameters
-    ----------
-    path : Path
-        Of the log.
-    log : LogFormat
-        Of the log.
-    sensor : LogFormat or None
-        That of the sensor file.
-    words : str
-        What the log is.
+    ``words`` says what the log is.
     """
     own = log.model_dump(exclude_unset=True, exclude_none=True)
     base = {} if sensor is None else sensor.model_dump(exclude_unset=True)
@@ -134,17 +112,7 @@ def notes_path(path: Path) -> Path:
 
 
 def layout(path: Path, columns: Iterable[str], rate: float, sensor: LogFormat | None) -> LogFormat:
-    """Return how a log will be written.
-
-    Parameters
-    ----------
-    path : Path
-    columns : iterable of str
-        Channels, and perhaps temperature.
-    rate : float
-        Hz.
-    sensor : LogFormat or None
-        That of the sensor file.
+    """Return how a log of columns, channels and perhaps temperature, at a rate, Hz, is written.
 
     Raises
     ------

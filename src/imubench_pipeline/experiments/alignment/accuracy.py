@@ -30,34 +30,18 @@ from imubench_pipeline.typing import Array
 
 @dataclass(frozen=True)
 class TriadRuns:
-    """Simulated runs of one design, and their truth.
+    """Simulated runs of one design, and their truth."""
 
-    Attributes
-    ----------
-    means : ndarray, shape (runs, b, 6)
-        Block means of gyros and accelerometers x, y, z, rad/s and m/s^2.
-    drift : ndarray, shape (runs, b, 6)
-        Mean of each axis' slow error over each block, its bias included.
-    """
-
+    # shape (runs, b, 6); block means of gyros and accelerometers x, y, z, rad/s and m/s^2
     means: Array
+    # shape (runs, b, 6); mean of each axis' slow error over each block, its bias included
     drift: Array
 
 
 def true_means(positions: Positions, site: Site, attitude: Array) -> Array:
-    """Return what a triad without error shows.
+    """Return what a triad without error shows, rad/s and m/s^2, shape (b, 6).
 
-    Parameters
-    ----------
-    positions : Positions
-    site : Site
-    attitude : ndarray, shape (3, 3)
-        In the first position.
-
-    Returns
-    -------
-    ndarray, shape (b, 6)
-        Gyros and accelerometers x, y, z, rad/s and m/s^2.
+    Gyros and accelerometers x, y, z, at an attitude in the first position, shape (3, 3).
     """
     to_body = np.swapaxes(attitude @ positions.of_blocks, 1, 2)
     return np.concatenate([to_body @ site.earth_rate, to_body @ site.specific_force], axis=1)
@@ -72,18 +56,9 @@ def simulate_triad(
     runs: int,
     rng: np.random.Generator,
 ) -> TriadRuns:
-    """Draw the block means of many runs.
+    """Draw the block means of many runs; the fixed biases are drawn for each.
 
-    Parameters
-    ----------
-    triad : Triad
-        The fixed biases are drawn for each run.
-    positions : Positions
-    site : Site
-    attitude : ndarray, shape (3, 3)
-        In the first position.
-    runs : int
-    rng : numpy.random.Generator
+    The attitude is that in the first position, shape (3, 3).
     """
     drawn = [
         simulate_runs(
@@ -111,30 +86,15 @@ _LEVEL = np.eye(3)
 
 @dataclass(frozen=True)
 class Accuracy:
-    """How well attitude is known after a time.
+    """How well attitude is known after a time."""
 
-    Attributes
-    ----------
-    positions : int
-        1 or 2.
-    method : str
-        ``coarse`` or ``fine``.
-    time : float
-        s.
-    sigma : ndarray, shape (3,)
-        Of roll, pitch and heading, rad.
-    errors : ndarray, shape (3,), or None
-        Rms of simulated errors over these; NaN where there is no heading.
-    simulated : int
-        Triads of that check.
-    """
-
-    positions: int
-    method: str
-    time: float
-    sigma: Array
+    positions: int  # 1 or 2
+    method: str  # ``coarse`` or ``fine``
+    time: float  # s
+    sigma: Array  # shape (3,); of roll, pitch and heading, rad
+    # shape (3,); rms of simulated errors over these; NaN where there is no heading
     errors: Array | None = None
-    simulated: int = 0
+    simulated: int = 0  # triads of that check
 
     @property
     def reason(self) -> str | None:
@@ -163,18 +123,9 @@ def accuracies(
 ) -> Iterator[Accuracy]:
     """Yield how well a triad aligns itself in these times, in one position and in two.
 
-    Parameters
-    ----------
-    triad : Triad
-    site : Site
-    rate : float
-        Sampling rate, Hz.
-    times : sequence of float
-        Rising; each longer than the turn between two positions, s.
-    runs : int
-        Triads that are simulated at the last time, for fine alignment; 0: none.
-    rng : numpy.random.Generator, optional
-        Needed where some are.
+    The rate is that of sampling, Hz; the times rise, each longer than the turn between two
+    positions, s. So many ``runs`` are simulated by ``rng`` at the last time, for fine alignment; 0:
+    none.
     """
     for number in (1, 2):
         for time in times:

@@ -20,17 +20,7 @@ STEEPEST = 1e-6
 
 
 def matrix(roll: float, pitch: float, heading: float) -> Array:
-    """Return the matrix from body to navigation frame.
-
-    Parameters
-    ----------
-    roll, pitch, heading : float
-        rad.
-
-    Returns
-    -------
-    ndarray, shape (3, 3)
-    """
+    """Return the matrix from body to navigation frame, shape (3, 3), of angles in rad."""
     (cr, cp, ch), (sr, sp, sh) = (
         [float(f(angle)) for angle in (roll, pitch, heading)] for f in (np.cos, np.sin)
     )
@@ -44,17 +34,10 @@ def matrix(roll: float, pitch: float, heading: float) -> Array:
 
 
 def euler_angles(attitude: Array) -> Array:
-    """Return roll, pitch and heading.
+    """Return roll, pitch and heading, rad, of attitudes of shape (..., 3, 3).
 
-    Parameters
-    ----------
-    attitude : ndarray, shape (..., 3, 3)
-
-    Returns
-    -------
-    ndarray, shape (..., 3)
-        rad; roll and heading from -pi to pi, pitch from -pi/2 to pi/2. Where the pitch is +-pi/2
-        roll and heading are not told apart.
+    Roll and heading are from -pi to pi, pitch from -pi/2 to pi/2. Where the pitch is +-pi/2 roll
+    and heading are not told apart.
     """
     c = attitude
     level = np.hypot(c[..., 0, 0], c[..., 1, 0])
@@ -69,16 +52,7 @@ def euler_angles(attitude: Array) -> Array:
 
 
 def cross_matrix(vector: ArrayLike) -> Array:
-    """Return [v x], so that [v x] u is v x u.
-
-    Parameters
-    ----------
-    vector : array_like, shape (..., 3)
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
-    """
+    """Return [v x], shape (..., 3, 3), so that [v x] u is v x u, of v of shape (..., 3)."""
     v = np.asarray(vector, dtype=np.float64)
     cross = np.zeros((*v.shape, 3))
     cross[..., 0, 1], cross[..., 0, 2], cross[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
@@ -86,16 +60,9 @@ def cross_matrix(vector: ArrayLike) -> Array:
 
 
 def rotation(vector: ArrayLike) -> Array:
-    """Return the matrix that turns by a vector (O. Rodrigues), exp([v x]).
+    """Return the matrix that turns by a vector (O. Rodrigues), exp([v x]), shape (..., 3, 3).
 
-    Parameters
-    ----------
-    vector : array_like, shape (..., 3)
-        rad.
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
+    The vector is in rad, shape (..., 3).
     """
     v = np.asarray(vector, dtype=np.float64)
     angle = np.linalg.norm(v, axis=-1)[..., None, None]
@@ -107,34 +74,18 @@ def rotation(vector: ArrayLike) -> Array:
 
 
 def correct(attitude: Array, psi: Array) -> Array:
-    """Return an attitude from which an error is taken off.
+    """Return C: an attitude C~, shape (..., 3, 3), from which its error psi is taken off.
 
-    Parameters
-    ----------
-    attitude : ndarray, shape (..., 3, 3)
-        C~.
-    psi : ndarray, shape (..., 3)
-        Its error, rad.
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
-        C; exp([psi x]) is the inverse of I - [psi x] to the first order, and a rotation.
+    psi is in rad, shape (..., 3); exp([psi x]) is the inverse of I - [psi x] to the first order,
+    and a rotation.
     """
     return np.asarray(rotation(psi) @ attitude)
 
 
 def of_euler_angles(attitude: Array) -> Array:
-    """Return what a small error psi does to roll, pitch and heading.
+    """Return what times a small error psi is the errors of roll, pitch and heading, rad.
 
-    Parameters
-    ----------
-    attitude : ndarray, shape (3, 3)
-
-    Returns
-    -------
-    ndarray, shape (3, 3)
-        Times psi: the errors of roll, pitch and heading, rad.
+    Shape (3, 3), as the attitude.
 
     Raises
     ------

@@ -23,33 +23,17 @@ from imubench_pipeline.typing import Array
 
 @dataclass(frozen=True)
 class CoarseAccuracy:
-    """How well an attitude is known.
+    """How well an attitude is known."""
 
-    Attributes
-    ----------
-    psi : ndarray, shape (3, 3)
-        Covariance of the small errors about north, east and down, rad^2.
-    sigma : ndarray, shape (3,)
-        Standard deviations of roll, pitch and heading, rad.
-    """
-
-    psi: Array
-    sigma: Array
+    psi: Array  # shape (3, 3); covariance of the small errors about north, east and down, rad^2
+    sigma: Array  # shape (3,); standard deviations of roll, pitch and heading, rad
 
 
 def coarse_alignment(force: Array, rate: Array, site: Site) -> Array:
-    """Return the attitude from mean specific force and mean rate.
+    """Return the attitude from mean specific force and mean rate, shape (..., 3, 3).
 
-    Parameters
-    ----------
-    force, rate : ndarray, shape (..., 3)
-        In the body frame, m/s^2 and rad/s.
-    site : Site
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
-        From body to navigation frame.
+    From body to navigation frame; force, m/s^2, and rate, rad/s, are in the body frame, shape (...,
+    3).
 
     Raises
     ------
@@ -62,21 +46,12 @@ def coarse_alignment(force: Array, rate: Array, site: Site) -> Array:
 
 
 def mean_vectors(means: Array, positions: Positions) -> tuple[Array, Array]:
-    """Return mean specific force and rate in the body frame of the first position.
+    """Return mean specific force and rate in the body frame of the first position, shapes (..., 3).
 
     Every position counts alike, however long it is: where they are opposite, biases go. What turns
     do not reverse stays, such as the bias of the gyro about whose axis they are: where that is
-    large and the axis is not vertical, only fine alignment finds the heading.
-
-    Parameters
-    ----------
-    means : ndarray, shape (..., b, 6)
-        Block means of gyros and accelerometers x, y, z, rad/s and m/s^2.
-    positions : Positions
-
-    Returns
-    -------
-    force, rate : ndarray, shape (..., 3)
+    large and the axis is not vertical, only fine alignment finds the heading. The means of blocks
+    are of gyros and accelerometers x, y, z, rad/s and m/s^2, shape (..., b, 6).
     """
     weighed = _weights(positions)[:, None, None] * positions.of_blocks
     rate = np.einsum("bij,...bj->...i", weighed, means[..., :3])
@@ -89,13 +64,7 @@ def coarse_accuracy(
 ) -> CoarseAccuracy:
     """Return how well coarse alignment finds an attitude, to the first order.
 
-    Parameters
-    ----------
-    triad : Triad
-    positions : Positions
-    site : Site
-    attitude : ndarray, shape (3, 3)
-        The true one, in the first position.
+    The attitude, shape (3, 3), is the true one, in the first position.
 
     Raises
     ------

@@ -52,23 +52,17 @@ _MOST = 20
 
 @dataclass(frozen=True)
 class Aligned:
-    """Attitudes of runs of one design.
+    """Attitudes of runs of one design."""
 
-    Attributes
-    ----------
-    attitude : ndarray, shape (runs, 3, 3)
-        From body to navigation frame, in the first position, from all the data.
-    psi : ndarray, shape (runs, b, 3)
-        What the filter held for the error of the attitude that it was given, after each block, rad.
-    drift : ndarray, shape (runs, b, 6)
-        Mean of each axis' error over each block, its bias included, as known then, rad/s and m/s^2.
-    nis : ndarray, shape (runs, b)
-        Normalised innovation squared: chi-squared of six degrees of freedom.
-    """
-
+    # shape (runs, 3, 3); from body to navigation frame, in the first position, from all the data
     attitude: Array
+    # shape (runs, b, 3); what the filter held for the error of the attitude that it was given,
+    # after each block, rad
     psi: Array
+    # shape (runs, b, 6); mean of each axis' error over each block, its bias included, as known
+    # then, rad/s and m/s^2
     drift: Array
+    # shape (runs, b); normalised innovation squared: chi-squared of six degrees of freedom
     nis: Array
 
 
@@ -180,23 +174,10 @@ def align(
 ) -> tuple[Aligned, FineAlignment]:
     """Align one run: coarsely, then by filters about the attitude last found until it settles.
 
-    With the filter about a better attitude each time this is Gauss and Newton's method: what is
-    not linear in a large error of the coarse heading goes.
-
-    Parameters
-    ----------
-    means : ndarray, shape (b, 6)
-        Block means of gyros and accelerometers x, y, z, rad/s and m/s^2.
-    triad : Triad
-    positions : Positions
-    site : Site
-
-    Returns
-    -------
-    Aligned
-        Of one run.
-    FineAlignment
-        The last filter, with the standard deviations.
+    With the filter about a better attitude each time this is Gauss and Newton's method: what is not
+    linear in a large error of the coarse heading goes. The means of blocks are of gyros and
+    accelerometers x, y, z, rad/s and m/s^2, shape (b, 6). Beside the attitude of one run the last
+    filter is returned, which has the standard deviations.
 
     Raises
     ------

@@ -22,21 +22,14 @@ _NEAREST_POLE = 1e-6
 class Site:
     """A place on the Earth, and what a triad at rest there is exposed to.
 
-    Parameters
-    ----------
-    latitude : float
-        rad, north positive.
-    gravity : float
-        m/s^2.
-
     Raises
     ------
     ValueError
         If the latitude is not between the poles, where there is no north, or gravity not above 0.
     """
 
-    latitude: float
-    gravity: float = STANDARD_GRAVITY
+    latitude: float  # rad, north positive
+    gravity: float = STANDARD_GRAVITY  # m/s^2
 
     def __post_init__(self) -> None:
         if not (abs(self.latitude) < math.pi and math.cos(self.latitude) > _NEAREST_POLE):
@@ -95,14 +88,7 @@ class Triad:
         gyro_bias: float,
         accelerometer_bias: float,
     ) -> Triad:
-        """Return a triad whose axes are alike.
-
-        Parameters
-        ----------
-        gyro, accelerometer : NoiseModel
-        gyro_bias, accelerometer_bias : float
-            rad/s and m/s^2.
-        """
+        """Return a triad whose axes are alike; the biases are in rad/s and m/s^2."""
         return cls(
             gyros=(gyro,) * 3,
             accelerometers=(accelerometer,) * 3,
@@ -122,20 +108,14 @@ class Triad:
 class Positions:
     """Blocks of a run at rest, in one position or in several that are known from the first.
 
-    Parameters
-    ----------
-    blocks : Blocks
-        Neither their sense nor their latitude is used.
-    turned : ndarray, shape (dwells, 3, 3)
-        Turns vectors of the body frame in each dwell into that of the first.
-
     Raises
     ------
     ValueError
         If there is no rotation matrix for every dwell.
     """
 
-    blocks: Blocks
+    blocks: Blocks  # neither their sense nor their latitude is used
+    # shape (dwells, 3, 3); turns vectors of the body frame in each dwell into that of the first
     turned: Array
 
     def __post_init__(self) -> None:
@@ -150,17 +130,7 @@ class Positions:
 
     @classmethod
     def at_rest(cls, duration: float, block: float, rate: float) -> Positions:
-        """Return one position.
-
-        Parameters
-        ----------
-        duration : float
-            s.
-        block : float
-            Of a block at most, s.
-        rate : float
-            Sampling rate, Hz.
-        """
+        """Return one position, in blocks of so many s at most; the sampling rate is in Hz."""
         samples = max(round(duration * rate), 1)
         run = Experiment((Dwell(0, samples, 1),), rate, 0.0)
         return cls(run.blocks(max(round(block * rate), 1)), np.eye(3)[None])
@@ -171,16 +141,9 @@ class Positions:
     ) -> Positions:
         """Return positions that differ by turns about the z axis, exactly known.
 
-        Parameters
-        ----------
-        headings : sequence of float
-            Angle of each position from the first, rad; 0, pi is the classical pair.
-        dwell, turning : float
-            Data in each position, and the time between two, s.
-        block : float
-            Of a block at most, s.
-        rate : float
-            Sampling rate, Hz.
+        The headings are angles from the first, rad; 0, pi is the classical pair. ``dwell`` is the
+        data in each position, ``turning`` the time between two, ``block`` that of a block at most,
+        s; the sampling rate is in Hz.
         """
         run = Experiment.regular(
             dwell=dwell, turning=turning, dwells=len(headings), rate=rate, latitude=0.0

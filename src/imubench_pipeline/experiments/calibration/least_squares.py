@@ -43,20 +43,12 @@ Quantity = Literal[
 
 @dataclass(frozen=True)
 class NotObservable:
-    """A quantity that the recording does not tell.
-
-    Attributes
-    ----------
-    quantity : str
-    reason : str
-        In words.
-    half_width : float or None
-        What is known of its effect all the same: half of the range of the bias that it leaves
-        open, rad/s; None where nothing bounds it.
-    """
+    """A quantity that the recording does not tell."""
 
     quantity: Quantity
-    reason: str
+    reason: str  # in words
+    # what is known of its effect all the same: half of the range of the bias that it leaves open,
+    # rad/s; None where nothing bounds it
     half_width: float | None = None
 
 
@@ -69,24 +61,12 @@ Limits = tuple[Array, Array]
 
 @dataclass(frozen=True)
 class Fit:
-    """What generalised least squares finds in runs of one design.
+    """What generalised least squares finds in runs of one design."""
 
-    Attributes
-    ----------
-    value : ndarray, shape (runs, p)
-        Estimates, SI.
-    covariance : ndarray, shape (p, p)
-        Of their errors, by the noise model.
-    chi_squared : ndarray, shape (runs,)
-        Squared residuals in units of the noise model.
-    freedom : int
-        Their degrees of freedom, b - p.
-    """
-
-    value: Array
-    covariance: Array
-    chi_squared: Array
-    freedom: int
+    value: Array  # shape (runs, p); estimates, SI
+    covariance: Array  # shape (p, p); of their errors, by the noise model
+    chi_squared: Array  # shape (runs,); squared residuals in units of the noise model
+    freedom: int  # their degrees of freedom, b - p
 
     @property
     def sigma(self) -> Array:
@@ -104,18 +84,9 @@ class Fit:
 
 
 def limits(value: Array, sigma: Array | float) -> Limits:
-    """Return the 95 % limits of estimates with normal errors of a standard error.
+    """Return the 95 % limits, lower and upper, of estimates with normal errors.
 
-    Parameters
-    ----------
-    value : ndarray
-    sigma : ndarray or float
-        In the unit of the values, of a shape that goes with theirs.
-
-    Returns
-    -------
-    (ndarray, ndarray)
-        Lower and upper, in the shape of the values.
+    Their standard errors are in the unit of the values, of a shape that goes with theirs.
     """
     half = half_width() * sigma
     return value - half, value + half
@@ -124,10 +95,7 @@ def limits(value: Array, sigma: Array | float) -> Limits:
 def half_width(level: float = LEVEL) -> float:
     """Return half of a two-sided interval of the normal distribution, in standard deviations.
 
-    Parameters
-    ----------
-    level : float
-        0.95 gives 1.96.
+    A level of 0.95 gives 1.96.
 
     Raises
     ------
@@ -196,11 +164,7 @@ class LeastSquares:
         return np.sqrt(np.diag(self.covariance))
 
     def fit(self, means: Array) -> Fit:
-        """Estimate the parameters of runs of one design.
-
-        Parameters
-        ----------
-        means : ndarray, shape (runs, b)
+        """Estimate the parameters of runs of one design from means of shape (runs, b).
 
         Raises
         ------
@@ -222,22 +186,11 @@ class LeastSquares:
 def block_length(
     experiment: Experiment, model: NoiseModel, regressors: Callable[[Blocks], Array]
 ) -> int:
-    """Return the longest block whose means tell as much of the parameters as the samples.
+    """Return the longest block, in samples, whose means tell as much as the samples themselves.
 
     Blocks are shortened by halves until a fourth of their length would lower no standard error by
-    0.1 %; with 1,024 blocks at most.
-
-    Parameters
-    ----------
-    experiment : Experiment
-    model : NoiseModel
-    regressors : callable
-        Gives those of blocks, shape (b, p).
-
-    Returns
-    -------
-    int
-        Samples; at most those of the longest dwell.
+    0.1 %; with 1,024 blocks at most, none longer than the longest dwell. The regressors are those
+    of blocks, shape (b, p).
 
     Raises
     ------

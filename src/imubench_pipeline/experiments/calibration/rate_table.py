@@ -62,18 +62,11 @@ _SAME = 1e-9
 
 @dataclass(frozen=True)
 class Term:
-    """A further term of the line, in runs of one design.
+    """A further term of the line, in runs of one design."""
 
-    Attributes
-    ----------
-    value : ndarray, shape (runs,)
-        Of the quadratic term, s/rad; of the asymmetry, a fraction of the scale factor.
-    sigma : float
-        Its standard error by the noise model.
-    """
-
+    # shape (runs,); of the quadratic term, s/rad; of the asymmetry, a fraction of the scale factor
     value: Array
-    sigma: float
+    sigma: float  # its standard error by the noise model
 
     @property
     def p_value(self) -> Array:
@@ -87,23 +80,12 @@ class Term:
 
 @dataclass(frozen=True)
 class Linearity:
-    """The largest deviation of a rate from the line, over full scale, in runs of one design.
+    """The largest deviation of a rate from the line, over full scale, in runs of one design."""
 
-    Attributes
-    ----------
-    deviation : ndarray, shape (runs, levels)
-        What each rate is above the line, over full scale.
-    sigma : ndarray, shape (levels,)
-        Its standard error by the noise model.
-    full_scale : float
-        The largest rate of the test, rad/s.
-    p_value : ndarray, shape (runs,)
-        Chance of deviations at least as large, all together, where the line is right.
-    """
-
-    deviation: Array
-    sigma: Array
-    full_scale: float
+    deviation: Array  # shape (runs, levels); what each rate is above the line, over full scale
+    sigma: Array  # shape (levels,); its standard error by the noise model
+    full_scale: float  # the largest rate of the test, rad/s
+    # shape (runs,); chance of deviations at least as large, all together, where the line is right
     p_value: Array
 
     @property
@@ -124,29 +106,17 @@ class Linearity:
 
 @dataclass(frozen=True)
 class Calibration:
-    """Bias and scale factor in runs of one design.
+    """Bias and scale factor in runs of one design."""
 
-    Attributes
-    ----------
-    line : Fit
-        Bias, rad/s, at the first sample of the first block, and scale factor.
-    bias_sigma : float
-        Standard error of the bias, with that of the Earth's rate along the axis, rad/s.
-    quadratic : Term or None
-        Coefficient of the square of the rate beside the line, s/rad.
-    asymmetry : Term or None
-        Scale factor of positive less that of negative rates over their mean, beside a bias that
-        both share.
-    linearity : Linearity or None
-    not_observable : tuple of NotObservable
-        Why there is no value of what is None, and what is a part of what.
-    """
-
-    line: Fit
+    line: Fit  # bias, rad/s, at the first sample of the first block, and scale factor
+    # standard error of the bias, with that of the Earth's rate along the axis, rad/s
     bias_sigma: float
-    quadratic: Term | None
+    quadratic: Term | None  # coefficient of the square of the rate beside the line, s/rad
+    # scale factor of positive less that of negative rates over their mean, beside a bias that both
+    # share
     asymmetry: Term | None
     linearity: Linearity | None
+    # why there is no value of what is None, and what is a part of what
     not_observable: tuple[NotObservable, ...]
 
     @property
@@ -264,12 +234,7 @@ class RateTable:
         return math.hypot(bias, self._earth_sigma), float(scale)
 
     def fit(self, means: Array) -> Calibration:
-        """Estimate bias and scale factor in runs of this design.
-
-        Parameters
-        ----------
-        means : ndarray, shape (runs, b)
-            Block means, rad/s.
+        """Estimate bias and scale factor in runs of this design from block means, rad/s, (runs, b).
 
         Raises
         ------
@@ -325,26 +290,10 @@ def calibrate(
     *,
     setting_sigma: float = 0.0,
 ) -> tuple[Calibration, Measured]:
-    """Return bias and scale factor of a gyro from a log on a rate table.
+    """Return bias and scale factor of a gyro from a log on a rate table, and its block means.
 
-    Parameters
-    ----------
-    log : ndarray, shape (n,)
-        rad/s; NaN where a sample is missing.
-    schedule : Schedule
-    model : NoiseModel
-        Of the gyro.
-    pointing : Pointing, optional
-        Direction of the table's axis.
-    setting_sigma : float
-        Of the table's rate, see `RateTable`, rad/s.
-
-    Returns
-    -------
-    Calibration
-        Of one run.
-    Measured
-        The block means, and what was left out.
+    The log is in rad/s, shape (n,); NaN where a sample is missing. The other parameters are those
+    of `RateTable`.
 
     Raises
     ------
@@ -383,24 +332,14 @@ def _term(squares: LeastSquares | None, means: Array) -> Term | None:
 
 @dataclass(frozen=True)
 class Residuals:
-    """Steady rates and what the line leaves of them.
+    """Steady rates and what the line leaves of them."""
 
-    Attributes
-    ----------
-    dwell : ndarray of int, shape (k,)
-        Number of each among those of the schedule, from 0; one without samples is left out.
-    mean : ndarray, shape (k,)
-        Mean reading, rad/s.
-    line : ndarray, shape (k,)
-        What the line has there, rad/s.
-    sigma : ndarray, shape (k,)
-        Standard deviation of mean less line, rad/s.
-    """
-
+    # shape (k,); number of each among those of the schedule, from 0; one without samples is left
+    # out
     dwell: NDArray[np.int64]
-    mean: Array
-    line: Array
-    sigma: Array
+    mean: Array  # shape (k,); mean reading, rad/s
+    line: Array  # shape (k,); what the line has there, rad/s
+    sigma: Array  # shape (k,); standard deviation of mean less line, rad/s
 
     @property
     def value(self) -> Array:
@@ -415,19 +354,10 @@ def residuals(
     model: NoiseModel,
     setting_sigma: float = 0.0,
 ) -> Residuals:
-    """Return what the line leaves of each steady rate.
+    """Return what the line leaves of each steady rate, of a calibration of one run.
 
-    Parameters
-    ----------
-    calibration : Calibration
-        Of one run.
-    measured : Measured
-        Its block means.
-    rates : ndarray, shape (b,)
-        Rate that each block sensed, table and Earth, rad/s.
-    model : NoiseModel
-    setting_sigma : float
-        Standard deviation of the table's true rate about the stated one, rad/s.
+    The rates, table and Earth, are those that each block sensed, shape (b,), rad/s; the true rate
+    is about the stated one by ``setting_sigma``, rad/s.
     """
     blocks = measured.blocks
     dwell, place = np.unique(blocks.dwell, return_inverse=True)

@@ -55,14 +55,8 @@ class Schedule:
     ) -> Schedule:
         """Return the schedule of steps that are known.
 
-        Parameters
-        ----------
-        steps : sequence of (float, float, float)
-            Start and end of each steady rate, s from the first sample, and the rate, rad/s.
-        rate : float
-            Sampling rate, Hz.
-        settling : float
-            Time at the start of each that is left out, s.
+        Each is start and end of a steady rate, s from the first sample, and the rate, rad/s; a time
+        of settling, s, is left out at its start. The sampling rate is in Hz.
 
         Raises
         ------
@@ -148,11 +142,5 @@ class Schedule:
         return Experiment(tuple(self.stretches), self.rate, 0.0)
 
     def of_blocks(self, blocks: Blocks) -> Array:
-        """Return the table's rate in each block, rad/s, shape (b,).
-
-        Parameters
-        ----------
-        blocks : Blocks
-            Of `experiment`.
-        """
+        """Return the table's rate in each block of `experiment`, rad/s, shape (b,)."""
         return np.asarray(self.table_rates[blocks.dwell])

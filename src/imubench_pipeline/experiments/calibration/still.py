@@ -41,42 +41,24 @@ _LEVEL = 1e-9
 
 @dataclass(frozen=True)
 class StillBias:
-    """The bias of a gyro from runs at rest of one design.
+    """The bias of a gyro from runs at rest of one design."""
 
-    Attributes
-    ----------
-    fixed : ndarray, shape (runs,)
-        Bias at the first sample of the first block, rad/s.
-    fixed_noise_sigma : float
-        Its standard error by the noise model, rad/s.
-    present : ndarray, shape (runs,)
-        Mean of bias and slow noise over the last block, rad/s.
-    present_noise_sigma : float
-        Its standard error by the noise model, rad/s.
-    rate : float
-        The Earth's rate along the axis that was taken off, rad/s; with an unknown heading the
-        middle of what it may be.
-    rate_sigma : float
-        Standard deviation of that, which both biases have beside their noise, rad/s.
-    bound : float or None
-        Where the heading is not known: how far the true rate is from that at most at the stated
-        elevation, rad/s.
-    tilt_sigma : float
-        What the spread of the elevation adds to that, at the heading where it is most, rad/s.
-    p_value : ndarray, shape (runs,)
-        Chance of a scatter of the block means at least as large, where the noise model is right;
-        NaN for one block.
-    not_observable : tuple of NotObservable
-    """
-
-    fixed: Array
-    fixed_noise_sigma: float
-    present: Array
-    present_noise_sigma: float
+    fixed: Array  # shape (runs,); bias at the first sample of the first block, rad/s
+    fixed_noise_sigma: float  # its standard error by the noise model, rad/s
+    present: Array  # shape (runs,); mean of bias and slow noise over the last block, rad/s
+    present_noise_sigma: float  # its standard error by the noise model, rad/s
+    # the Earth's rate along the axis that was taken off, rad/s; with an unknown heading the middle
+    # of what it may be
     rate: float
+    # standard deviation of that, which both biases have beside their noise, rad/s
     rate_sigma: float
+    # where the heading is not known: how far the true rate is from that at most at the stated
+    # elevation, rad/s
     bound: float | None
+    # what the spread of the elevation adds to that, at the heading where it is most, rad/s
     tilt_sigma: float
+    # shape (runs,); chance of a scatter of the block means at least as large, where the noise model
+    # is right; NaN for one block
     p_value: Array
     not_observable: tuple[NotObservable, ...]
 
@@ -132,12 +114,7 @@ class StillRun:
         return float(self._fixed.sigma[0])
 
     def fit(self, means: Array) -> StillBias:
-        """Estimate the bias in runs of this design.
-
-        Parameters
-        ----------
-        means : ndarray, shape (runs, b)
-            Block means, rad/s.
+        """Estimate the bias in runs of this design from block means, rad/s, shape (runs, b).
 
         Raises
         ------
@@ -193,22 +170,8 @@ def bias_at_rest(
 ) -> StillBias:
     """Return the bias of a gyro from a log at rest.
 
-    Parameters
-    ----------
-    log : ndarray, shape (n,)
-        rad/s; NaN where a sample is missing.
-    rate : float
-        Hz.
-    model : NoiseModel
-        Of the gyro.
-    pointing : Pointing
-    longest : int, optional
-        Samples of a block at most; by default so many that nothing is lost.
-
-    Returns
-    -------
-    StillBias
-        Of one run.
+    The log is in rad/s, shape (n,); NaN where a sample is missing; the rate in Hz. A block has
+    ``longest`` samples at most; by default so many that nothing is lost.
 
     Raises
     ------

@@ -20,14 +20,9 @@ _WHITE = 16.0 / 6.0
 
 @dataclass(frozen=True)
 class Alternation:
-    """How far the dwells of the first sense lie above the mean, the others below it.
+    """How far the dwells of the first sense lie above the mean, the others below it."""
 
-    Attributes
-    ----------
-    value, sigma : float
-        rad/s; of one sense less the mean of both, and its standard error.
-    """
-
+    # value, sigma: rad/s; of one sense less the mean of both, and its standard error
     value: float
     sigma: float
 
@@ -122,8 +117,9 @@ def best_shift(
 ) -> tuple[float, float, float]:
     """Return by how much the turns should come later to make the log alternate the most.
 
-    Only the constancy of the alternation is used, not its size or sign. Its standard error is
-    taken as the same for all shifts: z^2 is then twice the log-likelihood.
+    Only the constancy of the alternation is used, not its size or sign. Its standard error is taken
+    as the same for all shifts: z^2 is then twice the log-likelihood. Returned are the shift, s, and
+    the alternation in standard errors with it, and without.
 
     Parameters
     ----------
@@ -136,13 +132,6 @@ def best_shift(
         Largest shift to try to either side, s.
     duration : float
         Of the log, s.
-
-    Returns
-    -------
-    shift : float
-        s.
-    z, unshifted : float
-        Alternation in standard errors with it, and without.
     """
     shifts = np.arange(-math.floor(longest / 0.5), math.floor(longest / 0.5) + 1) * 0.5
     alternations = []
@@ -158,21 +147,10 @@ def best_shift(
 
 
 def between(turns: Array, half_width: float, duration: float) -> list[tuple[float, float]]:
-    """Return the stretches between turns.
+    """Return the n + 1 stretches, start and stop in s, between turns.
 
-    Parameters
-    ----------
-    turns : ndarray, shape (n,)
-        Middle of the turns, s.
-    half_width : float
-        Half of what is left out about a turn, s.
-    duration : float
-        Of the log, s.
-
-    Returns
-    -------
-    list of (float, float)
-        n + 1 of them.
+    The middles of the turns are of shape (n,), and half of what is left out about each and the
+    duration of the log are in s, too.
     """
     starts = np.concatenate(([0.0], turns + half_width))
     stops = np.concatenate((turns - half_width, [duration]))

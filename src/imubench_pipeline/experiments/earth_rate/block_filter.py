@@ -70,27 +70,14 @@ class BlockFilter:
         self._cover(root, white)
 
     def matrices(self, block: int) -> tuple[Array, Array]:
-        """Return the transition into a block, and a root of its noise.
-
-        Returns
-        -------
-        (ndarray, ndarray), shapes (n, n) and (n, r)
-        """
+        """Return the transition into a block, (n, n), and a root of its noise, (n, r)."""
         return self._matrices[self._which[block]]
 
     def run(self, means: Array) -> tuple[Array, Array]:
-        """Filter runs of one design.
+        """Filter runs of one design, from means of shape (runs, b, a).
 
-        Parameters
-        ----------
-        means : ndarray, shape (runs, b, a)
-
-        Returns
-        -------
-        states : ndarray, shape (runs, b, n)
-            After each block.
-        innovations : ndarray, shape (runs, b, a)
-            What is measured less what was predicted.
+        Returned are the states after each block, shape (runs, b, n), and the innovations, what is
+        measured less what was predicted, shape (runs, b, a).
         """
         b, _, n = self._seen.shape
         states = np.empty((len(means), b, n))
@@ -136,31 +123,12 @@ class BlockFilter:
 
 
 def triangle(root: Array) -> Array:
-    """Return a lower triangular root of the same covariance.
-
-    Parameters
-    ----------
-    root : ndarray, shape (n, r)
-
-    Returns
-    -------
-    ndarray, shape (n, n)
-    """
+    """Return a lower triangular root, shape (n, n), of the covariance of one of shape (n, r)."""
     return np.asarray(np.linalg.qr(root.T, mode="r")).T
 
 
 def deviation(roots: Array, state: int) -> Array:
-    """Return the standard deviation of a state.
-
-    Parameters
-    ----------
-    roots : ndarray, shape (..., n, n)
-    state : int
-
-    Returns
-    -------
-    ndarray, shape (...)
-    """
+    """Return the standard deviation of a state, shape (...), of roots of shape (..., n, n)."""
     return np.asarray(np.linalg.norm(roots[..., state, :], axis=-1))
 
 

@@ -42,18 +42,9 @@ MOST_BLOCKS = 2048
 
 
 def whiten(model: NoiseModel, blocks: Blocks, columns: Array) -> Array:
-    """Return L^-1 columns, L L^T the covariance of the block means of a noise model.
+    """Return L^-1 columns, shape (b, c), L L^T the covariance of the block means of a noise model.
 
-    Parameters
-    ----------
-    model : NoiseModel
-        With some noise in every sample.
-    blocks : Blocks
-    columns : ndarray, shape (b, c)
-
-    Returns
-    -------
-    ndarray, shape (b, c)
+    The model has some noise in every sample.
 
     Raises
     ------
@@ -106,18 +97,8 @@ def _innovations(
 def cramer_rao(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> Array:
     """Return the least standard deviation of the rate that the data up to each block allow.
 
-    Parameters
-    ----------
-    blocks : Blocks
-    model : NoiseModel
-        With some noise in every sample: N, or a process that has one.
-    turn_on_bias : float
-        Standard deviation of the fixed bias, rad/s; by default it is not known.
-
-    Returns
-    -------
-    ndarray, shape (b,)
-        rad/s; infinite where the rate cannot be told from the bias.
+    In rad/s, shape (b,); infinite where the rate cannot be told from the bias, whose own, rad/s, is
+    by default not known. The model has some noise in every sample: N, or a process that has one.
 
     Raises
     ------
@@ -128,24 +109,9 @@ def cramer_rao(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf
 
 
 def information(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> Array:
-    """Return the Fisher information of the rate in the data up to each block.
+    """Return the Fisher information of the rate in the data up to each block, (rad/s)^-2, (b,).
 
-    Parameters
-    ----------
-    blocks : Blocks
-    model : NoiseModel
-    turn_on_bias : float
-        rad/s; see `cramer_rao`.
-
-    Returns
-    -------
-    ndarray, shape (b,)
-        (rad/s)^-2.
-
-    Raises
-    ------
-    ValueError
-        If the turn-on bias is negative, or NaN.
+    The parameters, and what is raised, are those of `cramer_rao`.
     """
     # Leading blocks have the leading part of the root.
     root = cholesky(of_means(model, blocks), lower=True, overwrite_a=True)
@@ -153,20 +119,7 @@ def information(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.in
 
 
 def information_by_states(blocks: Blocks, model: NoiseModel, turn_on_bias: float) -> Array:
-    """Return what `information` does, of many blocks faster.
-
-    Parameters
-    ----------
-    blocks : Blocks
-    model : NoiseModel
-    turn_on_bias : float
-        rad/s; infinite where nothing is known of it.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Of the data up to each block, 1/(rad/s)².
-    """
+    """Return what `information` does, of many blocks faster."""
     return _of_rate(whiten(model, blocks, _seen(blocks)), turn_on_bias)
 
 
@@ -188,23 +141,16 @@ def _of_rate(white: Array, turn_on_bias: float) -> Array:
 
 
 def bound(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> float:
-    """Return what `cramer_rao` does at the end of a run, of many blocks faster, rad/s.
-
-    Its parameters are those of `information`.
-    """
+    """Return what `cramer_rao` does at the end of a run, of many blocks faster, rad/s."""
     return float(sigma_of(information_by_states(blocks, model, turn_on_bias))[-1])
 
 
 def block_length(experiment: Experiment, model: NoiseModel) -> int:
-    """Return the longest block whose means tell as much of the rate as the samples.
+    """Return the longest block, in samples, whose means tell as much of the rate as the samples.
 
     Blocks are shortened, by halves, until a fourth of their length would lower the bound by less
-    than 0.1 %; tried on the first four dwells, with 2,048 blocks at most.
-
-    Returns
-    -------
-    int
-        Samples; at most those of the longest dwell.
+    than 0.1 %; tried on the first four dwells, with 2,048 blocks at most, none longer than the
+    longest dwell.
     """
     tried = Experiment(experiment.dwells[:_TRIED], experiment.rate, experiment.latitude)
     length = max(dwell.stop - dwell.start for dwell in experiment.dwells)
@@ -227,17 +173,9 @@ def block_length(experiment: Experiment, model: NoiseModel) -> int:
 
 
 def sigma_of(fisher: Array) -> Array:
-    """Return the standard deviations that go with information, infinite where there is none.
+    """Return the standard deviations, rad/s, of information, 1/(rad/s)², both of shape (n,).
 
-    Parameters
-    ----------
-    fisher : ndarray, shape (n,)
-        1/(rad/s)².
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        rad/s.
+    They are infinite where there is none.
     """
     with np.errstate(divide="ignore"):
         return np.asarray(1.0 / np.sqrt(fisher))

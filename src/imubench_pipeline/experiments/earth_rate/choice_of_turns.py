@@ -50,18 +50,12 @@ _SILENT = 0.05
 
 
 def closest(dwell: float) -> float:
-    """Return the shortest calm between two turns, s.
-
-    Parameters
-    ----------
-    dwell : float
-        Nominal, s.
-    """
+    """Return the shortest calm between two turns, s, of a nominal dwell, s."""
     return min(max(_APART, _CLOSEST * dwell), _LONGEST, 0.5 * dwell)
 
 
 def choose(events: Sequence[Event], dwell: float, tolerance: float, duration: float) -> list[int]:
-    """Return which events are turns.
+    """Return which events, in order of time, are turns: their places, in order.
 
     An event is a turn, a disturbance, or noise. The density of an interval between turns is a
     mixture about the multiples of the dwell (Student's t of 3 degrees of freedom, so that an
@@ -70,21 +64,8 @@ def choose(events: Sequence[Event], dwell: float, tolerance: float, duration: fl
     strength, so that noise does not stand in for a missed turn among strong ones, the usual dwell,
     and how far they are from it, so that dwells may be unequal where most of them are.
 
-    Parameters
-    ----------
-    events : sequence of Event
-        In order of time.
-    dwell : float
-        Nominal, s.
-    tolerance : float
-        Standard deviation of the interval between two turns, s.
-    duration : float
-        Of the log, s.
-
-    Returns
-    -------
-    list of int
-        Their places in ``events``, in order.
+    Nominal dwell, tolerance (the standard deviation of the interval between two turns) and duration
+    of the log are in s.
     """
     if not events:
         return []
@@ -107,24 +88,12 @@ def choose(events: Sequence[Event], dwell: float, tolerance: float, duration: fl
 
 
 def shorter_dwell(events: Sequence[Event], chosen: Sequence[int], dwell: float) -> float | None:
-    """Return the dwell that clear transients keep, where it is far shorter than the nominal one.
+    """Return the dwell, s, that clear transients keep, where it is far shorter than nominal.
 
     Where turns come at twice the pace that is declared, each second one would be a knock, evenly
-    halfway. Knocks and handling do not keep a pace.
-
-    Parameters
-    ----------
-    events : sequence of Event
-        In order of time.
-    chosen : sequence of int
-        Places of the turns, by the nominal dwell.
-    dwell : float
-        Nominal, s.
-
-    Returns
-    -------
-    float or None
-        s; None where the transients that are no turns are few, weaker, or at odd places.
+    halfway. Knocks and handling do not keep a pace. Of events in order of time, with the places of
+    the turns by the nominal dwell, s; None where the transients that are no turns are few, weaker,
+    or at odd places.
     """
     turns = [events[k] for k in chosen]
     if len(turns) < 2:
@@ -183,21 +152,10 @@ def _best(time: Array, gain: Array, dwell: float, tolerance: float, duration: fl
 
 
 def interval_density(interval: Array, dwell: float, tolerance: float) -> Array:
-    """Return the logarithm of the density of the interval between two turns.
+    """Return the logarithm of the density, 1/s, of the interval between two turns, shape (n,).
 
-    Parameters
-    ----------
-    interval : ndarray, shape (n,)
-        s.
-    dwell : float
-        Nominal, s.
-    tolerance : float
-        Standard deviation for one dwell, s; for k dwells sqrt(k) times that.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Of 1/s.
+    The intervals, the nominal dwell, and the standard deviation for one dwell (for k dwells it is
+    sqrt(k) times that) are in s.
     """
     nearest = np.maximum(np.rint(interval / dwell), 1.0)
     density = np.zeros(len(interval))
@@ -222,12 +180,9 @@ def _at_edge(interval: float, dwell: float) -> float:
 
 
 def strength(turns: Sequence[Event]) -> tuple[float, float]:
-    """Return what the strengths of turns are about, and how they scatter.
+    """Return what the strengths of turns are about, the median, and how they scatter.
 
-    Returns
-    -------
-    usual, scatter : float
-        Median, and the standard deviation from the median distance.
+    The scatter is the standard deviation from the median distance.
     """
     values = np.array([event.strength for event in turns])
     usual = float(np.median(values))

@@ -41,61 +41,35 @@ Range = dict[str, float]
 
 @dataclass(frozen=True)
 class Course:
-    """What one method says as the data come in.
+    """What one method says as the data come in."""
 
-    Attributes
-    ----------
-    method : str
-        One of `METHODS`.
-    time : ndarray, shape (k,)
-        s from the first sample of the log.
-    rate : ndarray, shape (k,)
-        Estimate from the data up to then, rad/s; by the smoother from all of the data.
-    sigma : ndarray, shape (k,), or None
-        Its standard deviation, rad/s; None where the method has none.
-    reason : str or None
-        Why there is no estimate: the arrays are empty then.
-    """
-
-    method: str
-    time: Array
+    method: str  # one of `METHODS`
+    time: Array  # shape (k,); s from the first sample of the log
+    # shape (k,); estimate from the data up to then, rad/s; by the smoother from all of the data
     rate: Array
-    sigma: Array | None
-    reason: str | None = None
+    sigma: Array | None  # shape (k,); its standard deviation, rad/s; None where the method has none
+    reason: str | None = None  # why there is no estimate: the arrays are empty then
 
 
 @dataclass(frozen=True)
 class Courses:
-    """The estimates of one experiment, and what they are made of.
+    """The estimates of one experiment, and what they are made of."""
 
-    Attributes
-    ----------
-    courses : tuple of Course
-        One a method.
-    measured : Measured
-    longest : int
-        Samples of a block at most.
-    drift_time, drift, drift_sigma : ndarray, shape (b,)
-        Middle of each block in s from the first sample of the log; the gyro's slow error in it
-        with its bias, from all of the data, and its standard deviation, rad/s.
-    """
-
-    courses: tuple[Course, ...]
+    courses: tuple[Course, ...]  # one a method
     measured: Measured
-    longest: int
+    longest: int  # samples of a block at most
+    # drift_time, drift, drift_sigma: shape (b,); middle of each block in s from the first sample of
+    # the log; the gyro's slow error in it with its bias, from all of the data, and its standard
+    # deviation, rad/s
     drift_time: Array
     drift: Array
     drift_sigma: Array
 
 
 def white_sigma(model: NoiseModel, blocks: Blocks) -> float:
-    """Return N / sqrt(T) / cos(latitude), below which no estimate from T s of data can be, rad/s.
+    """Return N / sqrt(T) / cos(latitude), rad/s, below which no estimate from T s of data can be.
 
-    Parameters
-    ----------
-    model : NoiseModel
-    blocks : Blocks
-        T is the time that their samples stand for.
+    T is the time that the samples of the blocks stand for.
     """
     return model.N / math.sqrt(blocks.time_in_blocks) / math.cos(blocks.latitude)
 
@@ -181,10 +155,7 @@ def _tracked(log: Array, experiment: Experiment, papers: NoiseModel) -> Course:
 def thin(points: int) -> Iterator[int]:
     """Yield places of a course that show it: as many at its begin as later, and its end.
 
-    Parameters
-    ----------
-    points : int
-        Of the course; about 400 are kept.
+    About 400 are kept.
     """
     if points <= _KEPT:
         yield from range(points)
@@ -199,21 +170,9 @@ def sigma_ranges(
 ) -> dict[str, Range]:
     """Return the limits of the standard deviation of each method at the end of a run.
 
-    Parameters
-    ----------
-    blocks : Blocks
-    model : NoiseModel
-        As estimated.
-    drawn : sequence of NoiseModel
-        From the limits of its parameters.
-    turn_on_bias : float or None
-        Standard deviation of the fixed bias, rad/s; None: not known.
-
-    Returns
-    -------
-    dict
-        By method, ``sigma_lower`` and ``sigma_upper``, rad/s; none where nothing is drawn, or the
-        method has no estimate.
+    By method ``sigma_lower`` and ``sigma_upper``, rad/s, over models drawn from the limits of the
+    parameters of the estimated one; none where nothing is drawn, or the method has no estimate. The
+    standard deviation of the fixed bias is in rad/s; None: not known.
     """
     if not drawn:
         return {}

@@ -15,20 +15,10 @@ from imubench_pipeline.typing import Array
 
 
 def of_means(model: NoiseModel, blocks: Blocks) -> Array:
-    """Return the covariance of block means.
+    """Return the covariance of the means of b blocks, (rad/s)^2, shape (b, b).
 
-    Parameters
-    ----------
-    model : NoiseModel
-        Flicker noise is its bank of Gauss-Markov processes, followed up to the duration of the
-        blocks.
-    blocks : Blocks
-        b of them.
-
-    Returns
-    -------
-    ndarray, shape (b, b)
-        (rad/s)^2. The random walk counts from the first sample of the first block.
+    The random walk counts from the first sample of the first block; flicker noise is its bank of
+    Gauss-Markov processes, followed up to the duration of the blocks.
     """
     total = np.zeros((len(blocks), len(blocks)))
     for term in model.realised(1.0 / blocks.rate, longest(blocks)):

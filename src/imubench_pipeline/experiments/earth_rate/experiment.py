@@ -29,22 +29,16 @@ _LEAST_PRESENT = 0.5
 class Dwell:
     """A time at rest in one position.
 
-    Parameters
-    ----------
-    start, stop : int
-        First sample of the log, and the one past the last.
-    sense : {1, -1}
-        1: the axis points north; -1: south.
-
     Raises
     ------
     ValueError
         If there is no sample, or the sense is neither.
     """
 
+    # start, stop: first sample of the log, and the one past the last
     start: int
     stop: int
-    sense: int
+    sense: int  # 1: the axis points north; -1: south
 
     def __post_init__(self) -> None:
         if not 0 <= self.start < self.stop:
@@ -57,16 +51,6 @@ class Dwell:
 class Experiment:
     """Dwells in their order.
 
-    Parameters
-    ----------
-    dwells : sequence of Dwell
-        At least one; what lies between them is turning. Two that follow each other may have the
-        same sense: a turn was missed.
-    rate : float
-        Sampling rate, Hz.
-    latitude : float
-        rad.
-
     Raises
     ------
     ValueError
@@ -74,9 +58,11 @@ class Experiment:
         between the poles.
     """
 
+    # at least one; what lies between them is turning. Two that follow each other may have the same
+    # sense: a turn was missed
     dwells: Sequence[Dwell]
-    rate: float
-    latitude: float
+    rate: float  # sampling rate, Hz
+    latitude: float  # rad
 
     def __post_init__(self) -> None:
         if not self.dwells:
@@ -104,20 +90,9 @@ class Experiment:
     ) -> Experiment:
         """Return an experiment that keeps to a schedule.
 
-        Parameters
-        ----------
-        dwell : float
-            Data in each dwell, s; taken to the nearest whole number of samples, at least one.
-        turning : float
-            Time between dwells, s; likewise, from 0.
-        dwells : int
-            How many, one more than turns.
-        rate : float
-            Hz.
-        latitude : float
-            rad.
-        first : {1, -1}
-            Sense of the first dwell.
+        Data in each of so many dwells (at least one sample) and time between them are in s, taken
+        to the nearest whole number of samples; the rate is in Hz, the latitude in rad. ``first`` is
+        the sense of the first dwell.
         """
         length = max(round(dwell * rate), 1)
         period = length + max(round(turning * rate), 0)
@@ -135,10 +110,7 @@ class Experiment:
     def blocks(self, longest: int) -> Blocks:
         """Return the blocks of a log without missing samples.
 
-        Parameters
-        ----------
-        longest : int
-            Samples of a block at most; a dwell is divided evenly (`block_length`).
+        Of ``longest`` samples at most; a dwell is divided evenly (`block_length`).
 
         Raises
         ------
@@ -165,31 +137,16 @@ class Experiment:
 
 @dataclass(frozen=True)
 class Blocks:
-    """Blocks of samples, each within one dwell, in their order.
+    """Blocks of samples, each within one dwell, in their order."""
 
-    Attributes
-    ----------
-    start, stop : ndarray of int, shape (b,)
-        First sample of the log, and the one past the last.
-    count : ndarray of int, shape (b,)
-        Samples that are present.
-    sense : ndarray, shape (b,)
-        1 north, -1 south.
-    dwell : ndarray of int, shape (b,)
-        Number of the dwell, from 0, rising.
-    rate : float
-        Hz.
-    latitude : float
-        rad.
-    """
-
+    # start, stop: shape (b,); first sample of the log, and the one past the last
     start: Integers
     stop: Integers
-    count: Integers
-    sense: Array
-    dwell: Integers
-    rate: float
-    latitude: float
+    count: Integers  # shape (b,); samples that are present
+    sense: Array  # shape (b,); 1 north, -1 south
+    dwell: Integers  # shape (b,); number of the dwell, from 0, rising
+    rate: float  # Hz
+    latitude: float  # rad
 
     def __len__(self) -> int:
         return len(self.start)
@@ -220,17 +177,9 @@ class Blocks:
         return float(self.count.sum()) / self.rate
 
     def check_means(self, means: Array) -> None:
-        """Check that there is one finite mean a block: without one a block is none.
+        """Raise a ValueError if there is not one finite mean a block: without one a block is none.
 
-        Parameters
-        ----------
-        means : ndarray, shape (runs, b)
-            See `block_means`.
-
-        Raises
-        ------
-        ValueError
-            If it is not so.
+        The means have the shape (runs, b), see `block_means`.
         """
         if means.ndim != 2 or means.shape[1] != len(self):
             raise ValueError(
@@ -240,12 +189,7 @@ class Blocks:
             raise ValueError("a block mean is not finite; leave its block out")
 
     def chosen(self, which: NDArray[np.bool_] | NDArray[np.int64] | slice) -> Blocks:
-        """Return some of the blocks.
-
-        Parameters
-        ----------
-        which : ndarray of bool, shape (b,), or of int, or slice
-        """
+        """Return some of the blocks: by bool, shape (b,), by number, or a slice."""
         return replace(
             self,
             start=self.start[which],
@@ -263,16 +207,9 @@ class Blocks:
         return replace(self.chosen(first), stop=self.stop[last], count=count)
 
     def means_of_dwells(self, means: Array) -> Array:
-        """Return the mean of each dwell over its samples present.
+        """Return the mean of each dwell over its samples present, shape (runs, dwells).
 
-        Parameters
-        ----------
-        means : ndarray, shape (runs, b)
-            Of the blocks, rad/s.
-
-        Returns
-        -------
-        ndarray, shape (runs, dwells)
+        Of the means of blocks, rad/s, shape (runs, b).
         """
         first = np.flatnonzero(np.diff(self.dwell, prepend=-1))
         total = np.add.reduceat(means * self.count, first, axis=1)
@@ -281,45 +218,24 @@ class Blocks:
 
 @dataclass(frozen=True)
 class Measured:
-    """The block means of a log, and what was left out.
+    """The block means of a log, and what was left out."""
 
-    Attributes
-    ----------
-    blocks : Blocks
-        Those of which enough samples are present.
-    means : ndarray, shape (1, b)
-        rad/s, a row for the one log.
-    missing : int
-        Samples within dwells that are not there (NaN).
-    left_out : int
-        Samples present in blocks that have too few.
-    turning : int
-        Samples of the log, present or not, outside of dwells.
-    """
-
-    blocks: Blocks
-    means: Array
-    missing: int
-    left_out: int
-    turning: int
+    blocks: Blocks  # those of which enough samples are present
+    means: Array  # shape (1, b); rad/s, a row for the one log
+    missing: int  # samples within dwells that are not there (NaN)
+    left_out: int  # samples present in blocks that have too few
+    turning: int  # samples of the log, present or not, outside of dwells
 
 
 def block_means(parts: Iterable[Array], experiment: Experiment, longest: int) -> Measured:
-    """Return the means of blocks of a log, in one pass.
+    """Return the means of blocks, of ``longest`` samples at most, of a log, in one pass.
 
     The mean is over the samples present. White noise in it counts by their number; the slow noise
     in it is taken as that of a complete block, which is why a block of which more than half is
     missing is left out; the blocks beside it know how long that hole is. With a third of all
-    samples missing, a standard deviation is right to 1 %, and 3 % too small where most of the
-    noise is a process of a correlation time of two samples.
-
-    Parameters
-    ----------
-    parts : iterable of ndarray
-        The log in order, rad/s; NaN where a sample is missing.
-    experiment : Experiment
-    longest : int
-        Samples of a block at most.
+    samples missing, a standard deviation is right to 1 %, and 3 % too small where most of the noise
+    is a process of a correlation time of two samples. The parts of the log are in order, rad/s,
+    each ndarray of one axis; NaN where a sample is missing.
 
     Raises
     ------

@@ -38,39 +38,21 @@ _NOTHING = 1e-12
 
 @dataclass(frozen=True)
 class Filtered:
-    """What a filter knows after each block, from the data up to there.
+    """What a filter knows after each block, from the data up to there."""
 
-    Attributes
-    ----------
-    time : ndarray, shape (b,)
-        End of each block, s from the first sample of the first.
-    rate : ndarray, shape (runs, b)
-        Estimated Earth's rate, rad/s.
-    rate_sigma : ndarray, shape (b,)
-        Its standard deviation, rad/s.
-    drift : ndarray, shape (runs, b)
-        Estimated mean of the gyro's slow error over the block, its bias included, rad/s.
-    drift_sigma : ndarray, shape (b,)
-        Its standard deviation, rad/s.
-    innovation : ndarray, shape (runs, b)
-        Each block mean less its prediction, rad/s.
-    innovation_sigma : ndarray, shape (b,)
-        Its standard deviation, rad/s.
-    states : ndarray, shape (runs, b, m + 2)
-        Rate, the states of `RateFilter.names` at the sample after the block, and the drift.
-    roots : ndarray, shape (b, m + 2, m + 2)
-        Lower triangular roots of their covariances.
-    """
-
-    time: Array
-    rate: Array
-    rate_sigma: Array
+    time: Array  # shape (b,); end of each block, s from the first sample of the first
+    rate: Array  # shape (runs, b); estimated Earth's rate, rad/s
+    rate_sigma: Array  # shape (b,); its standard deviation, rad/s
+    # shape (runs, b); estimated mean of the gyro's slow error over the block, its bias included,
+    # rad/s
     drift: Array
-    drift_sigma: Array
-    innovation: Array
-    innovation_sigma: Array
+    drift_sigma: Array  # shape (b,); its standard deviation, rad/s
+    innovation: Array  # shape (runs, b); each block mean less its prediction, rad/s
+    innovation_sigma: Array  # shape (b,); its standard deviation, rad/s
+    # shape (runs, b, m + 2); rate, the states of `RateFilter.names` at the sample after the block,
+    # and the drift
     states: Array
-    roots: Array
+    roots: Array  # shape (b, m + 2, m + 2); lower triangular roots of their covariances
 
     @property
     def nis(self) -> Array:
@@ -78,36 +60,19 @@ class Filtered:
         return np.asarray((self.innovation / self.innovation_sigma) ** 2)
 
     def rate_nees(self, rate: float) -> Array:
-        """Return the squared error of the rate over its variance.
+        """Return the squared error of the rate over its variance, shape (runs, b).
 
-        Parameters
-        ----------
-        rate : float
-            The true one, rad/s.
-
-        Returns
-        -------
-        ndarray, shape (runs, b)
-            Chi-squared of one degree of freedom, where the filter is consistent and what it knew
-            at the start no longer counts: once both positions have been seen.
+        Chi-squared of one degree of freedom, where the filter is consistent and what it knew at the
+        start no longer counts: once both positions have been seen. The true rate is in rad/s.
         """
         return np.asarray(((self.rate - rate) / self.rate_sigma) ** 2)
 
     def nees(self, rate: float, states: Array) -> Array:
-        """Return the normalised estimation error squared of the rate and all states.
+        """Return the normalised estimation error squared of rate and all states, shape (runs, b).
 
-        Parameters
-        ----------
-        rate : float
-            The true one, rad/s.
-        states : ndarray, shape (runs, b, m)
-            The true ones, at the sample after each block.
-
-        Returns
-        -------
-        ndarray, shape (runs, b)
-            Chi-squared of m + 1 degrees of freedom; see `rate_nees`. Not finite where a state is
-            known exactly.
+        Chi-squared of m + 1 degrees of freedom; see `rate_nees`. Not finite where a state is known
+        exactly. The true rate is in rad/s, the true states, at the sample after each block, are of
+        shape (runs, b, m).
         """
         error = self.states[:, :, :-1].copy()
         error[:, :, 0] -= rate
@@ -121,27 +86,16 @@ class Filtered:
 
 @dataclass(frozen=True)
 class Smoothed:
-    """What is known of each block from all the data.
+    """What is known of each block from all the data."""
 
-    Attributes
-    ----------
-    rate : ndarray, shape (runs,)
-        Estimated Earth's rate, rad/s: a constant, which the filter has found at the end.
-    rate_sigma : float
-        Its standard deviation, rad/s.
-    drift : ndarray, shape (runs, b)
-        Mean of the gyro's slow error over each block, its bias included, rad/s.
-    drift_sigma : ndarray, shape (b,)
-        Its standard deviation, rad/s.
-    states : ndarray, shape (runs, b, m + 2)
-        As those of `Filtered`.
-    """
-
+    # shape (runs,); estimated Earth's rate, rad/s: a constant, which the filter has found at the
+    # end
     rate: Array
-    rate_sigma: float
+    rate_sigma: float  # its standard deviation, rad/s
+    # shape (runs, b); mean of the gyro's slow error over each block, its bias included, rad/s
     drift: Array
-    drift_sigma: Array
-    states: Array
+    drift_sigma: Array  # shape (b,); its standard deviation, rad/s
+    states: Array  # shape (runs, b, m + 2); as those of `Filtered`
 
 
 class RateFilter:
@@ -192,12 +146,7 @@ class RateFilter:
         return deviation(self._filter.roots, 0)
 
     def run(self, means: Array) -> Filtered:
-        """Filter runs of one design.
-
-        Parameters
-        ----------
-        means : ndarray, shape (runs, b)
-            Block means, rad/s.
+        """Filter runs of one design from block means, rad/s, shape (runs, b).
 
         Raises
         ------

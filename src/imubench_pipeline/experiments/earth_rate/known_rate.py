@@ -28,21 +28,12 @@ _START = 0.1
 
 @dataclass(frozen=True)
 class Tracked:
-    """What comes of the filter that is given the rate, for the samples in dwells.
+    """What comes of the filter that is given the rate, for the samples in dwells."""
 
-    Attributes
-    ----------
-    sample : ndarray of int, shape (n,)
-        Number of each sample in the log.
-    drift : ndarray, shape (n,)
-        Tracked error of the gyro, z_f + z_rrw, rad/s.
-    mean : ndarray, shape (n,)
-        Cumulative mean of what it calls the Earth's rate, reading less drift, as in the paper's
-        figures 10 to 13, rad/s.
-    """
-
-    sample: NDArray[np.int64]
-    drift: Array
+    sample: NDArray[np.int64]  # shape (n,); number of each sample in the log
+    drift: Array  # shape (n,); tracked error of the gyro, z_f + z_rrw, rad/s
+    # shape (n,); cumulative mean of what it calls the Earth's rate, reading less drift, as in the
+    # paper's figures 10 to 13, rad/s
     mean: Array
 
 
@@ -50,18 +41,10 @@ def track(log: Array, experiment: Experiment, model: NoiseModel, known_rate: flo
     """Track the bias of a gyro with the filter of the paper, which is given the Earth's rate.
 
     F = diag(e^(-T/T_B), 1), H = [1, 1], R_d = N^2/T, Q_d = T diag(S_B, S_K), P_0 = 0.1 I, x_0 = 0
-    as printed, also where that is an approximation (the first entry of Q_d). Samples of turning
-    are left out, as if no time lay between dwells.
-
-    Parameters
-    ----------
-    log : ndarray, shape (samples,)
-        rad/s; NaN where a sample is missing.
-    experiment : Experiment
-    model : NoiseModel
-        N, B with T_B, and K are used.
-    known_rate : float
-        The rate that the filter is given, rad/s, and returns.
+    as printed, also where that is an approximation (the first entry of Q_d). Samples of turning are
+    left out, as if no time lay between dwells. The log, shape (samples,), is in rad/s, NaN where a
+    sample is missing, and so is the rate that the filter is given, and returns; of the model N, B
+    with T_B, and K are used.
 
     Raises
     ------

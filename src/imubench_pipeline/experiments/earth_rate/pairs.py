@@ -25,44 +25,24 @@ from imubench_pipeline.typing import Array
 
 @dataclass(frozen=True)
 class Differences:
-    """Estimates from differences between dwells, and their mean as it grows with time.
+    """Estimates from differences between dwells, and their mean as it grows with time."""
 
-    Attributes
-    ----------
-    time : ndarray, shape (p,)
-        End of the last dwell of each, s from the first sample of the first dwell.
-    each : ndarray, shape (runs, p)
-        Each estimate, rad/s.
-    each_sigma : ndarray, shape (p,)
-        Its standard error, rad/s.
-    rate : ndarray, shape (runs, p)
-        Mean of the estimates up to each, rad/s.
-    sigma : ndarray, shape (p,)
-        Its standard error, rad/s.
-    scatter : ndarray, shape (runs, p)
-        What the scatter would give for it, were the estimates independent, rad/s; NaN for one.
-    """
-
+    # shape (p,); end of the last dwell of each, s from the first sample of the first dwell
     time: Array
-    each: Array
-    each_sigma: Array
-    rate: Array
-    sigma: Array
+    each: Array  # shape (runs, p); each estimate, rad/s
+    each_sigma: Array  # shape (p,); its standard error, rad/s
+    rate: Array  # shape (runs, p); mean of the estimates up to each, rad/s
+    sigma: Array  # shape (p,); its standard error, rad/s
+    # shape (runs, p); what the scatter would give for it, were the estimates independent, rad/s;
+    # NaN for one
     scatter: Array
 
 
 def by_pairs(means: Array, blocks: Blocks, model: NoiseModel) -> Differences:
     """Estimate the rate by 003 eq. 14 from pairs of dwells, each dwell in one pair at most.
 
-    A dwell that the same sense follows, a turn having been missed, is left out.
-
-    Parameters
-    ----------
-    means : ndarray, shape (runs, b)
-        Block means, rad/s.
-    blocks : Blocks
-    model : NoiseModel
-        Of the gyro, for the standard errors.
+    A dwell that the same sense follows, a turn having been missed, is left out. The block means are
+    in rad/s, shape (runs, b); the noise model is for the standard errors.
 
     Raises
     ------

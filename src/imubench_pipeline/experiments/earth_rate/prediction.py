@@ -54,40 +54,20 @@ _MOST_TURNS = 20_000
 
 @dataclass(frozen=True)
 class Prediction:
-    """The least standard deviation of the rate as a run grows.
+    """The least standard deviation of the rate as a run grows."""
 
-    Attributes
-    ----------
-    turns : ndarray of int, shape (k,)
-        Turns done, from 1.
-    time : ndarray, shape (k,)
-        End of the dwell after the last turn, s.
-    sigma : ndarray, shape (k,)
-        rad/s.
-    """
-
-    turns: NDArray[np.int64]
-    time: Array
-    sigma: Array
+    turns: NDArray[np.int64]  # shape (k,); turns done, from 1
+    time: Array  # shape (k,); end of the dwell after the last turn, s
+    sigma: Array  # shape (k,); rad/s
 
 
 @dataclass(frozen=True)
 class DwellCurve:
-    """The least standard deviation of the rate for a given run time, over the dwell.
+    """The least standard deviation of the rate for a given run time, over the dwell."""
 
-    Attributes
-    ----------
-    dwells : ndarray of int, shape (k,)
-        How many, rising.
-    dwell : ndarray, shape (k,)
-        Data in each, s.
-    sigma : ndarray, shape (k,)
-        rad/s.
-    """
-
-    dwells: NDArray[np.int64]
-    dwell: Array
-    sigma: Array
+    dwells: NDArray[np.int64]  # shape (k,); how many, rising
+    dwell: Array  # shape (k,); data in each, s
+    sigma: Array  # shape (k,); rad/s
 
     @property
     def best(self) -> int:
@@ -97,10 +77,7 @@ class DwellCurve:
     def nearly_best(self) -> tuple[float, float]:
         """Return the dwells between which 1 % is lost at most: the best is mostly a broad one.
 
-        Returns
-        -------
-        (float, float)
-            Shortest and longest dwell of the curve about the best one, s.
+        Shortest and longest dwell of the curve about the best one, s.
         """
         little = self.sigma <= (1.0 + _LITTLE) * self.sigma[self.best]
         worse = np.flatnonzero(~little)
@@ -115,36 +92,17 @@ class Outlook:
 
     Beyond 64 dwells the information of the rate grows by as much a dwell as before: what turns
     at a steady pace sees the noise at the frequency of the turns and its odd multiples alone.
-
-    Parameters
-    ----------
-    model : NoiseModel
-    latitude : float
-        rad.
-    turning : float
-        Time that a turn takes, s.
-    rate : float
-        Sampling rate, Hz.
-    turn_on_bias : float
-        Standard deviation of the fixed bias, rad/s; by default it is not known.
     """
 
     model: NoiseModel
-    latitude: float
-    turning: float
-    rate: float
+    latitude: float  # rad
+    turning: float  # time that a turn takes, s
+    rate: float  # sampling rate, Hz
+    # standard deviation of the fixed bias, rad/s; by default it is not known
     turn_on_bias: float = math.inf
 
     def against_time(self, dwell: float, turns: int) -> Prediction:
-        """Return the bound after each turn and dwell.
-
-        Parameters
-        ----------
-        dwell : float
-            Data in each dwell, s.
-        turns : int
-            The last one wanted, from 1.
-        """
+        """Return the bound after each turn and dwell, of so many s of data, up to the last turn."""
         information = self._information(dwell, turns + 1)
         number = np.arange(1, turns + 1)
         time = (number + 1) * dwell + number * self.turning
@@ -153,17 +111,8 @@ class Outlook:
     def turns_needed(self, dwell: float, relative: float) -> int:
         """Return how many turns give the Earth's rate to a relative standard deviation.
 
-        Parameters
-        ----------
-        dwell : float
-            Data in each dwell, s.
-        relative : float
-            Of the Earth's rate: 0.01 is 1 %.
-
-        Returns
-        -------
-        int
-            The run lasts (turns + 1) dwells and as many turns.
+        The run lasts (turns + 1) dwells, s of data each, and as many turns; ``relative`` is of the
+        Earth's rate: 0.01 is 1 %.
 
         Raises
         ------
@@ -190,25 +139,15 @@ class Outlook:
         return float(sigma_of(np.array([last]))[0])
 
     def time_needed(self, dwell: float, relative: float) -> float:
-        """Return how long a run gives the Earth's rate to a relative standard deviation, s.
-
-        `dwell` and `relative`: as of `turns_needed`.
-        """
+        """Return how long a run gives the Earth's rate to a relative standard deviation, s."""
         turns = self.turns_needed(dwell, relative)
         return (turns + 1) * dwell + turns * self.turning
 
     def over_dwell(self, run_time: float) -> DwellCurve:
-        """Return the bound of a run of given length over the dwell, from one turn to short dwells.
+        """Return the bound of a run of a length, s, over the dwell, from one turn to short dwells.
 
-        Parameters
-        ----------
-        run_time : float
-            Length of the run, s: all of it is dwell or turning.
-
-        Returns
-        -------
-        DwellCurve
-            Down to dwells of a fourth of the turning time, or of one second.
+        All of the run is dwell or turning; down to dwells of a fourth of the turning time, or of
+        one second.
 
         Raises
         ------
@@ -244,16 +183,9 @@ class Outlook:
         """Return the least standard deviation of the heading by gyrocompassing after each turn.
 
         The axis lies across north, and is turned end for end: half the difference of its readings
-        is w_ie cos(latitude) times the (small) heading error. An error s of that half difference
-        is a heading error s / (w_ie cos(latitude)), the same as `error_budget.Gyrocompass` with
-        two positions; with s = sigma cos(latitude), sigma that of the rate.
-
-        `dwell` and `turns`: as of `against_time`.
-
-        Returns
-        -------
-        ndarray, shape (turns,)
-            rad.
+        is w_ie cos(latitude) times the (small) heading error. An error s of that half difference is
+        a heading error s / (w_ie cos(latitude)), the same as `error_budget.Gyrocompass` with two
+        positions; with s = sigma cos(latitude), sigma that of the rate. In rad, shape (turns,).
         """
         of_axis = self.against_time(dwell, turns).sigma * math.cos(self.latitude)
         return np.asarray(of_axis / (EARTH_RATE * math.cos(self.latitude)))
@@ -292,15 +224,8 @@ def prediction_rows(
 ) -> Iterator[Row]:
     """Yield the rows of the table ``earth_rate_prediction``, without the names.
 
-    Parameters
-    ----------
-    outlook : Outlook
-    dwell : float
-        Data in each dwell, s.
-    goals : sequence of float
-        Standard deviations that are wanted, relative to the Earth's rate.
-    run_time : float
-        For which the best dwell is sought, s.
+    ``dwell`` is the data in each, s; the goals are standard deviations relative to the Earth's
+    rate; the best dwell is sought for the run time, s.
 
     Raises
     ------

@@ -30,24 +30,12 @@ _WITHIN = 1.96
 
 @dataclass(frozen=True)
 class RunDesign:
-    """A run as its source describes it.
+    """A run as its source describes it."""
 
-    Attributes
-    ----------
-    dwell : float
-        From turn to turn, s.
-    turning : float
-        Of it that turning takes, s.
-    rate : float
-        Sampling rate, Hz.
-    latitude : float
-        rad.
-    """
-
-    dwell: float
-    turning: float
-    rate: float
-    latitude: float
+    dwell: float  # from turn to turn, s
+    turning: float  # of it that turning takes, s
+    rate: float  # sampling rate, Hz
+    latitude: float  # rad
 
     def experiment(self, duration: float) -> Experiment:
         """Return the design of a run of so many s."""
@@ -61,19 +49,9 @@ class RunDesign:
 
 
 def allowed_sigmas(run: RunDesign, duration: float, model: NoiseModel) -> Row:
-    """Return the standard deviations that noise gives the estimates of a run, rad/s.
+    """Return the standard deviations that noise gives the estimates of a run of so many s, rad/s.
 
-    Parameters
-    ----------
-    run : RunDesign
-    duration : float
-        s.
-    model : NoiseModel
-
-    Returns
-    -------
-    dict
-        ``white``, by white noise alone; ``sigma``, of the mean over pairs; ``sigma_filter``.
+    ``white``, by white noise alone; ``sigma``, of the mean over pairs; ``sigma_filter``.
     """
     design = run.experiment(duration)
     blocks = design.blocks(block_length(design, model))
@@ -88,15 +66,8 @@ def allowed_sigmas(run: RunDesign, duration: float, model: NoiseModel) -> Row:
 def published_row(value: float, run: RunDesign, duration: float, model: NoiseModel) -> Row:
     """Return what noise says of a published estimate: columns of ``earth_rate_published``.
 
-    Parameters
-    ----------
-    value : float
-        As published, rad/s.
-    run : RunDesign
-    duration : float
-        Of the run, or of the part of it, s.
-    model : NoiseModel
-        As published.
+    The value is in rad/s; the duration, s, that of the run or of the part of it; the noise model as
+    published.
     """
     noise = allowed_sigmas(run, duration, model)
     off = (value - EARTH_RATE) / noise["sigma"]

@@ -35,48 +35,27 @@ _CALMING = 0.25
 
 @dataclass(frozen=True)
 class TurnSchedule:
-    """The turns as they are stated, before the log is looked at.
+    """The turns as they are stated, before the log is looked at."""
 
-    Attributes
-    ----------
-    dwell, start, turning, margin : float
-        As `imubench_pipeline.experiments.earth_rate.turning.find_turning` takes them, s.
-    tolerance : float
-        How far a turn may be from the schedule, s (a standard deviation): a tenth of a dwell, and
-        at least 2 s. So much is left out on both sides of a turn that is not seen.
-    duration : float
-        Of the log, s.
-    """
-
+    # dwell, start, turning, margin: as
+    # `imubench_pipeline.experiments.earth_rate.turning.find_turning` takes them, s
     dwell: float
     start: float
     turning: float
+    # how far a turn may be from the schedule, s (a standard deviation): a tenth of a dwell, and at
+    # least 2 s. So much is left out on both sides of a turn that is not seen
     tolerance: float
     margin: float
-    duration: float
+    duration: float  # of the log, s
 
 
 def by_sight(
     blocks: LevelBlocks, events: list[Event], schedule: TurnSchedule, trust: bool
 ) -> tuple[list[Turn], list[tuple[float, float]], list[str]]:
-    """Return turns, knocks and doubts where there is no column.
+    """Return turns (at least one), knocks and doubts where there is no column, in order.
 
-    Parameters
-    ----------
-    blocks : LevelBlocks
-    events : list of Event
-        In order of time.
-    schedule : TurnSchedule
-    trust : bool
-        Take the schedule's word where nothing is seen.
-
-    Returns
-    -------
-    turns : list of Turn
-        In order; at least one.
-    knocks : list of (float, float)
-        Start and stop of what is left out besides, s.
-    doubts : list of str
+    Of events in order of time; ``trust`` takes the schedule's word where nothing is seen. Knocks
+    are start and stop of what is left out besides, s.
 
     Raises
     ------
@@ -260,13 +239,7 @@ def _at_end(event: Event, schedule: TurnSchedule) -> bool:
 
 
 def disturbances(events: Sequence[Event]) -> list[tuple[float, float]]:
-    """Return what to leave out of transients that are no turns, and are not noise.
-
-    Returns
-    -------
-    list of (float, float)
-        Start and stop, s.
-    """
+    """Return start and stop, s, to leave out of transients that are no turns, and are not noise."""
     return [
         (event.start - _CALMING, event.stop + _CALMING)
         for event in events
@@ -275,14 +248,7 @@ def disturbances(events: Sequence[Event]) -> list[tuple[float, float]]:
 
 
 def leave_out_knocks(blocks: LevelBlocks, knocks: Sequence[tuple[float, float]]) -> LevelBlocks:
-    """Return the blocks without those of knocks.
-
-    Parameters
-    ----------
-    blocks : LevelBlocks
-    knocks : sequence of (float, float)
-        Start and stop, s.
-    """
+    """Return the blocks without those of knocks, from start to stop, s."""
     present = blocks.present.copy()
     for start, stop in knocks:
         first, last = int(start / blocks.length), math.ceil(stop / blocks.length)

@@ -42,13 +42,7 @@ ASSUMED_TURNING = 2.0
 
 
 def paper_run(minutes: float) -> Experiment:
-    """Return the design of a run of the paper: north first, a turn every 30 s.
-
-    Parameters
-    ----------
-    minutes : float
-        Its length, such as in `PAPER_MINUTES`.
-    """
+    """Return the design of a run of the paper: north first, a turn every 30 s, for so many min."""
     return Experiment.regular(
         dwell=PAPER_PERIOD - ASSUMED_TURNING,
         turning=ASSUMED_TURNING,
@@ -60,20 +54,12 @@ def paper_run(minutes: float) -> Experiment:
 
 @dataclass(frozen=True)
 class Runs:
-    """Simulated runs of one design, and their truth.
+    """Simulated runs of one design, and their truth."""
 
-    Attributes
-    ----------
-    means : ndarray, shape (runs, b)
-        Block means, rad/s.
-    drift : ndarray, shape (runs, b)
-        Mean of the slow error over each block, its bias included, rad/s.
-    states : ndarray, shape (runs, b, m)
-        States at the sample after each block (`states.BlockStates`).
-    """
-
-    means: Array
+    means: Array  # shape (runs, b); block means, rad/s
+    # shape (runs, b); mean of the slow error over each block, its bias included, rad/s
     drift: Array
+    # shape (runs, b, m); states at the sample after each block (`states.BlockStates`)
     states: Array
 
 
@@ -88,16 +74,8 @@ def simulate_runs(
 ) -> Runs:
     """Draw the block means of many runs, from their exact joint distribution.
 
-    Parameters
-    ----------
-    model : NoiseModel
-    blocks : Blocks
-    earth_rate : float
-        rad/s.
-    turn_on_bias : float
-        Standard deviation of the fixed bias, which is drawn for each run, rad/s.
-    runs : int
-    rng : numpy.random.Generator
+    The Earth's rate is in rad/s, and so is the standard deviation of the fixed bias, which is drawn
+    for each run.
     """
     block_model = block_states(model, blocks, turn_on_bias)
     m = len(block_model.names)
@@ -120,49 +98,23 @@ def simulate_log(
     transient: ArrayLike,
     rng: np.random.Generator,
 ) -> Array:
-    """Return a whole log of an experiment, turning samples among it.
+    """Return a whole log of an experiment, turning samples among it, rad/s, shape (samples,).
 
-    While it turns, the axis goes from one position to the other at a speed that rises and falls
-    as a sine, and sees the Earth's rate by the cosine of the angle. The turn is about an axis
-    across it: of that turn itself it senses only what misalignment lets through, a pulse
-    peak sin^2(pi t / turning).
-
-    Parameters
-    ----------
-    model : SensorModel
-        The gyro; its bias is the fixed one of this run.
-    experiment : Experiment
-        The log begins with its first sample at 0 and ends with its last dwell.
-    earth_rate : float
-        rad/s.
-    transient : array_like
-        Peak of what is sensed of the turns, rad/s: one, or one a turn.
-    rng : numpy.random.Generator
-
-    Returns
-    -------
-    ndarray, shape (samples,)
-        rad/s.
+    While it turns, the axis goes from one position to the other at a speed that rises and falls as
+    a sine, and sees the Earth's rate by the cosine of the angle. The turn is about an axis across
+    it: of that turn itself it senses only what misalignment lets through, a pulse peak sin^2(pi t /
+    turning). The log begins with the first sample at 0 and ends with the last dwell; the bias of
+    the gyro's model is the fixed one of this run. The other parameters are those of `true_rate`.
     """
     true = true_rate(experiment, earth_rate, transient)
     return simulate(model, experiment.rate, len(true), rng, true=lambda a, b: true[a:b])
 
 
 def true_rate(experiment: Experiment, earth_rate: float, transient: ArrayLike) -> Array:
-    """Return what a gyro without errors senses in an experiment.
+    """Return what a gyro without errors senses in an experiment, rad/s, shape (samples,).
 
-    Parameters
-    ----------
-    experiment : Experiment
-    earth_rate : float
-        rad/s.
-    transient : array_like
-        Peak of what is sensed of the turns, rad/s: one, or one a turn.
-
-    Returns
-    -------
-    ndarray, shape (samples,)
-        rad/s, to the end of the last dwell.
+    To the end of the last dwell; ``transient`` is the peak of what is sensed of the turns, one, or
+    one a turn, and as the Earth's rate in rad/s.
     """
     dwells = experiment.dwells
     peaks = np.broadcast_to(np.asarray(transient, dtype=np.float64), len(dwells) - 1)

@@ -26,59 +26,34 @@ WIDE = 1.0
 
 @dataclass(frozen=True)
 class Step:
-    """From the states after one block to those after the next, and its mean.
+    """From the states after one block to those after the next, and its mean."""
 
-    Attributes
-    ----------
-    transition : ndarray, shape (m + 1, m)
-        The last row gives the mean of the block.
-    factor : ndarray, shape (m + 1, m + 1)
-        A root of the noise: its covariance is ``factor @ factor.T``.
-    """
-
-    transition: Array
+    transition: Array  # shape (m + 1, m); the last row gives the mean of the block
+    # shape (m + 1, m + 1); a root of the noise: its covariance is ``factor @ factor.T``
     factor: Array
 
 
 @dataclass(frozen=True)
 class BlockStates:
-    """The states over the blocks of an experiment.
+    """The states over the blocks of an experiment."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        One a state: ``z_G`` and a number for each Gauss-Markov process, members of a flicker bank
-        among them; ``z_Q``, ``z_R``, ``z_S`` in pairs for quantization, a ramp (level and slope)
-        and lines; ``z_K``, the last, is the random walk with the fixed bias.
-    initial : ndarray, shape (m, m)
-        A root of the covariance of the states at the first sample of the first block.
-    steps : tuple of Step
-        The different ones.
-    which : ndarray of int, shape (b,)
-        Step of each block.
-    white : ndarray, shape (b,)
-        Standard deviation of the white noise of each mean, rad/s.
-    """
-
+    # one a state: ``z_G`` and a number for each Gauss-Markov process, members of a flicker bank
+    # among them; ``z_Q``, ``z_R``, ``z_S`` in pairs for quantization, a ramp (level and slope) and
+    # lines; ``z_K``, the last, is the random walk with the fixed bias
     names: tuple[str, ...]
+    # shape (m, m); a root of the covariance of the states at the first sample of the first block
     initial: Array
-    steps: tuple[Step, ...]
-    which: NDArray[np.int64]
-    white: Array
+    steps: tuple[Step, ...]  # the different ones
+    which: NDArray[np.int64]  # shape (b,); step of each block
+    white: Array  # shape (b,); standard deviation of the white noise of each mean, rad/s
 
 
 def block_states(model: NoiseModel, blocks: Blocks, turn_on_bias: float = WIDE) -> BlockStates:
     """Return the states of a noise model over blocks.
 
-    Parameters
-    ----------
-    model : NoiseModel
-        Gauss-Markov processes start in their stationary distribution; flicker noise is its bank
-        up to the duration of the blocks; a ramp has a slope of variance R^2, of either sign; a
-        line's phase is not known.
-    blocks : Blocks
-    turn_on_bias : float
-        Standard deviation of the fixed bias, rad/s, with which z_K starts.
+    Gauss-Markov processes start in their stationary distribution; flicker noise is its bank up to
+    the duration of the blocks; a ramp has a slope of variance R^2, of either sign; a line's phase
+    is not known; z_K starts with the standard deviation of the fixed bias, rad/s.
 
     Raises
     ------

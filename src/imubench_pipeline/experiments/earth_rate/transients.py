@@ -61,59 +61,33 @@ _MOST = 2000
 
 @dataclass(frozen=True)
 class LevelBlocks:
-    """A log as means of short blocks.
+    """A log as means of short blocks."""
 
-    Attributes
-    ----------
-    length : float
-        Of a block, s.
-    mean, level : ndarray, shape (b,)
-        Mean of the samples present (NaN where there are none), and the running median, rad/s.
-    z : ndarray, shape (b,)
-        Mean less level in standard deviations; 0 where there are no samples.
-    present : ndarray of bool, shape (b,)
-        Where there are samples.
-    sigma : float
-        Standard deviation of the noise of a full block, rad/s.
-    rough : bool
-        Whether the log is noisier, or calmer, by half than the noise model given.
-    """
-
-    length: float
+    length: float  # of a block, s
+    # mean, level: shape (b,); mean of the samples present (NaN where there are none), and the
+    # running median, rad/s
     mean: Array
     level: Array
-    z: Array
-    present: NDArray[np.bool_]
-    sigma: float
-    rough: bool
+    z: Array  # shape (b,); mean less level in standard deviations; 0 where there are no samples
+    present: NDArray[np.bool_]  # shape (b,); where there are samples
+    sigma: float  # standard deviation of the noise of a full block, rad/s
+    rough: bool  # whether the log is noisier, or calmer, by half than the noise model given
 
 
 @dataclass(frozen=True)
 class Event:
-    """A transient or a step: perhaps a turn, perhaps not.
+    """A transient or a step: perhaps a turn, perhaps not."""
 
-    Attributes
-    ----------
-    start, stop : float
-        s from the first sample; equal for a step.
-    kind : "transient" or "step"
-    likelihood : float
-        Logarithm of the likelihood ratio against noise alone, its outliers clipped.
-    peak : float
-        Largest distance from the level of a block, or of a sample that is far out; or height of
-        the step; rad/s.
-    strength : float
-        Logarithm of the likelihood ratio over the least that can be found.
-    haste : float
-        Logarithm of how much likelier a knock is over so soon than a turn; 0 where it lasted.
-    """
-
+    # start, stop: s from the first sample; equal for a step
     start: float
     stop: float
     kind: Literal["transient", "step"]
-    likelihood: float
+    likelihood: float  # logarithm of the likelihood ratio against noise alone, its outliers clipped
+    # largest distance from the level of a block, or of a sample that is far out; or height of the
+    # step; rad/s
     peak: float
-    strength: float
+    strength: float  # logarithm of the likelihood ratio over the least that can be found
+    # logarithm of how much likelier a knock is over so soon than a turn; 0 where it lasted
     haste: float
 
     @property
@@ -127,19 +101,10 @@ def blocks_of(
 ) -> LevelBlocks:
     """Take a log together to blocks, with their level and noise.
 
-    The level is a running median over less than a dwell, which follows a step at once. The noise
-    is the median distance from it, with what is far away left out.
-
-    Parameters
-    ----------
-    log : ndarray, shape (n,)
-        rad/s; NaN where a sample is missing.
-    rate : float
-        Hz.
-    dwell : float
-        Nominal length of a dwell, s.
-    model : NoiseModel, optional
-        Noise of the sensor at rest. Its noise is taken where the log's is within half of it.
+    The level is a running median over less than a dwell, which follows a step at once. The noise is
+    the median distance from it, with what is far away left out. The log, shape (n,), is in rad/s,
+    NaN where a sample is missing; the rate in Hz, the nominal dwell in s. The noise of the sensor
+    at rest, if given, is taken where the log's is within half of it.
 
     Raises
     ------
@@ -190,18 +155,11 @@ def _spread(residual: Array) -> float:
 def transients(blocks: LevelBlocks, log: Array, rate: float) -> list[Event]:
     """Return the transients in order of time.
 
-    A window of n blocks whose mean square is r times that of the noise has the log-likelihood
-    ratio (n/2) (r - 1 - ln r) of a larger variance, maximised over its length and place. Where
-    blocks of the calm parts are correlated, n is divided by the largest eigenvalue that their
-    covariance can have, 1 + 2 sum (1 - k/n) rho_k: so slowly falls the tail of r then.
-
-    Parameters
-    ----------
-    blocks : LevelBlocks
-    log : ndarray, shape (n,)
-        rad/s; the same log.
-    rate : float
-        Hz.
+    A window of n blocks whose mean square is r times that of the noise has the log-likelihood ratio
+    (n/2) (r - 1 - ln r) of a larger variance, maximised over its length and place. Where blocks of
+    the calm parts are correlated, n is divided by the largest eigenvalue that their covariance can
+    have, 1 + 2 sum (1 - k/n) rho_k: so slowly falls the tail of r then. The log is the same as of
+    `blocks_of`, in its shape and units.
     """
     correlation = _correlation(blocks)
     ratios = [_ratio(blocks, window, correlation) for window in _WINDOWS if window < len(blocks.z)]
@@ -297,12 +255,8 @@ def _events(
 def outliers(blocks: LevelBlocks, log: Array, rate: float) -> list[tuple[float, float]]:
     """Return where single samples are far out, which in the mean of a block may not be seen.
 
-    Its parameters are those of `transients`.
-
-    Returns
-    -------
-    list of (float, float)
-        Start and stop, s; those nearer than a block are one.
+    Start and stop, s; those nearer than a block are one. The log has shape and units as of
+    `blocks_of`.
     """
     size = round(blocks.length * rate)
     residual = log - np.repeat(blocks.level, size)[: len(log)]
@@ -320,19 +274,11 @@ def steps(
 ) -> list[Event]:
     """Return steps of the level that stand out alone, in order of time.
 
-    The mean over a third of a dwell after a place, less that before it, in its standard
-    deviations: a place where that is largest, and above 8. Only a gyro far better than the
-    paper's (N below some 0.001 deg/sqrt(s)) shows the Earth's rate so.
-
-    Parameters
-    ----------
-    blocks : LevelBlocks
-    dwell : float
-        Nominal, s.
-    model : NoiseModel, optional
-        Its drift over a third of a dwell is no step; without it, the noise is taken as white.
-    rate : float, optional
-        Of the log, Hz; only quantization noise depends on it.
+    The mean over a third of a nominal dwell, s, after a place, less that before it, in its standard
+    deviations: a place where that is largest, and above 8. Only a gyro far better than the paper's
+    (N below some 0.001 deg/sqrt(s)) shows the Earth's rate so. The drift of a noise model over a
+    third of a dwell is no step; without one, the noise is taken as white. The rate of the log, Hz,
+    is for its quantization noise only.
     """
     width = round(dwell / 3.0 / blocks.length)
     if width < 4 or 2 * width >= len(blocks.z):
@@ -358,12 +304,9 @@ def steps(
 
 
 def calm_means(blocks: LevelBlocks) -> Array:
-    """Return the means of the blocks, outliers drawn to 4 standard deviations; 0 where none is.
+    """Return the means of the blocks, rad/s, shape (b,), outliers drawn to 4 standard deviations.
 
-    Returns
-    -------
-    ndarray, shape (b,)
-        rad/s.
+    0 where none is.
     """
     within = np.clip(blocks.z, -4.0, 4.0) * blocks.sigma
     return np.where(blocks.present, np.nan_to_num(blocks.level) + within, 0.0)

@@ -42,44 +42,27 @@ _NEAR = 0.1
 
 @dataclass(frozen=True)
 class Stays:
-    """Where the sensor stood.
+    """Where the sensor stood."""
 
-    Attributes
-    ----------
-    start, stop : ndarray, shape (n,)
-        s; what lies between two of them is turning.
-    high : ndarray of bool, shape (n,)
-        Whether it is the position of the larger number; alternates.
-    senses : bool
-        Whether the column has +1 and -1: then it says the sense itself.
-    away : bool
-        Whether more than a twentieth of the column is in neither position for longer than a turn
-        takes: perhaps there are more than two.
-    """
-
+    # start, stop: shape (n,); s; what lies between two of them is turning
     start: Array
     stop: Array
+    # shape (n,); whether it is the position of the larger number; alternates
     high: NDArray[np.bool_]
-    senses: bool
+    senses: bool  # whether the column has +1 and -1: then it says the sense itself
+    # whether more than a twentieth of the column is in neither position for longer than a turn
+    # takes: perhaps there are more than two
     away: bool
 
 
 def stays(position: Array, rate: float, shortest: float) -> Stays:
     """Find the stays in two positions.
 
-    The positions are the medians of the column's lower and upper half, by range. A sample within
-    a tenth of their distance of one is in it; other samples are turning, or overrun. Stays of the
-    same position that follow each other are one.
-
-    Parameters
-    ----------
-    position : ndarray, shape (n,)
-        Two positions as numbers in any unit, such as angles, 0 and 1, or -1 and +1; NaN where it
-        is not known. An angle must not wrap at one of them.
-    rate : float
-        Hz.
-    shortest : float
-        Shorter stays are overruns, s.
+    The positions are the medians of the column's lower and upper half, by range. A sample within a
+    tenth of their distance of one is in it; other samples are turning, or overrun. Stays of the
+    same position that follow each other are one. The column, shape (n,), has two positions as
+    numbers in any unit, such as angles, 0 and 1, or -1 and +1; NaN where it is not known. An angle
+    must not wrap at one of them. The rate is in Hz; stays below the shortest, s, are overruns.
 
     Raises
     ------

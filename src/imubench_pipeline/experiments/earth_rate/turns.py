@@ -19,63 +19,31 @@ SURE: tuple[FoundBy, ...] = ("column", "transient", "step", "schedule")
 
 @dataclass(frozen=True)
 class Turn:
-    """A turn of the sensor.
+    """A turn of the sensor."""
 
-    Attributes
-    ----------
-    start, stop : float
-        s from the first sample; what is left out for it, with the margin.
-    time : float
-        Its middle as found, s.
-    found_by : "transient", "step", "schedule" or "column"
-    peak : float or None
-        Largest rate sensed of it, or the step, rad/s.
-    doubts : tuple of str
-        What speaks against it, in words.
-    """
-
+    # start, stop: s from the first sample; what is left out for it, with the margin
     start: float
     stop: float
-    time: float
+    time: float  # its middle as found, s
     found_by: FoundBy
-    peak: float | None = None
-    doubts: tuple[str, ...] = ()
+    peak: float | None = None  # largest rate sensed of it, or the step, rad/s
+    doubts: tuple[str, ...] = ()  # what speaks against it, in words
 
 
 @dataclass(frozen=True)
 class FoundDwell:
-    """A dwell between two turns, or between a turn and an end of the log.
+    """A dwell between two turns, or between a turn and an end of the log."""
 
-    Attributes
-    ----------
-    start, stop : float
-        s from the first sample; the turning beside it is left out.
-    sense : int
-        +1 or -1.
-    found_by : "transient", "step", "schedule" or "column"
-        How the less sure of the turns beside it was found.
-    doubts : tuple of str
-        What to doubt about its length and sense, in words; empty where nothing is.
-    """
-
+    # start, stop: s from the first sample; the turning beside it is left out
     start: float
     stop: float
-    sense: int
-    found_by: FoundBy = "schedule"
+    sense: int  # +1 or -1
+    found_by: FoundBy = "schedule"  # how the less sure of the turns beside it was found
+    # what to doubt about its length and sense, in words; empty where nothing is
     doubts: tuple[str, ...] = ()
 
     def in_samples(self, rate: float) -> Dwell:
-        """Return the dwell as an experiment has it.
-
-        Parameters
-        ----------
-        rate : float
-            Hz.
-
-        Returns
-        -------
-        Dwell
-            The samples that lie in it.
+        """Return the dwell as an experiment at a rate, Hz, has it: the samples that lie in it.
 
         Raises
         ------
@@ -87,31 +55,18 @@ class FoundDwell:
 
 @dataclass(frozen=True)
 class Turning:
-    """The dwells and turns of a log.
+    """The dwells and turns of a log."""
 
-    Attributes
-    ----------
-    dwells : tuple of FoundDwell
-        In order; the sense alternates.
-    turns : tuple of Turn
-        In order.
-    knocks : tuple of (float, float)
-        Start and stop of disturbances that are no turns, s: not to be used either.
-    ambiguous : bool
-        Whether the sense of the first dwell was assumed: all senses may be the other way round.
-    alternation : Alternation
-        Level of sense +1 less the mean of both, from A-B-A differences: the Earth's rate as
-        sensed, for a look at it and no more.
-    doubts : tuple of str
-        About the log as a whole, in words.
-    """
-
-    dwells: tuple[FoundDwell, ...]
-    turns: tuple[Turn, ...]
+    dwells: tuple[FoundDwell, ...]  # in order; the sense alternates
+    turns: tuple[Turn, ...]  # in order
+    # start and stop of disturbances that are no turns, s: not to be used either
     knocks: tuple[tuple[float, float], ...]
+    # whether the sense of the first dwell was assumed: all senses may be the other way round
     ambiguous: bool
+    # level of sense +1 less the mean of both, from A-B-A differences: the Earth's rate as sensed,
+    # for a look at it and no more
     alternation: Alternation
-    doubts: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()  # about the log as a whole, in words
 
     @property
     def by_schedule(self) -> int:
@@ -119,19 +74,9 @@ class Turning:
         return sum(turn.found_by == "schedule" for turn in self.turns)
 
     def senses(self, samples: int, rate: float) -> NDArray[np.int8]:
-        """Return the sense of each sample, 0 where it is not to be used.
+        """Return the sense of each sample, 1 or -1, and 0 where it is not to be used.
 
-        Parameters
-        ----------
-        samples : int
-            Of the log.
-        rate : float
-            Hz.
-
-        Returns
-        -------
-        ndarray of int8, shape (samples,)
-            1, -1 or 0. Missing samples are not told apart.
+        The shape is (samples,), the rate in Hz. Missing samples are not told apart.
         """
         sense = np.zeros(samples, dtype=np.int8)
         for dwell in self.dwells:

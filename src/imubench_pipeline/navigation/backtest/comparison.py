@@ -50,32 +50,17 @@ SHORTEST = 3
 
 @dataclass(frozen=True)
 class Predicted:
-    """The mean square of the errors of a log, by the noise models that the log allows.
+    """The mean square of the errors of a log, by the noise models that the log allows."""
 
-    Parameters
-    ----------
-    spreads : sequence of Spread
-        By each model drawn, at least one.
-    efficient : bool
-        The models are drawn jointly from a likelihood, as sure as the log allows; else the
-        uncertainty of the model is taken to be independent of the scatter, and adds to it.
-    """
-
-    spreads: Sequence[Spread]
+    spreads: Sequence[Spread]  # by each model drawn, at least one
+    # the models are drawn jointly from a likelihood, as sure as the log allows; else the
+    # uncertainty of the model is taken to be independent of the scatter, and adds to it
     efficient: bool = True
 
     def limits(self, level: float = 0.95) -> tuple[float, float]:
-        """Return between what limits the mean square of the log lies, if the model is right.
+        """Return between what limits the mean square of a part ``level`` of all logs lies.
 
-        Parameters
-        ----------
-        level : float
-            In that part of all logs.
-
-        Returns
-        -------
-        (float, float)
-            rad^2, (m/s)^2 or m^2.
+        If the model is right; in rad^2, (m/s)^2 or m^2.
         """
         means = np.array([spread.mean for spread in self.spreads])
         logarithms = np.log(means)
@@ -92,13 +77,8 @@ class Predicted:
     def chance_above(self, mean_square: float) -> float:
         """Return the chance of so large a mean square, or a larger one, if the model is right.
 
-        Here the uncertainty of the model counts in full beside the scatter: to doubt a log, more
-        is asked than that a ratio is outside its range.
-
-        Parameters
-        ----------
-        mean_square : float
-            Of the log; rad^2, (m/s)^2 or m^2.
+        Here the uncertainty of the model counts in full beside the scatter: to doubt a log, more is
+        asked than that a ratio is outside its range. The mean square is in rad^2, (m/s)^2 or m^2.
         """
         means = np.array([spread.mean for spread in self.spreads])
         variances = np.array([spread.variance for spread in self.spreads])
@@ -107,22 +87,13 @@ class Predicted:
 
 @dataclass(frozen=True)
 class DeadReckoning:
-    """An error of one channel.
+    """An error of one channel."""
 
-    Attributes
-    ----------
-    order : int
-        m: integrations but one.
-    rest, time : float
-        W at rest, over which the bias is the mean, and t in motion, s.
-    factor : float
-        By which the integral is multiplied.
-    """
-
-    order: int
+    order: int  # m: integrations but one
+    # rest, time: W at rest, over which the bias is the mean, and t in motion, s
     rest: float
     time: float
-    factor: float = 1.0
+    factor: float = 1.0  # by which the integral is multiplied
 
     @property
     def duration_needed(self) -> float:
@@ -138,33 +109,19 @@ class DeadReckoning:
 
 @dataclass(frozen=True)
 class Comparison:
-    """The rms error over the windows of a log, and what its noise model predicts.
+    """The rms error over the windows of a log, and what its noise model predicts."""
 
-    Attributes
-    ----------
-    windows : int
-        Of the log; those with gaps are left out.
-    predicted, lower, upper : float
-        Standard deviation, with 95 % limits: rad, m/s or m.
-    measured : float or None
-        Rms over the windows; None where ``reason`` says why.
-    independent : float or None
-        Windows that would scatter as little, if independent.
-    least, most : float or None
-        Limits of measured in 95 % of logs, if the model is right.
-    chance : float or None
-        Of such an rms or a larger one, if the model is right (`Predicted.chance_above`).
-    reason : str or None
-    """
-
-    windows: int
+    windows: int  # of the log; those with gaps are left out
+    # predicted, lower, upper: standard deviation, with 95 % limits: rad, m/s or m
     predicted: float
     lower: float
     upper: float
-    measured: float | None = None
-    independent: float | None = None
+    measured: float | None = None  # rms over the windows; None where ``reason`` says why
+    independent: float | None = None  # windows that would scatter as little, if independent
+    # least, most: limits of measured in 95 % of logs, if the model is right
     least: float | None = None
     most: float | None = None
+    # of such an rms or a larger one, if the model is right (`Predicted.chance_above`)
     chance: float | None = None
     reason: str | None = None
 
@@ -258,12 +215,7 @@ def words(row: Row) -> str:
 def findings(rows: Iterable[Row]) -> Iterator[Row]:
     """Yield the rows of the table ``findings`` of logs that contradict their own budgets.
 
-    One a channel, of the error whose ratio is least likely.
-
-    Parameters
-    ----------
-    rows : iterable of mapping
-        Of the table ``backtest``.
+    One a channel, of the error whose ratio is least likely; from rows of the table ``backtest``.
     """
     worst: dict[tuple[str, str, str], Row] = {}
     for row in rows:

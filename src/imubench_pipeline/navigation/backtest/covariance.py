@@ -29,14 +29,9 @@ _ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class Spread:
-    """What the mean square of the errors of a log is by a noise model.
+    """What the mean square of the errors of a log is by a noise model."""
 
-    Attributes
-    ----------
-    mean, variance : float
-        Of the mean square: rad^2, (m/s)^2 or m^2, and its square.
-    """
-
+    # mean, variance: of the mean square: rad^2, (m/s)^2 or m^2, and its square
     mean: float
     variance: float
 
@@ -48,19 +43,11 @@ class Spread:
 
 @dataclass(frozen=True)
 class WindowCovariance:
-    """The covariance of the errors of windows, for any noise model.
-
-    Parameters
-    ----------
-    window : Window
-    order : int
-        m: integrations but one.
-    factor : float
-        By which the errors are multiplied: g, where a gyro's attitude turns gravity.
-    """
+    """The covariance of the errors of windows, for any noise model."""
 
     window: Window
-    order: int
+    order: int  # m: integrations but one
+    # by which the errors are multiplied: g, where a gyro's attitude turns gravity
     factor: float = 1.0
 
     @cached_property
@@ -76,10 +63,7 @@ class WindowCovariance:
     def of(self, model: NoiseModel) -> Array:
         """Return the covariance of the errors by lag in blocks, without what is deterministic.
 
-        Returns
-        -------
-        ndarray, shape (lags,)
-            rad^2, (m/s)^2 or m^2.
+        Shape (lags,), in rad^2, (m/s)^2 or m^2.
         """
         total = np.zeros(self.lags)
         for term in model.terms:
@@ -92,14 +76,8 @@ class WindowCovariance:
         """Return mean and variance of the mean square of the errors that a log has.
 
         Of Gaussian errors of covariance c the variance is 2 / n^2 times the sum of c^2 over all
-        pairs of windows. A ramp adds its square; a line, at a random phase, half that of its
-        amplitude, and both their products with the noise.
-
-        Parameters
-        ----------
-        model : NoiseModel
-        errors : Errors
-            Of the log: which windows there are.
+        pairs of windows, which the errors say. A ramp adds its square; a line, at a random phase,
+        half that of its amplitude, and both their products with the noise.
         """
         covariance, share = self.of(model), _twofold(errors.pairs) / errors.count**2
         mean, variance = float(covariance[0]), 2.0 * float(share @ covariance**2)

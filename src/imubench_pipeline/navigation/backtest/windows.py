@@ -34,17 +34,10 @@ PRESENT = 0.9
 
 @dataclass(frozen=True)
 class Window:
-    """The parts of a window in blocks of a log.
+    """The parts of a window in blocks of a log."""
 
-    Attributes
-    ----------
-    block : float
-        Length of a block, s.
-    resting, moving : int
-        Blocks at rest and in motion.
-    """
-
-    block: float
+    block: float  # length of a block, s
+    # resting, moving: blocks at rest and in motion
     resting: int
     moving: int
 
@@ -64,20 +57,10 @@ class Window:
         return self.moving * self.block
 
     def weights(self, order: int) -> Array:
-        """Return what each block mean counts in the error; their sum is 0.
+        """Return what each block mean counts in the error, s^(m+1), shape (blocks,); their sum: 0.
 
         In motion it is the integral of (t - s)^m / m! over the block, at rest -c / W times the
-        length of the block, with c = t^(m+1) / (m+1)!.
-
-        Parameters
-        ----------
-        order : int
-            m: integrations but one.
-
-        Returns
-        -------
-        ndarray, shape (blocks,)
-            s^(m+1).
+        length of the block, with c = t^(m+1) / (m+1)!; ``order`` is m, integrations but one.
         """
         left = self.block * np.arange(self.moving, -1, -1, dtype=np.float64)
         grown = left ** (order + 1) / math.factorial(order + 1)
@@ -87,17 +70,7 @@ class Window:
 def window(rest: float, time: float, rate: float) -> Window | None:
     """Return a window in blocks that divide both its parts as evenly as possible.
 
-    Parameters
-    ----------
-    rest, time : float
-        W and t, s.
-    rate : float
-        Hz.
-
-    Returns
-    -------
-    Window or None
-        None where its shorter part has no sample.
+    Its parts W and t in s, the rate in Hz; None where the shorter part has no sample.
     """
     shorter, longer = sorted((rest, time))
     # A rate that is found from stamps may be a little low.
@@ -121,20 +94,11 @@ def _uneven(number: int, shorter: float, longer: float, rate: float) -> float:
 
 @dataclass(frozen=True)
 class Errors:
-    """The errors of the windows of a log.
+    """The errors of the windows of a log."""
 
-    Attributes
-    ----------
-    mean_square : float
-        Of the errors; rad^2, (m/s)^2 or m^2. NaN where there is no window.
-    count : int
-        Windows; those with a gap in them are left out.
-    pairs : ndarray, shape (lags,)
-        Pairs of windows that begin so many blocks apart, from 0; in one segment only.
-    """
-
-    mean_square: float
-    count: int
+    mean_square: float  # of the errors; rad^2, (m/s)^2 or m^2. NaN where there is no window
+    count: int  # windows; those with a gap in them are left out
+    # shape (lags,); pairs of windows that begin so many blocks apart, from 0; in one segment only
     pairs: Array
 
 
@@ -170,15 +134,7 @@ def errors(means: Sequence[Array], weights: Array, lags: int) -> Errors:
 def correlated(values: Array, weights: Array) -> Array:
     """Return the sums of weights times values, one for every place that the weights fit in.
 
-    Parameters
-    ----------
-    values : ndarray, shape (n,)
-    weights : ndarray, shape (p,)
-        p <= n.
-
-    Returns
-    -------
-    ndarray, shape (n - p + 1,)
+    Of values, shape (n,), and weights, shape (p,), p <= n, they have the shape (n - p + 1,).
     """
     length = 1 << (len(values) - 1).bit_length()
     # What wraps around comes to the places that are cut off.

@@ -280,18 +280,8 @@ def of_sensor(
 ) -> Iterator[Contribution]:
     """Yield the contributions of one sensor axis, after ``order + 1`` integrations.
 
-    Parameters
-    ----------
-    sensor : str
-        Name in the sources.
-    model : NoiseModel
-    order : int
-        m, 0 to 2.
-    time : float
-        s.
-    start : Calibrated or Uncalibrated
-    factor : float
-        By which the sigmas are multiplied.
+    ``sensor`` is its name in the sources, ``order`` m, 0 to 2; the time is in s, and the sigmas are
+    multiplied by ``factor``.
     """
     for term in model.terms:
         for source, sigma in term.sources(order, time, start):

@@ -77,20 +77,10 @@ class Gyrocompass:
             raise ValueError(f"positions is {self.positions}, expected 1 or 2")
 
     def heading(self, time: float) -> Budget:
-        """Return the heading error after a static window of a given length, by source.
+        """Return the heading error after a static window, s, by source, rad.
 
-        At one position the error of the mean has, by term, the variance `Term.mean_variance`;
-        at two positions sigma^2(t/2) / 2, with sigma^2 the Allan variance.
-
-        Parameters
-        ----------
-        time : float
-            t, s.
-
-        Returns
-        -------
-        Budget
-            Of the quantity ``heading``, rad.
+        At one position the error of the mean has, by term, the variance `Term.mean_variance`; at
+        two positions sigma^2(t/2) / 2, with sigma^2 the Allan variance.
 
         Raises
         ------
@@ -99,8 +89,8 @@ class Gyrocompass:
 
         References
         ----------
-        K. R. Britting, "Inertial Navigation Systems Analysis", Wiley 1971 (the limit
-        of gyrocompassing, drift over w_ie cos(latitude)).
+        K. R. Britting, "Inertial Navigation Systems Analysis", Wiley 1971 (the limit of
+        gyrocompassing, drift over w_ie cos(latitude)).
         """
         if not (math.isfinite(time) and time > 0):
             raise ValueError(f"time is {time}, expected a time above 0")
@@ -118,21 +108,11 @@ class Gyrocompass:
         )
 
     def time_needed(self, accuracy: float) -> float | None:
-        """Return the shortest static window that gives a heading accuracy.
+        """Return the shortest static window, s, that gives a heading accuracy, 1 sigma, rad.
 
         Longer is not always better: a walk and a ramp grow. Lines count by the envelope of their
-        mean, so that no lucky number of whole periods is found.
-
-        Parameters
-        ----------
-        accuracy : float
-            1 sigma, rad.
-
-        Returns
-        -------
-        float or None
-            s, from 1 ms to 30 years; None where no window gives it, because of turn-on bias,
-            flicker noise, walk or ramp.
+        mean, so that no lucky number of whole periods is found. It is from 1 ms to 30 years; None
+        where no window gives it, because of turn-on bias, flicker noise, walk or ramp.
 
         Raises
         ------

@@ -114,13 +114,7 @@ NO_FIGURES: Figures = MappingProxyType({})
 
 
 def check_not_negative(**values: float) -> None:
-    """Check that numbers are finite and not negative.
-
-    Raises
-    ------
-    ValueError
-        If one is not; it is named.
-    """
+    """Raise a ValueError that names a number, if it is not finite or negative."""
     for name, value in values.items():
         if not (math.isfinite(value) and value >= 0):
             raise ValueError(f"{name} is {value}, expected a number from 0")
@@ -169,32 +163,16 @@ NO_USE = Use()
 def of_pulse(order: int, time: float, over: float) -> float:
     """Return what an error of 1 grows to that lasts a time: c(t) - c(t - T), see `of_constant`.
 
-    Parameters
-    ----------
-    order : int
-        m: integrations but one.
-    time : float
-        t, s.
-    over : float
-        T, s; it begins at 0.
+    ``order`` is m, integrations but one; t and T in s, T begins at 0.
     """
     return of_constant(order, time) - of_constant(order, max(time - over, 0.0))
 
 
 def of_rise(order: int, time: float, over: float) -> float:
-    """Return what an error grows to that rises linearly to 1 in a time, and stays there.
+    """Return what an error grows to that rises linearly to 1 in a time T, and stays there.
 
-    (c'(t) - c'(t - T)) / T with c' of ``order + 1`` (see `of_constant`): t^(m+1) / (m+2)! at
-    t = T, a (m+2)nd of what a constant 1 grows to.
-
-    Parameters
-    ----------
-    order : int
-        m: integrations but one.
-    time : float
-        t, s.
-    over : float
-        T, s.
+    (c'(t) - c'(t - T)) / T with c' of ``order + 1`` (see `of_constant`): t^(m+1) / (m+2)! at t = T,
+    a (m+2)nd of what a constant 1 grows to. The arguments are those of `of_pulse`.
     """
     return of_pulse(order + 1, time, over) / over
 
@@ -203,8 +181,6 @@ def of_squared_rise(order: int, time: float, over: float) -> float:
     """Return what the square of the error of `of_rise` grows to, s^(m+1).
 
     2 (c''(t) - c''(t - T) - T c'(t - T)) / T^2, with c' and c'' of ``order + 1`` and ``order + 2``.
-
-    Its parameters are those of `of_rise`.
     """
     later = of_constant(order + 1, max(time - over, 0.0))
     return 2.0 * (of_pulse(order + 2, time, over) - over * later) / over**2
@@ -213,25 +189,11 @@ def of_squared_rise(order: int, time: float, over: float) -> float:
 def levers(
     measured: Measured, order: int, time: float, start: SensorStart, use: Use, *, seen: bool
 ) -> Iterator[tuple[Cause, float]]:
-    """Yield what a figure of 1 grows to, of every cause that there is in a use.
+    """Yield each cause that there is in a use, and what a figure of 1 grows to.
 
-    Parameters
-    ----------
-    measured : {"gyro", "accel"}
-    order : int
-        m, 0 to 2: integrations but one.
-    time : float
-        t, s.
-    start : Calibrated or Uncalibrated
-    use : Use
-    seen : bool
-        What the sensor measures is the error that is asked for, or a rate of it: then its scale
-        factor counts.
-
-    Yields
-    ------
-    (str, float)
-        Cause, and lever: s^(m+1) times the unit of the use.
+    ``order`` is m, 0 to 2, and the time in s; ``seen``: what the sensor measures is the error that
+    is asked for, or a rate of it, so that its scale factor counts. A lever is in s^(m+1) times the
+    unit of the use.
     """
     constant = of_constant(order, time)
     calibrated = isinstance(start, Calibrated)
@@ -255,16 +217,7 @@ def levers(
 
 
 def needed(measured: Measured, cause: Cause, figures: Figures) -> bool:
-    """Tell whether an error is not known to within a figure, because one is missing.
-
-    Parameters
-    ----------
-    measured : {"gyro", "accel"}
-    cause : str
-        That is there in use.
-    figures : mapping
-        Of the axis.
-    """
+    """Tell whether an error that is there in use is not known, because a figure is missing."""
 
     def has_figure(candidate: Cause) -> bool:
         return candidate in figures and figures[candidate].sigma is not None

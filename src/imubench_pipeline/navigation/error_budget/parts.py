@@ -105,21 +105,8 @@ def of_figure(
 ) -> Contribution | Missing | None:
     """Return what a figure of a sensor adds to an error, or that it is not known.
 
-    Parameters
-    ----------
-    measured : {"gyro", "accel"}
-    cause : str
-    source : str
-        Name of the source.
-    lever : float
-        The error that a figure of 1 SI unit makes.
-    figures : mapping of str to Figure
-        Of the axis.
-
-    Returns
-    -------
-    Contribution, Missing or None
-        None: another figure says how large it may be.
+    ``lever`` is the error that a figure of 1 SI unit makes. None: another figure says how large it
+    may be.
     """
     figure = figures.get(cause, Figure(reason="the sensor file does not give it"))
     if figure.sigma is not None:
@@ -148,29 +135,17 @@ class Largest:
 
     A printed turn-on bias counts as delivered; where it alone breaks the limit, a calibration may
     take it down to what there is room for. All these figures share the room.
-
-    Attributes
-    ----------
-    room : float
-        Of each of them: the error that it may add, 1 sigma; 0 where there is none.
-    biases : tuple of Contribution
-        The printed biases that break the limit.
     """
 
-    room: float
-    biases: tuple[Contribution, ...] = ()
+    room: float  # of each of them: the error that it may add, 1 sigma; 0 where there is none
+    biases: tuple[Contribution, ...] = ()  # the printed biases that break the limit
 
     @classmethod
     def of(cls, budget: Budget, limit: float | None, upper: float) -> Largest:
         """Return the room in a budget.
 
-        Parameters
-        ----------
-        budget : Budget
-        limit : float or None
-            Largest standard deviation that is allowed, SI; None: there is none to keep.
-        upper : float
-            Upper limit of the total. A sensor that surely passes still does with these figures.
+        Under a limit, SI (None: there is none to keep), with the upper limit of the total: a sensor
+        that surely passes still does with these figures.
         """
         if limit is None:
             return cls(0.0)
@@ -192,13 +167,7 @@ class Largest:
         return cls(math.sqrt(max(room, 0.0) / parts) if parts else 0.0, biases)
 
     def of_bias(self, contribution: Contribution) -> dict[str, Any]:
-        """Return the largest figure of a printed bias; nothing of what the limit can bear.
-
-        Parameters
-        ----------
-        contribution : Contribution
-            A source of the budget.
-        """
+        """Return the largest figure of a printed bias; nothing of what the limit can bear."""
         figure = contribution.figure
         if not self.room or contribution not in self.biases or figure is None or not figure.sigma:
             return {}

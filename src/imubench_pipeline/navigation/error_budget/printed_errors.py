@@ -51,18 +51,9 @@ _MEASURED: Mapping[str, Cause] = {"sensitivity": "temperature", "quadratic": "te
 
 
 def of_datasheet(datasheet: Datasheet, channel: str) -> dict[Cause, Figure]:
-    """Return what a datasheet says of the errors of a channel that come in use.
+    """Return what a datasheet says of the errors of a channel that come in use, SI.
 
-    Parameters
-    ----------
-    datasheet : Datasheet
-    channel : str
-        Such as ``gyro_x``.
-
-    Returns
-    -------
-    dict of str to Figure
-        SI, of every cause that a datasheet may print; without sigma where it does not.
+    Of every cause that a datasheet may print; without sigma where it does not.
     """
     axis = PrintedAxis.of(datasheet, channel)
     names = FIGURE_DIMENSIONS[axis.quantity]
@@ -84,17 +75,10 @@ def _figure(axis: PrintedAxis, name: str) -> Figure:
 
 
 def of_log(rows: Iterable[Row]) -> dict[Cause, Figure]:
-    """Return what the log of a channel tells of the errors that come in use.
+    """Return what the log of a channel tells of the errors that come in use, SI.
 
-    Parameters
-    ----------
-    rows : iterable of mapping
-        Of the table ``temperature``, of the channel.
-
-    Returns
-    -------
-    dict of str to Figure
-        SI; ``temperature`` and ``temperature_squared`` where the log tells them.
+    From its rows of the table ``temperature``; ``temperature`` and ``temperature_squared`` where it
+    tells them.
     """
     return {
         _MEASURED[row["parameter"]]: Figure(
@@ -111,20 +95,9 @@ def of_log(rows: Iterable[Row]) -> dict[Cause, Figure]:
 def in_use(
     datasheet: Datasheet, channels: Iterable[str], temperature: Iterable[Row]
 ) -> dict[str, dict[Cause, Figure]]:
-    """Return what is known of the errors of a recording's channels that come in use.
+    """Return by channel what is known of the errors that come in use, as `error_rows` takes it.
 
-    Parameters
-    ----------
-    datasheet : Datasheet
-        Of its sensor.
-    channels : iterable of str
-    temperature : iterable of mapping
-        The table ``temperature`` of the recording.
-
-    Returns
-    -------
-    dict of str to dict
-        By channel, as `error_rows` takes it.
+    From the datasheet of the sensor, and the table ``temperature`` of the recording.
     """
     rows = list(temperature)
     return {

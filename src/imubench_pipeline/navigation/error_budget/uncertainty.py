@@ -70,7 +70,7 @@ def chance_within(limit: float, budgets: Sequence[Budget]) -> float:
 
 
 def draw_models(estimate: Estimate, draws: int, rng: np.random.Generator) -> list[NoiseModel]:
-    """Return noise models that the log of an estimate allows.
+    """Return as many noise models as ``draws`` that the log of an estimate allows.
 
     Where the estimate has draws of its posterior they are taken, all parameters of a model
     together: evenly where fewer are asked for than there are, the same ones again where more are,
@@ -84,11 +84,6 @@ def draw_models(estimate: Estimate, draws: int, rng: np.random.Generator) -> lis
     draws. A lower limit of 0 is reached linearly. What is absent, with an upper limit, is
     half-normal from 0 with that as its 95 % point. A ramp, which has a sign, is normal on either
     side. What has no limits stays as it is.
-
-    Returns
-    -------
-    list of NoiseModel
-        ``draws`` of them.
     """
     if estimate.draws is None:
         return [_drawn(estimate, rng) for _ in range(draws)]

@@ -26,17 +26,11 @@ class Shared:
 
     Such are the temperature of a board, the noise of its supply, and a motion that is not wanted
     (sensitivity 1): the errors that come of it go together and are not averaged away.
-
-    Attributes
-    ----------
-    model : NoiseModel
-        The process in its own unit, say K (kelvin); it is taken at the fused rate.
-    sensitivity : sequence of float
-        SI unit of the sensors per that unit, one a sensor; the sign is kept: sensors of opposite
-        signs can cancel it.
     """
 
-    model: NoiseModel
+    model: NoiseModel  # the process in its own unit, say K (kelvin); it is taken at the fused rate
+    # SI unit of the sensors per that unit, one a sensor; the sign is kept: sensors of opposite
+    # signs can cancel it
     sensitivity: Sequence[float]
 
 
@@ -46,33 +40,16 @@ class Parts:
 
     The covariance of the sensors is diag(own) + sum over s of shared_s g_s g_s^T. It is kept in
     these parts: where what is common is far the largest, the sum would have lost the rest.
-
-    Attributes
-    ----------
-    own : ndarray, shape (m, n)
-        Of what each sensor has alone, SI^2.
-    shared : ndarray, shape (m, s)
-        Of the shared processes, in their squared units.
-    sensitivities : ndarray, shape (s, n)
-        g: SI per these units.
     """
 
-    own: Array
-    shared: Array
-    sensitivities: Array
+    own: Array  # shape (m, n); of what each sensor has alone, SI^2
+    shared: Array  # shape (m, s); of the shared processes, in their squared units
+    sensitivities: Array  # shape (s, n); g: SI per these units
 
     def of_sum(self, weights: NDArray[Any]) -> Array:
-        """Return the variances of weighed sums, alone and in common.
+        """Return the variances of weighed sums, alone and in common, SI^2, shape (m, 2).
 
-        Parameters
-        ----------
-        weights : ndarray, shape (m, n)
-            Real or complex.
-
-        Returns
-        -------
-        ndarray, shape (m, 2)
-            SI^2.
+        The weights have the shape (m, n), real or complex.
         """
         alone = np.sum(self.own * np.abs(weights) ** 2, axis=1)
         common = np.sum(self.shared * np.abs(weights @ self.sensitivities.T) ** 2, axis=1)
@@ -183,10 +160,8 @@ class Board:
     def allan_parts(self, tau: ArrayLike) -> Parts:
         """Return the Allan variances of what the sensors have alone and in common.
 
-        Parameters
-        ----------
-        tau : array_like, shape (m,)
-            s; taken to the nearest whole number of fused samples, at least one.
+        At tau, s, array_like of shape (m,): taken to the nearest whole number of fused samples, at
+        least one.
         """
         t = np.atleast_1d(np.asarray(tau, dtype=np.float64))
         t = np.maximum(np.rint(t * self.rate), 1.0) / self.rate
@@ -197,10 +172,7 @@ class Board:
     def spectral_parts(self, omega: ArrayLike) -> Parts:
         """Return the spectra of the fused samples; ramps and lines have none.
 
-        Parameters
-        ----------
-        omega : array_like, shape (m,)
-            rad a fused sample, above 0.
+        At omega, rad a fused sample, above 0, array_like of shape (m,).
         """
         w = np.atleast_1d(np.asarray(omega, dtype=np.float64))
         spectra: dict[tuple[int, int], Array] = {}  # specimens of one sensor have one spectrum
@@ -260,20 +232,9 @@ def divided(model: NoiseModel, correlation: Mapping[str, float]) -> tuple[NoiseM
 def block_mean_spectrum(model: NoiseModel, omega: Array, rate: float, size: int) -> Array:
     """Return the spectrum of the means of blocks of samples, with all that is folded into it.
 
-    Parameters
-    ----------
-    model : NoiseModel
-    omega : ndarray, shape (m,)
-        rad a block, above 0 and up to pi.
-    rate : float
-        Of the samples, Hz.
-    size : int
-        Samples in a block.
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        SI^2: sum over k of P((w + 2 pi k)/m) sin^2(w/2) / (m^3 sin^2((w + 2 pi k)/(2m))).
+    sum over k of P((w + 2 pi k)/m) sin^2(w/2) / (m^3 sin^2((w + 2 pi k)/(2m))), SI^2, with w
+    ``omega`` of shape (m,), rad a block, above 0 and up to pi, the rate of the samples in Hz, and m
+    ``size``, samples in a block.
     """
     if size == 1:
         return model.sampled_spectrum(omega, rate)

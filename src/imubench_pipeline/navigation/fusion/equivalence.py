@@ -30,21 +30,14 @@ def number_needed(own: ArrayLike, common: ArrayLike, wanted: ArrayLike) -> Array
     """Return how many sensors of one kind have together the Allan variance that is wanted.
 
     n of them with equal weights have ``own / n + common``: n = own / (wanted - common). Where
-    nothing is common, n is the ratio of the Allan variances.
+    nothing is common, n is the ratio of the Allan variances. It is not rounded, below 1 where less
+    than one would do, and infinite where no number is enough.
 
     Parameters
     ----------
-    own : array_like
-        Allan variance of one, without what all have in common, (rad/s)^2 or (m/s^2)^2.
-    common : array_like
-        What all have in common.
-    wanted : array_like
-        Such as that of one better sensor.
-
-    Returns
-    -------
-    ndarray
-        Not rounded, below 1 where less than one would do; infinite where no number is enough.
+    own, common, wanted : array_like
+        Allan variance of one without what all have in common, that, and such as that of one better
+        sensor; (rad/s)^2 or (m/s^2)^2, in shapes that go together.
     """
     own, common, wanted = np.broadcast_arrays(own, common, wanted)
     room = np.asarray(wanted - common, dtype=np.float64)
@@ -53,21 +46,11 @@ def number_needed(own: ArrayLike, common: ArrayLike, wanted: ArrayLike) -> Array
 
 @dataclass(frozen=True)
 class TemperaturePart:
-    """What temperature adds to a channel: all specimens on a board follow it together.
+    """What temperature adds to a channel: all specimens on a board follow it together."""
 
-    Attributes
-    ----------
-    tau : ndarray, shape (t,)
-        s.
-    deviation : ndarray, shape (t,)
-        Its Allan deviation over the recording, (rad/s) or (m/s²).
-    relative_error : float
-        Standard deviation of the sensitivity over its value.
-    """
-
-    tau: Array
-    deviation: Array
-    relative_error: float
+    tau: Array  # shape (t,); s
+    deviation: Array  # shape (t,); its Allan deviation over the recording, (rad/s) or (m/s²)
+    relative_error: float  # standard deviation of the sensitivity over its value
 
     def variance(self, tau: float) -> float:
         """Return its Allan variance at a tau in s, (rad/s)² or (m/s²)²."""
@@ -82,30 +65,18 @@ class TemperaturePart:
 
 @dataclass(frozen=True)
 class FusionChannel:
-    """A channel that may answer for its sensor.
-
-    Attributes
-    ----------
-    sensor, recording, channel : str
-    simulated : bool
-    duration : float
-        Of the recording, s.
-    estimate : Estimate
-        The recommended one; where temperature is taken out, that of what it leaves.
-    temperature : TemperaturePart, optional
-        What is taken out.
-    joint : callable, optional
-        Gives the joint draws of the estimate where the estimate has not got them with it: of a
-        run they are read of the channels that answer alone.
-    """
+    """A channel that may answer for its sensor."""
 
     sensor: str
     recording: str
     channel: str
     simulated: bool
-    duration: float
+    duration: float  # of the recording, s
+    # the recommended one; where temperature is taken out, that of what it leaves
     estimate: Estimate
-    temperature: TemperaturePart | None = None
+    temperature: TemperaturePart | None = None  # what is taken out
+    # gives the joint draws of the estimate where the estimate has not got them with it: of a run
+    # they are read of the channels that answer alone
     joint: Callable[[], JointDraws | None] | None = None
 
     def drawn(self, draws: int, rng: np.random.Generator) -> list[NoiseModel]:
@@ -159,26 +130,16 @@ def _alone(name: str, group: Mapping[str, Parameter], tau: float) -> float:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a sensor has at one tau.
+    """What a sensor has at one tau."""
 
-    Attributes
-    ----------
-    candidate : FusionChannel
-        The channel that answers.
-    own, common : float
-        Allan variance of one specimen without the common part, and this, SI.
-    drawn_own, drawn_common : ndarray, shape (draws,)
-        The same of the models that the log allows.
-    unknown : str or None
-        The parameters that matter and are not known: there is no plain number.
-    """
-
-    candidate: FusionChannel
+    candidate: FusionChannel  # the channel that answers
+    # own, common: Allan variance of one specimen without the common part, and this, SI
     own: float
     common: float
+    # drawn_own, drawn_common: shape (draws,); the same of the models that the log allows
     drawn_own: Array
     drawn_common: Array
-    unknown: str | None
+    unknown: str | None  # the parameters that matter and are not known: there is no plain number
 
 
 def answer(
@@ -197,8 +158,8 @@ def answer(
     ----------
     sensor : str
     candidates : sequence of FusionChannel
-        All channels of one quantity of the sensor, at least one; where some are measured,
-        simulated ones are left out. Of two the worse one is the median.
+        All channels of one quantity of the sensor, at least one; where some are measured, simulated
+        ones are left out. Of two the worse one is the median.
     tau : float
         s.
     correlation : mapping of str to float
@@ -209,11 +170,6 @@ def answer(
         Models that are drawn of those that the log allows.
     seed : int
         Each channel has a stream of its own.
-
-    Returns
-    -------
-    Answer or str
-        The reason, where there is no answer.
     """
     measured = [channel for channel in candidates if not channel.simulated] or list(candidates)
     long = [channel for channel in measured if tau <= longest * channel.duration]
@@ -251,26 +207,9 @@ def equivalence_rows(
     draws: int,
     seed: int,
 ) -> Iterator[Row]:
-    """Yield the rows of the table ``fusion``: every ordered pair of sensors at every tau.
+    """Yield the rows of the table ``fusion``: every ordered pair of sensors at every tau, s.
 
-    Parameters
-    ----------
-    candidates : iterable of FusionChannel
-        The channels of all sensors.
-    taus : sequence of float
-        s.
-    correlation : mapping of str to float
-        Part of the variance of N, B, K and R that specimens of one sensor have in common.
-    longest : float
-        Longest tau that a log tells, as a part of it.
-    draws : int
-        Noise models that give the interval.
-    seed : int
-
-    Yields
-    ------
-    mapping
-        By column of the table.
+    The candidates are the channels of all sensors; the other parameters are those of `answer`.
     """
     listed = sorted(candidates, key=lambda channel: channel.sensor)
     for quantity in ("gyro", "accel"):

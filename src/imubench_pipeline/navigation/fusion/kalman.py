@@ -147,18 +147,10 @@ class KalmanFusion:
         return len(self._transition)
 
     def response(self, omega: Array) -> NDArray[np.complex128]:
-        """Return the transfer from each sensor; its sum over the sensors is 1.
+        """Return the transfer from each sensor, shape (m, n); its sum over the sensors is 1.
 
-        a^T (I - H (z I - F)^-1 Phi L) with F = Phi (I - L H), solved in the Schur form of F.
-
-        Parameters
-        ----------
-        omega : ndarray, shape (m,)
-            rad a fused sample.
-
-        Returns
-        -------
-        ndarray, shape (m, n)
+        a^T (I - H (z I - F)^-1 Phi L) with F = Phi (I - L H), solved in the Schur form of F, at
+        angular frequencies in rad a fused sample, shape (m,).
         """
         # Loss of significance near frequency 0 is avoided: (z - 1) + (1 - F).
         turn = np.expm1(1j * omega)

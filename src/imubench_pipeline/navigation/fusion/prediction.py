@@ -38,22 +38,12 @@ _SLOW = 1e-9
 def nodes(n: int) -> tuple[Array, Array]:
     """Return frequencies and weights that integrate a spectrum to the Allan variance.
 
-    sigma^2(n T) = (1/pi) int_0^pi P(w) 2 sin^4(n w/2) / (n^2 sin^2(w/2)) dw
+    sigma^2(n T) = (1/pi) int_0^pi P(w) 2 sin^4(n w/2) / (n^2 sin^2(w/2)) dw = ``weights @ P(w)``
 
-    by Gauss and Legendre, in panels of an octave of w up to the first zero of sin^4, where P is
-    smooth over log w, then of one period; the many periods of a long cluster at high frequencies
-    are replaced by their mean, again in octaves.
-
-    Parameters
-    ----------
-    n : int
-        Samples in a cluster, from 1.
-
-    Returns
-    -------
-    (ndarray, ndarray)
-        Angular frequencies, rad a sample, and weights: the Allan variance is
-        ``weights @ P(omega)``.
+    with w in rad a sample and n samples in a cluster, from 1, by Gauss and Legendre, in panels of
+    an octave of w up to the first zero of sin^4, where P is smooth over log w, then of one period;
+    the many periods of a long cluster at high frequencies are replaced by their mean, again in
+    octaves.
 
     Raises
     ------
@@ -81,19 +71,10 @@ def nodes(n: int) -> tuple[Array, Array]:
 
 
 def allan_of_spectrum(spectrum: Callable[[Array], NDArray[Any]], sizes: ArrayLike) -> NDArray[Any]:
-    """Return the Allan variance of samples of a given spectrum.
+    """Return the Allan variance of samples of a given spectrum, SI^2, shape (m, ...).
 
-    Parameters
-    ----------
-    spectrum : callable
-        Takes angular frequencies in rad a sample, shape (k,), and returns SI^2, shape (k, ...).
-    sizes : array_like of int, shape (m,)
-        n, samples in a cluster.
-
-    Returns
-    -------
-    ndarray, shape (m, ...)
-        SI^2.
+    The spectrum takes angular frequencies in rad a sample, shape (k,), and returns SI^2, shape (k,
+    ...); ``sizes`` are samples in a cluster, shape (m,).
     """
     variances = []
     for n in np.atleast_1d(np.asarray(sizes, dtype=np.int64)):
@@ -125,20 +106,11 @@ def _octaves(start: float, end: float) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class FusedCurve:
-    """The predicted Allan variance of a virtual sensor.
+    """The predicted Allan variance of a virtual sensor."""
 
-    Attributes
-    ----------
-    tau : ndarray, shape (m,)
-        s.
-    variance : ndarray, shape (m,)
-        (rad/s)^2 or (m/s^2)^2.
-    common : ndarray, shape (m,)
-        The part of it that comes of what the sensors share: more sensors do not lower it.
-    """
-
-    tau: Array
-    variance: Array
+    tau: Array  # shape (m,); s
+    variance: Array  # shape (m,); (rad/s)^2 or (m/s^2)^2
+    # shape (m,); the part of it that comes of what the sensors share: more sensors do not lower it
     common: Array
 
     @property
@@ -157,17 +129,8 @@ class FusedCurve:
 def fused_psd(board: Board, weights: Weights, frequency: ArrayLike) -> tuple[Array, Array]:
     """Return the two-sided density of a virtual sensor, and the part that is common.
 
-    Parameters
-    ----------
-    board : Board
-    weights : Weights
-    frequency : array_like, shape (m,)
-        Hz, above 0 and up to half the fused rate.
-
-    Returns
-    -------
-    (ndarray, ndarray), shapes (m,)
-        (rad/s)^2/Hz or (m/s^2)^2/Hz, of the samples: w^H S w / rate.
+    w^H S w / rate of the samples, in (rad/s)^2/Hz or (m/s^2)^2/Hz, shapes (m,), at frequencies,
+    array_like of shape (m,), in Hz, above 0 and up to half the fused rate.
     """
     omega = 2.0 * np.pi * np.atleast_1d(np.asarray(frequency, dtype=np.float64)) / board.rate
     spectra = _spectra(board, weights, omega) / board.rate

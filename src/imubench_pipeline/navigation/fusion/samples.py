@@ -43,19 +43,9 @@ def at_fused_rate(board: Board, samples: Sequence[Array]) -> Array:
 
 
 def fuse(board: Board, how: Constant | KalmanFusion, samples: Sequence[Array]) -> Array:
-    """Return the samples of the virtual sensor.
+    """Return the samples of the virtual sensor, rad/s or m/s^2, shape (k,), at the fused rate.
 
-    Parameters
-    ----------
-    board : Board
-    how : Constant or KalmanFusion
-    samples : sequence of ndarray
-        As for `at_fused_rate`.
-
-    Returns
-    -------
-    ndarray, shape (k,)
-        rad/s or m/s^2, at the fused rate.
+    The samples are those of each sensor, shape (n,), as for `at_fused_rate`.
 
     Raises
     ------

@@ -19,17 +19,9 @@ class Weights(Protocol):
     """What weighs the sensors of a board."""
 
     def response(self, omega: Array) -> NDArray[Any]:
-        """Return the weight of each sensor at angular frequencies.
+        """Return the weight of each sensor, shape (m, n), complex where a filter delays.
 
-        Parameters
-        ----------
-        omega : ndarray, shape (m,)
-            rad a fused sample.
-
-        Returns
-        -------
-        ndarray, shape (m, n)
-            Complex where a filter delays.
+        At angular frequencies in rad a fused sample, shape (m,).
         """
 
 
@@ -37,18 +29,13 @@ class Weights(Protocol):
 class Constant:
     """Weights that are the same at every frequency.
 
-    Attributes
-    ----------
-    values : ndarray, shape (n,)
-        Their sum is 1: what all sensors measure alike passes unchanged.
-
     Raises
     ------
     ValueError
         If there is not one weight a sensor, or their sum is not 1 or not a number.
     """
 
-    values: Array
+    values: Array  # shape (n,); their sum is 1: what all sensors measure alike passes unchanged
 
     def __post_init__(self) -> None:
         if self.values.ndim != 1 or not abs(self.values.sum() - 1.0) <= 1e-9:
@@ -82,18 +69,7 @@ class ByFrequency:
 
 
 def equal(sensors: int) -> Constant:
-    """Return equal weights.
-
-    Parameters
-    ----------
-    sensors : int
-        From 1.
-
-    Raises
-    ------
-    ValueError
-        If there is no sensor.
-    """
+    """Return equal weights of a number of sensors, from 1; else a ValueError is raised."""
     if sensors < 1:
         raise ValueError(f"found {sensors} sensors, expected at least one")
     return Constant(np.full(sensors, 1.0 / sensors))
@@ -129,20 +105,11 @@ def best_constant(board: Board, tau: float | None = None) -> Constant:
 
 
 def least(parts: Parts) -> Array:
-    """Return the weights of least variance with a sum of 1.
+    """Return the weights of least variance with a sum of 1, shape (m, n), at m frequencies or tau.
 
     The sensors are y = 1 x + G c + e, with x not known at all, and c of unit variance the shared
-    processes. Their best estimates follow from normal equations that stay well conditioned
-    however large c is, if what c has in common with x (the mean of G) is set apart.
-
-    Parameters
-    ----------
-    parts : Parts
-        Of m frequencies or tau.
-
-    Returns
-    -------
-    ndarray, shape (m, n)
+    processes. Their best estimates follow from normal equations that stay well conditioned however
+    large c is, if what c has in common with x (the mean of G) is set apart.
     """
     # What has nothing of its own is nearly perfect; where none has, all are alike.
     largest = parts.own.max(axis=1, keepdims=True)

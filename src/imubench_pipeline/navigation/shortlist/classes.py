@@ -17,54 +17,30 @@ _TAKEN = {"N": "N", "B_curve": "B", "K": "K", "T_B": "T_B"}
 
 @dataclass(frozen=True)
 class Span:
-    """The least and the largest value that a figure may have.
+    """The least and the largest value that a figure may have."""
 
-    Attributes
-    ----------
-    low, high : float
-        SI.
-    words : str
-        What it is from, where it is assumed; empty: as printed.
-    """
-
+    # low, high: SI
     low: float
     high: float
-    words: str = ""
+    words: str = ""  # what it is from, where it is assumed; empty: as printed
 
 
 @dataclass(frozen=True)
 class MeasuredRanges:
-    """Ranges of measured parameters, by sensor, quantity and figure.
+    """Ranges of measured parameters, by sensor, quantity and figure."""
 
-    Attributes
-    ----------
-    of_sensor : dict
-        (sensor, quantity, figure) -> (low, high), SI.
-    classes : dict of str to str
-        The class of each sensor that states one.
-    printed : dict
-        (sensor, quantity) -> (low, high) of B, SI, as datasheets have it: where none is measured.
-    """
-
+    # (sensor, quantity, figure) -> (low, high), SI
     of_sensor: Mapping[tuple[str, str, str], tuple[float, float]]
-    classes: Mapping[str, str]
+    classes: Mapping[str, str]  # the class of each sensor that states one
+    # (sensor, quantity) -> (low, high) of B, SI, as datasheets have it: where none is measured
     printed: Mapping[tuple[str, str], tuple[float, float]] = field(default_factory=dict)
 
     def span(self, price_class: str | None, quantity: str, figure: str) -> Span | None:
-        """Return the range of a figure over the measured sensors of a class.
+        """Return the range of a figure (N, B, K or T_B) over the measured sensors of a class.
 
-        Parameters
-        ----------
-        price_class : str or None
-            As stated; only what stands before a comma or parenthesis counts.
-        quantity, figure : str
-            ``gyro`` or ``accel``; ``N``, ``B``, ``K`` or ``T_B``.
-
-        Returns
-        -------
-        Span or None
-            Over all measured sensors where none of the class is measured; of B where no sensor is
-        measured over datasheets; None: nothing is known.
+        Of the class as stated, only what stands before a comma or parenthesis counts. It is over
+        all measured sensors where none of the class is measured; of B where no sensor is measured
+        over datasheets; None: nothing is known.
         """
         by_sensor = {
             sensor: ends
@@ -98,18 +74,9 @@ def measured_ranges(
 ) -> MeasuredRanges:
     """Return what the logs of a run say, of real sensors and recordings that decide.
 
-    Parameters
-    ----------
-    parameters, recordings : iterable of mapping
-        Rows of the tables.
-    price_classes : mapping of str to str or None
-        Of each sensor.
-
-    Returns
-    -------
-    MeasuredRanges
-        The 95 % limits of what has a value. A random walk that a log does not show may be 0; its
-        upper limit counts only where no log of the sensor shows one.
+    From rows of the tables ``parameters`` and ``recordings``: the 95 % limits of what has a value.
+    A random walk that a log does not show may be 0; its upper limit counts only where no log of the
+    sensor shows one.
     """
     about = list(recordings)
     apart = left_out(about)

@@ -25,24 +25,16 @@ End = Literal["best", "worst"]
 
 @dataclass(frozen=True)
 class Figures:
-    """What a quantity of a sensor may have.
+    """What a quantity of a sensor may have."""
 
-    Attributes
-    ----------
-    N, B, K : Span or None
-        SI; None: not published, and known of no other sensor. It is 0 at best then, and the worst
-        is not known.
-    times : tuple of (float or None)
-        Correlation times of the process that B may be, s; None: flicker noise.
-    assumed : tuple of str
-        What stands for what is not printed, in words.
-    """
-
+    # N, B, K: SI; None: not published, and known of no other sensor. It is 0 at best then, and the
+    # worst is not known
     N: Span
     B: Span | None
     K: Span | None
+    # correlation times of the process that B may be, s; None: flicker noise
     times: tuple[float | None, ...]
-    assumed: tuple[str, ...]
+    assumed: tuple[str, ...]  # what stands for what is not printed, in words
 
     @property
     def bounded(self) -> bool:
@@ -51,10 +43,6 @@ class Figures:
 
     def models(self, end: End) -> list[NoiseModel]:
         """Return the models of one end: all figures there, for each correlation time.
-
-        Parameters
-        ----------
-        end : {"best", "worst"}
 
         Raises
         ------
@@ -73,19 +61,7 @@ class Figures:
 
 
 def figures_of(sensor: Sensor, quantity: str, ranges: MeasuredRanges) -> Figures | str:
-    """Return what a datasheet allows of a quantity.
-
-    Parameters
-    ----------
-    sensor : Sensor
-    quantity : {"gyro", "accel"}
-    ranges : MeasuredRanges
-
-    Returns
-    -------
-    Figures or str
-        str: why nothing can be said.
-    """
+    """Return what a datasheet allows of a quantity, or why nothing can be said."""
     if getattr(sensor.datasheet, quantity) is None:
         return f"it has no {SENSORS[quantity]}"
     printed, options = _printed(sensor.datasheet, quantity)
@@ -128,12 +104,9 @@ def figures_of(sensor: Sensor, quantity: str, ranges: MeasuredRanges) -> Figures
 
 
 def printed_ranges(sensors: Mapping[str, Sensor]) -> dict[tuple[str, str], tuple[float, float]]:
-    """Return the range of B that each datasheet of a catalogue allows.
+    """Return the range of B, SI, that each datasheet of a catalogue allows, where it prints one.
 
-    Returns
-    -------
-    dict
-        (sensor, quantity) -> (low, high), SI; without those that print none.
+    (sensor, quantity) -> (low, high).
     """
     ranges = {}
     for name, sensor in sensors.items():

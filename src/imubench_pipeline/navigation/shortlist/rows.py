@@ -47,19 +47,9 @@ def shortlist_rows(
 ) -> Iterator[Row]:
     """Judge all sensors of a catalogue by their datasheets alone, beside what is measured.
 
-    Parameters
-    ----------
-    requirements : mapping of str to Requirement
-    sensors : mapping of str to Sensor
-    ranges : MeasuredRanges
-        For what is not published.
-    ranking, recordings : iterable of mapping
-        Rows of the tables of a run: what its logs say.
-
-    Yields
-    ------
-    mapping
-        One a requirement and sensor, the best margin first; what is not judged is last.
+    Yields a row a requirement and sensor, the best margin first; what is not judged is last. The
+    ranges are for what is not published; rows of the tables ``ranking`` and ``recordings`` of a run
+    have what its logs say.
     """
     simulated = {(row["sensor"], row["recording"]): row["simulated"] for row in recordings}
     measured = {(row["requirement"], row["sensor"]): row for row in ranking if row["decides"]}

@@ -22,31 +22,19 @@ _ROUNDED = 1.0 + 1e-9
 
 
 class Abilities(Strict):
-    """What a sensor has; SI, None: not known.
+    """What a sensor has; SI, None: not known."""
 
-    Attributes
-    ----------
-    full_scale, bandwidth : dict
-        The largest that it has, or that can be chosen, by quantity; rad/s, m/s^2 and Hz.
-    logged_rate, rate : float or None
-        Of its logs, and the highest that it gives, Hz.
-    temperature : tuple of float or None
-        Range of operation, degC.
-    channels : tuple of str
-        Axes that its logs have.
-    without : tuple of str
-        Quantities that it does not measure.
-    mass, power : float or None
-        kg and W.
-    """
-
+    # full_scale, bandwidth: the largest that it has, or that can be chosen, by quantity; rad/s,
+    # m/s^2 and Hz
     full_scale: dict[Measured, float] = Field(default_factory=dict)
     bandwidth: dict[Measured, float] = Field(default_factory=dict)
+    # logged_rate, rate: of its logs, and the highest that it gives, Hz
     logged_rate: float | None = None
     rate: float | None = None
-    temperature: tuple[float, float] | None = None
-    channels: tuple[str, ...] = ()
-    without: tuple[Measured, ...] = ()
+    temperature: tuple[float, float] | None = None  # range of operation, degC
+    channels: tuple[str, ...] = ()  # axes that its logs have
+    without: tuple[Measured, ...] = ()  # quantities that it does not measure
+    # mass, power: kg and W
     mass: float | None = None
     power: float | None = None
 

@@ -64,35 +64,20 @@ _DIMENSIONS = {
 
 @dataclass(frozen=True)
 class Rests:
-    """What a verdict on a sensor rests on.
+    """What a verdict on a sensor rests on."""
 
-    Attributes
-    ----------
-    lacking : tuple of str
-        What it must have and has not.
-    unknown : tuple of str
-        What it must have, and nobody knows whether it has.
-    figures : mapping of (str, str) to float
-        Figures that are not known, or too large, by ``gyro`` or ``accel`` and cause, with the
-        largest with which every limit is kept, SI.
-    """
-
-    lacking: tuple[str, ...]
-    unknown: tuple[str, ...]
+    lacking: tuple[str, ...]  # what it must have and has not
+    unknown: tuple[str, ...]  # what it must have, and nobody knows whether it has
+    # figures that are not known, or too large, by ``gyro`` or ``accel`` and cause, with the largest
+    # with which every limit is kept, SI
     figures: Mapping[tuple[str, str], float]
 
     @classmethod
     def of(cls, must: Must, has: Abilities, conditions: Iterable[Row]) -> Rests:
         """Return what the verdict on a sensor rests on.
 
-        Parameters
-        ----------
-        must : Must
-            Of the requirement.
-        has : Abilities
-            Of the sensor.
-        conditions : iterable of mapping
-            Rows of the table ``error_budget`` that a limit rests on, of all limits.
+        Of what it must have and has, and the rows of the table ``error_budget`` that a limit rests
+        on, of all limits.
         """
         lacking, unknown = judge(must, has)
         figures: dict[tuple[str, str], float] = {}
@@ -137,12 +122,9 @@ def _down(value: float) -> float:
 
 
 def in_words(row: Row) -> str:
-    """Return a verdict with what it rests on: ``passes if its gyros are calibrated to ...``.
+    """Return the verdict of a row of ``ranking`` with what it rests on.
 
-    Parameters
-    ----------
-    row : mapping
-        Has ``verdict`` and ``conditions``, as the table ``ranking``.
+    Such as ``passes if its gyros are calibrated to ...``.
     """
     if not row["conditions"]:
         return str(row["verdict"])
@@ -162,16 +144,9 @@ def is_condition(row: Row) -> bool:
 def once_calibrated(words: str, total: Row, conditions: Iterable[Row]) -> str:
     """Return the verdict on an error when the biases that break its limit are calibrated.
 
-    A bias is in every draw of the total by its square, and so in the limits of the total.
-
-    Parameters
-    ----------
-    words : str
-        The verdict on the error as it is.
-    total : mapping
-        Row of the table ``error_budget``.
-    conditions : iterable of mapping
-        Rows of sources that the limit rests on.
+    A bias is in every draw of the total by its square, and so in the limits of the total. ``words``
+    is the verdict as it is; total and conditions, the sources that the limit rests on, are rows of
+    the table ``error_budget``.
     """
     squares = [row["sigma"] ** 2 for row in conditions if row["sigma"] is not None]
     if not squares or words in CONDITIONAL:
@@ -185,14 +160,7 @@ def once_calibrated(words: str, total: Row, conditions: Iterable[Row]) -> str:
 def parts_of(total: float, sources: Iterable[Row], least: float = 0.01) -> str | None:
     """Return the sources of an error with their parts of the variance, the largest first.
 
-    Parameters
-    ----------
-    total : float
-        Standard deviation of the error.
-    sources : iterable of mapping
-        Rows of the table ``error_budget``.
-    least : float
-        Parts below it are left out.
+    Of a total, 1 sigma, and rows of the table ``error_budget``; parts below ``least`` are left out.
     """
     if total <= 0.0:
         return None
@@ -202,11 +170,5 @@ def parts_of(total: float, sources: Iterable[Row], least: float = 0.01) -> str |
 
 
 def named(row: Row) -> str:
-    """Return the name of a source, marked where it is printed and not measured.
-
-    Parameters
-    ----------
-    row : mapping
-        Of the table ``error_budget``.
-    """
+    """Return the name of a source of the table ``error_budget``, marked where it is printed."""
     return row["source"] + f" (datasheet, {row['kind']})" * (row["origin"] == "datasheet")

@@ -18,26 +18,17 @@ _BACKTEST = ("requirement", "sensor", "recording", "channel", "error", "time")
 
 @dataclass(frozen=True)
 class Basis:
-    """The recordings of a run, by sensor and name.
+    """The recordings of a run, by sensor and name."""
 
-    Attributes
-    ----------
-    recordings : mapping
-        The row of the table ``recordings``.
-    doubts : mapping
-        The rows of the table ``doubts``.
-    channels : mapping
-        The channels that were analysed, and whether anything is known of their noise.
-    apart : mapping
-        Why a recording does not decide, of those that do not.
-    backtests : mapping
-        What the logs themselves show, by what names the rows of the table ``backtest``.
-    """
-
+    # the row of the table ``recordings``
     recordings: Mapping[Key, Row] = field(default_factory=dict)
+    # the rows of the table ``doubts``
     doubts: Mapping[Key, Sequence[Row]] = field(default_factory=dict)
+    # the channels that were analysed, and whether anything is known of their noise
     channels: Mapping[Key, Mapping[str, bool]] = field(default_factory=dict)
+    # why a recording does not decide, of those that do not
     apart: Mapping[Key, str] = field(default_factory=dict)
+    # what the logs themselves show, by what names the rows of the table ``backtest``
     backtests: Mapping[tuple[Any, ...], Row] = field(default_factory=dict)
 
     @classmethod
@@ -48,15 +39,7 @@ class Basis:
         parameters: Iterable[Row] = (),
         backtests: Iterable[Row] = (),
     ) -> Basis:
-        """Return it from rows of the tables of these names.
-
-        Parameters
-        ----------
-        recordings, doubts : iterable of mapping
-        parameters : iterable of mapping
-            Those of other methods than the recommended one do not count.
-        backtests : iterable of mapping
-        """
+        """Return it from rows of these tables; of parameters the recommended ones count."""
         about = {_key(row): row for row in recordings}
         doubted: dict[Key, list[Row]] = {}
         for row in doubts:
@@ -84,6 +67,11 @@ class Basis:
         """Return the length of a recording, s; None where it is not known."""
         row = self.recordings.get(key)
         return row["duration"] if row else None
+
+    def longest(self, rows: Iterable[Row]) -> float | None:
+        """Return the length of the longest recording of rows, s; None where none is known."""
+        durations = (self.duration(_key(row)) for row in rows)
+        return max((duration for duration in durations if duration is not None), default=None)
 
     def simulated(self, key: Key) -> bool:
         """Tell whether a recording is simulated."""

@@ -9,7 +9,6 @@ What a contribution to an error comes of, quantity and noise parameter, is told 
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Iterator
 from typing import Literal, get_args
@@ -50,11 +49,8 @@ _AXES = 3
 def quantity_behind(source: str) -> str | None:
     """Return gyro or accel where a source is noise of one that the log tells; else None.
 
-    Parameters
-    ----------
-    source : str
-        As in the table ``error_budget``: ``gyro N``, ``initial tilt by accel GM 89.5 s``. A
-        turn-on bias is stated, and not of the log.
+    A source is such as ``gyro N`` or ``initial tilt by accel GM 89.5 s`` of the table
+    ``error_budget``. A turn-on bias is stated, and not of the log.
     """
     words = source.removeprefix("initial tilt by ").split()
     noise = len(words) > 1 and words[0] in ("gyro", "accel") and words[1] in _PARAMETERS
@@ -62,13 +58,7 @@ def quantity_behind(source: str) -> str | None:
 
 
 def parameters_behind(source: str) -> frozenset[str]:
-    """Return the noise parameters that a source comes of; none where it is no noise of the log.
-
-    Parameters
-    ----------
-    source : str
-        As in `quantity_behind`.
-    """
+    """Return the noise parameters that a source comes of; none where it is no noise of the log."""
     if quantity_behind(source) is None:
         return frozenset()
     return _PARAMETERS[source.removeprefix("initial tilt by ").split()[1]]
@@ -77,25 +67,15 @@ def parameters_behind(source: str) -> frozenset[str]:
 def weaknesses(standing: Standing, requirement: Requirement, basis: Basis) -> list[str]:
     """Return what makes the evidence of a limit weak; nothing where it is strong.
 
-    Parameters
-    ----------
-    standing : Standing
-        With a figure.
-    requirement : Requirement
-    basis : Basis
-
-    Returns
-    -------
-    list of str
-        `REASONS` and codes of the table ``doubts``. Axes and doubts count where they are those of
-        half the recordings or more, the length is that of the longest.
+    `REASONS` and codes of the table ``doubts``. Axes and doubts count where they are those of half
+    the recordings or more, the length is that of the longest. The standing has a figure.
     """
     reasons = []
     if standing.expected.specimens == 1:
         reasons.append("one_specimen")
-    durations = [basis.duration((row["sensor"], row["recording"])) for row in standing.totals]
-    longest = max((duration for duration in durations if duration is not None), default=math.inf)
-    if longest_asked(standing.total, requirement) > LONGEST_PART * longest:
+    longest = basis.longest(standing.totals)
+    asked = longest_asked(standing.total, requirement)
+    if longest is not None and asked > LONGEST_PART * longest:
         reasons.append("short_log")
     if standing.wide:
         reasons.append("wide_interval")
@@ -131,11 +111,7 @@ def _of_log(
 def longest_asked(total: Row, requirement: Requirement) -> float:
     """Return the longest time that a limit is about, s: its own, or the window at rest before.
 
-    Parameters
-    ----------
-    total : mapping
-        Row of the table ``error_budget``.
-    requirement : Requirement
+    ``total`` is a row of the table ``error_budget``.
     """
     window = requirement.static_window
     # The heading found at rest has no window before it.

@@ -30,37 +30,18 @@ _WORST_FIRST = (
 
 @dataclass(frozen=True)
 class Judgement:
-    """A sensor and a requirement.
+    """A sensor and a requirement."""
 
-    Attributes
-    ----------
-    name : str
-        Of the requirement.
-    requirement : Requirement
-    sensor : str
-    standings : sequence of Standing
-        One a limit.
-    decides : Standing
-        The one of them with which the sensor stands.
-    weak : sequence of list of str
-        What makes the evidence of each limit weak; empty also where nothing is known.
-    outside : str or None
-        Why the requirement does not admit the sensor.
-    rests : Rests
-        On what the verdict rests beside the errors that are known.
-    unless : Unless or None
-        What the verdict would be, if what is doubted were mended.
-    """
-
-    name: str
+    name: str  # of the requirement
     requirement: Requirement
     sensor: str
-    standings: Sequence[Standing]
-    decides: Standing
+    standings: Sequence[Standing]  # one a limit
+    decides: Standing  # the one of them with which the sensor stands
+    # what makes the evidence of each limit weak; empty also where nothing is known
     weak: Sequence[Sequence[str]]
-    outside: str | None
-    rests: Rests
-    unless: Unless | None
+    outside: str | None  # why the requirement does not admit the sensor
+    rests: Rests  # on what the verdict rests beside the errors that are known
+    unless: Unless | None  # what the verdict would be, if what is doubted were mended
 
     @property
     def verdict(self) -> str:
@@ -100,15 +81,8 @@ def judgements(
 ) -> Iterator[Judgement]:
     """Yield how each sensor stands to each requirement.
 
-    Parameters
-    ----------
-    errors : iterable of mapping
-        Rows of the table ``error_budget``.
-    requirements : mapping of str to Requirement
-    sensors : mapping of str to mapping
-        ``price_class`` of each sensor, and its ``abilities``, where known.
-    basis : Basis
-        The recordings; those that do not decide are left out.
+    Of rows of the table ``error_budget``, ``price_class`` and, where known, ``abilities`` of each
+    sensor, and the recordings, of which those that do not decide are left out.
     """
     by_requirement: dict[str, dict[str, list[Row]]] = {}
     for row in errors:
@@ -118,9 +92,7 @@ def judgements(
         of_sensors = by_requirement.get(name, {})
         usual = {made: _usual(of_sensors, basis, simulated=made) for made in (False, True)}
         for sensor, rows in of_sensors.items():
-            keys = [(sensor, row["recording"]) for row in rows]
-            devices = {key[1]: basis.device(key) for key in keys}
-            made = all(basis.simulated(key) for key in keys)
+            devices, made = _specimens(sensor, rows, basis)
             by_limit = standings(_deciding_rows(rows, basis), devices, usual[made])
             decides = deciding(by_limit)
             yield Judgement(
@@ -140,14 +112,20 @@ def judgements(
             )
 
 
-def _deciding_rows(rows: Iterable[Row], basis: Basis) -> list[Row]:
+def _specimens(sensor: str, rows: Iterable[Row], basis: Basis) -> tuple[dict[str, str], bool]:
+    """Return the specimen of each recording of rows, and whether all of these are simulated."""
+    keys = [(sensor, row["recording"]) for row in rows]
+    devices = {recording: basis.device((sensor, recording)) for _, recording in keys}
+    return devices, all(basis.simulated(key) for key in keys)
+
+
+def _deciding_rows(rows: Sequence[Row], basis: Basis) -> list[Row]:
     """Return rows without the figures of recordings that do not decide."""
-    deciding_rows = []
-    for row in rows:
-        key = row["sensor"], row["recording"]
-        apart = basis.apart.get(key)
-        deciding_rows.append(row if apart is None else {**row, **_NOTHING, "reason": apart})
-    return deciding_rows
+    apart = [basis.apart.get((row["sensor"], row["recording"])) for row in rows]
+    return [
+        row if reason is None else {**row, **_NOTHING, "reason": reason}
+        for row, reason in zip(rows, apart, strict=True)
+    ]
 
 
 def _usual(
@@ -156,10 +134,9 @@ def _usual(
     """Return the spread between specimens of all sensors that have several, by limit."""
     by_limit: dict[tuple[Any, ...], list[Spread]] = {}
     for sensor, rows in of_sensors.items():
-        keys = [(sensor, row["recording"]) for row in rows]
-        if all(basis.simulated(key) for key in keys) is not simulated:
+        devices, made = _specimens(sensor, rows, basis)
+        if made is not simulated:
             continue
-        devices = {key[1]: basis.device(key) for key in keys}
         for standing in standings(_deciding_rows(rows, basis), devices):
             if standing.expected.spread is not None and standing.expected.spread_of == "specimens":
                 by_limit.setdefault(limit_of(standing.total), []).append(standing.expected.spread)

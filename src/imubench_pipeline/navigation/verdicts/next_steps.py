@@ -47,14 +47,7 @@ class _Step:
 
 
 def next_step_rows(judged: Sequence[Judgement], basis: Basis) -> list[dict[str, Any]]:
-    """Return the rows of the table ``next_steps``, what turns most verdicts first.
-
-    Parameters
-    ----------
-    judged : sequence of Judgement
-    basis : Basis
-        Of the recordings that they stand on.
-    """
+    """Return the rows of the table ``next_steps``, what turns most verdicts first."""
     groups: dict[tuple[Any, ...], list[_Step]] = {}
     for judgement in judged:
         if judgement.outside is None and not judgement.rests.lacking:
@@ -133,20 +126,9 @@ def _to_settle(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
 def specimens_needed(expected: Expected, away: float) -> int | None:
     """Return how many more specimens would bring the limits of an error within a distance.
 
-    t sqrt(tau^2 (1 + 1/n)) with n - 1 degrees of freedom, where the spread stays what it is: the
-    errors of the logs are left out.
-
-    Parameters
-    ----------
-    expected : Expected
-        With a spread.
-    away : float
-        Logarithm of the margin: how far the limits may be.
-
-    Returns
-    -------
-    int or None
-        None where 20 specimens would not do.
+    t sqrt(tau^2 (1 + 1/n)) with n - 1 degrees of freedom, where the spread, which is known, stays
+    what it is: the errors of the logs are left out. ``away`` is the logarithm of the margin, how
+    far the limits may be. None where 20 specimens would not do.
     """
     assert expected.spread is not None
     for number in range(expected.specimens + 1, _MOST_SPECIMENS + 1):

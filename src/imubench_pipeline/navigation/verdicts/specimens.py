@@ -47,45 +47,27 @@ _NARROWEST = 1e-9  # likewise, for a value that is its own limit
 
 @dataclass(frozen=True)
 class Spread:
-    """How much specimens differ.
+    """How much specimens differ."""
 
-    Attributes
-    ----------
-    variance : float
-        Of the logarithm, tau^2.
-    freedom : int
-        Degrees of freedom.
-    """
-
-    variance: float
-    freedom: int
+    variance: float  # of the logarithm, tau^2
+    freedom: int  # degrees of freedom
 
 
 @dataclass(frozen=True)
 class Expected:
-    """The error of the next specimen, or of the only one.
+    """The error of the next specimen, or of the only one."""
 
-    Attributes
-    ----------
-    sigma, lower, upper : float or None
-        Median and 95 % limits, SI; None where nothing is known.
-    within : float or None
-        Chance that it is within the limit.
-    specimens, recordings : int
-        That it stands on.
-    spread : Spread or None
-        Between specimens, or between the recordings of one; None: unknown.
-    spread_of : str or None
-        ``specimens``, ``recordings`` (of one specimen), or ``other sensors``.
-    """
-
+    # sigma, lower, upper: median and 95 % limits, SI; None where nothing is known
     sigma: float | None
     lower: float | None
     upper: float | None
-    within: float | None
+    within: float | None  # chance that it is within the limit
+    # specimens, recordings: that it stands on
     specimens: int
     recordings: int
+    # between specimens, or between the recordings of one; None: unknown
     spread: Spread | None = None
+    # ``specimens``, ``recordings`` (of one specimen), or ``other sensors``
     spread_of: str | None = None
 
 
@@ -94,15 +76,9 @@ def expected(
 ) -> Expected:
     """Return the error that the next specimen of a sensor will have.
 
-    Parameters
-    ----------
-    totals : sequence of mapping
-        Rows ``total`` of the table ``error_budget`` of one limit, one a recording; those without a
-        figure do not count.
-    devices : mapping of str to str
-        The specimen of each recording.
-    usual : Spread, optional
-        Of other sensors, for one specimen.
+    Of rows ``total`` of the table ``error_budget`` of one limit, one a recording, of which those
+    without a figure do not count; the specimen of each recording; and the spread of other sensors,
+    for one specimen.
     """
     with_figure = [row for row in totals if row["sigma"] is not None]
     if not with_figure:
@@ -138,10 +114,7 @@ def expected(
 def usual_spread(spreads: Iterable[Spread]) -> Spread | None:
     """Return the spread of several sensors together; None where they tell too little.
 
-    Parameters
-    ----------
-    spreads : iterable of Spread
-        Between specimens, of one sensor each.
+    Each is between specimens, of one sensor.
     """
     listed = list(spreads)
     freedom = sum(spread.freedom for spread in listed)

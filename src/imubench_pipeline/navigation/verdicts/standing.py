@@ -20,33 +20,17 @@ VAGUE = 4.0
 
 @dataclass(frozen=True)
 class Standing:
-    """What a sensor makes of one limit of a requirement.
+    """What a sensor makes of one limit of a requirement."""
 
-    Attributes
-    ----------
-    total : mapping
-        Row ``total`` of the table ``error_budget`` of the recording that answers: of several, the
-        one whose error is nearest to what is expected.
-    totals : sequence of mapping
-        Those of all recordings with a figure.
-    expected : Expected
-        The error, of the next specimen where there are several.
-    source : str or None
-        The largest contribution.
-    share : float or None
-        Its part of the variance.
-    parts : str or None
-        All sources that count.
-    conditions : tuple of mapping
-        Rows of sources whose figure is not known, or breaks the limit until it is calibrated.
-    """
-
+    # row ``total`` of the table ``error_budget`` of the recording that answers: of several, the one
+    # whose error is nearest to what is expected
     total: Row
-    totals: Sequence[Row]
-    expected: Expected
-    source: str | None = None
-    share: float | None = None
-    parts: str | None = None
+    totals: Sequence[Row]  # those of all recordings with a figure
+    expected: Expected  # the error, of the next specimen where there are several
+    source: str | None = None  # the largest contribution
+    share: float | None = None  # its part of the variance
+    parts: str | None = None  # all sources that count
+    # rows of sources whose figure is not known, or breaks the limit until it is calibrated
     conditions: tuple[Row, ...] = ()
 
     @property
@@ -103,14 +87,8 @@ def standings(
 ) -> list[Standing]:
     """Return how one sensor stands to each limit of one requirement.
 
-    Parameters
-    ----------
-    rows : iterable of mapping
-        Of the table ``error_budget``.
-    devices : mapping of str to str
-        The specimen of each recording.
-    usual : mapping, optional
-        The spread of other sensors by `limit_of`.
+    Of rows of the table ``error_budget``, the specimen of each recording, and the spread of other
+    sensors by `limit_of`.
     """
     by_limit: dict[tuple[Any, ...], list[Row]] = {}
     for row in rows:
@@ -146,13 +124,7 @@ def _standing(parts: Sequence[Row], devices: Mapping[str, str], usual: Spread | 
 
 
 def deciding(by_limit: Sequence[Standing]) -> Standing:
-    """Return the limit that decides: one that surely fails, whatever is not known of others.
-
-    Parameters
-    ----------
-    by_limit : sequence of Standing
-        Of one sensor.
-    """
+    """Return the limit that decides for a sensor: one that surely fails, whatever is not known."""
     known = [standing for standing in by_limit if standing.known]
     worst = min(known, key=lambda standing: standing.margin, default=by_limit[0])
     unknown = [standing for standing in by_limit if not standing.known]

@@ -41,41 +41,21 @@ _MEANT = {
 
 @dataclass(frozen=True)
 class Unless:
-    """What the verdict on a sensor would be.
+    """What the verdict on a sensor would be."""
 
-    Attributes
-    ----------
-    logged : Standing or None
-        The limit that would decide with the figures as they were logged; None: as it does.
-    mended : Standing or None
-        With the factors of the doubts; None where there are none.
-    factors : mapping of str to float
-        By quantity.
-    doubts : mapping of (str, str) to str
-        What is doubted of each recording that is concerned.
-    """
-
+    # the limit that would decide with the figures as they were logged; None: as it does
     logged: Standing | None
-    mended: Standing | None
-    factors: Factors
-    doubts: Mapping[tuple[str, str], str]
+    mended: Standing | None  # with the factors of the doubts; None where there are none
+    factors: Factors  # by quantity
+    doubts: Mapping[tuple[str, str], str]  # what is doubted of each recording that is concerned
 
 
 def unless(sensor: str, rows: Sequence[Row], basis: Basis) -> Unless | None:
     """Return what the verdict on a sensor would be if what is doubted were mended.
 
-    Parameters
-    ----------
-    sensor : str
-    rows : sequence of mapping
-        Of the table ``error_budget``, of one requirement, with the figures of all recordings.
-    basis : Basis
-
-    Returns
-    -------
-    Unless or None
-        None where there is nothing to say. Where all recordings of a sensor were left out, it says
-        what they would give as they were logged; else what another unit would turn.
+    The rows are those of the table ``error_budget``, of one requirement, with the figures of all
+    recordings. None where there is nothing to say. Where all recordings of a sensor were left out,
+    it says what they would give as they were logged; else what another unit would turn.
     """
     keys = list(dict.fromkeys((sensor, row["recording"]) for row in rows))
     apart = [key for key in keys if key in basis.apart]
@@ -107,14 +87,9 @@ def _mended(rows: Iterable[Row], factors: Mapping[tuple[str, str], Factors]) -> 
 
 
 def scaled(parts: Sequence[Row], factors: Factors) -> list[Row]:
-    """Return the rows of one error of one recording with quantities multiplied.
+    """Return the rows of one error of one recording with the quantities of factors multiplied.
 
-    Parameters
-    ----------
-    parts : sequence of mapping
-        Rows of the table ``error_budget``: ``total``, and its sources.
-    factors : mapping of str to float
-        By quantity, gyro and accel.
+    They are of the table ``error_budget``: ``total``, and its sources.
     """
     sources = [
         {**row, "sigma": factors.get(quantity_behind(row["source"]) or "", 1.0) * row["sigma"]}

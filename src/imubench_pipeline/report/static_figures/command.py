@@ -115,13 +115,7 @@ def _load(results: Path) -> dict[str, pa.Table]:
 def select(
     tables: Mapping[str, pa.Table], sensor: str | None, recording: str | None, channel: str | None
 ) -> dict[str, pa.Table]:
-    """Return the part of the tables that a sensor, recording and channel have.
-
-    Parameters
-    ----------
-    tables : mapping of str to pyarrow.Table
-    sensor, recording, channel : str or None
-        None: all.
+    """Return the part of the tables that a sensor, recording and channel have; None: all.
 
     Raises
     ------

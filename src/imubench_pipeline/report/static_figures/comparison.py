@@ -47,17 +47,8 @@ def comparison_figure(
 ) -> Figure:
     """Draw the Allan deviation of one channel of several sensors.
 
-    A sensor has the same colour, dash and marker in every figure; a marker of a simulated log is
-    hollow.
-
-    Parameters
-    ----------
-    views : sequence of ChannelView
-        Of one channel.
-    sensors : sequence of str
-        All sensors of the run: the place in it gives the look.
-    system : str
-        ``practical`` or ``si``.
+    A sensor has the same colour, dash and marker in every figure, by its place among all sensors of
+    the run; a marker of a simulated log is hollow.
     """
     looks = sensor_appearances(list(sensors))
     groups: dict[tuple[str, bool], list[ChannelView]] = {}

@@ -74,14 +74,7 @@ def finish(figure: Figure, axes: Axes, view: ChannelView, scale: float, *more: f
 
 @style()
 def allan_figure(view: ChannelView, system: System = "practical") -> Figure:
-    """Draw the Allan deviation with its 95 % limits alone (003, Figure 2).
-
-    Parameters
-    ----------
-    view : ChannelView
-    system : str
-        ``practical`` or ``si``.
-    """
+    """Draw the Allan deviation with its 95 % limits alone (003, Figure 2)."""
     figure, axes, scale = channel_axes(view, system, "Allan deviation")
     draw_measured(axes, view, scale)
     return finish(figure, axes, view, scale)
@@ -93,12 +86,6 @@ def methods_figure(view: ChannelView, system: System = "practical") -> Figure | 
 
     The lower panel has the models over the measured curve (000, Figures 2 to 5). None where no
     method gave a model.
-
-    Parameters
-    ----------
-    view : ChannelView
-    system : str
-        ``practical`` or ``si``.
     """
     models = {method: view.model(method) for method in view.parameters}
     models = {method: model for method, model in models.items() if model.terms}

@@ -25,12 +25,6 @@ def datasheet_figure(view: ChannelView, system: System = "practical") -> Figure 
 
     N is a line of slope -1/2, K one of +1/2; a bias instability is the level of the minimum, as
     vendors mean it. None where the datasheet has no such figure.
-
-    Parameters
-    ----------
-    view : ChannelView
-    system : str
-        ``practical`` or ``si``.
     """
     rows = _printed(view)
     if not rows:

@@ -59,15 +59,7 @@ def cross_figures(
 ) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Yield the name of each cross-IMU figure, and what makes it.
 
-    Parameters
-    ----------
-    views : sequence of ChannelView
-    system : str
-        ``practical`` or ``si``.
-    sensors : sequence of str, optional
-        All sensors of the run, for their looks; default: those of the views.
-    kinds : sequence of str
-        Of `CROSS_KINDS`.
+    The looks are those of all sensors of the run, or else of those of the views.
     """
     every = sorted({view.sensor for view in views}) if sensors is None else list(sensors)
     for channel in dict.fromkeys(view.channel for view in views):
@@ -85,16 +77,7 @@ def channel_figures(
     *,
     kinds: Sequence[str] = tuple(CHANNEL_KINDS),
 ) -> Iterator[tuple[str, Make]]:
-    """Yield the name of each figure of a channel, and what makes it or says that there is none.
-
-    Parameters
-    ----------
-    view : ChannelView
-    system : str
-        ``practical`` or ``si``.
-    kinds : sequence of str
-        Of `CHANNEL_KINDS`.
-    """
+    """Yield the name of each figure of a channel, and what makes it or says that there is none."""
     for kind in kinds:
         # A folder a recording: joined by any sign, two names could make the same one.
         name = f"{view.sensor}/{view.recording}/{view.channel}_{kind}"
@@ -102,14 +85,7 @@ def channel_figures(
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a figure, atomically; the same figure has the same bytes.
-
-    Parameters
-    ----------
-    figure : Figure
-    path : Path
-        Its ending is the format, ``.svg`` or ``.pdf``.
-    """
+    """Write a figure, atomically, as its ending says; the same figure has the same bytes."""
     with replacing(path) as temporary:
         temporary.write_bytes(_bytes(figure, path.suffix[1:]))
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,7 +15,6 @@ from matplotlib.path import Path
 from imubench_pipeline.estimators.estimate import COMPARED
 from imubench_pipeline.report.palette import Appearance, sensor_appearances
 from imubench_pipeline.report.practical import System, page_unit
-from imubench_pipeline.report.static_figures.marks import Kind, Mark, marks
 from imubench_pipeline.report.static_figures.names import SYMBOLS, channel_name
 from imubench_pipeline.report.static_figures.style import (
     DOUBLE,
@@ -30,6 +29,9 @@ from imubench_pipeline.report.static_figures.style import (
     style,
 )
 from imubench_pipeline.report.view import ChannelView
+from imubench_pipeline.typing import Row
+
+Kind = Literal["estimate", "not identified", "limit"]
 
 _SLOT = 2.6  # mm, of a recording where there is room
 _LEAST_ROW = 4.2  # mm, of a sensor: its name must fit
@@ -44,6 +46,48 @@ _ARROW = Path(
     [Path.MOVETO, Path.LINETO, Path.MOVETO, Path.LINETO, Path.MOVETO, Path.LINETO, Path.LINETO],
 )
 _ARROW_SIZE = 4.5  # of a dot
+
+
+@dataclass(frozen=True)
+class Mark:
+    """What the figure shows of one estimate."""
+
+    place: float  # distance from the top, mm
+    kind: Kind
+    # the estimate; of a limit the limit; of what is not identified what the model has
+    value: float | None
+    # lower, upper: 95 % limits
+    lower: float | None = None
+    upper: float | None = None
+
+
+def marks(view: ChannelView, symbol: str, place: float, spread: float = 0.0) -> Iterator[Mark]:
+    """Yield what is known of a parameter, one mark a component of the model.
+
+    ``spread`` is the height for these about the place of the recording, in the same unit.
+    """
+    if view.recommended not in view.parameters:
+        return
+    rows = [row for row in view.named(view.recommended, symbol) if _is_shown(row)]
+    for number, row in enumerate(rows):
+        yield _mark(row, place + spread * ((number + 0.5) / len(rows) - 0.5))
+
+
+def _is_shown(row: Row) -> bool:
+    return row["value"] is not None or bool(row["upper"])
+
+
+def _mark(row: Row, place: float) -> Mark:
+    lower, upper = row["lower"], row["upper"]
+    if lower is not None and lower < 0.0:
+        # A ramp has a sign, and a logarithmic axis shows its size.
+        lower, upper = (-upper, -lower) if upper <= 0.0 else (None, max(-lower, upper))
+    if row["value"] is not None:
+        return Mark(place, "estimate", abs(row["value"]), lower, upper)
+    if not lower:
+        return Mark(place, "limit", upper)
+    fitted = None if row["fitted"] is None else abs(row["fitted"])
+    return Mark(place, "not identified", fitted, lower, upper)
 
 
 @dataclass(frozen=True)
@@ -70,16 +114,7 @@ def forest_figure(
 ) -> Figure:
     """Draw parameters of one channel across sensors, with their 95 % limits.
 
-    Parameters
-    ----------
-    views : sequence of ChannelView
-        Of one channel.
-    sensors : sequence of str
-        All sensors of the run: the place in it gives the look.
-    symbol : str or sequence of str
-        Parameters, as they stand in the table; each has a panel.
-    system : str
-        ``practical`` or ``si``.
+    A panel each; the look is by the place among all sensors of the run.
     """
     symbols = [symbol] if isinstance(symbol, str) else list(symbol)
     looks = sensor_appearances(list(sensors))

@@ -17,13 +17,7 @@ from imubench_pipeline.tables.schemas import BY_RECORDING
 def draw_comparison(tables: Mapping[str, pa.Table], system: System, folder: Path) -> None:
     """Write the figures of each channel of all sensors, as SVG and PDF.
 
-    Parameters
-    ----------
-    tables : mapping of str to pyarrow.Table
-        Joined; those of recordings that are left out count as empty.
-    system : str
-        Units: ``practical`` or ``si``.
-    folder : Path
+    Of joined tables; those of recordings that are left out count as empty.
     """
     folder.mkdir(parents=True, exist_ok=True)
     unused = {name: schema(name).empty_table() for name in BY_RECORDING}

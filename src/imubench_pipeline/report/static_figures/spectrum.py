@@ -37,12 +37,6 @@ def spectrum_figure(view: ChannelView, system: System = "practical") -> Figure |
     """Draw the root of the two-sided spectrum with the model of the likelihood.
 
     None where there is no spectrum.
-
-    Parameters
-    ----------
-    view : ChannelView
-    system : str
-        ``practical`` or ``si``.
     """
     if not view.spectrum:
         return None

@@ -52,14 +52,8 @@ def terms_figure(view: ChannelView, system: System = "practical") -> Figure | No
     """Draw every term of the recommended model, their sum, and where N, B and K are read.
 
     N is the white noise at tau = 1 s, 0.664 B the plateau of flicker noise or the peak of a
-    Gauss-Markov process, K the random walk at tau = 3 s (000, Figure 1; 003, Figure 3). None
-    where there is no model.
-
-    Parameters
-    ----------
-    view : ChannelView
-    system : str
-        ``practical`` or ``si``.
+    Gauss-Markov process, K the random walk at tau = 3 s (000, Figure 1; 003, Figure 3). None where
+    there is no model.
     """
     if view.recommended not in view.parameters:
         return None

@@ -34,13 +34,7 @@ _TAU = np.geomspace(1e-2, 1e5, 281)
 
 @style()
 def theory_figure(system: System = "practical") -> Figure:
-    """Draw a curve with white noise N, bias instability B and random walk K, and how it is read.
-
-    Parameters
-    ----------
-    system : str
-        ``practical`` or ``si``.
-    """
+    """Draw a curve with white noise N, bias instability B and random walk K, and how it is read."""
     unit = page_unit("gyro", "adev", system)
     model = CHARACTERISTIC
     figure = new_figure(SINGLE, 68.0, "Characteristic curve of the Allan deviation")
