@@ -110,12 +110,9 @@ def seen(tests: Path, source: Path) -> Seen:
     kept = source / f"{tests.stem}-{hashlib.sha256(text).hexdigest()[:16]}.json"
     if not kept.exists():
         recorder = _Recorder(source / PACKAGE.name)
-        compiled = -1
-        while compiled < (now := len(list(source.rglob("*.nbi")))):  # again, if it has compiled
-            compiled = now
-            status = _forked([tests], source, recorder, kept.with_suffix(".log"), 3600.0)
-            if os.waitstatus_to_exitcode(status) not in (0, 5):
-                raise RuntimeError(f"{tests} fails without a mutant: {kept.with_suffix('.log')}")
+        status = _forked([tests], source, recorder, kept.with_suffix(".log"), 3600.0)
+        if os.waitstatus_to_exitcode(status) not in (0, 5):
+            raise RuntimeError(f"{tests} fails without a mutant: {kept.with_suffix('.log')}")
         recorder.kept.rename(kept)
     read = json.loads(kept.read_text())
     times = {name: (seconds, lines) for name, (seconds, lines) in read["tests"].items()}
@@ -244,20 +241,25 @@ class _Recorder(_Order):
         super().__init__({}, package, package.parent / f"last-{os.getpid()}")
         self.kept = package.parent / f"seen-{os.getpid()}.json"
         self.prefix = f"{package}/"
-        self.now: dict[str, set[int]] = {}
+        self.left: dict[tuple[str, int, str], set[int]] = {}
+        self.lines: dict[str, set[int]] = {}
         self.imported: Lines = {}
         self.found: dict[str, tuple[float, Lines]] = {}
         self.caches: list[Any] = []
+        self.compiling, self.compiled = 0, 0.0
 
     def pytest_sessionstart(self) -> None:
-        """Begin with what importing runs."""
-        threading.settrace(self._traced)
-        sys.settrace(self._traced)
+        """Begin with what importing runs; leave the compiler alone."""
+        from numba.core import event
+
+        event.Listener.register(type(self))
+        event.register("numba:compile", self)
+        self._trace()
 
     @pytest.hookimpl(trylast=True)
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
         """Keep what importing has run."""
-        self.imported, self.now = self._lines(), {}
+        self.imported = self._lines()
         self.caches = [
             value
             for name, module in list(sys.modules.items())
@@ -271,11 +273,12 @@ class _Recorder(_Order):
         """Note one test; what the package has kept of another does not hide what it needs."""
         for kept in self.caches:
             kept.cache_clear()
-        self.now = {}
-        sys.settrace(self._traced)
+        self.left, self.lines, self.compiled = {}, {}, 0.0
+        self._trace()
         begin = time.perf_counter()
         ended = yield
-        self.found[item.nodeid] = (time.perf_counter() - begin, self._lines())
+        seconds = time.perf_counter() - begin - self.compiled
+        self.found[item.nodeid] = (seconds, self._lines())
         return ended
 
     def pytest_sessionfinish(self) -> None:
@@ -284,20 +287,40 @@ class _Recorder(_Order):
         super().pytest_sessionfinish()
         self.kept.write_text(json.dumps({"imported": self.imported, "tests": self.found}))
 
+    def notify(self, event: Any) -> None:
+        """Leave the compiler alone, which would be slow, as numba tells when it compiles."""
+        if event.is_start:
+            self.compiling += 1
+            self.began = time.perf_counter() if self.compiling == 1 else self.began
+            sys.settrace(None)
+        else:
+            self.compiling -= 1
+            if self.compiling == 0:
+                self.compiled += time.perf_counter() - self.began
+                self._trace()
+
+    def _trace(self) -> None:
+        threading.settrace(self._traced)
+        sys.settrace(self._traced)
+
     def _lines(self) -> Lines:
-        return {name.removeprefix(self.prefix): sorted(rows) for name, rows in self.now.items()}
+        return {name.removeprefix(self.prefix): sorted(rows) for name, rows in self.lines.items()}
 
     def _traced(self, frame: FrameType, event: str, argument: object) -> Any:
-        name = frame.f_code.co_filename
-        if not name.startswith(self.prefix):
+        code = frame.f_code
+        if not code.co_filename.startswith(self.prefix):
             return None
-        rows = self.now.setdefault(name, set())
-        if rows.issuperset(line for _, _, line in frame.f_code.co_lines() if line is not None):
+        key = code.co_filename, code.co_firstlineno, code.co_name
+        left = self.left.get(key)
+        if left is None:
+            left = self.left[key] = {line for *_, line in code.co_lines() if line is not None}
+        if not left:
             return None  # nothing new will be seen
+        rows = self.lines.setdefault(code.co_filename, set())
 
         def within(frame: FrameType, event: str, argument: object) -> Any:
             rows.add(frame.f_lineno)
+            left.discard(frame.f_lineno)
             return within
 
-        rows.add(frame.f_lineno)
-        return within
+        return within(frame, event, argument)

@@ -236,19 +236,19 @@ def _statement(module: Path, line: int) -> tuple[range, bool, bool]:
     return lines, imported, compiled
 
 
-def tests_against(mutant: Mutant, source: Path, most: float) -> dict[str, float]:
+def tests_against(module: Path, line: int, source: Path, most: float) -> dict[str, float]:
     """Return the tests that run a line, in the order in which to run them, with their seconds.
 
     Of a file whose tests share what they compute, the others come last. What takes longer than
     `most` seconds altogether is left out.
     """
-    lines, imported, compiled = _statement(mutant.module, mutant.place[0])
-    own = str(mutant.module.relative_to(PACKAGE))
+    lines, imported, compiled = _statement(module, line)
+    own = str(module.relative_to(PACKAGE))
     near = [own]
     if compiled:  # which nothing sees: what calls it
-        near += [str(path.relative_to(PACKAGE)) for path in _importers({_dotted(mutant.module)})]
+        near += [str(path.relative_to(PACKAGE)) for path in _importers({_dotted(module)})]
     ranked: list[tuple[int, bool, float, str, float]] = []
-    for path in tests_of(mutant.module):
+    for path in tests_of(module):
         file = seen(path, source)
         if imported or compiled:
             run = {
@@ -262,9 +262,7 @@ def tests_against(mutant: Mutant, source: Path, most: float) -> dict[str, float]
         for name, (seconds, _) in file.tests.items():
             if name in run or (run and file.shares):
                 phase = 2 if name not in run else int(seconds > _QUICK)
-                ranked.append(
-                    (phase, not _is_named_after(path, mutant.module), cost, name, seconds)
-                )
+                ranked.append((phase, not _is_named_after(path, module), cost, name, seconds))
     ranked.sort(key=lambda one: (*one[:3], one[3].partition("::")[0], one[4]))
     taken, total = {}, 0.0
     for *_, name, seconds in ranked:
@@ -279,33 +277,33 @@ def _runs(rows: Lines, module: str, lines: range) -> bool:
     return any(line in lines for line in rows.get(module, ()))
 
 
+def judged_as(module: Path, line: int, code: str, source: Path, most: float) -> tuple[str, str]:
+    """Return what becomes of a module with a changed line, and which test has found it."""
+    own = module.relative_to(PACKAGE)
+    tests = tests_against(module, line, source, most)
+    if not tests:
+        return NOT_COVERED, ""
+    kernels = "njit" in code
+    stale = _all_importers(module) if kernels else []
+    slowest: Counter[str] = Counter()
+    for name, seconds in tests.items():
+        file = name.partition("::")[0]
+        slowest[file] = max(slowest[file], seconds)  # a fixture may be made by any test
+    besides = _COMPILING if kernels else _GRACE
+    limits = [(name, _PATIENCE * slowest[name.partition("::")[0]] + besides) for name in tests]
+    ended = run(own, code, limits, source, [str(path.relative_to(PACKAGE)) for path in stale])
+    outcome = TIMED_OUT if ended.timed_out else KILLED if ended.failed else SURVIVED
+    return outcome, ended.last if ended.failed else ""
+
+
 def judged(mutant: Mutant, source: Path, most: float) -> Outcome:
     """Return what becomes of a mutant."""
     begin = time.monotonic()
     code = mutant.code()
     assert code is not None
-    own = mutant.module.relative_to(PACKAGE)
-    tests = tests_against(mutant, source, most)
-    outcome, test = NOT_COVERED, ""
-    if tests:
-        kernels = "njit" in code
-        stale = _all_importers(mutant.module) if kernels else []
-        slowest: Counter[str] = Counter()
-        for name, seconds in tests.items():
-            file = name.partition("::")[0]
-            slowest[file] = max(slowest[file], seconds)  # a fixture may be made by any test
-        limits = [
-            (
-                name,
-                _PATIENCE * slowest[name.partition("::")[0]] + (_COMPILING if kernels else _GRACE),
-            )
-            for name in tests
-        ]
-        ended = run(own, code, limits, source, [str(path.relative_to(PACKAGE)) for path in stale])
-        outcome = TIMED_OUT if ended.timed_out else KILLED if ended.failed else SURVIVED
-        test = ended.last if ended.failed else ""
+    outcome, test = judged_as(mutant.module, mutant.place[0], code, source, most)
     return Outcome(
-        str(own),
+        str(mutant.module.relative_to(PACKAGE)),
         mutant.operator,
         mutant.occurrence,
         mutant.place[0],
