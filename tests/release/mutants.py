@@ -24,7 +24,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from functools import cache, partial
@@ -53,8 +53,8 @@ _OPERATOR = re.compile(
     r"|ReplaceAndWithOr|ReplaceOrWithAnd|ReplaceTrueWithFalse|ReplaceFalseWithTrue|AddNot"
     r"|ReplaceContinueWithBreak|ReplaceBreakWithContinue|NumberReplacer|ZeroIterationForLoop)"
 )
-_MOST = 6
-"""Test files against one mutant."""
+_MOST = 5
+"""Test files against one mutant; those that are not of its module's name, if these do not find it."""
 
 ELSEWHERE = {"workflow", "browser", "slurm", "release", "report", "benchmarks"}
 """Folders of tests of what is far above, and slow."""
@@ -64,7 +64,7 @@ _PATIENCE, _GRACE, _COMPILING = 5.0, 5.0, 60.0
 is found. Kernels that are compiled anew have a minute more."""
 
 _QUICK = 0.3
-"""Seconds of a test that runs before those of files nearer to the module."""
+"""Seconds of a test that runs before the others."""
 
 Place = tuple[int, int]
 
@@ -186,19 +186,18 @@ def tests_of(module: Path) -> tuple[Path, ...]:
         if tests:
             break
         names |= {_dotted(path) for path in _importers(names)}
-    by_name = sorted(
-        tests,
-        key=lambda path: (
-            not _is_named_after(path, module),
-            module.parent.name not in path.parts,
-            path.stat().st_size,
-        ),
-    )
-    return tuple(by_name[:_MOST])
+    tests.sort(key=lambda path: (_distance(path, module), path.stat().st_size))
+    return tuple(tests[:_MOST])
 
 
-def _is_named_after(tests: Path, module: Path) -> bool:
-    return module.stem in tests.stem
+def _distance(tests: Path, module: Path) -> int:
+    """Return how far tests are from a module: of its name, of one like it, of its room, or not."""
+    name = tests.stem.removeprefix("test_")
+    if name == module.stem:
+        return 0
+    if module.stem in name:
+        return 1
+    return 2 if module.parent.name in (name, *tests.parts) else 3
 
 
 def _importers(names: set[str]) -> list[Path]:
@@ -236,34 +235,35 @@ def _statement(module: Path, line: int) -> tuple[range, bool, bool]:
     return lines, imported, compiled
 
 
-def tests_against(module: Path, line: int, source: Path, most: float) -> dict[str, float]:
-    """Return the tests that run a line, in the order in which to run them, with their seconds.
+def tests_against(
+    module: Path, line: int, files: Sequence[Path], source: Path, most: float
+) -> dict[str, float]:
+    """Return the tests that run a line, the quickest first, with their seconds.
 
     Of a file whose tests share what they compute, the others come last. What takes longer than
     `most` seconds altogether is left out.
     """
     lines, imported, compiled = _statement(module, line)
     own = str(module.relative_to(PACKAGE))
-    near = [own]
+    near = {own}
     if compiled:  # which nothing sees: what calls it
-        near += [str(path.relative_to(PACKAGE)) for path in _importers({_dotted(module)})]
-    ranked: list[tuple[int, bool, float, str, float]] = []
-    for path in tests_of(module):
+        near |= {str(path.relative_to(PACKAGE)) for path in _importers({_dotted(module)})}
+    ranked: list[tuple[int, float, str, float]] = []
+    for path in files:
         file = seen(path, source)
-        if imported or compiled:
-            run = {
-                name for name, (_, rows) in file.tests.items() if any(one in rows for one in near)
-            }
-        else:
-            run = {name for name, (_, rows) in file.tests.items() if _runs(rows, own, lines)}
+        run = {
+            name
+            for name, (_, rows) in file.tests.items()
+            if (near & set(rows) if imported or compiled else set(lines) & set(rows.get(own, ())))
+        }
         if imported and own in file.imported and not run:
             run = set(file.tests)
         cost = sum(file.tests[name][0] for name in run)
         for name, (seconds, _) in file.tests.items():
             if name in run or (run and file.shares):
                 phase = 2 if name not in run else int(seconds > _QUICK)
-                ranked.append((phase, not _is_named_after(path, module), cost, name, seconds))
-    ranked.sort(key=lambda one: (*one[:3], one[3].partition("::")[0], one[4]))
+                ranked.append((phase, cost, name, seconds))
+    ranked.sort(key=lambda one: (*one[:2], one[2].partition("::")[0], one[3]))
     taken, total = {}, 0.0
     for *_, name, seconds in ranked:
         total += seconds
@@ -273,27 +273,31 @@ def tests_against(module: Path, line: int, source: Path, most: float) -> dict[st
     return taken
 
 
-def _runs(rows: Lines, module: str, lines: range) -> bool:
-    return any(line in lines for line in rows.get(module, ()))
-
-
 def judged_as(module: Path, line: int, code: str, source: Path, most: float) -> tuple[str, str]:
-    """Return what becomes of a module with a changed line, and which test has found it."""
-    own = module.relative_to(PACKAGE)
-    tests = tests_against(module, line, source, most)
-    if not tests:
-        return NOT_COVERED, ""
+    """Return what becomes of a module with a changed line, and which test has found it.
+
+    The tests nearest to it run first, and the others if these do not find it.
+    """
+    files = tests_of(module)
+    nearest = [path for path in files if _distance(path, module) == _distance(files[0], module)][:2]
     kernels = "njit" in code
-    stale = _all_importers(module) if kernels else []
-    slowest: Counter[str] = Counter()
-    for name, seconds in tests.items():
-        file = name.partition("::")[0]
-        slowest[file] = max(slowest[file], seconds)  # a fixture may be made by any test
-    besides = _COMPILING if kernels else _GRACE
-    limits = [(name, _PATIENCE * slowest[name.partition("::")[0]] + besides) for name in tests]
-    ended = run(own, code, limits, source, [str(path.relative_to(PACKAGE)) for path in stale])
-    outcome = TIMED_OUT if ended.timed_out else KILLED if ended.failed else SURVIVED
-    return outcome, ended.last if ended.failed else ""
+    stale = [str(path.relative_to(PACKAGE)) for path in _all_importers(module)] if kernels else []
+    outcome = NOT_COVERED
+    for stage in nearest, [path for path in files if path not in nearest]:
+        tests = tests_against(module, line, stage, source, most)
+        if not tests:
+            continue
+        slowest: Counter[str] = Counter()
+        for name, seconds in tests.items():
+            file = name.partition("::")[0]
+            slowest[file] = max(slowest[file], seconds)  # a fixture may be made by any test
+        besides = _COMPILING if kernels else _GRACE
+        limits = [(name, _PATIENCE * slowest[name.partition("::")[0]] + besides) for name in tests]
+        ended = run(module.relative_to(PACKAGE), code, limits, source, stale)
+        if ended.failed:
+            return TIMED_OUT if ended.timed_out else KILLED, ended.last
+        outcome = SURVIVED
+    return outcome, ""
 
 
 def judged(mutant: Mutant, source: Path, most: float) -> Outcome:
@@ -362,7 +366,7 @@ def main() -> int:
     parser.add_argument("--room", nargs="+", choices=list(ROOMS), default=list(ROOMS))
     parser.add_argument("--mutants", type=int, default=40, help="of each room")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--jobs", type=int, default=1, help="at a time, of one core each")
     parser.add_argument("--seconds", type=float, default=60.0, help="of tests against one mutant")
     parser.add_argument("--kept", type=Path, help="folder for what tests do without mutants")
     parser.add_argument("--again", type=Path, help="JSON of a run: those that it did not find")
@@ -378,9 +382,6 @@ def main() -> int:
     table, enough = [], True
     context = multiprocessing.get_context("fork")
     with ProcessPoolExecutor(arguments.jobs, mp_context=context) as pool:
-        modules = dict.fromkeys(one.module for sample, _ in samples.values() for one in sample)
-        files = dict.fromkeys(path for module in modules for path in tests_of(module))
-        list(pool.map(partial(seen, source=source), files))
         for room, (sample, every) in samples.items():
             counts: Counter[str] = Counter()
             report = folder / f"{room}-{arguments.seed}-{time.strftime('%H%M%S')}.jsonl"
