@@ -34,7 +34,7 @@ from cosmic_ray.ast import ast_nodes, get_ast
 from cosmic_ray.mutating import mutate_code
 from cosmic_ray.plugins import get_operator, operator_names
 
-from tests.release.mutant_runs import PACKAGE, PROJECT, Lines, copied, prepare, run, seen
+from tests.release.mutant_runs import PACKAGE, PROJECT, copied, prepare, run, seen
 
 ROOMS = {
     "allan": "allan/**/*.py",
@@ -54,7 +54,7 @@ _OPERATOR = re.compile(
     r"|ReplaceContinueWithBreak|ReplaceBreakWithContinue|NumberReplacer|ZeroIterationForLoop)"
 )
 _MOST = 5
-"""Test files against one mutant; those that are not of its module's name, if these do not find it."""
+"""Test files against one mutant."""
 
 ELSEWHERE = {"workflow", "browser", "slurm", "release", "report", "benchmarks"}
 """Folders of tests of what is far above, and slow."""
