@@ -142,6 +142,26 @@ def test_no_difference_spans_segments(rng: np.random.Generator) -> None:
     np.testing.assert_allclose(curve.variance, apart, rtol=1e-9)
 
 
+@pytest.mark.parametrize("loss", [0.0, 0.02])
+def test_each_segment_adds_what_it_has(rng: np.random.Generator, loss: float) -> None:
+    log = rng.standard_normal(2060)
+    log[rng.random(2060) < loss] = np.nan
+    sizes = [10, 50, 100]
+    first, second, both = (
+        allan_variance(log[:stop], 10.0, cluster_sizes=sizes, segments=segments)
+        for stop, segments in (
+            (1000, None),
+            (1060, [(0, 1000), (1000, 1060)]),  # shorter than two clusters of the longer sizes
+            (2000, [(0, 1000), (1000, 2000)]),
+        )
+    )
+    for name in ("variance", "edf", "averaged", "share"):
+        np.testing.assert_allclose(getattr(second, name)[1:], getattr(first, name)[1:], rtol=1e-12)
+    if not loss:
+        np.testing.assert_allclose(both.edf, 2 * first.edf, rtol=1e-12)
+        np.testing.assert_array_equal(both.share, 1.0)
+
+
 # --------------------------------------------------------------------------------- grid, errors
 
 
