@@ -39,8 +39,10 @@ def test_agrees_with_allantools(rng: np.random.Generator, offset: float) -> None
     np.testing.assert_array_equal(terms, len(samples) - 2 * sizes + 1)
 
 
-def test_gravity_in_single_precision_costs_no_digits(rng: np.random.Generator) -> None:
+@pytest.mark.parametrize("loss", [0.0, 0.01])
+def test_gravity_in_single_precision_costs_no_digits(rng, loss: float) -> None:
     samples = (9.81 + 1e-3 * rng.standard_normal(100_000)).astype(np.float32)
+    samples[1:][rng.random(99_999) < loss] = np.nan
     exact = samples.astype(np.float64) - float(samples[0])
     np.testing.assert_allclose(
         allan_variance(samples, 100.0).variance, allan_variance(exact, 100.0).variance, rtol=1e-10

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from imubench_pipeline.allan import cluster_sizes
 from imubench_pipeline.allan.presence import presence
 
 
@@ -43,3 +44,19 @@ def test_a_long_log_is_counted_at_a_stride() -> None:
     gone = stride * np.flatnonzero(~there)
     assert gone[0] == pytest.approx(100_000 - 38_000, abs=2 * stride)
     assert gone[-1] == pytest.approx(160_000 - 2_000, abs=2 * stride)
+
+
+def test_no_answer_rather_than_one_of_few_clusters() -> None:
+    length = 3_000_000
+    found = presence([np.zeros(length)], length)
+    told = []
+    for n in cluster_sizes(length):
+        answer = found.differences(n)
+        if answer is not None:
+            there, stride = answer
+            assert there.all()
+            # the whole log, or 32 clusters of its beginning
+            reach = (len(there) - 1) * stride + 2 * n
+            assert reach > length - 2 * stride or reach >= 32 * n - stride
+        told.append(answer is not None)
+    assert told[0] and told[-1] and not all(told)

@@ -53,8 +53,8 @@ _OPERATOR = re.compile(
     r"|ReplaceAndWithOr|ReplaceOrWithAnd|ReplaceTrueWithFalse|ReplaceFalseWithTrue|AddNot"
     r"|ReplaceContinueWithBreak|ReplaceBreakWithContinue|NumberReplacer|ZeroIterationForLoop)"
 )
-_MOST = 5
-"""Test files against one mutant."""
+_MOST = 4
+"""Test files against one mutant besides those that are nearest to it."""
 
 ELSEWHERE = {"workflow", "browser", "slurm", "release", "report", "benchmarks"}
 """Folders of tests of what is far above, and slow."""
@@ -129,11 +129,9 @@ def mutants_of(module: Path) -> tuple[Mutant, ...]:
     return tuple(found)
 
 
-_KEEPS = re.compile(r"cache|lru_cache|njit|dataclass|field|TypeVar|NewType|cast")
-"""Calls whose arguments no result depends on: what is kept, compiled, shown or frozen."""
-
-_CHECKS = {"strict", "check_finite", "overwrite_a", "overwrite_b", "stacklevel"}
-"""Arguments that check what always holds, or that save memory."""
+_TYPES = {"TypeVar", "NewType"}
+_CHECKS = {"strict", "check_finite", "overwrite_a", "overwrite_b", "repr"}
+"""Arguments that check what always holds, save memory, or tell what is shown."""
 
 
 def _without_effect(text: str) -> Iterator[tuple[Place, Place]]:
@@ -162,9 +160,10 @@ def _parts_without_effect(node: ast.AST) -> Iterator[ast.expr | ast.stmt | ast.k
         case ast.ClassDef():
             yield from (one for one in node.decorator_list if isinstance(one, ast.Call))
         case ast.Call(func=ast.Name(id=name) | ast.Attribute(attr=name)):
-            if _KEEPS.fullmatch(name):
-                yield from node.args
-                yield from node.keywords
+            if name in _TYPES:
+                yield node
+            if name == "cast":
+                yield node.args[0]
             yield from (one for one in node.keywords if one.arg in _CHECKS)
         case ast.Raise(exc=ast.Call(args=words)):
             yield from words
@@ -186,8 +185,7 @@ def tests_of(module: Path) -> tuple[Path, ...]:
         if tests:
             break
         names |= {_dotted(path) for path in _importers(names)}
-    tests.sort(key=lambda path: (_distance(path, module), path.stat().st_size))
-    return tuple(tests[:_MOST])
+    return tuple(sorted(tests, key=lambda path: (_distance(path, module), path.stat().st_size)))
 
 
 def _distance(tests: Path, module: Path) -> int:
@@ -276,14 +274,19 @@ def tests_against(
 def judged_as(module: Path, line: int, code: str, source: Path, most: float) -> tuple[str, str]:
     """Return what becomes of a module with a changed line, and which test has found it.
 
-    The tests nearest to it run first, and the others if these do not find it.
+    The tests nearest to it run first, some others if these do not find it, and the rest one by one
+    while none of them runs the line.
     """
     files = tests_of(module)
     nearest = [path for path in files if _distance(path, module) == _distance(files[0], module)][:2]
     kernels = "njit" in code
     stale = [str(path.relative_to(PACKAGE)) for path in _all_importers(module)] if kernels else []
     outcome = NOT_COVERED
-    for stage in nearest, [path for path in files if path not in nearest]:
+    further = [path for path in files if path not in nearest]
+    stages = [nearest, further[:_MOST], *([path] for path in further[_MOST:])]
+    for place, stage in enumerate(stages):
+        if place > 1 and outcome == SURVIVED:
+            break
         tests = tests_against(module, line, stage, source, most)
         if not tests:
             continue
