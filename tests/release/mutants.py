@@ -173,29 +173,34 @@ def _parts_without_effect(node: ast.AST) -> Iterator[ast.expr | ast.stmt | ast.k
 
 @cache
 def tests_of(module: Path) -> tuple[Path, ...]:
-    """Return the tests of a module: by its name, or that import it, or else what imports it."""
-    names = {_dotted(module)}
-    for _ in range(3):
-        tests = [
-            path
-            for path in (PROJECT / "tests").rglob("test_*.py")
-            if not ELSEWHERE & set(path.parts)
-            and any(_imports(path.read_text(), name) for name in names)
-        ]
-        if tests:
-            break
-        names |= {_dotted(path) for path in _importers(names)}
+    """Return tests that import a module, or what imports it, those nearest to it first."""
+    direct = {_dotted(module)}
+    names = direct | {_dotted(path) for path in _importers(direct)}
+    tests = [
+        path
+        for path in (PROJECT / "tests").rglob("test_*.py")
+        if not ELSEWHERE & set(path.parts)
+        and any(_imports(path.read_text(), name) for name in names)
+    ]
     return tuple(sorted(tests, key=lambda path: (_distance(path, module), path.stat().st_size)))
 
 
+@cache
 def _distance(tests: Path, module: Path) -> int:
     """Return how far tests are from a module: of its name, of one like it, of its room, or not."""
-    name = tests.stem.removeprefix("test_")
+    name, text = tests.stem.removeprefix("test_"), tests.read_text()
     if name == module.stem:
         return 0
     if module.stem in name:
         return 1
-    return 2 if module.parent.name in (name, *tests.parts) else 3
+    names = [
+        node.name
+        for node in ast.parse(module.read_text()).body
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name[0] != "_"
+    ]
+    if any(re.search(rf"\b{one}\b", text) for one in names):
+        return 2 if _imports(text, _dotted(module)) else 3
+    return 4 if module.parent.name in (name, *tests.parts) else 5
 
 
 def _importers(names: set[str]) -> list[Path]:
@@ -274,7 +279,7 @@ def tests_against(
 def judged_as(module: Path, line: int, code: str, source: Path, most: float) -> tuple[str, str]:
     """Return what becomes of a module with a changed line, and which test has found it.
 
-    The tests nearest to it run first, some others if these do not find it, and the rest one by one
+    The tests nearest to it run first, some others if these do not find it, and more one by one
     while none of them runs the line.
     """
     files = tests_of(module)
@@ -283,7 +288,7 @@ def judged_as(module: Path, line: int, code: str, source: Path, most: float) -> 
     stale = [str(path.relative_to(PACKAGE)) for path in _all_importers(module)] if kernels else []
     outcome = NOT_COVERED
     further = [path for path in files if path not in nearest]
-    stages = [nearest, further[:_MOST], *([path] for path in further[_MOST:])]
+    stages = [nearest, further[:_MOST], *([path] for path in further[_MOST : 3 * _MOST])]
     for place, stage in enumerate(stages):
         if place > 1 and outcome == SURVIVED:
             break
