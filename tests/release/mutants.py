@@ -174,33 +174,33 @@ def _parts_without_effect(node: ast.AST) -> Iterator[ast.expr | ast.stmt | ast.k
 @cache
 def tests_of(module: Path) -> tuple[Path, ...]:
     """Return tests that import a module, or what imports it, those nearest to it first."""
-    direct = {_dotted(module)}
-    names = direct | {_dotted(path) for path in _importers(direct)}
+    names = {_dotted(module)}
+    for _ in range(3):  # what packages hand on
+        names |= {_dotted(path) for path in _importers(names) if path.stem == "__init__"}
+    names |= {_dotted(path) for path in _importers(names)}
     tests = [
         path
         for path in (PROJECT / "tests").rglob("test_*.py")
         if not ELSEWHERE & set(path.parts)
         and any(_imports(path.read_text(), name) for name in names)
     ]
-    return tuple(sorted(tests, key=lambda path: (_distance(path, module), path.stat().st_size)))
+    return tuple(sorted(tests, key=lambda path: (*_distance(path, module), path.stat().st_size)))
 
 
 @cache
-def _distance(tests: Path, module: Path) -> int:
-    """Return how far tests are from a module: of its name, of one like it, of its room, or not."""
+def _distance(tests: Path, module: Path) -> tuple[int, int]:
+    """Return how far tests are from a module: by its name, its room, and what they use of it."""
     name, text = tests.stem.removeprefix("test_"), tests.read_text()
-    if name == module.stem:
-        return 0
-    if module.stem in name:
-        return 1
     names = [
         node.name
         for node in ast.parse(module.read_text()).body
         if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name[0] != "_"
     ]
-    if any(re.search(rf"\b{one}\b", text) for one in names):
-        return 2 if _imports(text, _dotted(module)) else 3
-    return 4 if module.parent.name in (name, *tests.parts) else 5
+    used = sum(re.search(rf"\b{one}\b", text) is not None for one in names)
+    by_name = (name == module.stem) + (name in module.stem or module.stem in name)
+    direct = used > 0 and _imports(text, _dotted(module))
+    rooms = set(module.relative_to(PACKAGE).parts[:-1])
+    return 4 - by_name - direct - bool(rooms & {name, *tests.parts}), -used
 
 
 def _importers(names: set[str]) -> list[Path]:
@@ -283,7 +283,9 @@ def judged_as(module: Path, line: int, code: str, source: Path, most: float) -> 
     while none of them runs the line.
     """
     files = tests_of(module)
-    nearest = [path for path in files if _distance(path, module) == _distance(files[0], module)][:2]
+    nearest = [
+        path for path in files if _distance(path, module)[0] == _distance(files[0], module)[0]
+    ][:2]
     kernels = "njit" in code
     stale = [str(path.relative_to(PACKAGE)) for path in _all_importers(module)] if kernels else []
     outcome = NOT_COVERED
