@@ -30,6 +30,7 @@ from dataclasses import asdict, dataclass
 from functools import cache, partial
 from pathlib import Path
 
+import yaml
 from cosmic_ray.ast import ast_nodes, get_ast
 from cosmic_ray.mutating import mutate_code
 from cosmic_ray.plugins import get_operator, operator_names
@@ -42,7 +43,14 @@ ROOMS = {
     "units": "units.py",
     "estimators": "estimators/**/*.py",
 }
-KILLED, TIMED_OUT, SURVIVED, NOT_COVERED = "killed", "timed out", "survived", "not covered"
+KILLED, TIMED_OUT, SURVIVED, NOT_COVERED, EQUIVALENT = OUTCOMES = (
+    "killed",
+    "timed out",
+    "survived",
+    "not covered",
+    "equivalent",
+)
+EQUIVALENTS = Path(__file__).with_name("equivalent_mutants.yaml")
 ENOUGH = 0.85
 
 _OPERATOR = re.compile(
@@ -87,6 +95,15 @@ class Mutant:
         except SyntaxError:
             return None
         return None if ast.dump(tree) == ast.dump(ast.parse(text)) else str(changed)
+
+    def change(self) -> tuple[str, str, str]:
+        """Return the module, and its lines that change, as they were and as they become."""
+        lines = [line.strip() for line in self.difference().splitlines()]
+        was, becomes = (
+            " ".join(word for line in lines if line[0] == sign for word in line[1:].split())
+            for sign in "-+"
+        )
+        return str(self.module.relative_to(PACKAGE)), was, becomes
 
     def difference(self) -> str:
         """Return the lines that change."""
@@ -175,9 +192,9 @@ def _parts_without_effect(node: ast.AST) -> Iterator[ast.expr | ast.stmt | ast.k
 def tests_of(module: Path) -> tuple[Path, ...]:
     """Return tests that import a module, or what imports it, those nearest to it first."""
     names = {_dotted(module)}
-    for _ in range(3):  # what packages hand on
-        names |= {_dotted(path) for path in _importers(names) if path.stem == "__init__"}
-    names |= {_dotted(path) for path in _importers(names)}
+    for handed_on in True, True, False, True, True:  # by packages, and by what imports it
+        importers = _importers(names)
+        names |= {_dotted(path) for path in importers if path.stem == "__init__" or not handed_on}
     tests = [
         path
         for path in (PROJECT / "tests").rglob("test_*.py")
@@ -310,12 +327,34 @@ def judged_as(module: Path, line: int, code: str, source: Path, most: float) -> 
     return outcome, ""
 
 
+@cache
+def equivalents() -> frozenset[tuple[str, str, str]]:
+    """Return the changes that are known to change no value.
+
+    Raises
+    ------
+    ValueError
+        If a line is no longer in its module.
+    """
+    found = set()
+    for module, changes in yaml.safe_load(EQUIVALENTS.read_text()).items():
+        text = " ".join((PACKAGE / module).read_text().split())
+        for one in changes:
+            was, becomes = (" ".join(one[key].split()) for key in ("was", "becomes"))
+            if was not in text:
+                raise ValueError(f"{EQUIVALENTS.name}: {module} has no line {was!r} any more")
+            found.add((module, was, becomes))
+    return frozenset(found)
+
+
 def judged(mutant: Mutant, source: Path, most: float) -> Outcome:
     """Return what becomes of a mutant."""
     begin = time.monotonic()
     code = mutant.code()
     assert code is not None
-    outcome, test = judged_as(mutant.module, mutant.place[0], code, source, most)
+    outcome, test = EQUIVALENT, ""
+    if mutant.change() not in equivalents():
+        outcome, test = judged_as(mutant.module, mutant.place[0], code, source, most)
     return Outcome(
         str(mutant.module.relative_to(PACKAGE)),
         mutant.operator,
@@ -338,8 +377,8 @@ def _all_importers(module: Path) -> list[Path]:
     return sorted(found)
 
 
-def drawn(room: str, number: int, seed: int) -> tuple[list[Mutant], int]:
-    """Return mutants of a room drawn at random, and how many there are to draw from."""
+def drawn(room: str, number: int, seed: int) -> list[Mutant]:
+    """Return mutants of a room drawn at random."""
     every = [
         mutant for module in sorted(PACKAGE.glob(ROOMS[room])) for mutant in mutants_of(module)
     ]
@@ -350,7 +389,7 @@ def drawn(room: str, number: int, seed: int) -> tuple[list[Mutant], int]:
             break
         if mutant.code() is not None:
             taken.append(mutant)
-    return taken, len(every)
+    return taken
 
 
 def left_in(report: Path) -> list[Mutant]:
@@ -386,13 +425,13 @@ def main() -> int:
     prepare()
     source = copied(folder)
     if arguments.again:
-        samples = {arguments.again.stem: (left_in(arguments.again), 0)}
+        samples = {arguments.again.stem: left_in(arguments.again)}
     else:
         samples = {room: drawn(room, arguments.mutants, arguments.seed) for room in arguments.room}
     table, enough = [], True
     context = multiprocessing.get_context("fork")
     with ProcessPoolExecutor(arguments.jobs, mp_context=context) as pool:
-        for room, (sample, every) in samples.items():
+        for room, sample in samples.items():
             counts: Counter[str] = Counter()
             report = folder / f"{room}-{arguments.seed}-{time.strftime('%H%M%S')}.jsonl"
             for one in pool.map(partial(judged, source=source, most=arguments.seconds), sample):
@@ -401,27 +440,28 @@ def main() -> int:
                     lines.write(f"{json.dumps(asdict(one))}\n")
                 if one.outcome in (SURVIVED, NOT_COVERED):
                     print(f"{one.module}:{one.line} {one.outcome}\n{one.change}", flush=True)
-            table.append(_row(room, counts, every))
-            enough &= _share(counts) >= ENOUGH
-    print("room        drawn    of  killed  timed out  survived  not covered  found (95 %)")
+            table.append(_row(room, counts))
+            enough &= _share(counts)[0] >= ENOUGH
+    print(f"{'room':<11} drawn {'  '.join(OUTCOMES)}  found of the others (95 %)")
     print("\n".join(table))
     return int(not enough)
 
 
-def _share(counts: Counter[str]) -> float:
-    return (counts[KILLED] + counts[TIMED_OUT]) / max(counts.total(), 1)
-
-
-def _row(room: str, counts: Counter[str], every: int) -> str:
+def _share(counts: Counter[str]) -> tuple[float, float, float]:
+    """Return the part found of what can be found, and the limits of its Wilson interval."""
     from scipy.stats import binomtest
 
-    found = counts[KILLED] + counts[TIMED_OUT]
-    low, high = binomtest(found, max(counts.total(), 1)).proportion_ci(method="wilson")
-    return (
-        f"{room:<11} {counts.total():>5} {every:>5}  {counts[KILLED]:>6}  {counts[TIMED_OUT]:>9}"
-        f"  {counts[SURVIVED]:>8}  {counts[NOT_COVERED]:>11}"
-        f"  {_share(counts):.0%} ({low:.0%} to {high:.0%})"
-    )
+    can, found = counts.total() - counts[EQUIVALENT], counts[KILLED] + counts[TIMED_OUT]
+    if not can:
+        return 1.0, 0.0, 1.0
+    interval = binomtest(found, can).proportion_ci(method="wilson")
+    return found / can, interval.low, interval.high
+
+
+def _row(room: str, counts: Counter[str]) -> str:
+    numbers = "  ".join(f"{counts[outcome]:>{len(outcome)}}" for outcome in OUTCOMES)
+    share, low, high = _share(counts)
+    return f"{room:<11} {counts.total():>5} {numbers}  {share:.0%} ({low:.0%} to {high:.0%})"
 
 
 if __name__ == "__main__":
