@@ -24,7 +24,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from functools import cache, partial
@@ -208,24 +208,32 @@ def tests_of(module: Path) -> tuple[Path, ...]:
 def _distance(tests: Path, module: Path) -> tuple[int, int]:
     """Return how far tests are from a module: by its name, its room, and what they use of it."""
     name, text = tests.stem.removeprefix("test_"), tests.read_text()
-    names = [
+    by_name = (name == module.stem) + bool(set(name.split("_")) & set(module.stem.split("_")))
+    words = set(re.findall(r"\w+", text))
+    used = len(words & _names(module))
+    direct = used > 0 and _imports(text, _dotted(module))
+    through = sum(len(words & _names(path)) for path in _importers({_dotted(module)}))
+    rooms = set(module.relative_to(PACKAGE).parts[:-1])
+    return 4 - by_name - direct - bool(rooms & {name, *tests.parts}), -2 * used - through
+
+
+@cache
+def _names(module: Path) -> frozenset[str]:
+    """Return what a module defines for others."""
+    return frozenset(
         node.name
         for node in ast.parse(module.read_text()).body
         if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name[0] != "_"
-    ]
-    used = sum(re.search(rf"\b{one}\b", text) is not None for one in names)
-    by_name = (name == module.stem) + (name in module.stem or module.stem in name)
-    direct = used > 0 and _imports(text, _dotted(module))
-    rooms = set(module.relative_to(PACKAGE).parts[:-1])
-    return 4 - by_name - direct - bool(rooms & {name, *tests.parts}), -used
+    )
 
 
 def _importers(names: set[str]) -> list[Path]:
-    return [
-        path
-        for path in sorted(PACKAGE.rglob("*.py"))
-        if any(_imports(path.read_text(), name) for name in names)
-    ]
+    return [path for path in sorted(PACKAGE.rglob("*.py")) if any(map(_of(path), names))]
+
+
+@cache
+def _of(path: Path) -> Callable[[str], bool]:
+    return cache(partial(_imports, path.read_text()))
 
 
 def _dotted(module: Path) -> str:
@@ -302,12 +310,12 @@ def judged_as(module: Path, line: int, code: str, source: Path, most: float) -> 
     files = tests_of(module)
     nearest = [
         path for path in files if _distance(path, module)[0] == _distance(files[0], module)[0]
-    ][:2]
+    ][:3]
     kernels = "njit" in code
     stale = [str(path.relative_to(PACKAGE)) for path in _all_importers(module)] if kernels else []
     outcome = NOT_COVERED
     further = [path for path in files if path not in nearest]
-    stages = [nearest, further[:_MOST], *([path] for path in further[_MOST : 3 * _MOST])]
+    stages = [nearest, further[:_MOST], *([path] for path in further[_MOST : 2 * _MOST])]
     for place, stage in enumerate(stages):
         if place > 1 and outcome == SURVIVED:
             break
