@@ -46,5 +46,5 @@ def test_blocks_far_apart_have_the_mean_logarithm_of_their_distance(lag: int) ->
 
     mean = mpmath.quad(weighed, [-1, 0, 1])
     found = Flicker(2.0).block_covariance(np.array([float(lag)]), 10.0)[0]
-    # 1e-14 but at lag 99, where the closed form has lost digits: 4e-13
+    # 1e-15, but at lag 99, where the closed form has lost digits, 2e-12
     assert found == pytest.approx(-4.0 / math.pi * float(mean), rel=1e-11)
