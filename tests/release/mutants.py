@@ -61,6 +61,9 @@ _OPERATOR = re.compile(
     r"|ReplaceAndWithOr|ReplaceOrWithAnd|ReplaceTrueWithFalse|ReplaceFalseWithTrue|AddNot"
     r"|ReplaceContinueWithBreak|ReplaceBreakWithContinue|NumberReplacer|ZeroIterationForLoop)"
 )
+_FAR = (4, 0)
+"""From here on tests neither have a name like that of a module, nor use what it defines."""
+
 _MOST = 4
 """Test files against one mutant besides those that are nearest to it."""
 
@@ -200,6 +203,7 @@ def tests_of(module: Path) -> tuple[Path, ...]:
         for path in (PROJECT / "tests").rglob("test_*.py")
         if not ELSEWHERE & set(path.parts)
         and any(_imports(path.read_text(), name) for name in names)
+        and _distance(path, module) < _FAR
     ]
     return tuple(sorted(tests, key=lambda path: (*_distance(path, module), path.stat().st_size)))
 
