@@ -176,6 +176,9 @@ def _forked(files: list[Path], source: Path, plugin: _Order, log: Path, longest:
         output = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
         os.dup2(output, 1)
         os.dup2(output, 2)
+        sys.stdout, sys.stderr = os.fdopen(1, "w"), os.fdopen(2, "w")
+        for name in [name for name in sys.modules if name.split(".")[0] in (PACKAGE.name, "tests")]:
+            del sys.modules[name]
         os.chdir(PROJECT)
         os.environ["PYTHONPATH"] = str(source)
         sys.path.insert(0, str(source))
