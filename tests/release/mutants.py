@@ -64,9 +64,6 @@ _OPERATOR = re.compile(
 _FAR = (4, 0)
 """From here on tests neither have a name like that of a module, nor use what it defines."""
 
-_MOST = 4
-"""Test files against one mutant besides those that are nearest to it."""
-
 ELSEWHERE = {"workflow", "browser", "slurm", "release", "report", "benchmarks"}
 """Folders of tests of what is far above, and slow."""
 
@@ -305,11 +302,13 @@ def tests_against(
     return taken
 
 
-def judged_as(module: Path, line: int, code: str, source: Path, most: float) -> tuple[str, str]:
+def judged_as(
+    module: Path, line: int, code: str, source: Path, most: float, further: int = 4
+) -> tuple[str, str]:
     """Return what becomes of a module with a changed line, and which test has found it.
 
-    The tests nearest to it run first, some others if these do not find it, and more one by one
-    while none of them runs the line.
+    The tests nearest to it run first, those of further files if these do not find it, and as many
+    files again, one by one, while none of them runs the line.
     """
     files = tests_of(module)
     nearest = [
@@ -318,8 +317,8 @@ def judged_as(module: Path, line: int, code: str, source: Path, most: float) -> 
     kernels = "njit" in code
     stale = [str(path.relative_to(PACKAGE)) for path in _all_importers(module)] if kernels else []
     outcome = NOT_COVERED
-    further = [path for path in files if path not in nearest]
-    stages = [nearest, further[:_MOST], *([path] for path in further[_MOST : 2 * _MOST])]
+    others = [path for path in files if path not in nearest]
+    stages = [nearest, others[:further], *([path] for path in others[further : 2 * further])]
     for place, stage in enumerate(stages):
         if place > 1 and outcome == SURVIVED:
             break
@@ -359,14 +358,14 @@ def equivalents() -> frozenset[tuple[str, str, str]]:
     return frozenset(found)
 
 
-def judged(mutant: Mutant, source: Path, most: float) -> Outcome:
+def judged(mutant: Mutant, source: Path, most: float, further: int) -> Outcome:
     """Return what becomes of a mutant."""
     begin = time.monotonic()
     code = mutant.code()
     assert code is not None
     outcome, test = EQUIVALENT, ""
     if mutant.change() not in equivalents():
-        outcome, test = judged_as(mutant.module, mutant.place[0], code, source, most)
+        outcome, test = judged_as(mutant.module, mutant.place[0], code, source, most, further)
     return Outcome(
         str(mutant.module.relative_to(PACKAGE)),
         mutant.operator,
@@ -429,6 +428,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=1, help="at a time, of one core each")
     parser.add_argument("--seconds", type=float, default=60.0, help="of tests against one mutant")
+    parser.add_argument("--further", type=int, default=4, help="files of tests besides the nearest")
     parser.add_argument("--kept", type=Path, help="folder for what tests do without mutants")
     parser.add_argument("--again", type=Path, help="JSON of a run: those that it did not find")
     arguments = parser.parse_args()
@@ -446,7 +446,10 @@ def main() -> int:
         for room, sample in samples.items():
             counts: Counter[str] = Counter()
             report = folder / f"{room}-{arguments.seed}-{time.strftime('%H%M%S')}.jsonl"
-            for one in pool.map(partial(judged, source=source, most=arguments.seconds), sample):
+            for one in pool.map(
+                partial(judged, source=source, most=arguments.seconds, further=arguments.further),
+                sample,
+            ):
                 counts[one.outcome] += 1
                 with report.open("a") as lines:
                     lines.write(f"{json.dumps(asdict(one))}\n")
