@@ -36,4 +36,4 @@ def test_what_is_certain_is_found(
     assert line in text
     place = text[: text.index(line)].count("\n") + 1
     code = text.replace(line, changed)
-    assert judged_as(PACKAGE / module, place, code, source, most=20.0)[0] == outcome
+    assert judged_as(PACKAGE / module, place, code, source, 20.0, further=0)[0] == outcome
