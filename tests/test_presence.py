@@ -24,7 +24,7 @@ def test_differences_are_there_by_definition(n: int, spans: list[tuple[int, int]
     log = rng.standard_normal(3000)
     log[rng.random(3000) < 0.05] = np.nan
     log[1800:1950] = np.nan
-    blocks = [log[:700], log[700:701], log[701:]]
+    blocks = [log[:700], log[700:701], log[701:-1], log[-1:]]
     found = presence(blocks, len(log), spans).differences(n)
     assert found is not None
     there, stride = found
