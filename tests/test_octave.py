@@ -92,6 +92,8 @@ def test_noise_types_are_those_of_full_overlap(rng: np.random.Generator) -> None
     np.testing.assert_array_equal(octave.exponent[:5], 0)
     assert -2 in octave.exponent
     assert (octave.exponent == full.exponent).mean() > 0.9
+    walk = make(rng, "walk", 1 << 17)
+    assert (of_blocks([walk], len(walk), 1.0, holes=False).exponent[:20] == -2).all()
 
 
 def test_what_goes_wrong_in_the_blocks_is_told(rng: np.random.Generator) -> None:
