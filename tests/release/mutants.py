@@ -1,14 +1,18 @@
 """How many small faults in the code the tests find: mutants, drawn at random.
 
 Each is one operator, comparison, number or condition changed in a copy of the package. Against it
-run the tests that run its lines, the quickest first, to the first that fails; of tests of every day
-that import its module, workflows and browsers apart. What is changed without any effect is not
-drawn: annotations, exports, what a decorator keeps or compiles, messages. What makes the mutants
+run the tests of every day that run its line, workflows and browsers apart: of the files nearest to
+its module first, the quickest first, to the first that fails. What changes no result is not drawn:
+annotations, exports, what a decorator keeps or compiles, the words of errors. What was looked at
+and changes no value is in ``equivalent_mutants.yaml``, and counted apart. What makes the mutants
 comes with ``pip install -e '.[release]'``.
 
     python -m tests.release.mutants --room noise --mutants 40 --kept /tmp/mutants
+    python -m tests.release.mutants --again /tmp/mutants/noise-1-120000.jsonl --kept /tmp/mutants
 
-A mutant that no test finds is printed with its change, and is in ``--kept`` as JSON.
+A mutant that no test finds is printed with its change. ``--kept`` has all of them as JSON, and what
+tests do without mutants, so that another run begins at once; ``--again`` runs those of an earlier
+run that were not found.
 """
 
 from __future__ import annotations
