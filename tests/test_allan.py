@@ -39,8 +39,10 @@ def test_agrees_with_allantools(rng: np.random.Generator, offset: float) -> None
     np.testing.assert_array_equal(terms, len(samples) - 2 * sizes + 1)
 
 
-def test_gravity_in_single_precision_costs_no_digits(rng: np.random.Generator) -> None:
+@pytest.mark.parametrize("loss", [0.0, 0.01])
+def test_gravity_in_single_precision_costs_no_digits(rng, loss: float) -> None:
     samples = (9.81 + 1e-3 * rng.standard_normal(100_000)).astype(np.float32)
+    samples[1:][rng.random(99_999) < loss] = np.nan
     exact = samples.astype(np.float64) - float(samples[0])
     np.testing.assert_allclose(
         allan_variance(samples, 100.0).variance, allan_variance(exact, 100.0).variance, rtol=1e-10
@@ -140,6 +142,26 @@ def test_no_difference_spans_segments(rng: np.random.Generator) -> None:
         for n, weight in zip(sizes, terms, strict=True)
     ]
     np.testing.assert_allclose(curve.variance, apart, rtol=1e-9)
+
+
+@pytest.mark.parametrize("loss", [0.0, 0.02])
+def test_each_segment_adds_what_it_has(rng: np.random.Generator, loss: float) -> None:
+    log = rng.standard_normal(2060)
+    log[rng.random(2060) < loss] = np.nan
+    sizes = [10, 50, 100]
+    first, second, both = (
+        allan_variance(log[:stop], 10.0, cluster_sizes=sizes, segments=segments)
+        for stop, segments in (
+            (1000, None),
+            (1060, [(0, 1000), (1000, 1060)]),  # shorter than two clusters of the longer sizes
+            (2000, [(0, 1000), (1000, 2000)]),
+        )
+    )
+    for name in ("variance", "edf", "averaged", "share"):
+        np.testing.assert_allclose(getattr(second, name)[1:], getattr(first, name)[1:], rtol=1e-12)
+    if not loss:
+        np.testing.assert_allclose(both.edf, 2 * first.edf, rtol=1e-12)
+        np.testing.assert_array_equal(both.share, 1.0)
 
 
 # --------------------------------------------------------------------------------- grid, errors

@@ -44,15 +44,19 @@ def test_long_and_short_sums_meet() -> None:
 
 
 @pytest.mark.parametrize(
-    ("make", "exponent"),
+    ("make", "exponent", "loss"),
     [
-        (lambda noise: np.diff(noise, prepend=0.0), 2),
-        (lambda noise: noise, 0),
-        (lambda noise: np.cumsum(noise), -2),
+        (lambda noise: np.diff(noise, prepend=0.0), 2, 0.0),
+        (lambda noise: noise, 0, 0.0),
+        (lambda noise: noise, 0, 0.02),
+        (lambda noise: np.cumsum(noise), -2, 0.0),
+        (lambda noise: np.cumsum(noise), -2, 0.02),
     ],
 )
-def test_noise_types_are_told(rng: np.random.Generator, make, exponent: int) -> None:
-    curve = allan_variance(make(rng.standard_normal(100_000)), 1.0, cluster_sizes=[1, 4, 32, 256])
+def test_noise_types_are_told(rng: np.random.Generator, make, exponent: int, loss: float) -> None:
+    log = 9.81 + make(rng.standard_normal(100_000))
+    log[rng.random(100_000) < loss] = np.nan
+    curve = allan_variance(log, 1.0, cluster_sizes=[1, 4, 32, 256])
     assert curve.exponent.tolist() == [exponent] * 4
 
 

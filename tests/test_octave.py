@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes, of_blocks
-from imubench_pipeline.allan.octave import SECTION, STEPS, octave_sizes
+from imubench_pipeline.allan.octave import SECTION, SHORTEST, STEPS, octave_sizes
 
 
 def standard_error(curve: AllanCurve) -> np.ndarray:
@@ -34,6 +34,8 @@ def test_equal_to_full_overlap_within_a_tenth_of_its_error(rng, kind, samples, l
     difference = np.abs(octave.deviation - full.deviation[:together])
     assert (difference < 0.1 * standard_error(full)[:together]).all()
     np.testing.assert_allclose(octave.averaged, full.averaged[:together], rtol=2e-3)
+    if samples < SHORTEST:  # all clusters are used
+        np.testing.assert_array_equal(octave.variance, full.variance)
 
 
 def test_short_clusters_overlap_fully(rng: np.random.Generator) -> None:
@@ -90,6 +92,8 @@ def test_noise_types_are_those_of_full_overlap(rng: np.random.Generator) -> None
     np.testing.assert_array_equal(octave.exponent[:5], 0)
     assert -2 in octave.exponent
     assert (octave.exponent == full.exponent).mean() > 0.9
+    walk = make(rng, "walk", 1 << 17)
+    assert (of_blocks([walk], len(walk), 1.0, holes=False).exponent[:20] == -2).all()
 
 
 def test_what_goes_wrong_in_the_blocks_is_told(rng: np.random.Generator) -> None:

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from imubench_pipeline.allan import cluster_sizes
 from imubench_pipeline.allan.presence import presence
 
 
@@ -23,7 +24,7 @@ def test_differences_are_there_by_definition(n: int, spans: list[tuple[int, int]
     log = rng.standard_normal(3000)
     log[rng.random(3000) < 0.05] = np.nan
     log[1800:1950] = np.nan
-    blocks = [log[:700], log[700:701], log[701:]]
+    blocks = [log[:700], log[700:701], log[701:-1], log[-1:]]
     found = presence(blocks, len(log), spans).differences(n)
     assert found is not None
     there, stride = found
@@ -43,3 +44,19 @@ def test_a_long_log_is_counted_at_a_stride() -> None:
     gone = stride * np.flatnonzero(~there)
     assert gone[0] == pytest.approx(100_000 - 38_000, abs=2 * stride)
     assert gone[-1] == pytest.approx(160_000 - 2_000, abs=2 * stride)
+
+
+def test_no_answer_rather_than_one_of_few_clusters() -> None:
+    length = 8 << 20
+    found = presence([np.zeros(1 << 20)] * 8, length)
+    told = []
+    for n in cluster_sizes(length):
+        answer = found.differences(n)
+        if answer is not None:
+            there, stride = answer
+            assert there.all()
+            # the whole log, or 32 clusters of its beginning
+            reach = (len(there) - 1) * stride + 2 * n
+            assert reach > length - 2 * stride or reach >= 32 * n - stride
+        told.append(answer is not None)
+    assert told[0] and told[-1] and not all(told)

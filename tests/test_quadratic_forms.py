@@ -30,3 +30,5 @@ def test_unequal_weights_have_a_shorter_lower_tail_than_their_variance_says() ->
 
 def test_one_weight_is_one_degree_of_freedom() -> None:
     assert tail_degrees(np.array([0.2])) == 1.0
+    # and a second one that counts for nothing adds none: 0.965 by the saddlepoint
+    assert tail_degrees(np.array([0.2, 1e-12])) == pytest.approx(1.0, rel=0.05)

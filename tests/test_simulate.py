@@ -158,6 +158,17 @@ def test_the_ensemble_is_that_of_full_length_logs(rng) -> None:
     np.testing.assert_allclose(drawn.std(axis=0) / spread, 1.0, atol=0.2)
 
 
+def test_the_ensemble_has_the_mean_and_the_scatter_of_the_model(rng) -> None:
+    length, members = 40_000, 300
+    sizes = cluster_sizes(length, per_decade=4, longest=1 / 9)
+    drawn = ensemble(MODEL, RATE, length, sizes, members, rng)
+    expected = MODEL.allan_variance(sizes / RATE, RATE)
+    scatter = np.sqrt(np.diag(variance_covariance(MODEL, RATE, length, sizes)))
+    error = np.abs(drawn.mean(axis=0) - expected) / scatter * np.sqrt(members)
+    assert (error < 4.5).all()
+    np.testing.assert_allclose(drawn.std(axis=0) / scatter, 1.0, atol=0.15)
+
+
 @pytest.mark.release
 def test_neighbouring_taus_go_together_in_the_ensemble(rng) -> None:
     sizes = np.array([2, 3, 4, 8])

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from imubench_pipeline.noise import Ramp
 from imubench_pipeline.noise.state_space import repeat_step, root_of
 
 
@@ -24,3 +25,12 @@ def test_the_root_of_a_covariance_in_which_something_does_not_vary():
     np.testing.assert_allclose(root @ root.T, covariance, atol=1e-15)
     assert (np.triu(root, 1) == 0.0).all()
     assert root_of(np.zeros((0, 0))).shape == (0, 0)
+
+
+def test_of_either_sign_the_mean_square_is_the_same():
+    space = Ramp(0.7).state_space(0.01)
+    either = space.of_either_sign()
+    assert (either.initial_mean == 0.0).all()
+    square = np.diag(space.initial_variance) + space.initial_mean**2
+    np.testing.assert_allclose(np.diag(either.initial_variance), square, rtol=1e-15)
+    assert square[1] == pytest.approx(0.7**2)

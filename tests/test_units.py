@@ -35,6 +35,7 @@ KNOWN = [
     (30, "º/s over -40..85 (total)", "angular_rate", 0.523598776),
     (4096, "deg/s*2^-12", "angular_rate", 0.0174532925),
     (1, "g", "acceleration", 9.80665),
+    (1, "g0", "acceleration", 9.80665),
     (1, "mg", "acceleration", 9.80665e-3),
     (8, "mg(RMS)", "acceleration", 0.0784532),
     (1, "µg", "acceleration", 9.80665e-6),
@@ -317,6 +318,7 @@ def test_any_text_is_a_unit_or_an_error_that_says_so(text: str, dimension: str) 
         ("m*s**(-1)", 1.0),
         ("1/(s/m)", 1.0),
         ("km/(h)", 1 / 3.6),
+        ("s^(-2/2) m", 1.0),
     ],
 )
 def test_products_quotients_and_powers(written: str, factor: float | None) -> None:

@@ -61,6 +61,14 @@ def test_the_covariance_is_the_exact_double_sum(model: NoiseModel) -> None:
     assert difference.max() < 0.1
 
 
+def test_the_differences_of_a_short_log_are_counted() -> None:
+    sizes = np.array([1, 2, 4])
+    expected = np.diag(exact(NoiseModel(N=1.0), 40, sizes))
+    found = np.diag(variance_covariance(NoiseModel(N=1.0), 1.0, 40, sizes))
+    # within 0.0021; one difference more or less is 0.0125
+    np.testing.assert_allclose(np.sqrt(found / expected), 1.0, atol=0.004)
+
+
 def test_white_noise_has_the_degrees_of_freedom_of_greenhall_and_riley() -> None:
     samples = 3_600_000
     sizes = cluster_sizes(samples, longest=1 / 9)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.estimators.deterministic.courses import find_courses
+from imubench_pipeline.estimators.deterministic.means import Steadiness
 from imubench_pipeline.estimators.deterministic.verdict import (
     Verdict,
     deterministic_rows,
@@ -115,3 +116,19 @@ def test_what_makes_b_doubtful_makes_the_curve_doubtful() -> None:
     assert [one.status for one in found.values()] == ["ok", "doubtful", "doubtful"]
     found = Verdict((), {"K": ("not_identified", "a drift is as good")}).applied(estimate).curve
     assert {one.status for one in found.values()} == {"ok"}
+
+
+@pytest.mark.parametrize(
+    ("trend", "error", "spread", "chi_squared", "grows", "varies"),
+    [
+        (0.1, 0.01, 0.1, 90.0, True, True),
+        (-0.1, 0.01, 0.1, 90.0, True, True),
+        (0.1, 0.05, 0.1, 20.0, False, False),  # by chance
+        (0.01, 0.0005, 0.01, 90.0, False, False),  # surely, but by nothing that matters
+    ],
+)
+def test_a_change_of_noise_is_told_if_it_is_sure_and_matters(
+    trend: float, error: float, spread: float, chi_squared: float, grows: bool, varies: bool
+) -> None:
+    steady = Steadiness(trend, error, spread, chi_squared, 0.0, 3600.0)
+    assert (steady.grows, steady.varies) == (grows, varies)

@@ -44,3 +44,9 @@ def test_the_limits_of_what_is_absent_are_those_of_white_noise_alone() -> None:
     B = found.parameters["B"].upper
     assert B is not None
     assert B < 1e-3
+    # White noise alone is told to N / sqrt(2 L), the Cramér-Rao bound.
+    N = found.parameters["N"]
+    assert N.status == "ok" and N.value is not None and N.lower is not None and N.upper is not None
+    bound = 1e-3 / np.sqrt(2 * SAMPLES)
+    assert abs(N.value - 1e-3) < 4 * bound
+    assert (N.upper - N.lower) / (2 * 1.96) == pytest.approx(bound, rel=0.25)

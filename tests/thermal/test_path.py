@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from imubench_pipeline.estimators.thermal.path import temperature_path
+from imubench_pipeline.estimators.thermal.path import TemperaturePath, temperature_path
 from imubench_pipeline.estimators.thermal.path_kernels import cell_moments
 from imubench_pipeline.estimators.thermal.register import KNOTS, readings, step_of
 
@@ -103,6 +103,22 @@ def test_between_segments_nothing_is_interpolated():
     assert np.array_equal(np.concatenate(parts), expected)
     within = path.at(np.array([29_998.5, 30_500.5]), path.sample)
     assert within == pytest.approx([29_995.5, 30_503.5])
+
+
+@pytest.mark.parametrize("first, block, count", [(0, 3, 10), (0, 30, 1), (7, 1, 5), (103, 7, 2)])
+def test_means_over_blocks_are_integrals_of_lines_between_knots(first, block, count):
+    parts, segments = (slice(0, 3), slice(3, 5)), ((0, 30), (100, 120))
+    knots = np.array([4.5, 14.5, 24.5, 104.5, 114.5])
+    path = TemperaturePath(knots, knots, knots, knots[None], parts, segments, 0.0, 0.0)
+    values = np.random.default_rng(first).standard_normal((2, 5))
+    part = parts[first >= 100]
+    for row, means in zip(values, path.means(first, block, count, values), strict=True):
+        for i, mean in enumerate(means):
+            begin = first - 0.5 + i * block
+            inside = knots[(knots > begin) & (knots < begin + block)]
+            places = np.concatenate(([begin], inside, [begin + block]))
+            heights = np.interp(places, knots[part], row[part])
+            assert mean == pytest.approx(np.trapezoid(heights, places) / block, rel=1e-12)
 
 
 def test_draws_spread_as_the_deviation_says():
