@@ -29,10 +29,6 @@ def limit_memory(more: int) -> None:
 
     What it asks for beyond is refused to it, which the libraries report as an error. Addresses
     that are only reserved do not count, as they do with RLIMIT_AS: Arrow and numba reserve many.
-
-    Parameters
-    ----------
-    more : int
     """
     if sys.platform != "linux":
         return
@@ -50,7 +46,6 @@ def bounded(
 
     Parameters
     ----------
-    seconds : float
     memory : int
         Bytes that it may take beside what this process has.
     function : callable

@@ -275,10 +275,6 @@ def _directory_of(archive: Path, _size: int, _written: int) -> Mapping[str, zipf
 def opened_archive(path: Path) -> Iterator[zipfile.ZipFile]:
     """Open a zip archive whose directory is no larger than that of a log.
 
-    Parameters
-    ----------
-    path : Path
-
     Raises
     ------
     RecordingError

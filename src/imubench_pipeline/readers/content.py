@@ -47,7 +47,6 @@ def format_of(path: Path, stated: Reader | None = None) -> FileFormat:
 
     Parameters
     ----------
-    path : Path
     stated : Reader or None
         What the sensor file says.
     """

@@ -155,7 +155,6 @@ def unpacked_zstd(data: bytes, most: int) -> bytes:
 
     Parameters
     ----------
-    data : bytes
     most : int
         That are unpacked at most.
 

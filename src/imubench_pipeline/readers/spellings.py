@@ -76,7 +76,6 @@ def divided(label: str, dimension: str) -> tuple[str, str | None]:
 
     Parameters
     ----------
-    label : str
     dimension : str
         Of the unit that is looked for.
 

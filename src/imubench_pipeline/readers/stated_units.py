@@ -19,18 +19,12 @@ _LONGEST = 60
 
 @dataclass(frozen=True)
 class StatedUnit:
-    """The unit of a channel as the log itself states it.
-
-    Attributes
-    ----------
-    unit : str
-        As a sensor file would state it.
-    where : str
-        The place in the log.
-    """
+    """The unit of a channel as the log itself states it."""
 
     unit: str
+    """As a sensor file would state it."""
     where: str
+    """The place in the log."""
 
 
 def stated(channel: str, beside: Iterable[tuple[str | None, str]], label: str) -> StatedUnit | None:

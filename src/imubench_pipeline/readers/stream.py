@@ -17,7 +17,6 @@ def blocks(path: Path, findings: list[Finding]) -> Iterator[bytes]:
 
     Parameters
     ----------
-    path : Path
     findings : list of Finding
         What is found goes here: that compressed data end early.
 

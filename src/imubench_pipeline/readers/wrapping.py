@@ -11,18 +11,12 @@ from numpy.typing import NDArray
 
 @dataclass
 class WrapState:
-    """What is known of a counter after the stamps read so far.
-
-    Attributes
-    ----------
-    last : int or float or None
-        The last stamp that was there, as written.
-    turns : int
-        How often the counter has started again.
-    """
+    """What is known of a counter after the stamps read so far."""
 
     last: Any = None
+    """The last stamp that was there, as written."""
     turns: int = 0
+    """How often the counter has started again."""
 
 
 def unwrapped(stamps: NDArray[Any], wraps: float, state: WrapState) -> NDArray[Any]:

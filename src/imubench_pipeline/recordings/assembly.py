@@ -43,10 +43,8 @@ def assemble(
 
     Parameters
     ----------
-    parts : list of Part
     base : TimeBase
         Their clock.
-    settings : QualitySettings
     metadata : dict
         Goes into the file.
     path : Path

@@ -22,29 +22,19 @@ _LONGEST_NAME = 120
 
 @dataclass(frozen=True)
 class Recording:
-    """One recording that was found, or is to be simulated.
-
-    Attributes
-    ----------
-    sensor, name : str
-    path : Path
-        The log file, or the folder of a recording that has several.
-    notes : Path or None
-        The file of notes beside it.
-    simulated : bool
-    error : str or None
-        Why the file cannot be used, where its name or its place says so already.
-    held_back : bool
-        The log is not read in this run: the results that are there stay.
-    """
+    """One recording that was found, or is to be simulated."""
 
     sensor: str
     name: str
     path: Path
+    """The log file, or the folder of a recording that has several."""
     notes: Path | None
+    """The file of notes beside it."""
     simulated: bool
     error: str | None = None
+    """Why the file cannot be used, where its name or its place says so already."""
     held_back: bool = False
+    """The log is not read in this run: the results that are there stay."""
 
     @property
     def files(self) -> list[Path]:

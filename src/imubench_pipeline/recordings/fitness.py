@@ -74,36 +74,24 @@ _SHOWN = 3
 
 @dataclass(frozen=True)
 class Doubt:
-    """Why figures of a recording may be wrong.
-
-    Attributes
-    ----------
-    sensor, recording : str
-    channel : str or None
-        None: the whole recording.
-    code : str
-        The finding, ``not_explained`` (no model explains the spectrum), or the status of a
-        parameter.
-    parameters : tuple of str
-        On which it bears; none: on all.
-    unfit : bool
-        The figures may be of something else.
-    factor : float or None
-        By which it may change a value, where that is known.
-    start, end : float or None
-        The part of the recording that it concerns, s from the first sample; None: all of it.
-    reason : str
-    """
+    """Why figures of a recording may be wrong."""
 
     sensor: str
     recording: str
     channel: str | None
+    """None: the whole recording."""
     code: str
+    """The finding, ``not_explained`` (no model explains the spectrum), or the status of a
+    parameter."""
     parameters: tuple[str, ...]
+    """On which it bears; none: on all."""
     unfit: bool
+    """The figures may be of something else."""
     factor: float | None
+    """By which it may change a value, where that is known."""
     start: float | None
     end: float | None
+    """The part of the recording that it concerns, s from the first sample; None: all of it."""
     reason: str
 
     @property
@@ -258,7 +246,6 @@ def with_doubts(
 
     Parameters
     ----------
-    rows : iterable of mapping
     recordings : iterable of mapping
         Rows of the table ``recordings``.
     names : sequence of (str, str)

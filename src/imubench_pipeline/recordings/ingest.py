@@ -39,29 +39,19 @@ from imubench_pipeline.tables.findings import Finding, RecordingError
 
 @dataclass(frozen=True)
 class Ingested:
-    """What was kept of a recording.
-
-    Attributes
-    ----------
-    summary : dict
-        A row of the table ``recordings`` without the names.
-    findings : list of Finding
-    channels : dict
-        Rate in Hz, points of the grid, segments and levels of each channel that goes on.
-    kept : dict
-        The files of samples (`imubench_pipeline.recordings.quality_file.identified`).
-    gravity : GravityTurn or None
-        How gravity turns against the sensor.
-    sources : dict
-        The files of the log, by their place in it; None: they were not read to their end.
-    """
+    """What was kept of a recording."""
 
     summary: dict[str, Any]
+    """A row of the table ``recordings`` without the names."""
     findings: list[Finding]
     channels: dict[str, dict[str, Any]] = field(default_factory=dict)
+    """Rate in Hz, points of the grid, segments and levels of each channel that goes on."""
     kept: dict[str, dict[str, Any]] = field(default_factory=dict)
+    """The files of samples (`imubench_pipeline.recordings.quality_file.identified`)."""
     gravity: GravityTurn | None = None
+    """How gravity turns against the sensor."""
     sources: dict[str, KnownFile] | None = None
+    """The files of the log, by their place in it; None: they were not read to their end."""
 
     def quality(self, names: dict[str, Any]) -> Quality:
         """Return what ``quality.json`` says, with the names of the recording."""

@@ -33,28 +33,19 @@ _TICK = 2_000_000_000
 
 @dataclass(frozen=True)
 class KnownFile:
-    """A file of a log as it was read.
-
-    Attributes
-    ----------
-    size : int
-        Bytes.
-    sha256 : str
-        Of the content.
-    steady : bool
-        Nothing was done to it while it was read.
-    stamps : tuple of int or None
-        Last change of the content and of anything, ns since 1970; None: they were too young to
-        tell a later change.
-    version : str
-        What the plan calls this content; another text wherever it is another one.
-    """
+    """A file of a log as it was read."""
 
     size: int
+    """Bytes."""
     sha256: str
+    """Of the content."""
     steady: bool
+    """Nothing was done to it while it was read."""
     stamps: tuple[int, int] | None
+    """Last change of the content and of anything, ns since 1970; None: they were too young to tell
+    a later change."""
     version: str = ""
+    """What the plan calls this content; another text wherever it is another one."""
 
     @classmethod
     def of(cls, path: Path) -> KnownFile:
@@ -167,11 +158,6 @@ def versions(source: Path, folder: Path) -> dict[str, str]:
 
 def versions_of(recording: Recording, results: Path) -> dict[str, str]:
     """Return the `versions` of the files of a recording; of one that is to be simulated, none.
-
-    Parameters
-    ----------
-    recording : Recording
-    results : Path
 
     Raises
     ------

@@ -25,7 +25,6 @@ def check_opening(source: Path, log: LogFormat, seconds: float) -> None:
     ----------
     source : Path
         The log file, or the folder of a recording.
-    log : LogFormat
     seconds : float
         How long it may take, and a second more for each 5 MB of the log.
 

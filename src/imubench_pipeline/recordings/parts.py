@@ -25,34 +25,23 @@ _STAMP_BLOCK = 1 << 20
 
 @dataclass
 class Part:
-    """One file of a recording, read once into columns and stamps on the disk.
-
-    Attributes
-    ----------
-    source : LogFile
-    data, stamps_path : Path
-        Scratch files: the columns as Parquet, the stamps as they come.
-    writer : LogWriter
-        Of ``data``; open until it is known what belongs into the metadata.
-    columns : dict of str to ColumnSummary
-        What was counted of each column.
-    rows, not_used : int
-        Records kept, and those outside the part to use.
-    knocks : dict of str to int
-        Samples left out of each column, as part of a knock.
-    stamped : bool
-        Records have stamps.
-    """
+    """One file of a recording, read once into columns and stamps on the disk."""
 
     source: LogFile
     data: Path
     stamps_path: Path
+    """Scratch files: the columns as Parquet, the stamps as they come."""
     writer: LogWriter
+    """Of ``data``; open until it is known what belongs into the metadata."""
     rows: int = 0
     not_used: int = 0
+    """Records kept, and those outside the part to use."""
     columns: dict[str, ColumnSummary] = field(default_factory=dict)
+    """What was counted of each column."""
     knocks: dict[str, int] = field(default_factory=dict)
+    """Samples left out of each column, as part of a knock."""
     stamped: bool = False
+    """Records have stamps."""
 
     def stamps(self) -> Iterator[NDArray[np.float64]]:
         """Yield the stamps in s, from the disk."""
@@ -72,8 +61,6 @@ def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
 
     Parameters
     ----------
-    file : LogFile
-    use : UsedPart
     scratch : Path
         Folder for the scratch files.
     number : int
@@ -132,8 +119,6 @@ def _used(
 
     Parameters
     ----------
-    batch : Batch
-    use : UsedPart
     before : int
         Records before the batch.
     rate : float or None
@@ -165,7 +150,6 @@ def leave_out_knocks(
         Distance from the level that counts, in standard deviations.
     longest : int
         Records: what lasts longer is motion.
-    scratch : Path
     """
     blocks = {name: column.blocks() for name, column in part.columns.items()}
     doubtful = [name for name, b in blocks.items() if len(suspects(b, sigmas)[0])]

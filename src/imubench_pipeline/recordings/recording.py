@@ -116,38 +116,25 @@ def _to_numpy(column: pa.ChunkedArray) -> NDArray[Any]:
 
 @dataclass(frozen=True)
 class ChannelLog:
-    """One channel of a kept recording.
-
-    Attributes
-    ----------
-    path : Path
-        Its Parquet file.
-    channel : str
-    rate : float
-        Hz.
-    grid : int
-        Points of the uniform grid.
-    segments : tuple of (int, int)
-        Grid points that begin and end each segment.
-    holes : bool
-        Samples are missing: blocks have NaN in their place.
-    temperature : bool
-        There are readings of the temperature on the same grid.
-    position : bool
-        There is a column on the same grid that says how the sensor stood.
-    table_rate : bool
-        There is a column on the same grid with the rate of the table that the sensor stood on.
-    """
+    """One channel of a kept recording."""
 
     path: Path
+    """Its Parquet file."""
     channel: str
     rate: float
+    """Hz."""
     grid: int
+    """Points of the uniform grid."""
     segments: tuple[tuple[int, int], ...]
+    """Grid points that begin and end each segment."""
     holes: bool
+    """Samples are missing: blocks have NaN in their place."""
     temperature: bool = False
+    """There are readings of the temperature on the same grid."""
     position: bool = False
+    """There is a column on the same grid that says how the sensor stood."""
     table_rate: bool = False
+    """There is a column on the same grid with the rate of the table that the sensor stood on."""
 
     def blocks(self) -> Iterator[NDArray[np.float64]]:
         """Yield the samples on the uniform grid in SI, in consecutive blocks; NaN where missing.

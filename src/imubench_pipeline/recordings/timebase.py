@@ -28,45 +28,30 @@ _SAME = 1e-5
 
 @dataclass(frozen=True)
 class TimeBase:
-    """The uniform grid that the samples of a file lie on.
-
-    Attributes
-    ----------
-    rate : float
-        Hz.
-    source : str
-        Where the rate is from: ``stated`` or ``stamps``.
-    rows : int
-        Records in the file.
-    grid : int
-        Grid points from the first to the last sample, all segments together.
-    segments : tuple of (int, int)
-        First and one-past-last grid point of each; no difference may span two segments.
-    uniform : bool
-        The samples are the grid points: stamps need not be kept.
-    stamped : bool
-        The stamps say which grid point each sample is.
-    findings : tuple of Finding
-    tracking_interval : float or None
-        Interval with which the stamps were put on the grid, s.
-    repeated : int
-        Records left out, since an earlier one has their grid point.
-    rate_error : float or None
-        Standard deviation of the rate, as far as the scatter of the stamps tells, Hz; None for
-        a stated rate.
-    """
+    """The uniform grid that the samples of a file lie on."""
 
     rate: float
+    """Hz."""
     source: str
+    """Where the rate is from: ``stated`` or ``stamps``."""
     rows: int
+    """Records in the file."""
     grid: int
+    """Grid points from the first to the last sample, all segments together."""
     segments: tuple[tuple[int, int], ...]
+    """First and one-past-last grid point of each; no difference may span two segments."""
     uniform: bool
+    """The samples are the grid points: stamps need not be kept."""
     stamped: bool
+    """The stamps say which grid point each sample is."""
     findings: tuple[Finding, ...] = ()
     tracking_interval: float | None = None
+    """Interval with which the stamps were put on the grid, s."""
     repeated: int = 0
+    """Records left out, since an earlier one has their grid point."""
     rate_error: float | None = None
+    """Standard deviation of the rate, as far as the scatter of the stamps tells, Hz; None for a
+    stated rate."""
 
     @property
     def missing(self) -> int:
@@ -93,7 +78,6 @@ def from_stamps(stamps: Stamps, stated: float | None, settings: QualitySettings)
         Gives the stamps in s, in blocks; called several times.
     stated : float or None
         The rate that the sensor file states, Hz.
-    settings : QualitySettings
 
     Raises
     ------

@@ -22,7 +22,6 @@ def write_sealed_json(data: Mapping[str, Any], path: Path) -> None:
     ----------
     data : mapping
         What JSON can hold, no NaN among it.
-    path : Path
     """
     text = json.dumps(dict(data), indent=1, allow_nan=False)
     write_content(text.removesuffix(_END) + _last_line(text), path)

@@ -34,24 +34,15 @@ _NAMED = ("recordings", "findings", "estimate_findings", "failures")
 
 @dataclass(frozen=True)
 class Failure:
-    """A step that failed.
-
-    Attributes
-    ----------
-    sensor : str
-    recording : str or None
-        None: a step of the whole sensor.
-    step : str
-    cause : {"error", "killed", "time"}
-    reason : str
-        In one line.
-    """
+    """A step that failed."""
 
     sensor: str
     recording: str | None
+    """None: a step of the whole sensor."""
     step: str
     cause: Cause
     reason: str
+    """In one line."""
 
     @property
     def name(self) -> str:
@@ -91,13 +82,7 @@ def told_by(read: pa.Schema) -> Failure | None:
 
 
 def read_with_failures(table: str, paths: Sequence[Path]) -> tuple[pa.Table, list[Failure]]:
-    """Read and join files of one table, and what failed of those that are empty for it.
-
-    Parameters
-    ----------
-    table : str
-    paths : sequence of Path
-    """
+    """Read and join files of one table, and what failed of those that are empty for it."""
     parts = [read_part(table, path) for path in paths]
     failures = [told for part in parts if len(part) == 0 and (told := told_by(part.schema))]
     return joined(table, parts), failures
@@ -110,7 +95,6 @@ def write_empty(tables: Iterable[Path], failure: Failure) -> None:
     ----------
     tables : iterable of Path
         Each has the name of its file.
-    failure : Failure
     """
     told = {_METADATA: json.dumps(asdict(failure), sort_keys=True).encode()}
     for path in tables:
@@ -129,7 +113,6 @@ def with_failures(
     ----------
     tables : mapping of str to Table
         Those of recordings, among them ``recordings`` and ``findings``.
-    failures : sequence of Failure
     """
     if not failures:
         return {"failures": schema("failures").empty_table()} | dict(tables)
@@ -169,7 +152,6 @@ def without(
 
     Parameters
     ----------
-    tables : mapping of str to Table
     left_out : container of (str, str)
         Sensor and recording.
     """

@@ -35,8 +35,6 @@ def write_sealed(table: pa.Table, path: Path, compression: str) -> None:
 
     Parameters
     ----------
-    table : pyarrow.Table
-    path : Path
     compression : str
         As `pyarrow.parquet.ParquetWriter` takes it.
     """

@@ -52,7 +52,6 @@ class SealedFile:
 
         Parameters
         ----------
-        path : Path
         whole : bool
             All of it is read, and not only where it was changed since.
         """
@@ -73,27 +72,18 @@ class SealedFile:
 
 @dataclass(frozen=True)
 class Seal:
-    """What a step left.
-
-    Attributes
-    ----------
-    place : str
-        Of the seal: the step, after the recording or sensor that it is of.
-    form : str
-        As `form` gave it.
-    inputs : dict of str to str
-        Digests of what it read, by their places below the results.
-    outputs : dict of str to SealedFile
-        Likewise, what it wrote.
-    settings : str
-        Digest of the settings and the code that it ran with.
-    """
+    """What a step left."""
 
     place: str
+    """Of the seal: the step, after the recording or sensor that it is of."""
     form: str
+    """As `form` gave it."""
     inputs: dict[str, str]
+    """Digests of what it read, by their places below the results."""
     outputs: dict[str, SealedFile]
+    """Likewise, what it wrote."""
     settings: str = ""
+    """Digest of the settings and the code that it ran with."""
 
     def write(self, results: Path) -> None:
         """Keep it, atomically."""
@@ -127,7 +117,6 @@ def seal_files(
 
     Parameters
     ----------
-    results : Path
     place : str
         As of `place_of`.
     outputs : iterable of Path
@@ -146,10 +135,8 @@ def seal_again(results: Path, place: str, outputs: Iterable[Path]) -> None:
 
     Parameters
     ----------
-    results : Path
     place : str
         Where there is no seal, none is made.
-    outputs : iterable of Path
     """
     try:
         before = read_seal(results, place)
@@ -160,13 +147,7 @@ def seal_again(results: Path, place: str, outputs: Iterable[Path]) -> None:
 
 
 def lost_inputs(results: Path, place: str) -> list[str]:
-    """Return what a step read and is no longer there; nothing where there is no seal of it.
-
-    Parameters
-    ----------
-    results : Path
-    place : str
-    """
+    """Return what a step read and is no longer there; nothing where there is no seal of it."""
     try:
         inputs = read_seal(results, place).inputs
     except (FileNotFoundError, SealError):
@@ -179,7 +160,6 @@ def digests(results: Path, paths: Iterable[Path]) -> dict[str, str]:
 
     Parameters
     ----------
-    results : Path
     paths : iterable of Path
         Files, and folders of which all files are meant; others than of results are left out.
     """

@@ -38,10 +38,6 @@ def as_cell(text: str) -> str:
     Each sign that would begin a formula has one apostrophe more before it than in the text:
     `of_cell` takes it away.
 
-    Parameters
-    ----------
-    text : str
-
     Returns
     -------
     str

@@ -30,7 +30,6 @@ def check_batches(path: Path, in_file: bool) -> None:
 
     Parameters
     ----------
-    path : Path
     in_file : bool
         The format is that of a file, and not that of a stream.
 

@@ -46,11 +46,6 @@ _HIGHEST_RATE = 1e6
 def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
     """Return the tables of a file, as far as the first thousand.
 
-    Parameters
-    ----------
-    path : Path
-    file_format : FileFormat
-
     Raises
     ------
     RecordingError

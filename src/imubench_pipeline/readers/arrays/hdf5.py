@@ -42,12 +42,7 @@ class Hdf5File(ArrayFile):
 
 
 def opened(path: Path) -> h5py.File:
-    """Open an HDF5 file for reading.
-
-    Parameters
-    ----------
-    path : Path
-    """
+    """Open an HDF5 file for reading."""
     return h5py.File(path, "r")
 
 
@@ -56,7 +51,6 @@ def data_sets(file: h5py.File, time_axis: int = 0, passed_over: str = "\0") -> l
 
     Parameters
     ----------
-    file : h5py.File
     time_axis : int
         The side of a square matrix that is time.
     passed_over : str
@@ -117,8 +111,6 @@ class DataSet(Array):
 
     Parameters
     ----------
-    data : h5py.Dataset
-    name : str
     time_axis : int
         See `Array`.
     """

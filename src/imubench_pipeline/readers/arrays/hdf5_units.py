@@ -21,12 +21,7 @@ _LONGEST_STORED = 1 << 12
 
 
 def stated_unit(data: h5py.Dataset) -> str | None:
-    """Return the unit that an attribute of a data set states.
-
-    Parameters
-    ----------
-    data : h5py.Dataset
-    """
+    """Return the unit that an attribute of a data set states."""
     name = next((name for name in _NAMES if name in data.attrs), None)
     if name is None:
         return None

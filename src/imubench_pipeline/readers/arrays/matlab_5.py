@@ -51,12 +51,7 @@ _FED = 1 << 16
 
 
 def is_version_5(path: Path) -> bool:
-    """Tell whether a file begins as MATLAB files of version 5 do.
-
-    Parameters
-    ----------
-    path : Path
-    """
+    """Tell whether a file begins as MATLAB files of version 5 do."""
     with path.open("rb") as file:
         header = file.read(_HEADER)
     order = _ORDERS.get(header[126:])
@@ -64,12 +59,7 @@ def is_version_5(path: Path) -> bool:
 
 
 def variables(path: Path) -> Iterator[Table]:
-    """Yield the variables of a file, and the fields of its structures as ``name/field``.
-
-    Parameters
-    ----------
-    path : Path
-    """
+    """Yield the variables of a file, and the fields of its structures as ``name/field``."""
     size = path.stat().st_size
     with path.open("rb") as file:
         order = _ORDERS[file.read(_HEADER)[126:]]

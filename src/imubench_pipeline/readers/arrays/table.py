@@ -43,21 +43,14 @@ class UnusableError(Exception):
 
 @dataclass(frozen=True)
 class Column:
-    """One column of a table.
-
-    Attributes
-    ----------
-    label : str
-        Its name; empty in a matrix, whose columns have none.
-    kind : str
-        NumPy's letter for the kind of data.
-    holds : str
-        The same in words.
-    """
+    """One column of a table."""
 
     label: str
+    """Its name; empty in a matrix, whose columns have none."""
     kind: str
+    """NumPy's letter for the kind of data."""
     holds: str
+    """The same in words."""
 
 
 class Table(ABC):
@@ -149,9 +142,6 @@ class Array(Table):
 
     Parameters
     ----------
-    name : str
-    shape : tuple of int
-    dtype : dtype
     time_axis : int
         The side that is time where both are equally long.
     """

@@ -19,24 +19,16 @@ __all__ = ["Draft", "Inspection", "Proof", "inspect"]
 
 @dataclass(frozen=True)
 class Inspection:
-    """What was found of a recording.
-
-    Attributes
-    ----------
-    listing : str
-        What it holds, for a human.
-    block : str
-        The sensor file, YAML.
-    draft : Draft
-        The same, as values.
-    proof : Proof
-        What came of reading the first records with it.
-    """
+    """What was found of a recording."""
 
     listing: str
+    """What it holds, for a human."""
     block: str
+    """The sensor file, YAML."""
     draft: Draft
+    """The same, as values."""
     proof: Proof
+    """What came of reading the first records with it."""
 
     @property
     def complete(self) -> bool:

@@ -33,7 +33,6 @@ def block(draft: Draft, file: str) -> str:
 
     Parameters
     ----------
-    draft : Draft
     file : str
         The name of the log, for the first line.
     """

@@ -17,32 +17,21 @@ _CALLED = {"gyro": "gyro", "accel": "accelerometer", "temperature": "temperature
 
 @dataclass(frozen=True)
 class Choice:
-    """What is taken of a log.
-
-    Attributes
-    ----------
-    gyro, accel, temperature : Group or None
-    clock : Clock or None
-    local : bool
-        The time column is one of the table of the channels, in each file.
-    anchor : LogTable or None
-        The table that the others must go with.
-    other_clocks : list of Clock
-    left : list of (Group, str)
-        What was recognised and not taken, and why.
-    unknown : list of LogColumn
-        Numbers of the tables in use that were not recognised.
-    """
+    """What is taken of a log."""
 
     gyro: Group | None
     accel: Group | None
     temperature: Group | None
     clock: Clock | None
     local: bool
+    """The time column is one of the table of the channels, in each file."""
     anchor: LogTable | None
+    """The table that the others must go with."""
     other_clocks: list[Clock]
     left: list[tuple[Group, str]]
+    """What was recognised and not taken, and why."""
     unknown: list[LogColumn]
+    """Numbers of the tables in use that were not recognised."""
 
     @property
     def taken(self) -> list[Group]:
@@ -51,12 +40,7 @@ class Choice:
 
 
 def chosen(contents: Contents) -> Choice:
-    """Choose the channels, the temperature and the time of a recording.
-
-    Parameters
-    ----------
-    contents : Contents
-    """
+    """Choose the channels, the temperature and the time of a recording."""
     recognised = groups(contents)
     left = [(g, _why_not(g)) for g in recognised if _why_not(g)]
     able = [group for group in recognised if not _why_not(group)]

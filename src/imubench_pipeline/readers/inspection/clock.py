@@ -54,23 +54,15 @@ _RATE_HINT = "the file does not say: such as 100 Hz"
 
 @dataclass(frozen=True, eq=False)
 class Clock:
-    """The time of a table, as a sensor file states it.
-
-    Attributes
-    ----------
-    column : LogColumn
-    entry : Entry
-        ``time`` of the sensor file.
-    counts : bool
-        It counts samples: ``rate`` is needed.
-    order : tuple
-        The lower, the better.
-    """
+    """The time of a table, as a sensor file states it."""
 
     column: LogColumn
     entry: Entry
+    """``time`` of the sensor file."""
     counts: bool
+    """It counts samples: ``rate`` is needed."""
     order: tuple[int, ...]
+    """The lower, the better."""
 
 
 def clocks(table: LogTable, columns: Sequence[LogColumn], rate: float | None) -> list[Clock]:
@@ -78,7 +70,6 @@ def clocks(table: LogTable, columns: Sequence[LogColumn], rate: float | None) ->
 
     Parameters
     ----------
-    table : LogTable
     columns : sequence of LogColumn
         Those of the table that are no channel, and vectors beside it.
     rate : float or None

@@ -12,31 +12,16 @@ UNKNOWN = "?"
 
 @dataclass(frozen=True)
 class Entry:
-    """One entry of a sensor file.
-
-    Attributes
-    ----------
-    value : dict or str
-    comment : str
-        What was guessed and from what; empty: nothing was.
-    """
+    """One entry of a sensor file."""
 
     value: Any
     comment: str = ""
+    """What was guessed and from what; empty: nothing was."""
 
 
 @dataclass
 class Draft:
-    """A sensor file as far as the log tells.
-
-    Attributes
-    ----------
-    vendor, model : Entry
-    reader, rate, time, temperature : Entry or None
-    channels : dict of str to Entry
-    left_over : list of str
-        What was not taken, and why, for a human to finish.
-    """
+    """A sensor file as far as the log tells."""
 
     vendor: Entry
     model: Entry
@@ -46,6 +31,7 @@ class Draft:
     channels: dict[str, Entry] = field(default_factory=dict)
     temperature: Entry | None = None
     left_over: list[str] = field(default_factory=list)
+    """What was not taken, and why, for a human to finish."""
 
     def log(self) -> dict[str, Any]:
         """Return what stands under ``log``."""

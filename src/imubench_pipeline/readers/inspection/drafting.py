@@ -29,7 +29,6 @@ def draft(contents: Contents, model: str | None = None) -> Draft:
 
     Parameters
     ----------
-    contents : Contents
     model : str or None
         What the sensor is called; None: as the log.
     """

@@ -38,31 +38,20 @@ _TELLING = 40
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """The axes of one sensor, or a temperature.
-
-    Attributes
-    ----------
-    quantity : {"gyro", "accel", "temperature"}
-    table : LogTable
-    columns : dict of str to LogColumn
-        By axis; of a temperature by an empty text.
-    unit : str or None
-        The unit that the file states.
-    written : str
-        What the file says where a unit is expected and none is understood.
-    rank : int
-        See `imubench_pipeline.readers.inspection.names.Meaning`.
-    guessed : str
-        Why these columns are taken for it, where no name says so.
-    """
+    """The axes of one sensor, or a temperature."""
 
     quantity: Quantity
     table: LogTable
     columns: dict[str, LogColumn]
+    """By axis; of a temperature by an empty text."""
     unit: str | None
+    """The unit that the file states."""
     written: str
+    """What the file says where a unit is expected and none is understood."""
     rank: int
+    """See `imubench_pipeline.readers.inspection.names.Meaning`."""
     guessed: str = ""
+    """Why these columns are taken for it, where no name says so."""
 
     @property
     def names(self) -> str:

@@ -16,12 +16,7 @@ _NOT_STATED = "-"
 
 
 def listing(contents: Contents) -> str:
-    """Return what a recording holds: its tables, and of each its columns.
-
-    Parameters
-    ----------
-    contents : Contents
-    """
+    """Return what a recording holds: its tables, and of each its columns."""
     lines = [f"{printable(contents.path.name)}: {printable(contents.about)}"]
     stated: set[object] = set()
     for table in contents.tables[:_MOST]:

@@ -60,26 +60,17 @@ _SHORT: dict[str, tuple[Quantity, int]] = {
 
 @dataclass(frozen=True)
 class Meaning:
-    """What a name says.
-
-    Attributes
-    ----------
-    quantity : {"gyro", "accel", "temperature"}
-    axis : str
-        x, y or z; a number where columns are counted; empty: none.
-    stem : str
-        The rest of the name: the axes of one sensor have the same.
-    unit : str or None
-        The unit that is in the name.
-    rank : int
-        `PLAIN`, `WEAK`, `WITHOUT_GRAVITY` or `DERIVED`.
-    """
+    """What a name says."""
 
     quantity: Quantity
     axis: str
+    """x, y or z; a number where columns are counted; empty: none."""
     stem: str
+    """The rest of the name: the axes of one sensor have the same."""
     unit: str | None
+    """The unit that is in the name."""
     rank: int
+    """`PLAIN`, `WEAK`, `WITHOUT_GRAVITY` or `DERIVED`."""
 
 
 def meaning(label: str, context: str = "") -> Meaning | None:
@@ -87,7 +78,6 @@ def meaning(label: str, context: str = "") -> Meaning | None:
 
     Parameters
     ----------
-    label : str
     context : str
         The name of its table or file, which says the quantity where the label says an axis alone.
     """

@@ -28,18 +28,12 @@ _NEAR = 0.2
 
 @dataclass(frozen=True)
 class Proof:
-    """What came of reading the first records as drafted.
-
-    Attributes
-    ----------
-    read : bool
-        They could be read.
-    said : str
-        One line: what they are, or why they cannot be read.
-    """
+    """What came of reading the first records as drafted."""
 
     read: bool
+    """They could be read."""
     said: str
+    """One line: what they are, or why they cannot be read."""
 
 
 @dataclass
@@ -55,11 +49,6 @@ def proof(path: Path, draft: Draft) -> Proof:
     """Read the first records of a recording as a draft says.
 
     Where it has not been filled in, another unit stands in, for the reading alone.
-
-    Parameters
-    ----------
-    path : Path
-    draft : Draft
     """
     unfilled = draft.unfilled()
     if any(key.endswith(".column") for key in unfilled):

@@ -23,7 +23,6 @@ def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
     ----------
     path : Path
         A file, or the folder of a ROS 2 bag.
-    file_format : FileFormat
 
     Raises
     ------

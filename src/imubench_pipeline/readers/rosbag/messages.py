@@ -22,24 +22,16 @@ def _xyz(name: str, first: int) -> dict[str, int]:
 
 @dataclass(frozen=True)
 class Layout:
-    """Where the figures of a kind of message stand, counted behind its header.
-
-    Attributes
-    ----------
-    figures : int
-        How many there are.
-    columns : dict of str to int
-        Place of each that can be a column.
-    units : dict of str to str
-        Unit of each, which ROS fixes.
-    covariances : dict of str to int
-        Place of the first covariance of a quantity; it is -1 where the quantity is not there.
-    """
+    """Where the figures of a kind of message stand, counted behind its header."""
 
     figures: int
+    """How many there are."""
     columns: dict[str, int]
+    """Place of each that can be a column."""
     units: dict[str, str]
+    """Unit of each, which ROS fixes."""
     covariances: dict[str, int]
+    """Place of the first covariance of a quantity; it is -1 where the quantity is not there."""
 
 
 LAYOUTS: dict[str, Layout] = {
@@ -65,7 +57,6 @@ def figures_of(
     ----------
     messages : sequence of bytes
         As recorded.
-    layout : Layout
     ros_1 : bool
         They are written as ROS 1 does; else as CDR.
 

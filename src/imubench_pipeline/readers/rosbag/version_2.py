@@ -156,12 +156,7 @@ def check_folder(path: Path) -> None:
 
 
 def check_database(path: Path) -> None:
-    """Raise if a database is cut short, or its tables are computed where they are read.
-
-    Parameters
-    ----------
-    path : Path
-    """
+    """Raise if a database is cut short, or its tables are computed where they are read."""
     _check_whole(path)
     location = f"file:{quote(str(path.resolve()))}?mode=ro&immutable=1"
     with closing(sqlite3.connect(location, uri=True)) as database:

@@ -82,7 +82,6 @@ class CompleteLines:
 
     Parameters
     ----------
-    path : Path
     findings : list of Finding
         Gets what was left out.
     skipped : int
@@ -211,7 +210,6 @@ def first_lines(path: Path, most: int | None = None) -> Iterator[bytes]:
 
     Parameters
     ----------
-    path : Path
     most : int or None
         Bytes that are read, about; None: the whole file is.
     """

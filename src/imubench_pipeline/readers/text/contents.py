@@ -30,7 +30,6 @@ def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
     ----------
     path : Path
         A file, compressed or not, or a member of a zip archive.
-    file_format : FileFormat
 
     Raises
     ------

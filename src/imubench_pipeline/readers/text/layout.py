@@ -35,46 +35,30 @@ _SCORED_LINES, _SCORED_CELLS, _SHOWN, _LONGEST_SHOWN = 50, 50, 20, 40
 
 @dataclass(frozen=True)
 class TextLayout:
-    """How a text log is laid out.
-
-    Attributes
-    ----------
-    file : str
-        Its name, for messages.
-    lines_before, bytes_before : int
-        Lines and bytes before the first record.
-    split : Split
-    quoted : bool
-    decimal : {".", ","}
-    names : list of str
-        The names of the columns; their positions where there is no header.
-    rows : list of list of str
-        The cells of the first records; the last of them may be cut short.
-    comments : tuple of str
-        Beginnings of lines that are comments.
-    header : bytes
-        The line of names; empty: none.
-    preamble : tuple of bytes
-        The lines before the first record, with the comments.
-    passed_over : tuple of (int, str)
-        Number and text of the lines before the first record that are neither names nor units.
-    blank_is_missing : bool
-        A blank line among the records is one whose only cell is empty.
-    """
+    """How a text log is laid out."""
 
     file: str
+    """Its name, for messages."""
     lines_before: int
     bytes_before: int
+    """Lines and bytes before the first record."""
     split: Split
     quoted: bool
     decimal: Decimal
     names: list[str]
+    """The names of the columns; their positions where there is no header."""
     rows: list[list[str]]
+    """The cells of the first records; the last of them may be cut short."""
     comments: tuple[str, ...]
+    """Beginnings of lines that are comments."""
     header: bytes
+    """The line of names; empty: none."""
     preamble: tuple[bytes, ...]
+    """The lines before the first record, with the comments."""
     passed_over: tuple[tuple[int, str], ...]
+    """Number and text of the lines before the first record that are neither names nor units."""
     blank_is_missing: bool
+    """A blank line among the records is one whose only cell is empty."""
 
     def position(self, column: Column, key: str) -> int:
         """Return the position, counted from 0, of a column that the sensor file names.
@@ -130,7 +114,6 @@ def find_layout(
 
     Parameters
     ----------
-    path : Path
     log : LogFormat
         What is stated.
     figures, times : sequence of str or int

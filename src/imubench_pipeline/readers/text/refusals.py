@@ -45,10 +45,8 @@ def refuse_binary(file: str, number: int, line: bytes) -> None:
 
     Parameters
     ----------
-    file : str
     number : int
         Of the line, counted from 1.
-    line : bytes
     """
     zeros = line.count(b"\0")
     if not zeros:
@@ -72,7 +70,6 @@ def refuse_decimals_apart(file: str, number: int, line: str, rows: Sequence[Sequ
 
     Parameters
     ----------
-    file : str
     number : int
         Of the first record.
     line : str

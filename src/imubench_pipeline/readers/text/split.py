@@ -14,17 +14,11 @@ _APART = re.compile(r"\s{2,}|\t")
 
 @dataclass(frozen=True)
 class Split:
-    """How a line is divided into cells.
-
-    Attributes
-    ----------
-    delimiter : str
-    runs : bool
-        A run of spaces or tabs is one delimiter.
-    """
+    """How a line is divided into cells."""
 
     delimiter: str
     runs: bool = False
+    """A run of spaces or tabs is one delimiter."""
 
     def cells(self, text: str) -> list[str]:
         """Return the cells of a line."""

@@ -29,7 +29,6 @@ class TextTime:
     ----------
     file : LogFile
         Gets ``started`` with the first stamp.
-    layout : TextLayout
 
     Attributes
     ----------

@@ -10,12 +10,7 @@ from imubench_pipeline.readers.text.layout import TextLayout
 
 
 def line_of_units(layout: TextLayout) -> tuple[dict[int, str], bytes]:
-    """Return the units that a line beside the names says, by the positions of columns; and it.
-
-    Parameters
-    ----------
-    layout : TextLayout
-    """
+    """Return the units that a line beside the names says, by the positions of columns; and it."""
     for raw in layout.preamble:
         if raw == layout.header:
             continue
@@ -32,7 +27,6 @@ def text_units(layout: TextLayout, columns: Mapping[str, int]) -> dict[str, Stat
 
     Parameters
     ----------
-    layout : TextLayout
     columns : mapping of str to int
         Position of the column of each channel, and of what is beside them.
     """

@@ -18,11 +18,6 @@ _LOOKED_AT, _LOOKED_FOR = 1 << 22, 1 << 26
 def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
     """Return a table for each message that holds inertial figures.
 
-    Parameters
-    ----------
-    path : Path
-    file_format : FileFormat
-
     Raises
     ------
     RecordingError

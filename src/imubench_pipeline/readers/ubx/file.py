@@ -231,7 +231,6 @@ class Words:
     ----------
     kind : bytes
         Class and id of the messages.
-    columns : list of str
 
     Attributes
     ----------

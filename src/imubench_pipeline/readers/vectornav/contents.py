@@ -34,11 +34,6 @@ _LOOKED_AT = 1 << 21
 def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
     """Return a table for each kind of sentence that holds inertial figures.
 
-    Parameters
-    ----------
-    path : Path
-    file_format : FileFormat
-
     Raises
     ------
     RecordingError

@@ -17,24 +17,18 @@ _MANY = 1 << 15
 
 @dataclass(frozen=True)
 class BlockStatistics:
-    """Statistics of consecutive blocks of records.
-
-    Attributes
-    ----------
-    size : int
-        Records of a block; the last one may have fewer.
-    count : ndarray, shape (b,)
-        Samples present.
-    mean, spread, low, high : ndarray, shape (b,)
-        Mean, standard deviation and extremes of the samples present, SI; NaN where there are none.
-    """
+    """Statistics of consecutive blocks of records."""
 
     size: int
+    """Records of a block; the last one may have fewer."""
     count: Array
+    """Samples present, shape (b,)."""
     mean: Array
     spread: Array
     low: Array
     high: Array
+    """Mean, standard deviation and extremes of the samples present, SI, shape (b,); NaN where there
+    are none."""
 
 
 def _no_rows() -> Array:

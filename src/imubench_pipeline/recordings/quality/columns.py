@@ -119,7 +119,6 @@ def column_findings(
         Channels, and perhaps the temperature.
     rate : float
         Hz; the times of the findings follow from it.
-    settings : QualitySettings
     static : bool
         The sensor was to be at rest; where it was turned, changes are what was meant.
     """

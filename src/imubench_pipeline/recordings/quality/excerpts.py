@@ -21,18 +21,12 @@ MOST = 16
 
 @dataclass(frozen=True)
 class Excerpt:
-    """Consecutive records of a column.
-
-    Attributes
-    ----------
-    first : int
-        Number of the first record.
-    values : ndarray, shape (n,)
-        SI; NaN where the sample is missing.
-    """
+    """Consecutive records of a column."""
 
     first: int
+    """Number of the first record."""
     values: Array
+    """SI, shape (n,); NaN where the sample is missing."""
 
 
 @dataclass

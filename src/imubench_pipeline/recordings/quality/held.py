@@ -29,18 +29,12 @@ _SURE = -12.0
 
 @dataclass(frozen=True)
 class Held:
-    """Samples that repeat at a regular distance.
-
-    Attributes
-    ----------
-    every : int
-        Records from one to the next.
-    share : float
-        Part of the other samples that repeat.
-    """
+    """Samples that repeat at a regular distance."""
 
     every: int
+    """Records from one to the next."""
     share: float
+    """Part of the other samples that repeat."""
 
 
 def held(pieces: list[Excerpt]) -> Held | None:

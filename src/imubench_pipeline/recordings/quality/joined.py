@@ -54,8 +54,6 @@ def joined(channel: str, column: ColumnSummary, rate: float) -> Iterator[Finding
 
     Parameters
     ----------
-    channel : str
-    column : ColumnSummary
     rate : float
         Hz.
     """

@@ -33,20 +33,14 @@ _AROUND = 5
 
 @dataclass(frozen=True)
 class Knock:
-    """One knock.
-
-    Attributes
-    ----------
-    first, last : int
-        First and one-past-last record to leave out.
-    size : float
-        Largest distance from the level, in standard deviations, or in what `suspects` takes for
-        them.
-    """
+    """One knock."""
 
     first: int
     last: int
+    """First and one-past-last record to leave out."""
     size: float
+    """Largest distance from the level, in standard deviations, or in what `suspects` takes for
+    them."""
 
 
 def suspects(
@@ -56,7 +50,6 @@ def suspects(
 
     Parameters
     ----------
-    blocks : BlockStatistics
     sigmas : float
         Distance from the level that counts, in standard deviations of the samples.
     step : float or None

@@ -45,24 +45,16 @@ exp(-12)."""
 
 @dataclass(frozen=True)
 class Quantisation:
-    """The steps of a quantised column.
-
-    Attributes
-    ----------
-    step : float
-        Least significant bit, SI.
-    levels : float
-        Steps between the lowest and the highest sample, and one.
-    over_noise : float
-        Step over the standard deviation of the samples; infinite where they seldom change.
-    hidden : bool
-        The figures were rounded again, so that their differences are no multiples of it.
-    """
+    """The steps of a quantised column."""
 
     step: float
+    """Least significant bit, SI."""
     levels: float
+    """Steps between the lowest and the highest sample, and one."""
     over_noise: float
+    """Step over the standard deviation of the samples; infinite where they seldom change."""
     hidden: bool = False
+    """The figures were rounded again, so that their differences are no multiples of it."""
 
 
 def quantisation(column: ColumnSummary) -> Quantisation | None:
@@ -94,7 +86,6 @@ def piled(column: ColumnSummary, steps: Quantisation | None) -> tuple[float, flo
 
     Parameters
     ----------
-    column : ColumnSummary
     steps : Quantisation or None
         Of the column.
 
@@ -127,7 +118,6 @@ def kept_level(
 
     Parameters
     ----------
-    column : ColumnSummary
     rate : float
         Hz.
     unit : str
@@ -200,7 +190,6 @@ def saturated(
 
     Parameters
     ----------
-    column : ColumnSummary
     steps : Quantisation or None
         Of the column.
     share : float

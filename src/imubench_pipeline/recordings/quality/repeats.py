@@ -53,23 +53,16 @@ _LAG, _COPY, _END, _FROM, _TO = range(5)
 
 @dataclass(frozen=True)
 class Stretch:
-    """A part of a column that occurred before.
-
-    Attributes
-    ----------
-    first, last : int
-        First and one-past-last record of the second occurrence, as far as windows tell: it may
-        begin a little before and end a little after.
-    lag : int
-        Records from the first occurrence to the second.
-    changes : int
-        Changes of value within it.
-    """
+    """A part of a column that occurred before."""
 
     first: int
     last: int
+    """First and one-past-last record of the second occurrence, as far as windows tell: it may begin
+    a little before and end a little after."""
     lag: int
+    """Records from the first occurrence to the second."""
     changes: int
+    """Changes of value within it."""
 
 
 def _words() -> Words:

@@ -27,18 +27,12 @@ _SEEN = 0.01
 
 @dataclass(frozen=True)
 class GravityTurn:
-    """A steady turn of gravity against the sensor.
-
-    Attributes
-    ----------
-    rate : tuple of float
-        Of the sensor about x, y and z, rad/s, as far as gravity shows it: not about the vertical.
-    swept : float
-        Angle that it turns by over the log, rad.
-    """
+    """A steady turn of gravity against the sensor."""
 
     rate: tuple[float, float, float]
+    """Of the sensor about x, y and z, rad/s, as far as gravity shows it: not about the vertical."""
     swept: float
+    """Angle that it turns by over the log, rad."""
 
 
 def gravity_turn(axes: Sequence[BlockStatistics], rate: float) -> GravityTurn | None:

@@ -27,43 +27,28 @@ _MAD = 1.4826
 
 @dataclass(frozen=True)
 class Step:
-    """A sudden change of the mean.
-
-    Attributes
-    ----------
-    sample : int
-        Record at which it happens, to half a window.
-    size : float
-        SI.
-    sigmas : float
-        Its size over the spread of the other steps.
-    window : int
-        Records of a window.
-    """
+    """A sudden change of the mean."""
 
     sample: int
+    """Record at which it happens, to half a window."""
     size: float
+    """SI."""
     sigmas: float
+    """Its size over the spread of the other steps."""
     window: int
+    """Records of a window."""
 
 
 @dataclass(frozen=True)
 class WarmUp:
-    """A beginning that drifts.
-
-    Attributes
-    ----------
-    end : int
-        Record at which the drift is like that of the rest.
-    drift : float
-        Change of the mean over it, SI.
-    usual : float
-        Median change over a part of the rest, SI.
-    """
+    """A beginning that drifts."""
 
     end: int
+    """Record at which the drift is like that of the rest."""
     drift: float
+    """Change of the mean over it, SI."""
     usual: float
+    """Median change over a part of the rest, SI."""
 
 
 def steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
@@ -71,7 +56,6 @@ def steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
 
     Parameters
     ----------
-    blocks : BlockStatistics
     sigmas : float
         How far a step lies out of the others, in their robust standard deviations.
     """
@@ -105,7 +89,6 @@ def warm_up(blocks: BlockStatistics, times: float) -> WarmUp | None:
 
     Parameters
     ----------
-    blocks : BlockStatistics
     times : float
         How many times the median drift of a part counts.
     """
@@ -159,7 +142,6 @@ def motions(blocks: BlockStatistics, times: float, least: float = 0.0) -> list[t
 
     Parameters
     ----------
-    blocks : BlockStatistics
     times : float
         Times the median spread that count as motion.
     least : float
