@@ -16,7 +16,7 @@ from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.steps.known_rates import GyroLog, at_rest, on_rate_table, unusable
 from imubench_pipeline.steps.noise_source import noise_source
 from imubench_pipeline.tables.keys import Key
-from imubench_pipeline.tables.of_calibration import CALIBRATION_TABLES
+from imubench_pipeline.tables.of_experiments import CALIBRATION_TABLES
 from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si
 

@@ -18,7 +18,7 @@ from imubench_pipeline.simulate.models import axis_model
 from imubench_pipeline.steps.noise_source import noise_source
 from imubench_pipeline.steps.turned import WHOLE, earth_rate_of, unusable
 from imubench_pipeline.tables.keys import Key
-from imubench_pipeline.tables.of_earth_rate import EARTH_RATE_TABLES
+from imubench_pipeline.tables.of_experiments import EARTH_RATE_TABLES
 from imubench_pipeline.typing import Row
 from imubench_pipeline.units import quantity_to_si
 
