@@ -22,7 +22,7 @@ from imubench_pipeline.settings.sensor import (
     LogFormat,
     quantity_of,
 )
-from imubench_pipeline.tables.findings import Finding
+from imubench_pipeline.tables.findings import Finding, Severity
 from imubench_pipeline.units import conversion
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -78,6 +78,10 @@ class LogFile(ABC):
         RecordingError
             If the file is not what its sensor file says, or is corrupt inside.
         """
+
+    def note(self, finding: str, text: str, value: float, severity: Severity = "warning") -> None:
+        """Add a finding about the whole file."""
+        self.findings.append(Finding(finding, severity, f"{self.path.name}: {text}", value))
 
     def contradicted_units(self) -> list[Finding]:
         """Return the channels of which the file states another unit than the sensor file."""

@@ -21,7 +21,7 @@ from imubench_pipeline.readers.bounds import (
     UNSUSPICIOUS,
 )
 from imubench_pipeline.readers.decompression import OPENED
-from imubench_pipeline.tables.findings import RecordingError
+from imubench_pipeline.tables.findings import Finding, RecordingError
 
 _READ = 1 << 16
 _SEEN = 1 << 12
@@ -78,6 +78,14 @@ class Bytes:
                 "does; expected compressed text: unpack it and look what it is"
             )
         return block
+
+    def filled(self, size: int) -> bytes:
+        """Return the next ``size`` bytes, fewer at the end alone."""
+        blocks: list[bytes] = []
+        while size > 0 and (block := self.read(size)):
+            blocks.append(block)
+            size -= len(block)
+        return b"".join(blocks)
 
     def close(self) -> None:
         """Close the file."""
@@ -188,7 +196,7 @@ def open_bytes(path: Path) -> Bytes:
                     f"{path.name}: is compressed with {kind}; expected gzip, zstd, xz, bzip2 or "
                     "zip: unpack it"
                 )
-        opened = next((how for magic, how in OPENED.items() if begin.startswith(magic)), None)
+        opened = next((how for magic, (_, how) in OPENED.items() if begin.startswith(magic)), None)
         if opened is None:
             return Bytes(path.name, file, _UNKNOWN_SIZE)
         return Bytes(path.name, opened(file), path.stat().st_size, (file,))
@@ -385,3 +393,34 @@ def _open_member(archive: Path, name: str, file: IO[bytes]) -> Bytes:
     except NotImplementedError as error:
         raise RecordingError(f"{shown}: {error}; unpack the archive") from None
     return Bytes(shown, stream, min(info.compress_size, archive.stat().st_size), (file,))
+
+
+BLOCK_BYTES = 1 << 20
+
+
+def blocks(path: Path, findings: list[Finding]) -> Iterator[bytes]:
+    """Yield the bytes of a log, compressed or not, in blocks of about `BLOCK_BYTES`.
+
+    Parameters
+    ----------
+    findings : list of Finding
+        What is found goes here: that compressed data end early.
+
+    Raises
+    ------
+    RecordingError
+        If the file cannot be opened, or compressed data are corrupt.
+    """
+    with closing(open_bytes(path)) as stream:
+        while block := stream.filled(BLOCK_BYTES):
+            yield block
+            if len(block) < BLOCK_BYTES:
+                break
+    if stream.ended_early:
+        findings.append(ended_early(path))
+
+
+def ended_early(path: Path) -> Finding:
+    """Return the finding on a log whose compressed data end early."""
+    detail = f"{path.name}: the compressed file ends early; read as far as it goes"
+    return Finding("truncated_file", "warning", detail, 1)

@@ -177,10 +177,10 @@ def _unxz() -> lzma.LZMADecompressor:
     return lzma.LZMADecompressor(memlimit=LARGEST_WINDOW)
 
 
-OPENED: Mapping[bytes, Callable[[IO[bytes]], Any]] = {
-    b"\x1f\x8b": lambda file: _Parts(file, _Gunzip, padded=True),
-    b"\x28\xb5\x2f\xfd": _Zstd,
-    b"\xfd7zXZ\0": lambda file: _Parts(file, _unxz, padded=False),
-    b"BZh": lambda file: _Parts(file, bz2.BZ2Decompressor, padded=False),
+OPENED: Mapping[bytes, tuple[str, Callable[[IO[bytes]], Any]]] = {
+    b"\x1f\x8b": ("gzip", lambda file: _Parts(file, _Gunzip, padded=True)),
+    b"\x28\xb5\x2f\xfd": ("zstd", _Zstd),
+    b"\xfd7zXZ\0": ("xz", lambda file: _Parts(file, _unxz, padded=False)),
+    b"BZh": ("bzip2", lambda file: _Parts(file, bz2.BZ2Decompressor, padded=False)),
 }
-"""How a file is opened that begins so."""
+"""By what a file is compressed that begins so, and how it is opened."""

@@ -16,8 +16,10 @@ from __future__ import annotations
 
 import re
 from abc import abstractmethod
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -29,6 +31,16 @@ from imubench_pipeline.readers.arrays.table import DATES, NUMBERS, Column, Table
 from imubench_pipeline.readers.arrays.time import ArrayTime
 from imubench_pipeline.readers.batch import Batch, LogFile, stated_in
 from imubench_pipeline.readers.bounds import LARGEST_CHUNKS, LARGEST_RECORD, MOST_ARRAYS
+from imubench_pipeline.readers.file_format import (
+    FIRST,
+    NOTHING_STATED,
+    ROWS,
+    FileFormat,
+    Kind,
+    LogColumn,
+    LogTable,
+    shown,
+)
 from imubench_pipeline.readers.stated_units import StatedUnit, stated
 from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
@@ -51,13 +63,12 @@ class ArrayFile(LogFile):
     def batches(self) -> Iterator[Batch]:
         """Yield the records in the order of the file (see `LogFile.batches`)."""
         check_not_empty(self.path)
-        time = ArrayTime(self)
+        time = None if self.log.time is None else ArrayTime(self, self.log.time)
         for block in self._guarded():
-            stamps = block.pop(_TIME, None)
             # What stands in a damaged file may overflow: infinite, and counted as such.
             with np.errstate(over="ignore", invalid="ignore"):
                 try:
-                    seconds = None if stamps is None else time.seconds(stamps)
+                    seconds = None if time is None else time.seconds(block.pop(_TIME))
                 except UnusableError as error:
                     raise RecordingError(f"{self.path.name}: {error}") from None
                 columns = {name: self.to_si(name, numbers(raw)) for name, raw in block.items()}
@@ -155,14 +166,13 @@ class ArrayFile(LogFile):
 
 def _stated_units(places: Mapping[str, _Place]) -> dict[str, StatedUnit]:
     """Return the units that a file states of its channels."""
-    found = {}
+    units = {}
     for name, (table, position) in places.items():
         label = table.column(position).label or table.name.rpartition("/")[2]
-        beside = (table.unit(position), f"an attribute of {table.shown}")
-        unit = stated(name, (beside,), label)
-        if unit is not None:
-            found[name] = unit
-    return found
+        where = f"an attribute of {table.shown}"
+        if unit := stated(name, table.unit(position), where, label):
+            units[name] = unit
+    return units
 
 
 def rows_of_block(row_bytes: int, most: int) -> int:
@@ -383,3 +393,130 @@ def _listed(names: Iterable[str]) -> str:
     return ", ".join(cut(name, str) for name in every[:_SHOWN]) + (
         ", ..." if len(every) > _SHOWN else ""
     )
+
+
+# ----------------------------------------------------------------------- what a log holds
+
+_MOST_TABLES, _MOST_COLUMNS = 1000, 1000
+_MOST_BYTES = 1 << 24
+_RATES = frozenset(
+    ("fs", "rate", "sr", "samplerate", "samplingrate", "samplefreq", "samplingfreq", "freq",
+     "samplefrequency", "samplingfrequency", "frequency", "odr")
+)  # fmt: skip
+_HIGHEST_RATE = 1e6
+
+
+def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
+    """Return the tables of a file, as far as the first thousand.
+
+    Raises
+    ------
+    RecordingError
+        If it cannot be read.
+    """
+    check_not_empty(path)
+    file = file_format.code().log_file(path, NOTHING_STATED, {})
+    assert isinstance(file, ArrayFile)  # the readers of these files
+    with explained(path), ExitStack() as stack:
+        tables = list(islice(file.tables(stack), _MOST_TABLES))
+        described = [_described(path, file_format, table) for table in tables]
+    rates = {rate for table in described if (rate := _rate(table)) is not None}
+    if len(rates) == 1:
+        (rate,) = rates
+        described = [replace(table, rate=rate) for table in described]
+    return _together(described)
+
+
+def _rate(table: LogTable) -> float | None:
+    """Return the rate that a single value is, by its name."""
+    name = re.sub(r"[\W_\d]+", "", table.name.rpartition("/")[2]).lower().removesuffix("hz")
+    if table.rows != 1 or len(table.columns) != 1 or name not in _RATES:
+        return None
+    values = table.columns[0].values
+    return float(values[0]) if len(values) and 0 < values[0] < _HIGHEST_RATE else None
+
+
+def _together(described: Sequence[LogTable]) -> list[LogTable]:
+    """Put vectors of one length, side by side in the file, into one table."""
+    tables: dict[object, LogTable] = {}
+    for number, table in enumerate(described):
+        alone = table.fault or table.variable or not table.name or table.rows in (None, 1)
+        above = table.name.rpartition("/")[0]
+        key = number if alone else (above, table.rows)
+        if key in tables:
+            first = tables[key]
+            columns = (*first.columns, *table.columns)
+            tables[key] = replace(
+                first, name=above, columns=columns, about=f"{len(columns)} vectors of {table.rows}"
+            )
+        else:
+            tables[key] = table
+    return list(tables.values())
+
+
+def _described(path: Path, file_format: FileFormat, table: Table) -> LogTable:
+    if table.fault is not None:
+        return LogTable(file_format, table.name, fault=table.fault)
+    described = [table.column(place) for place in range(min(table.width, _MOST_COLUMNS))]
+    usable = [n for n, column in enumerate(described) if column.kind in NUMBERS + DATES]
+    try:
+        with explained(path):
+            values = _first_records(table, usable)
+            units = [table.unit(place) for place in range(len(described))]
+    except RecordingError as error:
+        return LogTable(file_format, table.name, fault=str(error).removeprefix(f"{path.name}: "))
+    kinds: dict[str, Kind] = {DATES: "date", **dict.fromkeys(NUMBERS, "number")}
+    columns = []
+    labels = Counter(table.labels)
+    for place, column in enumerate(described):
+        source, address = _called(table, place, labels)
+        raw = values.get(place, np.empty(0))
+        dated = column.kind == DATES
+        columns.append(
+            LogColumn(
+                source,
+                column.label or (table.name if table.width == 1 else ""),
+                kinds.get(column.kind, "other"),
+                tuple(map(str, raw[:FIRST])) if dated else shown(raw),
+                _nanoseconds(raw) if dated else numbers(raw),
+                units[place],
+                ("iso8601",) if dated else (),
+                address,
+            )
+        )
+    whole = not table.labels and table.width == 1 and table.name != ""
+    variable = None if whole or not table.name else table.name
+    about = "" if table.rows is None else f"{table.rows} x {table.width}"
+    return LogTable(file_format, table.name, tuple(columns), variable, rows=table.rows, about=about)
+
+
+def _called(table: Table, place: int, labels: Mapping[str, int]) -> tuple[str | int, str | int]:
+    """Return what a column is called, in its table and in the whole file."""
+    label = table.labels[place] if table.labels else ""
+    if label and (not label.isprintable() or labels[label] > 1):
+        label = ""
+    if label:
+        return label, f"{table.name}/{label}" if table.name else label
+    if not table.name:
+        return place + 1, place + 1
+    if table.labels:
+        return place + 1, f"{table.name}/{table.labels[place]}"
+    return (
+        (table.name, table.name) if table.width == 1 else (place + 1, f"{table.name}[{place + 1}]")
+    )
+
+
+def _first_records(table: Table, places: Sequence[int]) -> dict[int, NDArray[Any]]:
+    """Return the first records of some columns, by position."""
+    if not places:
+        return {}
+    rows = min(ROWS, rows_of_block(table.row_bytes(places), _MOST_BYTES))
+    for block in table.blocks(places, rows):
+        if len(block[0]):
+            return {place: values[:rows] for place, values in zip(places, block, strict=True)}
+    return {}
+
+
+def _nanoseconds(raw: NDArray[Any]) -> NDArray[np.float64]:
+    dates = raw.astype("M8[ns]")
+    return np.where(np.isnat(dates), np.nan, dates.astype(np.int64).astype(np.float64))

@@ -20,8 +20,14 @@ import numpy as np
 from numpy.lib import format as npy
 
 from imubench_pipeline.readers.arrays.file import ArrayFile
-from imubench_pipeline.readers.arrays.stream import LARGEST_RATIO, StreamedArray, exactly
-from imubench_pipeline.readers.arrays.table import Table, UnusableError, sides_of
+from imubench_pipeline.readers.arrays.table import (
+    LARGEST_RATIO,
+    StreamedArray,
+    Table,
+    UnusableError,
+    exactly,
+    sides_of,
+)
 from imubench_pipeline.readers.bounds import LONGEST_NPY_HEADER
 from imubench_pipeline.readers.compressed import opened_archive
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.readers.arrays.table import DATES, UnusableError
 from imubench_pipeline.readers.batch import LogFile
-from imubench_pipeline.readers.started import date_of_stamp
-from imubench_pipeline.readers.wrapping import WrapState, unwrapped
+from imubench_pipeline.readers.stamps import Clock, date_of_nanoseconds, date_of_stamp
+from imubench_pipeline.settings.sensor import TimeSource
 
 _NANOSECONDS = {
     "D": 86_400 * 10**9,
@@ -25,18 +25,12 @@ _LARGEST = 2**63 - 1
 
 
 class ArrayTime:
-    """Makes seconds of the stamps of an array; integers and dates lose no digit.
+    """Makes seconds of the stamps of an array; integers and dates lose no digit."""
 
-    Parameters
-    ----------
-    file : LogFile
-        Gets ``started`` with the first stamp.
-    """
-
-    def __init__(self, file: LogFile) -> None:
-        self._file = file
-        self._wrap = WrapState()
-        self._first: Any = None
+    def __init__(self, file: LogFile, source: TimeSource) -> None:
+        self._source = source
+        self._clock = Clock(file, source.wraps, self._started)
+        self._dated = False
 
     def seconds(self, raw: NDArray[Any]) -> NDArray[np.float64]:
         """Return s since the first stamp of the file; NaN where the stamp is missing.
@@ -44,12 +38,14 @@ class ArrayTime:
         Raises
         ------
         UnusableError
-            If the first records have no stamp, or dates do not fit into nanoseconds.
+            If dates do not fit into nanoseconds.
+        RecordingError
+            If the first records have no stamp.
         """
-        assert self._file.log.time is not None  # made where there are stamps
         missing = np.ma.getmaskarray(raw).copy()
         values = np.ma.getdata(raw)
-        if values.dtype.kind == DATES:
+        self._dated = values.dtype.kind == DATES
+        if self._dated:
             missing |= np.isnat(values)
             stamps = _nanoseconds(values, missing)
         elif values.dtype.kind == "f":
@@ -58,24 +54,10 @@ class ArrayTime:
         else:
             # The differences of uint64 are right in int64 too, and may be negative there.
             stamps = values.astype(np.int64)
-        if self._file.log.time.wraps is not None:
-            wraps = self._file.log.time.wraps
-            stamps[~missing] = unwrapped(stamps[~missing], wraps, self._wrap)
-        if self._first is None:
-            if missing.all():
-                raise UnusableError(
-                    f"no time stamp in the first {len(stamps)} records; mend 'column' of 'time' in "
-                    "the sensor file, or drop 'time' and state 'rate'"
-                )
-            self._first = stamps[missing.argmin()]
-            self._file.started = self._started(values.dtype.kind == DATES)
-        return np.where(missing, np.nan, self._file.seconds(stamps, self._first))
+        return self._clock.seconds(stamps, ~missing)
 
-    def _started(self, dated: bool) -> str | None:
-        if dated:
-            return str(np.datetime64(int(self._first), "ns"))[:23]
-        source = self._file.log.time
-        return None if source is None else date_of_stamp(self._first, source)
+    def _started(self, first: Any) -> str | None:
+        return date_of_nanoseconds(first) if self._dated else date_of_stamp(first, self._source)
 
 
 def _nanoseconds(dates: NDArray[Any], missing: NDArray[np.bool_]) -> NDArray[np.int64]:

@@ -13,8 +13,8 @@ from imubench_pipeline.readers.batch import SECONDS
 from imubench_pipeline.readers.file_format import LogColumn, LogTable
 from imubench_pipeline.readers.inspection.draft import UNKNOWN, Entry
 from imubench_pipeline.readers.inspection.names import words_of
-from imubench_pipeline.readers.spellings import divided, unit_of
-from imubench_pipeline.readers.started import date_of
+from imubench_pipeline.readers.stamps import date_of
+from imubench_pipeline.readers.stated_units import divided, unit_of
 from imubench_pipeline.readers.text.stamps import DAY
 
 _WORDS = frozenset(

@@ -23,7 +23,7 @@ from imubench_pipeline.readers.inspection.names import (
     meaning,
     quantity_of_text,
 )
-from imubench_pipeline.readers.spellings import said, unit_of
+from imubench_pipeline.readers.stated_units import said, unit_of
 from imubench_pipeline.units import conversion
 
 _AXES = "xyz"

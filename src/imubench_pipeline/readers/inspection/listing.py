@@ -8,7 +8,7 @@ from imubench_pipeline.readers.contents import Contents
 from imubench_pipeline.readers.file_format import LogColumn, LogTable
 from imubench_pipeline.readers.inspection.block import printable
 from imubench_pipeline.readers.inspection.names import meaning
-from imubench_pipeline.readers.spellings import said
+from imubench_pipeline.readers.stated_units import said
 
 _MOST = 40
 _WIDEST_NAME, _WIDEST_VALUES = 44, 60

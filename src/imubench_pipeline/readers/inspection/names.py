@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-from imubench_pipeline.readers.spellings import divided
+from imubench_pipeline.readers.stated_units import divided
 from imubench_pipeline.settings.sensor import QUANTITIES
 
 Quantity = Literal["gyro", "accel", "temperature"]

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import islice
 from pathlib import Path
 from typing import ClassVar, Protocol
 
@@ -22,12 +23,12 @@ from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
 from imubench_pipeline.readers.batch import Batch, LogFile
 from imubench_pipeline.readers.bounds import LARGEST_BATCH
+from imubench_pipeline.readers.file_format import ROWS, FileFormat, LogColumn, LogTable, shown
 from imubench_pipeline.readers.rosbag.messages import LAYOUTS, Layout, figures_of
 from imubench_pipeline.readers.rosbag.version_1 import Bag
 from imubench_pipeline.readers.rosbag.version_2 import Bag2, check_database, check_folder
-from imubench_pipeline.readers.started import date_of
-from imubench_pipeline.readers.wrapping import WrapState, unwrapped
-from imubench_pipeline.tables.findings import Finding, RecordingError
+from imubench_pipeline.readers.stamps import Clock, date_of
+from imubench_pipeline.tables.findings import RecordingError
 
 _BATCH = 1 << 14
 _SQLITE = b"SQLite format 3"
@@ -73,8 +74,8 @@ class RosbagFile(LogFile):
     def _read(self, source: Source, topic: str, layout: Layout) -> Iterator[Batch]:
         sound = damaged = 0
         absent = dict.fromkeys(layout.covariances, 0)
-        first: np.int64 | None = None
-        wrap = WrapState()
+        wraps = None if self.log.time is None else self.log.time.wraps
+        clock = Clock(self, wraps, lambda first: date_of(int(first)))
         for times, messages in self._blocks(source, topic):
             stamps, figures, good = figures_of(messages, layout, source.ros_1)
             sound += int(good.sum())
@@ -86,12 +87,7 @@ class RosbagFile(LogFile):
                 figures, chosen = figures[good], chosen[good]
                 if not len(chosen):
                     continue
-                if first is None:
-                    first = chosen[0]
-                    self.started = date_of(int(first))
-                if self.log.time.wraps is not None:
-                    chosen = unwrapped(chosen, self.log.time.wraps, wrap)
-                time = self.seconds(chosen, first)
+                time = clock.seconds(chosen, np.ones(len(chosen), bool))
             yield Batch(
                 time,
                 {
@@ -205,31 +201,28 @@ class RosbagFile(LogFile):
     def _report(self, topic: str, unclosed: bool, damaged: int, absent: dict[str, int]) -> None:
         fate = "left out" if self.log.time is not None else "missing samples"
         if damaged:
-            self._warn(
+            self.note(
                 "damaged_message",
                 f"{damaged} messages of {topic} are not as their type says; {fate}",
                 damaged,
             )
         for quantity, count in absent.items():
             if count:
-                self._warn(
+                self.note(
                     "not_measured",
                     f"{count} messages of {topic} say (covariance -1) that they hold no "
                     f"{quantity}; missing samples",
                     count,
                 )
         if unclosed:
-            self._warn("truncated_file", "the bag was not closed; read as far as it goes", 1)
+            self.note("truncated_file", "the bag was not closed; read as far as it goes", 1)
         for path in _unmerged(self.path):
-            self._warn(
+            self.note(
                 "truncated_file",
                 f"{path.name} holds records that are not yet in the bag and are not read; merge "
                 "them with sqlite3 and 'pragma wal_checkpoint'",
                 1,
             )
-
-    def _warn(self, name: str, text: str, value: float) -> None:
-        self.findings.append(Finding(name, "warning", f"{self.path.name}: {text}", value))
 
 
 @contextmanager
@@ -293,3 +286,71 @@ def _unmerged(path: Path) -> list[Path]:
     """Return the journals of SQLite that hold what was recorded last."""
     logs = path.glob("*-wal") if path.is_dir() else [path.with_name(f"{path.name}-wal")]
     return [log for log in logs if log.is_file() and log.stat().st_size]
+
+
+_RARE = 20
+"""Messages of a slow topic that are looked at."""
+
+
+def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
+    """Return a table for each topic.
+
+    Parameters
+    ----------
+    path : Path
+        A file, or the folder of a ROS 2 bag.
+
+    Raises
+    ------
+    RecordingError
+        If it is no bag, or has no topic.
+    """
+    source = opened(path)
+    try:
+        with explained(path):
+            topics, counts = source.topics(), source.counts()
+            if not topics:
+                raise RecordingError(f"{path.name}: the bag has no topic; expected sensor_msgs/Imu")
+            return [
+                _table(file_format, source, topic, kind, counts.get(topic))
+                for topic, kind in sorted(topics.items())
+            ]
+    finally:
+        source.close()
+
+
+def _table(
+    file_format: FileFormat, source: Source, topic: str, kind: str, rows: int | None
+) -> LogTable:
+    if kind not in LAYOUTS:
+        known = " or ".join(name.replace("/msg/", "/") for name in LAYOUTS)
+        return LogTable(
+            file_format, topic, rows=rows, about=kind, fault=f"is {kind}; only {known} are read"
+        )
+    layout = LAYOUTS[kind]
+    count = ROWS if layout.covariances else _RARE
+    columns = () if rows == 0 else _columns(source, topic, layout, count)
+    fault = None if columns else "has no message that can be read"
+    return LogTable(file_format, topic, columns, topic, rows=rows, about=kind, fault=fault)
+
+
+def _columns(source: Source, topic: str, layout: Layout, count: int) -> tuple[LogColumn, ...]:
+    messages = list(islice(source.messages(topic), count))
+    if not messages:
+        return ()
+    stamps, figures, sound = figures_of([data for _, data in messages], layout, source.ros_1)
+    if not sound.any():
+        return ()
+    columns = []
+    for name, place in layout.columns.items():
+        values = figures[sound, place]
+        covariance = layout.covariances.get(name.partition(".")[0])
+        if covariance is not None and (figures[sound, covariance] == -1).all():
+            continue  # the messages say that it is not measured
+        columns.append(LogColumn(name, name, "number", shown(values), values, layout.units[name]))
+    logged = np.array([time for time, _ in messages], np.int64)
+    for name, times in ((STAMP, stamps[sound]), (LOG_TIME, logged[sound])):
+        columns.append(
+            LogColumn(name, name, "number", shown(times), times.astype(np.float64), "ns")
+        )
+    return tuple(columns)

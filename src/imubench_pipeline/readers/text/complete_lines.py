@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from imubench_pipeline.readers.bounds import LONGEST_LINE
-from imubench_pipeline.readers.compressed import open_bytes
+from imubench_pipeline.readers.compressed import ended_early, open_bytes
 from imubench_pipeline.tables.findings import Finding, RecordingError
 
 _SEEN = 1 << 16
@@ -37,9 +37,7 @@ class _Text:
             raise
 
     def _prepare(self, skipped: int) -> None:
-        begin = b""
-        while len(begin) < _SEEN and (block := self._bytes.read(_SEEN - len(begin))):
-            begin += block
+        begin = self._bytes.filled(_SEEN)
         mark = next((mark for mark in _BYTE_ORDER_MARKS if begin.startswith(mark)), b"")
         encoding = _BYTE_ORDER_MARKS.get(mark)
         self._decoder = (
@@ -184,14 +182,7 @@ class CompleteLines:
     def _end(self) -> None:
         self._ended = True
         if self._text.ended_early:
-            self._findings.append(
-                Finding(
-                    "truncated_file",
-                    "warning",
-                    f"{self._path.name}: the compressed file ends early; read as far as it goes",
-                    1,
-                )
-            )
+            self._findings.append(ended_early(self._path))
         if self.rest.strip(b"\0\r\n\t "):
             shown = self.rest[:60].decode("utf-8", "replace")
             self._findings.append(

@@ -12,7 +12,14 @@ from pathlib import Path
 
 from imubench_pipeline.readers import bounds
 from imubench_pipeline.readers.batch import stated_in
-from imubench_pipeline.readers.text.cells import Decimal, are_figures, is_datum, is_number
+from imubench_pipeline.readers.text.cells import (
+    MOST_COLUMNS,
+    Decimal,
+    Split,
+    are_figures,
+    is_datum,
+    is_number,
+)
 from imubench_pipeline.readers.text.complete_lines import first_lines
 from imubench_pipeline.readers.text.header import are_units, completed, is_heading, likely_header
 from imubench_pipeline.readers.text.records import Records, are_apart
@@ -21,7 +28,6 @@ from imubench_pipeline.readers.text.refusals import (
     refuse_decimals_apart,
     refuse_other_formats,
 )
-from imubench_pipeline.readers.text.split import MOST_COLUMNS, Split
 from imubench_pipeline.settings.sensor import LogFormat
 from imubench_pipeline.tables.findings import RecordingError
 

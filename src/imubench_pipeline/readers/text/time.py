@@ -11,13 +11,11 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from imubench_pipeline.readers.batch import LogFile
-from imubench_pipeline.readers.started import date_of_stamp
+from imubench_pipeline.readers.stamps import Clock, date_of_nanoseconds, date_of_stamp
 from imubench_pipeline.readers.text.cells import is_missing
 from imubench_pipeline.readers.text.layout import TextLayout
 from imubench_pipeline.readers.text.stamps import DAY, TextStamps, arrow_type
-from imubench_pipeline.readers.wrapping import WrapState, unwrapped
 from imubench_pipeline.settings.sensor import TimeSource
-from imubench_pipeline.tables.findings import RecordingError
 
 _WHOLE = re.compile(r"-?\d{1,19}")
 
@@ -43,16 +41,15 @@ class TextTime:
     def __init__(self, file: LogFile, layout: TextLayout) -> None:
         assert file.log.time is not None  # made where there are stamps
         source = file.log.time
-        self._file = file
         self._source = source
         self._text: TextStamps | None = None
-        self._wrap = WrapState()
-        self._first: Any = None
         positions = [layout.position(column, "time") for column in time_columns(source)]
         self.position = positions[-1]
         stamps = [row[self.position] for row in layout.rows if self.position < len(row)]
         present = [stamp for stamp in stamps if not is_missing(stamp)]
         self.types = dict.fromkeys(positions, self._type(present))
+        daily = self._text is not None and not self._text.dated
+        self._clock = Clock(file, DAY if daily else source.wraps, self._started)
         self.expected = f"a time stamp as {source.format or source.unit!r}"
         if present:
             self.expected += f", like {present[0]!r}"
@@ -80,23 +77,7 @@ class TextTime:
             If the first records have no stamp.
         """
         columns = [part.column(str(position)) for position in self.types]
-        stamps, present = self._stamps(columns)
-        wraps = self._source.wraps
-        if self._text is not None and not self._text.dated:
-            wraps = DAY
-        if wraps is not None:
-            stamps = stamps.copy()
-            stamps[present] = unwrapped(stamps[present], wraps, self._wrap)
-        if self._first is None:
-            if not present.any():
-                raise RecordingError(
-                    f"{self._file.path.name}: no time stamp in the first {len(stamps)} records; "
-                    "mend 'column' of 'time' in the sensor file, or drop 'time' and state 'rate'"
-                )
-            self._first = stamps[present.argmax()]
-            self._file.started = self._started() or self._file.started
-        seconds = self._file.seconds(stamps, self._first)
-        return seconds if present.all() else np.where(present, seconds, np.nan)
+        return self._clock.seconds(*self._stamps(columns))
 
     def _stamps(self, columns: list[pa.Array]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
         """Return the stamps as numbers, and which of them are there."""
@@ -112,11 +93,10 @@ class TextTime:
             present &= np.isfinite(stamps)
         return stamps, present
 
-    def _started(self) -> str | None:
+    def _started(self, first: Any) -> str | None:
         if self._source.format is not None:
-            dated = self._text is None or self._text.dated
-            return str(np.datetime64(int(self._first), "ns"))[:23] if dated else None
-        return date_of_stamp(self._first, self._source)
+            return date_of_nanoseconds(first) if self._text is None or self._text.dated else None
+        return date_of_stamp(first, self._source)
 
 
 def time_columns(source: TimeSource | None) -> list[str | int]:

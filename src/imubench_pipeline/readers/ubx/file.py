@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from datetime import datetime, timedelta
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,9 +27,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from imubench_pipeline.readers.batch import Batch, LogFile
+from imubench_pipeline.readers.file_format import ROWS, FileFormat, LogColumn, LogTable, shown
+from imubench_pipeline.readers.stamps import WrapState, unwrapped
 from imubench_pipeline.readers.ubx.frames import Frames
-from imubench_pipeline.readers.wrapping import WrapState, unwrapped
-from imubench_pipeline.tables.findings import Finding, RecordingError, Severity
+from imubench_pipeline.tables.findings import RecordingError
 
 _MEAS, RAW, _NAV_PVT = b"\x10\x02", b"\x10\x03", b"\x01\x07"
 KINDS = {_MEAS: "ESF-MEAS", RAW: "ESF-RAW"}
@@ -160,9 +162,6 @@ class UbxFile(LogFile):
                 f"{self.path.name}: both ESF-MEAS and ESF-RAW hold the columns; say which with "
                 "'variable: ESF-RAW' (every sample) or 'variable: ESF-MEAS' at each column"
             )
-        others = ", ".join(
-            f"{key.hex(' ')} ({count})" for key, count in frames.right.most_common(10)
-        )
         types = ", ".join(
             f"{KINDS[key]} with data types {found.types()}"
             for key, found in words.items()
@@ -170,7 +169,7 @@ class UbxFile(LogFile):
         )
         raise RecordingError(
             f"{self.path.name}: found {types or 'no ESF-MEAS and no ESF-RAW'} among "
-            f"{frames.right.total()} UBX messages (class and id {others or 'none'}), "
+            f"{frames.right.total()} UBX messages (class and id {frames.kinds()}), "
             f"{frames.wrong.total()} with a wrong checksum; expected the data types of "
             f"{_types_of(self._columns())}; switch ESF-RAW or ESF-MEAS on in the receiver, or "
             "mend 'column' in the sensor file"
@@ -199,25 +198,12 @@ class UbxFile(LogFile):
             else "; state 'time' (column time_tag, unit ms), for without it what follows is "
             "shifted in time"
         )
-        found: tuple[tuple[int, str, Severity, str], ...] = (
-            (
-                frames.wrong[kind],
-                "wrong_checksum",
-                "warning",
-                f"{name} messages have a wrong checksum; left out{shifts}",
-            ),
-            (
-                frames.cut[kind],
-                "incomplete_last_record",
-                "note",
-                f"{name} messages are cut short by the end of the log; left out",
-            ),
-        )
-        self.findings += [
-            Finding(finding, severity, f"{self.path.name}: {count} {text}", count)
-            for count, finding, severity, text in found
-            if count
-        ]
+        if wrong := frames.wrong[kind]:
+            detail = f"{wrong} {name} messages have a wrong checksum; left out{shifts}"
+            self.note("wrong_checksum", detail, wrong)
+        if cut := frames.cut[kind]:
+            detail = f"{cut} {name} messages are cut short by the end of the log; left out"
+            self.note("incomplete_last_record", detail, cut, "note")
 
 
 def _types_of(columns: list[str]) -> str:
@@ -416,3 +402,55 @@ def _group(
             state[1] = 1
         row[column] = values[i]
     return count
+
+
+# ----------------------------------------------------------------------- what a log holds
+
+_DESCRIBED_IN, _LOOKED_FOR = 1 << 22, 1 << 26
+"""Bytes after which a log is known, and those in which a first message is looked for."""
+
+
+def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
+    """Return a table for each message that holds inertial figures.
+
+    Raises
+    ------
+    RecordingError
+        If there is none.
+    """
+    names = list(COLUMNS)
+    words = {kind: Words(kind, names) for kind in KINDS}
+    frames = Frames(path, [])
+    for key, payload in frames:
+        if key in words and len(words[key]) < ROWS * len(names):
+            words[key].add(payload)
+        if frames.read > (_DESCRIBED_IN if any(map(len, words.values())) else _LOOKED_FOR):
+            break
+    present = [kind for kind in KINDS if len(words[kind])]
+    described = [_table(file_format, kind, words[kind], frames) for kind in present]
+    if not any(table.columns for table in described):
+        raise RecordingError(
+            f"{path.name}: no inertial figures in ESF-MEAS or ESF-RAW among {frames.right.total()} "
+            f"UBX messages (class and id {frames.kinds()}); switch ESF-RAW on in the receiver"
+        )
+    return sorted(described, key=lambda table: table.name != KINDS[RAW])
+
+
+def _table(file_format: FileFormat, kind: bytes, words: Words, frames: Frames) -> LogTable:
+    """Describe one kind of message."""
+    places, figures, tags, _ = words.taken()
+    name = KINDS[kind]
+    columns = []
+    for place, column in enumerate(COLUMNS):
+        values = figures[places == place]
+        if len(values):
+            unit = UNITS[column.split("_")[0]]
+            columns.append(LogColumn(column, column, "number", shown(values), values, unit))
+    if columns:
+        first = tags[places == places[0]].astype(np.float64)
+        ticks = first * TICK_MS if kind == RAW else first
+        columns.append(LogColumn("time_tag", "time_tag", "number", shown(ticks), ticks, "ms"))
+        if kind == RAW:
+            columns.append(LogColumn("sTtag", "sTtag", "number", shown(first), first))
+    about = f"{frames.right[kind]} messages at the beginning"
+    return LogTable(file_format, name, tuple(columns), variable=name, about=about)

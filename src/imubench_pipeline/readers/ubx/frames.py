@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from imubench_pipeline.readers.stream import blocks
+from imubench_pipeline.readers.compressed import blocks
 from imubench_pipeline.tables.findings import Finding
 
 _SYNC = b"\xb5\x62"
@@ -41,6 +41,11 @@ class Frames:
         self.wrong: Counter[bytes] = Counter()
         self.cut: Counter[bytes] = Counter()
         self.read = 0
+
+    def kinds(self) -> str:
+        """Say of which class and id most messages are."""
+        most = self.right.most_common(10)
+        return ", ".join(f"{key.hex(' ')} ({count})" for key, count in most) or "none"
 
     def __iter__(self) -> Iterator[tuple[bytes, bytes]]:
         source = blocks(self._path, self._findings)

@@ -30,6 +30,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -37,9 +38,20 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from imubench_pipeline.readers.batch import SECONDS, Batch, LogFile
-from imubench_pipeline.readers.started import date_of
+from imubench_pipeline.readers.file_format import (
+    FIRST,
+    ROWS,
+    FileFormat,
+    LogColumn,
+    LogTable,
+    shown,
+)
+from imubench_pipeline.readers.stamps import Clock, date_of
+from imubench_pipeline.readers.text.cells import is_number
+from imubench_pipeline.readers.text.stamps import StampError, stamps_of
 from imubench_pipeline.readers.vectornav.sentences import (
     FIELDS,
+    UNITS,
     Row,
     Sentences,
     fields_of,
@@ -47,8 +59,7 @@ from imubench_pipeline.readers.vectornav.sentences import (
     position_of,
     right_checksums,
 )
-from imubench_pipeline.readers.wrapping import WrapState, unwrapped
-from imubench_pipeline.tables.findings import Finding, RecordingError, Severity
+from imubench_pipeline.tables.findings import RecordingError, Severity
 
 _LOOKED_AT = 1000
 _NAMES, _LONGEST_NAME = 10, 12
@@ -72,8 +83,8 @@ class VectorNavFile(LogFile):
         positions = {
             name: position_of(kind, source.column) for name, source in self.sources.items()
         }
-        first: Any = None
-        wrap = WrapState()
+        wraps = None if self.log.time is None else self.log.time.wraps
+        clock = Clock(self, wraps, self._started)
         for text in lines_of(self.path, self.findings):
             rows = records.add(text)
             if not rows:
@@ -81,12 +92,9 @@ class VectorNavFile(LogFile):
             time = None
             if self.log.time is not None:
                 stamps, missing = self._stamps(rows)
-                if first is None:
-                    first = self._first(stamps, missing, rows)
-                if self.log.time.wraps is not None:
-                    stamps[~missing] = unwrapped(stamps[~missing], self.log.time.wraps, wrap)
-                time = self.seconds(stamps, first)
-                time[missing] = np.nan
+                if clock.first is None and missing.all():
+                    raise self._without_stamp(rows)
+                time = clock.seconds(stamps, ~missing)
             fields, unread = fields_of(kind, rows, set(positions.values()))
             records.unread += unread
             columns = {
@@ -174,24 +182,23 @@ class VectorNavFile(LogFile):
             missing |= ~np.isfinite(stamps)
         return stamps, missing
 
-    def _first(self, stamps: NDArray[Any], missing: NDArray[np.bool_], rows: list[Row]) -> Any:
-        assert self.log.time is not None
-        present = stamps[~missing]
-        if not len(present):
-            where = (
-                "before the '$'" if self.log.time.column == HOST else "'T' and a count at the end"
-            )
-            raise RecordingError(
-                f"{self.path.name}: no stamp that can be read in the first {len(rows)} sentences; "
-                f"expected {where}, found {rows[0].before[:40].decode('ascii', 'replace')!r} "
-                f"before {rows[0].body[-40:].decode('ascii', 'replace')!r}; mend 'time' in the "
-                "sensor file, or drop it and state 'rate'"
-            )
-        if self.log.time.column == HOST and self.log.time.unit != "samples":
-            scale = SECONDS[self.log.time.unit or "ns"] * 1e9
-            first = present[0].item()
-            self.started = date_of(first if isinstance(first, int) else round(first * scale))
-        return present[0]
+    def _without_stamp(self, rows: list[Row]) -> RecordingError:
+        at_host = self.log.time is not None and self.log.time.column == HOST
+        where = "before the '$'" if at_host else "'T' and a count at the end"
+        return RecordingError(
+            f"{self.path.name}: no stamp that can be read in the first {len(rows)} sentences; "
+            f"expected {where}, found {rows[0].before[:40].decode('ascii', 'replace')!r} "
+            f"before {rows[0].body[-40:].decode('ascii', 'replace')!r}; mend 'time' in the "
+            "sensor file, or drop it and state 'rate'"
+        )
+
+    def _started(self, first: Any) -> str | None:
+        time = self.log.time
+        if time is None or time.column != HOST or time.unit == "samples":
+            return None
+        stamp = first.item()
+        scale = SECONDS[time.unit or "ns"] * 1e9
+        return date_of(stamp if isinstance(stamp, int) else round(stamp * scale))
 
     # ------------------------------------------------------------------------- findings
 
@@ -230,9 +237,7 @@ class VectorNavFile(LogFile):
 
     def _count(self, count: int, name: str, text: str, severity: Severity = "warning") -> None:
         if count:
-            self.findings.append(
-                Finding(name, severity, f"{self.path.name}: {count} {text}", count)
-            )
+            self.note(name, f"{count} {text}", count, severity)
 
 
 def _listed(names: Iterable[str]) -> str:
@@ -251,3 +256,71 @@ def _dates(texts: Sequence[bytes]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
         except (pa.ArrowInvalid, UnicodeDecodeError):
             missing[number] = True
     return stamps, missing
+
+
+# ----------------------------------------------------------------------- what a log holds
+
+_DESCRIBED_IN = 1 << 21  # bytes
+
+
+def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
+    """Return a table for each kind of sentence that holds inertial figures.
+
+    Raises
+    ------
+    RecordingError
+        If there is none with a right checksum.
+    """
+    sentences = {kind: Sentences(kind, stamped=True) for kind in FIELDS}
+    rows: dict[str, list[Row]] = {kind: [] for kind in FIELDS}
+    read = 0
+    for text in lines_of(path, []):
+        for kind, of_kind in sentences.items():
+            if b"$" + kind.encode() in text:
+                rows[kind] += of_kind.add(text)
+        read += len(text)
+        if read > _DESCRIBED_IN:
+            break
+    present = [kind for kind, kept in rows.items() if kept]
+    if not present:
+        raise RecordingError(
+            f"{path.name}: no sentence of {', '.join(FIELDS)} with a right checksum at its "
+            "beginning; set the output of the device (registers 6 and 30)"
+        )
+    return [_table(file_format, kind, rows[kind], len(present) == 1) for kind in present]
+
+
+def _table(file_format: FileFormat, kind: str, rows: list[Row], alone: bool) -> LogTable:
+    fields, _ = fields_of(kind, rows[:ROWS], set(range(len(FIELDS[kind]))))
+    columns = [
+        LogColumn(
+            name if alone else f"{kind}.{name}",
+            name,
+            "number",
+            shown(fields[place]),
+            fields[place],
+            UNITS.get(name),
+        )
+        for place, name in enumerate(FIELDS[kind])
+    ]
+    columns += _time(HOST, [row.before.strip(AROUND_STAMP) for row in rows[:ROWS]])
+    columns += _time(COUNTER, [row.counter for row in rows[:ROWS]])
+    about = f"{len(rows)} sentences at the beginning"
+    return LogTable(file_format, kind, tuple(columns), about=about)
+
+
+def _time(name: str, cells: list[bytes]) -> list[LogColumn]:
+    """Return a column of stamps, if it is there."""
+    texts = [cell.decode("ascii", "replace") for cell in cells]
+    first = tuple(text for text in texts[:FIRST])
+    if not any(texts):
+        return []
+    if all(is_number(text, ".") for text in texts if text):
+        values = np.array([float(text) if text else np.nan for text in texts])
+        return [LogColumn(name, name, "number", first, values)]
+    try:
+        return [
+            LogColumn(name, name, "date", first, stamps_of("iso8601", texts), None, ("iso8601",))
+        ]
+    except StampError:
+        return [LogColumn(name, name, "text", first)]

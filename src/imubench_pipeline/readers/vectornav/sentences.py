@@ -14,7 +14,7 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 from numpy.typing import NDArray
 
-from imubench_pipeline.readers.stream import BLOCK_BYTES, blocks
+from imubench_pipeline.readers.compressed import BLOCK_BYTES, blocks
 from imubench_pipeline.tables.findings import Finding, RecordingError
 
 _APPENDED = re.compile(rb"(?:,S[0-9A-Fa-f]{4})?(?:,T(\d{1,18}))?$")
