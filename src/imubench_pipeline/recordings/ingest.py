@@ -14,6 +14,7 @@ from typing import Any
 from imubench_pipeline.readers import read
 from imubench_pipeline.recordings import timebase
 from imubench_pipeline.recordings.assembly import assemble, counted, names_of
+from imubench_pipeline.recordings.kept import Quality, identified
 from imubench_pipeline.recordings.known_logs import KnownFile, read_log, write_known
 from imubench_pipeline.recordings.opening import check_opening
 from imubench_pipeline.recordings.parts import Part, leave_out_knocks, read_part
@@ -22,7 +23,6 @@ from imubench_pipeline.recordings.quality.copies import copied_channels
 from imubench_pipeline.recordings.quality.levels import kept_level
 from imubench_pipeline.recordings.quality.rotation import GravityTurn, gravity_turn
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
-from imubench_pipeline.recordings.quality_file import Quality, identified
 from imubench_pipeline.recordings.recording import channel_logs, log_paths
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import (
@@ -47,7 +47,7 @@ class Ingested:
     channels: dict[str, dict[str, Any]] = field(default_factory=dict)
     """Rate in Hz, points of the grid, segments and levels of each channel that goes on."""
     kept: dict[str, dict[str, Any]] = field(default_factory=dict)
-    """The files of samples (`imubench_pipeline.recordings.quality_file.identified`)."""
+    """The files of samples (`imubench_pipeline.recordings.kept.identified`)."""
     gravity: GravityTurn | None = None
     """How gravity turns against the sensor."""
     sources: dict[str, KnownFile] | None = None

@@ -18,7 +18,7 @@ from imubench_pipeline.recordings.quality.summary import ColumnSummary
 from imubench_pipeline.recordings.recording import LogWriter
 from imubench_pipeline.settings.sensor import UsedPart
 from imubench_pipeline.tables import checked_parquet
-from imubench_pipeline.tables.findings import Finding, RecordingError
+from imubench_pipeline.tables.findings import RecordingError
 
 _STAMP_BLOCK = 1 << 20
 
@@ -101,14 +101,8 @@ def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
             f"(use: start {use.start} s, end {use.end or 'open'})"
         )
     if part.not_used:
-        file.findings.append(
-            Finding(
-                "not_used",
-                "note",
-                f"{file.path.name}: {part.not_used} samples lie outside the part to use",
-                part.not_used,
-            )
-        )
+        detail = f"{part.not_used} samples lie outside the part to use"
+        file.note("not_used", detail, part.not_used, "note")
     return part
 
 

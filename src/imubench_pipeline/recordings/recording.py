@@ -21,7 +21,6 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from imubench_pipeline.recordings.quality_file import MEND
 from imubench_pipeline.settings.sensor import POSITION, TABLE_RATE, TEMPERATURE
 from imubench_pipeline.tables import checked_parquet
 from imubench_pipeline.tables.findings import RecordingError
@@ -29,6 +28,8 @@ from imubench_pipeline.typing import Array
 
 ROW_GROUP = 1 << 20
 """Rows of a row group."""
+
+MEND = "remove it, and the next run reads the log again"
 
 _METADATA = b"imubench"
 _NOT_CHANNELS = {"time", "sample", TEMPERATURE, POSITION, TABLE_RATE}

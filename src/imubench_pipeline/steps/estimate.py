@@ -27,8 +27,7 @@ from imubench_pipeline.estimators.rows import allan_rows, draw_rows, parameter_r
 from imubench_pipeline.estimators.thermal.path import TemperaturePath, temperature_path
 from imubench_pipeline.estimators.thermal.result import ThermalFit
 from imubench_pipeline.noise.simulate import channel_rng
-from imubench_pipeline.recordings.kept import kept_static_logs
-from imubench_pipeline.recordings.quality_file import Quality
+from imubench_pipeline.recordings.kept import Quality, kept_static_logs
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.config import EstimateSettings
 from imubench_pipeline.settings.sensor import quantity_of
