@@ -8,13 +8,7 @@ from pathlib import Path
 
 from imubench_pipeline.readers.batch import Batch, LogFile, stated_in
 from imubench_pipeline.readers.bounds import MOST_LOOKED_INTO
-from imubench_pipeline.readers.compressed import (
-    holds_text,
-    is_archive,
-    is_member,
-    members,
-    visible,
-)
+from imubench_pipeline.readers.compressed import holds_text, is_archive, is_member, members, visible
 from imubench_pipeline.readers.content import format_of, format_of_folder, is_endless
 from imubench_pipeline.settings.sensor import (
     POSITION,

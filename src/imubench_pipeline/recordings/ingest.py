@@ -325,13 +325,7 @@ def _summary(
 
 
 def ingest_as_planned(
-    source: Path,
-    settings: str,
-    sensor: str,
-    recording: str,
-    folder: Path,
-    *,
-    guarded: bool = False,
+    source: Path, settings: str, sensor: str, recording: str, folder: Path, *, guarded: bool = False
 ) -> Quality:
     """Ingest a recording as the plan says; one that cannot be used is rejected, with its reason.
 

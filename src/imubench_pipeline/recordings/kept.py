@@ -90,11 +90,7 @@ class Quality:
 def identified(paths: Iterable[Path]) -> dict[str, dict[str, Any]]:
     """Return size, digest, and digest of the metadata of Parquet files, by name."""
     return {
-        path.name: {
-            "size": path.stat().st_size,
-            "footer": _footer(path),
-            "sha256": digest_of(path),
-        }
+        path.name: {"size": path.stat().st_size, "footer": _footer(path), "sha256": digest_of(path)}
         for path in paths
     }
 

@@ -14,11 +14,7 @@ from imubench_pipeline.tables.columns import (
 )
 
 _RATE = "rad/s"
-_KEYS = (
-    SENSOR,
-    RECORDING,
-    text("channel", "the gyro that was turned"),
-)
+_KEYS = (SENSOR, RECORDING, text("channel", "the gyro that was turned"))
 _PART = text("part", "whole, or the last minutes of the recording")
 _METHOD = text("method", "pairs, triples, filter, smoother; known_rate is given the rate")
 
@@ -105,11 +101,7 @@ EARTH_RATE_TABLES: dict[str, tuple[Column, ...]] = {
 """Every number is SI."""
 
 
-_CALIBRATED = (
-    SENSOR,
-    RECORDING,
-    text("channel", "the gyro that was calibrated"),
-)
+_CALIBRATED = (SENSOR, RECORDING, text("channel", "the gyro that was calibrated"))
 
 CALIBRATION_TABLES: dict[str, tuple[Column, ...]] = {
     "calibration": (
@@ -124,11 +116,7 @@ CALIBRATION_TABLES: dict[str, tuple[Column, ...]] = {
         ),
         number("sigma", "as in unit", "standard deviation of value: noise and direction"),
         number("sigma_noise", "as in unit", "the part of it that is by the noise model"),
-        number(
-            "chance",
-            "-",
-            "of a quadratic, an asymmetry or deviations at least as large",
-        ),
+        number("chance", "-", "of a quadratic, an asymmetry or deviations at least as large"),
         number("half_width", _RATE, "half of the range of the bias that is left open"),
         number("earth_rate", _RATE, "along the axis, which was taken off; null: it was not"),
         number("earth_rate_sigma", _RATE, "its standard deviation, by the direction's"),

@@ -2,26 +2,14 @@
 
 from __future__ import annotations
 
-from imubench_pipeline.tables.columns import (
-    CHANNEL,
-    KEYS,
-    SENSOR,
-    count,
-    flag,
-    number,
-    text,
-)
+from imubench_pipeline.tables.columns import CHANNEL, KEYS, SENSOR, count, flag, number, text
 
 IN_USE = (
     text("cause", "of a source: noise, start, turn_on_bias, temperature, ...", required=False),
     text("origin", "of a source: measured, datasheet, requirement or not known", required=False),
     text("kind", "of a printed figure: typ, max, 1sigma, ...", required=False),
     text("convention", "how a figure became a standard deviation", required=False),
-    number(
-        "largest",
-        "as in largest_unit",
-        "1 sigma with which the limit is kept",
-    ),
+    number("largest", "as in largest_unit", "1 sigma with which the limit is kept"),
     text("largest_unit", "SI unit of the figure", required=False),
 )
 """Where a source of the table ``error_budget`` is from."""

@@ -16,11 +16,7 @@ from imubench_pipeline.tables.columns import (
     text,
 )
 from imubench_pipeline.tables.of_estimators import DETERMINISTIC, DRAWS
-from imubench_pipeline.tables.of_experiments import (
-    ALIGNMENT,
-    CALIBRATION_TABLES,
-    EARTH_RATE_TABLES,
-)
+from imubench_pipeline.tables.of_experiments import ALIGNMENT, CALIBRATION_TABLES, EARTH_RATE_TABLES
 from imubench_pipeline.tables.of_fitness import DOUBTS, JUDGED
 from imubench_pipeline.tables.of_navigation import (
     BACKTEST,

@@ -100,11 +100,7 @@ def quantity_of_text(text: str) -> tuple[Quantity, int] | None:
     """Return the one quantity that a text such as the name of a file says, and its rank."""
     joined = "".join(_words(text[:_LONGEST]))
     quantities: list[Quantity] = []
-    for quantity, pattern in (
-        ("gyro", _GYRO),
-        ("accel", _ACCEL),
-        ("temperature", _TEMPERATURE),
-    ):
+    for quantity, pattern in (("gyro", _GYRO), ("accel", _ACCEL), ("temperature", _TEMPERATURE)):
         if pattern.search(joined):
             quantities.append(quantity)  # type: ignore[arg-type]  # the keys of Quantity
     if len(quantities) != 1 or _OTHER.search(joined):

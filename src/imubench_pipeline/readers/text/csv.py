@@ -74,8 +74,7 @@ class CsvFile(LogFile):
                 raise self._bad_cell(line, column, error.text, time.expected) from None
             rows += len(part)
             yield Batch(
-                stamps,
-                {name: self.to_si(name, _numbers(part, at)) for name, at in columns.items()},
+                stamps, {name: self.to_si(name, _numbers(part, at)) for name, at in columns.items()}
             )
         if rows == 0:
             raise RecordingError(f"{self.path.name}: no complete record; expected at least one")

@@ -13,7 +13,7 @@ _RULED = re.compile(r"[-=_+]{2,}")
 _UNIT = re.compile(
     r"[(\[{<].*[)\]}>]|[-–.]*|"
     r"(?:[munpkMµμ]|milli|micro)?(?:s|sec|seconds?|g|rad|deg|degrees?|dps|m|T|gauss|Gauss|Hz|V|Pa|"
-    r"bar|[°º]?C|K|[°º])(?:\W.*|²)?|min|h|samples?|counts?|LSB",
+    r"bar|[°º]?C|K|[°º])(?:\W.*|²)?|min|h|samples?|counts?|LSB"
 )
 _WORDS = re.compile(r"[^\W\d]*(?:[\s./()\[\]-]+[^\W\d]+)*[.)\]]?")
 
